@@ -176,7 +176,7 @@ def test_a_job_that_ends_when_another_is_released_is_not_preempted():
 def test_sixty_four_take_part_and_no_more():
     with VirtualClock() as clock:
         places = [clock.participate() for _ in range(63)]
-        with pytest.raises(ValueError, match="room for 64"):
+        with pytest.raises(ValueError, match="all 64 slots"):
             clock.participate()
         places[7].leave()
         assert clock.participate().timer.slot == places[7].timer.slot

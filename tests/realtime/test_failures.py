@@ -299,7 +299,7 @@ def test_a_session_that_is_refused_leaves_nothing_started(monkeypatch):
 def test_more_tasks_than_a_virtual_clock_has_places_leave_it_as_it_was():
     tasks = [Task(bodies.idle, name=str(number), period=1e-3) for number in range(64)]
     with VirtualClock() as clock:
-        with pytest.raises(ValueError, match="room for 64"):
+        with pytest.raises(ValueError, match="all 64 slots"):
             Tasks(*tasks, workers="threads", clock=clock).start()
         assert clock.wait_until(MS)
         with Tasks(*tasks[:63], workers="threads", clock=clock) as running:

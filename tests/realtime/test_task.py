@@ -19,14 +19,14 @@ from tests.realtime.bodies import idle
         ({"period": math.nan}, "is not positive"),
         ({"period": math.inf}, "is not positive"),
         ({"period": 1e-6}, "period of 1 us is too short.*at least 20 us"),
-        ({"period": 1e7}, "is it in seconds"),
+        ({"period": 1e7}, "give it in seconds"),
         ({"deadline": 0.0}, "deadline of 0.0 s is not positive"),
         ({"priority": 0}, r"priority 0 is not within 1\.\.99"),
         ({"priority": 100}, r"priority 100 is not within 1\.\.99"),
         ({"cpu": -1}, "CPU -1 does not exist"),
         ({"cpu": 5000}, "CPU 5000 does not exist"),
-        ({"stack_size": 1000}, "invalid stack of 1000 bytes"),
-        ({"stack_size": 65537}, "a multiple of 4096 from 32768"),
+        ({"stack_size": 1000}, "invalid stack size of 1000 bytes"),
+        ({"stack_size": 65537}, "a multiple of 4096, at least 32768"),
         ({"on_miss": "ignore"}, 'on_miss must be "count", "skip", "stop" or a function'),
         ({"on_failure": "ignore"}, 'on_failure must be "stop", "restart" or "continue"'),
     ],
@@ -88,7 +88,7 @@ def test_a_cpu_that_is_kept_free_may_be_asked_for():
 
 def test_a_function_that_a_process_cannot_import_is_refused_before_anything_starts():
     tasks = Tasks(Task(lambda task: None, name="arm", period=1e-3), workers="processes")
-    with pytest.raises(TypeError, match=r"'arm': its process cannot import .*top of a module"):
+    with pytest.raises(TypeError, match=r"'arm': its process cannot import .*top level of a module"):
         tasks.start()
 
 

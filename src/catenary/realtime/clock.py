@@ -18,7 +18,7 @@ from catenary.realtime._clock import (
 )
 from catenary.realtime.system.memory import SharedMemory
 
-FIRST = 100  # precedes every task: these have 0 (ordinary scheduling) to 99
+FIRST = 100  # above all priorities of tasks, 0 (ordinary scheduling) to 99
 
 
 class Participant:
@@ -42,7 +42,7 @@ class Participant:
         return self.timer.capsule
 
     def wait_until(self, deadline_ns: int) -> bool:
-        """Wait. Return True if the deadline has passed, False if woken before."""
+        """Wait. Return True if the deadline has passed, False if `wake` ended the wait."""
         return self.timer.wait_until(deadline_ns)
 
     def spend(self, seconds: float) -> None:
@@ -106,18 +106,18 @@ class VirtualClock:
         return self.home.capsule
 
     def wait_until(self, deadline_ns: int) -> bool:
-        """Let time pass for all participants, as the thread that created the clock.
+        """Wait in the thread that created the clock, while time passes for all participants.
 
-        Return False if woken before the deadline.
+        Return True if the deadline has passed, False if a wake-up ended the wait.
         """
         return self.home.wait_until(deadline_ns)
 
     def spend(self, seconds: float) -> None:
-        """Let time pass as if this thread computed for `seconds`, on its own processor."""
+        """Let time pass as if this thread computed for `seconds` on its own processor."""
         self.home.spend(seconds)
 
     def close(self) -> None:
-        """Let time advance without the thread that created the clock."""
+        """Remove the thread that created the clock from the participants."""
         self.home.leave()
 
     def __enter__(self) -> Self:

@@ -113,7 +113,7 @@ def test_begins_once():
         "    try: s.__enter__()\n"
         "    except RuntimeError as error: print(error)"
     )
-    assert said == "this session has already begun; make one session for each block"
+    assert said == "this session is already active; create one session for each `with` block"
 
 
 @pytest.mark.parametrize("wrong", [{"heap_size": -1}, {"switch_interval": 0.0}])
