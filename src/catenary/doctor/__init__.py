@@ -1,4 +1,4 @@
-"""Checks of this machine for a real-time EtherCAT loop: `catenary doctor`, docs/doctor.md.
+"""Checks of a machine for a real-time loop: `catenary doctor`, docs/how_to/doctor.md.
 
     machine = this_machine("eth0")              # reads the kernel's and the driver's settings
     machine, latency = watch(machine, 3.0, cpu=None)

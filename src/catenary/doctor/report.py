@@ -104,7 +104,7 @@ def summary_lines(examination: Examination, width: int) -> Iterator[str]:
             "1 setting" if len(examination.changes) == 1 else f"{len(examination.changes)} settings"
         )
         yield f"--apply can change {settings}; the changes last until the next reboot."
-    yield "docs/doctor.md explains each check."
+    yield "docs/how_to/doctor.md explains each check."
 
 
 def change_lines(changes: Sequence[Change], ground: Ground) -> Iterator[str]:

@@ -24,14 +24,18 @@ MOST_STEPS = 1_000_000  # iteration limit for one task; only loads close to 1 re
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Demand:
-    """The load of a task on its processor. Times in [s].
+    """Load of a task on its processor.
 
-    execution: longest execution time of one job.
-    deadline: relative to the release; None for the period. It may be longer than the period.
-    blocking: longest time for which a task of lower priority blocks it.
-    jitter: longest delay of a release after its nominal time.
-    priority: greater is higher. If it is None for all tasks, they are deadline-monotonic.
-    cpu: its processor. If it is None for all tasks, they share one processor.
+    Args:
+        name: Name of the task.
+        period: Minimum time between two releases [s].
+        execution: Longest execution time of one job [s].
+        deadline: Deadline after the release [s]; None for the period. It may exceed the period.
+        blocking: Longest time for which a task of lower priority blocks the task [s].
+        jitter: Longest delay of a release after its nominal time [s].
+        priority: Priority; a larger number is higher. If all tasks have None, their priorities
+            are deadline-monotonic.
+        cpu: Processor of the task. If all tasks have None, they share one processor.
     """
 
     name: str

@@ -25,17 +25,21 @@ PAGE = 4096
 class Task:
     """A function that `Tasks` runs as `function(task, *arguments)`, with `for job in task:`.
 
-    period: [s] from release to release; with a `trigger`, the minimum time between two releases.
-    name: name in reports and errors; the function's name by default.
-    priority: SCHED_FIFO priority 1..99, greater is higher; None for ordinary scheduling.
-    cpu: processor that the task is bound to; None for any.
-    stack_size: [bytes], a multiple of 4096, at least 32 KiB; None for the default.
-    deadline: [s] after the release; None for the period.
-    trigger: Signal that releases the task, which is then sporadic; None for a periodic task.
-    on_miss: "count" the job and continue with the next release, late or not; "skip" the releases
-        that have passed; "stop" the task with an error; or a function, called with the late job.
-    on_failure: if the task raises or its process dies: "stop" all tasks with an error, "restart"
-        it at its next release, or "continue" without it.
+    Args:
+        period: Time between two releases [s]. With a `trigger`, it is the minimum time.
+        name: Name in reports and errors; by default, the name of the function.
+        priority: SCHED_FIFO priority, 1 to 99; a larger number is higher. None for ordinary
+            scheduling.
+        cpu: Processor on which the task runs; None for any.
+        stack_size: Size of the stack [bytes], a multiple of 4096, at least 32 KiB. None for the
+            default size.
+        deadline: Deadline after the release [s]; None for the period.
+        trigger: Signal that releases a sporadic task; None for a periodic task.
+        on_miss: Reaction to a missed deadline. "count": count the job and continue with the next
+            release, late or not. "skip": skip the releases that have passed. "stop": stop the task
+            with an error. A function: call it with the late job.
+        on_failure: Reaction if the task raises or its process ends. "stop": stop all tasks with an
+            error. "restart": restart the task at its next release. "continue": continue without it.
     """
 
     function: Callable[..., object]

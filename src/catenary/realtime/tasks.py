@@ -41,10 +41,13 @@ class Tasks:
     `with Tasks(a, b) as tasks:` starts them together, and stops them at the end of the block.
     `tasks["a"]` is the handle of one task; `print(tasks)` shows the statistics of all jobs.
 
-    workers: "processes" or "threads"; None selects processes for more than one task.
-    clock: VirtualClock that simulates priorities and processors (`cpu=None` counts as 0).
-    session: `realtime.session()`, entered in each process; for threads, in this process.
-    best_effort: if True, continue without refused priorities and processors.
+    Args:
+        tasks: Tasks to run.
+        workers: "processes" or "threads"; None selects processes for more than one task.
+        clock: VirtualClock that simulates the tasks by priority and processor. A `cpu` of None
+            counts as 0.
+        session: `realtime.session()` to enter in each process; for threads, in this process.
+        best_effort: True to continue without refused priorities and processors.
     """
 
     def __init__(
