@@ -29,7 +29,7 @@ def call(line: str, capsys: pytest.CaptureFixture[str]) -> tuple[int, str, str]:
 def test_nothing_found(segment: cat.Segment, capsys: pytest.CaptureFixture[str]) -> None:
     status, out, err = call("diag eth9", capsys)
     assert (status, err) == (0, "")
-    assert out.startswith("nothing found: 3 devices have counted no error since")
+    assert out.startswith("no fault found: 3 devices counted no error since")
 
 
 def test_a_cable_is_named(segment: cat.Segment, capsys: pytest.CaptureFixture[str]) -> None:

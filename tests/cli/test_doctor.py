@@ -130,4 +130,4 @@ def test_apply_asks(machine, monkeypatch, capsys, answer, after):
 def test_apply_without_a_terminal(machine, monkeypatch, capsys):
     monkeypatch.setattr("sys.stdin.isatty", lambda: False, raising=False)
     assert main(["doctor", "--seconds", "0", "--apply"]) == 2
-    assert "hint: --apply --yes" in capsys.readouterr().err
+    assert "hint: use --apply --yes" in capsys.readouterr().err

@@ -63,7 +63,7 @@ def test_init_does_not_overwrite(tmp_path: Path, capsys: pytest.CaptureFixture[s
     path.write_text("mine")
     status, _, err = call(capsys, "init", "virtual", "-o", path)
     assert status == 2
-    assert "exists already" in err
+    assert "already exists" in err
     assert path.read_text() == "mine"
     assert call(capsys, "init", "virtual", "-o", path, "--force")[0] == 0
     assert "catenary-machine/1" in path.read_text()

@@ -111,7 +111,7 @@ def test_a_help_fills_the_terminal(name: str, monkeypatch: pytest.MonkeyPatch) -
 
 @pytest.mark.parametrize(
     ("error", "hint"),
-    [(FileExistsError, "a folder is needed"), (PermissionError, "another user")],
+    [(FileExistsError, "a folder is needed"), (PermissionError, "owner and permissions")],
 )
 def test_a_file_in_the_way_has_a_hint(error: type[OSError], hint: str) -> None:
     message, found = describe(error(1, "no", "place"))

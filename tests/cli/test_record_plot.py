@@ -52,7 +52,7 @@ def test_record_says_what_it_does(
     cycles = len(record.read(path))
     assert (status, err) == (0, "")
     assert out.splitlines() == [
-        f"recording {name} (3 axes at 1000 Hz) to {path}; Ctrl-C ends",
+        f"recording {name} (3 axes at 1000 Hz) to {path}; press Ctrl-C to stop",
         f"{path}: {cycles} cycles, none lost; stopped",
     ]
     assert cycles > 100
@@ -155,7 +155,7 @@ def test_plot_says_what_is_wrong(recording: Path, capsys: pytest.CaptureFixture[
     assert err == "catenary: cell-1 has no axis 'elbow'\n  hint: it has joint0, joint1\n"
     status, _, err = call(f"plot {recording} --start 99", capsys)
     assert status == 2
-    assert err.startswith(f"catenary: {recording} has no cycles in that time")
+    assert err.startswith(f"catenary: {recording} has no cycles in this time range")
     assert not recording.with_suffix(".png").exists()
     recording.write_text("text")
     status, _, err = call(f"plot {recording}", capsys)

@@ -90,7 +90,7 @@ def test_a_write_shows_what_differs_writes_it_and_reads_it_back(
     assert segment.core.sii_image(1) != path.read_bytes()
     status, out, _ = call(f"sii write eth9 1 {path}", capsys)
     assert status == 0
-    assert out.endswith("words written and read back; switch the device off and on\n")
+    assert out.endswith("words written and verified; power-cycle the device to use them\n")
     assert segment.core.sii_image(1) == path.read_bytes()
     assert call(f"sii write eth9 1 {path}", capsys)[1].endswith("already has this content\n")
 
@@ -154,7 +154,7 @@ def test_an_image_larger_than_the_eeprom_is_refused(
     path.write_bytes(image)
     status, _, err = call(f"sii write eth9 1 {path}", capsys)
     assert status == 1
-    assert "the image has 4096 bytes, its EEPROM 2048" in err
+    assert "the image has 4096 bytes, but its EEPROM has only 2048" in err
     status, _, err = call(f"sii write eth9 1 {path} --force", capsys)
     assert status == 1
     assert "SII word 0x0400 cannot be written to 0x5555: the EEPROM does not acknowledge" in err
@@ -222,7 +222,7 @@ def test_a_file_that_is_not_an_image_is_named(
     path.write_text(":020000040000FA\n")
     status, out, err = call(f"sii show {path}", capsys)
     assert status == 1
-    assert "cannot be read as an image" in out
+    assert "invalid image" in out
     assert "the header alone needs" in err
     assert "convert Intel hex" in err
 

@@ -86,7 +86,7 @@ def test_alias_now_and_after_the_next_power_up(capsys: pytest.CaptureFixture[str
     name = "device 2 (Catenary virtual servo 1)"
     assert call("alias virtual 2", capsys) == (0, f"{name}: no alias\n", f"note: {VIRTUAL_TIME}\n")
     assert call("alias virtual 2 17", capsys)[1] == (
-        f"{name}: no alias, after its next power-up alias 17\n"
+        f"{name}: no alias; alias 17 after the next power-up\n"
     )
     _, out, _ = call("alias virtual 2 17 --json", capsys)
     assert json.loads(out)["eeprom"] == 17

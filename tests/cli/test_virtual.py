@@ -28,8 +28,10 @@ def test_lost_frames_are_reported_in_the_end(veth: tuple[str, str]) -> None:
         wire.send(encode_frame([Datagram(EcatCommand.BRD, 0, b"\0")]))
         time.sleep(0.1)  # real time, over a real wire: the frame has arrived
         server.process.send_signal(signal.SIGTERM)
-        said = server.read_line(SECONDS)
-    assert said == "1 frames waited longer than 0 ms and were lost; --priority 80 makes this rarer"
+        line = server.read_line(SECONDS)
+    assert line == (
+        "1 frames waited longer than 0 ms and were dropped; --priority 80 makes this less frequent"
+    )
 
 
 def test_a_priority_that_is_refused_is_an_error(

@@ -58,7 +58,7 @@ def test_what_does_not_fit_is_refused(wrong):
     ("make", "error", "words"),
     [
         (lambda: Value("O"), TypeError, "Python objects"),
-        (lambda: Value("f8", 0), ValueError, "no bytes"),
+        (lambda: Value("f8", 0), ValueError, "a size of 0 bytes"),
         (lambda: Queue("f8", length=0), ValueError, "length of 0 records"),
         (lambda: Queue("f8", length=4, full="wait"), ValueError, '"refuse" or "overwrite"'),
     ],

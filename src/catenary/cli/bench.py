@@ -1,4 +1,4 @@
-"""`catenary bench`: measure this machine, and print a measurement again."""
+"""`catenary bench`: measure the loop on this machine, or print a saved result."""
 
 from __future__ import annotations
 
@@ -33,9 +33,9 @@ def _add_loop(group: Commands) -> None:
         group,
         "loop",
         help="measure the phases of the cyclic exchange",
-        description="Runs catenary-inline, catenary-threaded and catenary-law (where Numba is "
+        description="Runs catenary-inline, catenary-threaded and catenary-law (if Numba is "
         "installed) alternately in short rounds, on virtual devices in a private network. Prints "
-        "output delay, input age and CPU time per cycle, then the phases.",
+        "the output delay, the input age and the CPU time per cycle, then the phases.",
         example="catenary bench loop --seconds 10 --json loop.json\n"
         "catenary bench loop --drives 33 --rate 4000 --body pd\n"
         "catenary bench loop --busy-wait 0.00005",
@@ -69,7 +69,7 @@ def _add_latency(group: Commands) -> None:
         "--cpu",
         type=number,
         metavar="N",
-        help="CPU of the thread (the last isolated, else the last)",
+        help="CPU of the thread (default: the last isolated CPU, else the last CPU)",
     )
     add_file(parser)
     parser.set_defaults(run=run_latency)
@@ -79,7 +79,7 @@ def _add_report(group: Commands) -> None:
     parser = add_command(
         group,
         "report",
-        help="print a saved result again",
+        help="print a saved result",
         description="Prints the figures and the verdict from a JSON file of `loop` or `latency`.",
         example="catenary bench report loop.json",
     )
