@@ -28,7 +28,7 @@ def test_this_machine(capsys):
     status = main(["doctor", "--seconds", "0.1"])
     out = capsys.readouterr().out
     assert out.startswith("Kernel\n")
-    assert " wake-ups of 1000 us: median " in " ".join(out.split())
+    assert " wake-ups with a period of 1000 us: median " in " ".join(out.split())
     assert status == (1 if " is not ready " in out else 0)
 
 

@@ -90,8 +90,8 @@ def test_kinds_of_containers(tmp_path, files, kind):
     ("files", "kind"),
     [
         ({"/sys/hypervisor/type": "xen"}, "xen"),
-        ({"/proc/device-tree/hypervisor/": ""}, "a hypervisor (device tree)"),
-        ({"/proc/cpuinfo": "flags\t: fpu hypervisor"}, "a hypervisor (/proc/cpuinfo)"),
+        ({"/proc/device-tree/hypervisor/": ""}, "unknown hypervisor, device tree"),
+        ({"/proc/cpuinfo": "flags\t: fpu hypervisor"}, "unknown hypervisor, /proc/cpuinfo"),
         ({"/proc/cpuinfo": "model name : hypervisor lover"}, ""),
     ],
 )

@@ -8,7 +8,7 @@ from tests.doctor.machines import CPU, controller, each_cpu, laptop, make
 
 def test_the_boot_options_isolate_the_last_cpu(tmp_path):
     check = isolated(laptop(tmp_path))
-    assert check.advice.startswith("`isolcpus=3 rcu_nocbs=3 irqaffinity=0-2` in GRUB_CMDLINE_LINUX")
+    assert check.advice.startswith("add `isolcpus=3 rcu_nocbs=3 irqaffinity=0-2` to GRUB_CMDLINE")
 
 
 def test_a_loop_on_another_cpu_than_the_isolated_one(tmp_path):

@@ -79,7 +79,7 @@ def test_progress_lines_are_printed_immediately(qemu: Path, tmp_path: Path) -> N
     ("script", "message"),
     [
         ("echo 'qemu: no kernel' >&2; echo more >&2; exit 1", "status 1: qemu: no kernel$"),
-        ("exit 3", "status 3: it message nothing$"),
+        ("exit 3", "status 3: it said nothing$"),
         ("echo panic; : >$RESULTS", "without an answer"),
         ('echo \'{"status": 2, "result": null}\' >$RESULTS', "status 2; its output is above"),
     ],

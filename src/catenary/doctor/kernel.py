@@ -75,12 +75,12 @@ def throttling(machine: Machine) -> Check:
     if share >= 90:
         return passed(
             id,
-            f"real-time threads may use {share:.0f} % of each {period / 1e6:g} s; this is enough, "
+            f"real-time threads may use {share:.0f} % of every {period / 1e6:g} s; this is enough, "
             "because a loop sleeps in every cycle",
         )
     return failed(
         id,
-        f"the kernel stops real-time threads after {share:.0f} % of each {period / 1e6:g} s",
+        f"the kernel stops real-time threads after {share:.0f} % of every {period / 1e6:g} s",
         "sudo sysctl kernel.sched_rt_runtime_us=950000",
     )
 
@@ -105,7 +105,7 @@ def virtual_machine(machine: Machine) -> Check:
         return passed(id, "none detected")
     return warned(
         id,
-        f"this is a virtual machine ({machine.virtual}); its host may stop it for milliseconds",
+        f"virtual machine ({machine.virtual}): its host may stop it for milliseconds",
         "run motors from real hardware; use a virtual machine for virtual segments "
         '(cat.MainDevice("virtual"))',
     )

@@ -84,9 +84,9 @@ def judge(latency: Latency | None, machine: Machine) -> Check:
         return skipped(id, "not measured", "catenary doctor --seconds 3")
     figure, period = latency.lateness, latency.period
     found = (
-        f"{figure.count} wake-ups of {period * 1e6:g} us: median {figure.p50 * 1e6:.1f}, "
-        f"p99.9 {figure.p999 * 1e6:.1f}, worst {figure.max * 1e6:.1f} us late "
-        f"({latency.scheduling})"
+        f"{figure.count} wake-ups with a period of {period * 1e6:g} us: median "
+        f"{figure.p50 * 1e6:.1f}, p99.9 {figure.p999 * 1e6:.1f}, worst {figure.max * 1e6:.1f} us "
+        f"late ({latency.scheduling})"
     )
     if figure.max <= GOOD_SHARE * period:
         return passed(id, found)

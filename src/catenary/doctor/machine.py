@@ -164,10 +164,10 @@ class Machine:
         if kind := self.text("/sys/hypervisor/type"):
             return kind
         if self.exists("/proc/device-tree/hypervisor"):
-            return "a hypervisor (device tree)"
+            return "unknown hypervisor, device tree"
         if re.search(r"^flags\s*:.*\bhypervisor\b", self.text("/proc/cpuinfo") or "", re.MULTILINE):
             names = (self.text(f"/sys/class/dmi/id/{name}") for name in DMI_NAMES)
-            return " ".join(filter(None, names)) or "a hypervisor (/proc/cpuinfo)"
+            return " ".join(filter(None, names)) or "unknown hypervisor, /proc/cpuinfo"
         return ""
 
     @cached_property

@@ -8,7 +8,7 @@ from catenary.doctor.machine import Machine, as_list, cpu_list
 
 CPU = "/sys/devices/system/cpu"
 SLOW_WAKE_US = 10  # time to leave an idle state: a tenth of the period at 10 kHz
-REBOOT = "in GRUB_CMDLINE_LINUX of /etc/default/grub; then `sudo update-grub` and reboot"
+REBOOT = "to GRUB_CMDLINE_LINUX in /etc/default/grub; then `sudo update-grub` and reboot"
 
 
 def boot_words(machine: Machine, *names: str, **others: str) -> str:
@@ -21,7 +21,7 @@ def boot_words(machine: Machine, *names: str, **others: str) -> str:
     """
     options = [f"{name}={machine.loop_cpu}" for name in names]
     options += [f"{name}={cpus}" for name, cpus in others.items()]
-    return f"`{' '.join(options)}` {REBOOT}"
+    return f"add `{' '.join(options)}` {REBOOT}"
 
 
 def isolated(machine: Machine) -> Check:
@@ -124,7 +124,7 @@ def idle_states(machine: Machine) -> Check:
         and machine.number(f"{state}/disable") == 0
     }
     if not slow:
-        return passed(id, f"every idle state wakes within {SLOW_WAKE_US} us")
+        return passed(id, f"all idle states wake within {SLOW_WAKE_US} us")
     deepest = max(slow, key=lambda state: slow[state])
     return warned(
         id,
