@@ -8,7 +8,7 @@ import pytest
 
 from catenary.bench import rounds
 from catenary.bench.job import Body, Job
-from catenary.bench.rounds import MOST_FAILED, RoundError, begin_anew, interleave
+from catenary.bench.rounds import MOST_FAILED, RoundError, interleave, run_with_retries
 from tests.bench.test_statistics import make_round
 
 
@@ -27,7 +27,7 @@ def once(good: Iterator[bool]) -> str:
 def test_a_failed_round_is_repeated_and_reported() -> None:
     failed: list[str] = []
     good = outcomes(2)
-    assert begin_anew(lambda: once(good), failed) == "done"
+    assert run_with_retries(lambda: once(good), failed) == "done"
     assert failed == ["the machine stopped"] * 2
 
 
@@ -35,7 +35,7 @@ def test_the_number_of_repetitions_is_limited() -> None:
     failed: list[str] = []
     good = outcomes(1000)
     with pytest.raises(RoundError, match="the machine stopped"):
-        begin_anew(lambda: once(good), failed)
+        run_with_retries(lambda: once(good), failed)
     assert len(failed) == MOST_FAILED
 
 

@@ -11,7 +11,7 @@ from tests.doctor import machines
 from tests.doctor.test_latency import latency
 
 
-def test_each_check_has_a_line_and_an_advice(tmp_path):
+def test_each_check_has_a_line_and_advice(tmp_path):
     lines = as_text(examine(machines.laptop(tmp_path))).splitlines()
     assert lines[:2] == [
         "Kernel",

@@ -26,7 +26,7 @@ from catenary.bench.statistics import Run, combine
 
 OURS = ("catenary-inline", "catenary-threaded")
 LAW = "catenary-law"  # only if Numba is installed
-STORM = "catenary-law-storm"  # next to a thread that busy-waits and creates garbage
+STORM = "catenary-law-storm"  # next to a busy thread that creates garbage
 MODULES = {
     "catenary-inline": "catenary.bench.python_loop",
     "catenary-threaded": "catenary.bench.python_loop",
@@ -67,10 +67,11 @@ def run_setting(setting: Setting, modules: Mapping[str, str]) -> list[Run]:
 
 
 def check_busy_wait(busy_wait: float, rate: int) -> None:
-    """Raise ValueError for a busy-wait that a loop cannot use."""
+    """Raise ValueError unless the busy-wait is less than the period."""
     if not 0 <= busy_wait < 1 / rate:
         raise ValueError(
-            f"a busy-wait of {busy_wait} s is not less than the period of {1 / rate} s"
+            f"busy-wait of {busy_wait} s: it must be at least 0 and less than the period of "
+            f"{1 / rate} s"
         )
 
 

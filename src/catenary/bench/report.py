@@ -76,7 +76,7 @@ def as_json(
 def loop_text(
     machine: str, setting: Setting, runs: Sequence[Run], ratios: Mapping[str, float]
 ) -> str:
-    """Return the machine, the setting, all tables and the verdicts."""
+    """Return the machine, the setting, all tables and the verdicts as text."""
     blocks = [f"{machine}\n{setting}", as_text(runs, ratios), verdict.as_text(runs, setting.rate)]
     return "\n\n".join(blocks)
 

@@ -28,7 +28,7 @@ class RoundError(CatenaryError):
     """A peer could not complete its round."""
 
 
-def begin_anew(run: Callable[[], T], failed: list[str]) -> T:
+def run_with_retries(run: Callable[[], T], failed: list[str]) -> T:
     """Run a round, and repeat it if it fails.
 
     A round fails, for example, if the machine pauses for longer than the devices' watchdog.
@@ -70,7 +70,7 @@ def interleave(
             for job in (*jobs[first:], *jobs[:first]):
                 progress(job.peer, number + 1, rounds)
                 run = partial(run_round, job, Path(name))
-                found[job.peer].append(run() if failed is None else begin_anew(run, failed))
+                found[job.peer].append(run() if failed is None else run_with_retries(run, failed))
     return found
 
 

@@ -39,7 +39,7 @@ class Served:
 
 @dataclass(frozen=True, slots=True)
 class Processors:
-    """One processor for the segment and one for all masters; None if there is only one."""
+    """Processors of the segment and of all masters; None if there is only one processor."""
 
     segment: int | None
     masters: int | None

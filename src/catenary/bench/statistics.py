@@ -75,13 +75,13 @@ def combine(name: str, rounds: Sequence[Round]) -> Run:
 
 
 def columns_of(one: Round) -> dict[str, Values]:
-    """Return the phases and derived columns of a round [us]; each without its missing values."""
+    """Return the phases and the derived columns of a round [us], without missing values."""
     samples = np.where(one.samples < 0, np.nan, one.samples * 1e-3)
     columns = dict(zip(PHASES, samples.T, strict=True))
     columns[IN_CONTROLLER] = columns["receive"] + columns["process"] + columns["send"]
     columns[WITH_TAIL] = columns[IN_CONTROLLER] + columns["tail"]
     columns[WAKE_TO_SENT] = columns["output_delay"] - columns["lateness"]
-    columns["period"] = columns["period"][1:]  # the first one started before the round
+    columns["period"] = columns["period"][1:]  # the first period started before the round
     return {name: values[~np.isnan(values)] for name, values in columns.items()}
 
 

@@ -35,7 +35,7 @@ def position(text: str) -> int:
 
 
 def entry(text: str) -> Entry:
-    """Return the entry for `0x6041` or `0x1018:1`."""
+    """Parse an entry such as `0x6041` or `0x1018:1`."""
     index_text, _, subindex_text = text.partition(":")
     if index_text.isalnum() and not index_text.lower().startswith("0x"):
         raise argparse.ArgumentTypeError(
@@ -57,7 +57,7 @@ def positive_number(text: str) -> int:
 
 
 def positive_numbers(text: str) -> list[int]:
-    """Return the numbers of a list such as `4000,8000`."""
+    """Parse a list of numbers such as `4000,8000`."""
     return [positive_number(each) for each in text.split(",")]
 
 

@@ -24,7 +24,7 @@ class Row:
     """An entry, or the heading of an object with several entries."""
 
     index: int
-    subindex: int | None  # None: heading
+    subindex: int | None  # None for a heading
     name: str
     type: str
     bit_length: int
@@ -41,7 +41,7 @@ def rows_of(device: SubDevice, notes: list[str], *, values: bool) -> Iterator[Ro
     Args:
         device: The device to read.
         notes: Receives notes about missing descriptions.
-        values: True to read also the values of readable entries.
+        values: True to also read the values of readable entries.
     """
     known = device.sdo.list()
     notes += device.sdo.notes

@@ -85,7 +85,7 @@ def run(arguments: argparse.Namespace) -> int:
         raise UsageError("--json cannot be combined with --apply or --undo")
     if arguments.undo:
         return undo()
-    examination = look(arguments)
+    examination = examine_machine(arguments)
     if arguments.json:
         print(as_json(examination))
     else:
@@ -98,7 +98,7 @@ def run(arguments: argparse.Namespace) -> int:
     return FAILED if examination.failed else 0
 
 
-def look(arguments: argparse.Namespace) -> Examination:
+def examine_machine(arguments: argparse.Namespace) -> Examination:
     from catenary.doctor import examine, obtainable_cpu, this_machine, watch
     from catenary.errors import LinkError
 

@@ -21,7 +21,7 @@ FILE_HINTS: Mapping[type[OSError], str] = {
 
 
 class UsageError(Exception):
-    """An invalid command line, detected after the parsing of the arguments."""
+    """An invalid command line, detected after argument parsing."""
 
     def __init__(self, message: str, *, hint: str = "") -> None:
         super().__init__(message)

@@ -34,7 +34,7 @@ def run(arguments: argparse.Namespace) -> int:
     from catenary.cli.drawing_dot import as_dot
     from catenary.target import MainDevice, named_target
 
-    with MainDevice(arguments.target, force=True) as main:  # it only reads
+    with MainDevice(arguments.target, force=True) as main:  # this command only reads
         note_other_masters(main)
         subs = main.passive_scan()
         drawing = draw(named_target(arguments.target), main, subs)

@@ -60,7 +60,7 @@ class Parser(argparse.ArgumentParser):
 
 
 class ShowVersion(argparse.Action):
-    """Action that prints the version. It imports `importlib.metadata` on request, which is slow."""
+    """Action that prints the version, with a slow import only on request."""
 
     def __call__(self, parser: argparse.ArgumentParser, *_: object) -> None:
         from importlib.metadata import version
@@ -107,7 +107,7 @@ def main(
 
 
 def note_virtual_time(target: str) -> None:
-    """Print a note on stderr if the times of a command were not those of this machine."""
+    """Print a note on stderr if the command ran in virtual time."""
     if not target.startswith("virtual") and not target.endswith(".toml"):
         return  # avoids the import
     from catenary.target.parse import in_virtual_time

@@ -89,7 +89,7 @@ def run_read(arguments: argparse.Namespace) -> int:
             f"no known register starts at 0x{address:04X}", hint="give the number of bytes: SIZE"
         )
     _check(address, size)
-    with MainDevice(arguments.target, force=True) as main:  # it only reads
+    with MainDevice(arguments.target, force=True) as main:  # this command only reads
         note_other_masters(main)
         device = device_at(main.passive_scan(names=False), arguments.position)
         data = main.converse(read_register(device.station, address, size))
@@ -155,7 +155,9 @@ def value_bytes(text: str, size: int | None, address: int) -> bytes:
         except ValueError:
             raise UsageError(f"{text!r} is not a list of pairs of hexadecimal digits") from None
         if size not in (None, len(data)):
-            raise UsageError(f"{len(data)} bytes do not fit the size of {size} at 0x{address:04X}")
+            raise UsageError(
+                f"VALUE has {len(data)} bytes, but the size at 0x{address:04X} is {size} bytes"
+            )
         return data
     try:
         value = number(text)

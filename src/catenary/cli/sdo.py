@@ -51,7 +51,7 @@ def add_parser(commands: Commands) -> None:
     )
     _add_place(writing)
     writing.add_argument(
-        "value", metavar="VALUE", help="decimal or 0x... number, text, or hexadecimal bytes"
+        "value", metavar="VALUE", help="value: decimal or 0x... number, text, or hexadecimal bytes"
     )
     _add_type(writing)
     add_json(writing)
@@ -168,7 +168,7 @@ def _data_type(name: str | None) -> DataType[Value] | None:
     except ValueError as error:
         near = get_close_matches(name.upper(), [kind.name for kind in ALL], n=1, cutoff=0.5)
         guess = f"did you mean {near[0]}? " if near else ""
-        hint = f"{guess}use BOOL, SINT, INT, DINT, USINT, UINT, UDINT, REAL, STRING, BYTES, ..."
+        hint = f"{guess}types: BOOL, SINT, INT, DINT, USINT, UINT, UDINT, REAL, STRING, BYTES, ..."
         raise UsageError(f"unknown data type {name!r}", hint=hint) from error
 
 

@@ -94,7 +94,7 @@ def run_read(arguments: argparse.Namespace) -> int:
     from catenary.target import MainDevice
     from catenary.wire.sii_check import objections
 
-    with MainDevice(arguments.target, force=True) as main:  # it only reads
+    with MainDevice(arguments.target, force=True) as main:  # this command only reads
         note_other_masters(main)
         station = device_at(main.passive_scan(names=False), arguments.position).station
         extent = main.converse(with_eeprom(station, read_extent(station)))
@@ -175,14 +175,14 @@ def run_write(arguments: argparse.Namespace) -> int:
         check_fit(image, device, extent, arguments.force)
         with Progress("read") as progress:
             old = read_eeprom(main, station, len(image), progress=progress)
-        wanted = changes(old, image)
-        print("\n".join(report(device, old, image, len(wanted))))
-        if arguments.dry_run or not wanted:
+        needed = changes(old, image)
+        print("\n".join(report(device, old, image, len(needed))))
+        if arguments.dry_run or not needed:
             return 0
         with Progress("write") as progress:
-            write_eeprom(main, station, wanted, progress=progress)
+            write_eeprom(main, station, needed, progress=progress)
         verify(main, device, image)
-    print(f"{len(wanted)} words written and verified; power-cycle the device to use them")
+    print(f"{len(needed)} words written and verified; power-cycle the device to use them")
     return 0
 
 
@@ -198,7 +198,8 @@ def check_image(image: bytes, arguments: argparse.Namespace) -> None:
     for each in objections(image):
         if each.insist and arguments.force:
             print(
-                f"catenary: {arguments.file}: {each.text} (ignored with --force)", file=sys.stderr
+                f"catenary: {arguments.file}: {each.text} (ignored because of --force)",
+                file=sys.stderr,
             )
             continue
         more = "; --force writes it anyway" if each.insist else ""

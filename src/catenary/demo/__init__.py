@@ -9,7 +9,7 @@ def run_demo(seconds: float, folder: Path, *, in_process: bool = False) -> None:
     """Run the demo, print its results, and write `demo.json` and `demo.html`.
 
     Unless `in_process`, this may restart the program in its own network namespace. Do not import
-    modules that start threads (NumPy) before.
+    modules that start threads (NumPy) before this call.
 
     Args:
         seconds: Duration of the motion [s].

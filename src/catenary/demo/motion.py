@@ -20,7 +20,7 @@ LOST_LIMIT = 800  # cycles
 WATCHDOG = 1.0  # [s], of the devices
 LATE_LIMIT = 0.5  # [s]
 AMPLITUDE = math.pi  # [rad]
-PULSATION = math.pi  # [rad/s]
+ANGULAR_FREQUENCY = math.pi  # [rad/s]
 VELOCITY_LIMIT = 20.0  # [rad/s]; the sines reach 10 rad/s
 FADE_IN = 1.0  # [s]; the amplitude grows during this time, so that the drives start from rest
 
@@ -41,7 +41,7 @@ def follow(loop: cat.Loop, arm: cat.Drives, recording: Recording, progress: Prog
     for cycle in loop:
         t = cycle.time
         growth = AMPLITUDE * min(t / FADE_IN, 1.0) ** 2
-        reference = home + growth * np.sin(PULSATION * t + phases)
+        reference = home + growth * np.sin(ANGULAR_FREQUENCY * t + phases)
         arm.target.position[:] = reference
         if not recording.add(t, reference, arm.actual.position):
             return

@@ -22,7 +22,7 @@ class Eee:
     """Energy-efficient Ethernet: `ethtool --show-eee`."""
 
     enabled: bool
-    active: bool  # agreed with the other end
+    active: bool  # negotiated with the other end
 
 
 @dataclass(frozen=True, slots=True)

@@ -147,7 +147,7 @@ class HostState:
         except (OSError, msgspec.MsgspecError, UnicodeDecodeError, RecursionError) as error:
             raise StateError(
                 f"{self.path} cannot be read: {error}",
-                hint="a reboot undoes all changes by --apply; delete the file after it",
+                hint="reboot to undo all changes by --apply, then delete the file",
             ) from error
         return noted.made if noted.boot == self.boot else []
 
@@ -180,8 +180,8 @@ class HostState:
             new.replace(self.path)
         except OSError as error:
             raise StateError(
-                f"{self.path} cannot be written ({error.strerror}); no setting is changed without "
-                "a saved old value",
+                f"{self.path} cannot be written ({error.strerror}); no setting is changed if its "
+                "old value cannot be saved",
                 hint="set $XDG_STATE_HOME to a writable folder",
             ) from error
 
@@ -225,7 +225,7 @@ def apply(changes: Sequence[Change], ground: Ground, state: HostState) -> Iterat
 def undo(ground: Ground, state: HostState) -> Iterator[str]:
     """Undo all changes in reverse order, and yield a line with the result of each.
 
-    Values that were changed again since then stay. Refused changes stay in the state file.
+    Keep values that were changed again since. Refused changes stay in the state file.
     """
     left: list[Made] = []
     for made in reversed(state.load()):

@@ -17,7 +17,7 @@ class Check:
     PASS: good. WARN: cycles may be late. FAIL: cycles will be late, or the loop cannot run.
     SKIP: unknown on this machine; `found` has the reason.
 
-    id: its heading in docs/how_to/doctor.md. found: the result.
+    id: heading in docs/how_to/doctor.md. found: the result.
     advice: commands to type; may be empty. changes: reversible changes that `--apply` makes.
     """
 

@@ -23,13 +23,13 @@ def card_interrupts(machine: Machine, card: Card) -> list[int]:
 
 
 def device_name(machine: Machine, place: str) -> str:
-    """Return the device name of a card; interrupts of paravirtual cards have it, as in virtio3."""
+    """Return the device name, such as virtio3, which interrupts of paravirtual cards have."""
     device = machine.path(f"{place}/device")
     return device.resolve().name if device.exists() else ""
 
 
 def handling_cpus(machine: Machine, numbers: list[int]) -> dict[int, frozenset[int]]:
-    """Return the CPUs that handle each interrupt. Interrupts of unknown affinity are left out."""
+    """Return the CPUs that handle each interrupt, without interrupts of unknown affinity."""
     lists = {
         number: machine.text(f"/proc/irq/{number}/effective_affinity_list")
         or machine.text(f"/proc/irq/{number}/smp_affinity_list")

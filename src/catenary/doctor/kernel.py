@@ -51,7 +51,7 @@ def preemption(machine: Machine) -> Check:
 def realtime_kernel(machine: Machine) -> str:
     """Return the advice for a real-time kernel on this distribution."""
     if machine.virtual or machine.container:
-        return "use a PREEMPT_RT kernel on the host, which also determines the latency in here"
+        return "use a PREEMPT_RT kernel on the host; its latency limits all guests and containers"
     found = re.search(r'^ID="?(\w+)', machine.text("/etc/os-release") or "", re.MULTILINE)
     distribution = found[1] if found else ""
     if distribution == "debian":

@@ -190,7 +190,7 @@ def ipv6(machine: Machine, card: Card) -> Check:
 def eee(machine: Machine, card: Card) -> Check:
     id = "nic-eee"
     if card.eee is None:
-        return passed(id, f"the driver does not have it ({card.refusals.get('eee', 'unknown')})")
+        return passed(id, f"the driver does not support it ({card.refusals.get('eee', 'unknown')})")
     if not card.eee.enabled:
         return passed(id, "off")
     return warned(

@@ -1,4 +1,4 @@
-"""Report of an examination as text, with a line and an advice for each check, or as JSON."""
+"""Report of an examination, as text with advice for each check, or as JSON."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ def wrap(text: str, width: int) -> list[str]:
 
 
 def histogram_lines(latency: Latency) -> Iterator[str]:
-    """Yield a histogram of latencies, in steps of 1, 2, 5."""
+    """Yield the lines of a histogram of latencies, with steps of 2, 5, 10, ... us."""
     counts = by_steps(latency)
     most = max(counts.values(), default=0)
     for step in sorted(counts):

@@ -187,7 +187,7 @@ def with_priorities(demands: Sequence[Demand]) -> list[Demand]:
 
 
 def rank(demand: Demand) -> int:
-    assert demand.priority is not None  # with_priorities
+    assert demand.priority is not None  # ensured by with_priorities
     return demand.priority
 
 
@@ -207,7 +207,7 @@ def as_load(demand: Demand) -> Load:
 
 
 def utilisation(demands: Sequence[Demand]) -> float:
-    """Return the utilisation of the busiest processor; more than 1.0 is an overload."""
+    """Return the utilisation of the busiest processor; above 1.0, it is overloaded."""
     processors = {demand.cpu for demand in demands}
     return max(
         math.fsum(demand.execution / demand.period for demand in demands if demand.cpu == cpu)
@@ -216,7 +216,7 @@ def utilisation(demands: Sequence[Demand]) -> float:
 
 
 def hyperperiod(demands: Sequence[Demand]) -> float:
-    """Return the time [s] after which the releases repeat; infinity if it exceeds a float."""
+    """Return the time [s] after which the releases repeat; infinity if a float cannot hold it."""
     try:
         return math.lcm(*(as_load(demand).period for demand in demands)) / 1e9
     except OverflowError:

@@ -1,7 +1,7 @@
 """Child processes that end with this process.
 
 Each child has its own session, so a Ctrl-C in the terminal does not reach it. This process ends it
-last; if this process dies, the kernel ends it (parent-death signal).
+after everything that depends on it. If this process dies, the kernel sends SIGTERM to the child.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ class Child:
         return self.process.poll() is None
 
     def read_line(self, seconds: float) -> str | None:
-        """Return the next line of output; None at its end, or if none arrives in `seconds`."""
+        """Return the next line of output; None at the end of the output or after `seconds`."""
         output = self.process.stdout
         assert output is not None
         deadline = time.monotonic() + seconds

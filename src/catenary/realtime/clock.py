@@ -1,4 +1,4 @@
-"""The virtual clock of tasks, and its participants.
+"""Virtual clock of tasks, and its participants.
 
 Time stands still while any participant runs. It advances when every participant waits or spends
 execution time. A participant has the clock interface of a loop's segment: `now_ns`, `wait_until`,
@@ -54,7 +54,7 @@ class Participant:
         self.timer.wake()
 
     def expect(self) -> None:
-        """Keep time still until the restarted participant first waits."""
+        """Stop the time until the restarted participant first waits."""
         self._time.expect(self.timer.slot)
 
     def step_aside(self) -> None:
@@ -88,7 +88,7 @@ class VirtualClock:
 
         Args:
             priority: fixed priority on the simulated processor; greater is higher.
-            cpu: simulated processor, shared with others by priority; None: its own.
+            cpu: simulated processor, shared by priority; None for its own.
 
         Raises:
             ValueError: the clock already has 64 participants.

@@ -98,7 +98,7 @@ class Value:
         return self._core.number
 
     def write(self, data: npt.ArrayLike) -> None:
-        """Publish an array. Readers never see a part of it.
+        """Publish an array. Readers never receive a partly written array.
 
         Raises:
             ValueError: the shape differs.

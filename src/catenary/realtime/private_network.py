@@ -43,7 +43,7 @@ class Refused:
 
 
 def state() -> Private | Refused:
-    """Return the state of this process; `enter` changes it."""
+    """Return `Private` in a private network, otherwise `Refused` with the reason."""
     value = os.environ.get(VARIABLE, "")
     if value == INSIDE:
         return Private()

@@ -26,6 +26,8 @@ class Task:
     """A function that `Tasks` runs as `function(task, *arguments)`, with `for job in task:`.
 
     Args:
+        function: Function of the task. Its first argument is the running task.
+        arguments: Further arguments of the function.
         period: Time between two releases [s]. With a `trigger`, it is the minimum time.
         name: Name in reports and errors; by default, the name of the function.
         priority: SCHED_FIFO priority, 1 to 99; a larger number is higher. None for ordinary

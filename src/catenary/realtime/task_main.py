@@ -116,7 +116,7 @@ def prepare(work: Work) -> str:
 
 
 def schedule(task: Task, best_effort: bool) -> Scheduling:
-    """Set priority and processor of the calling thread. Raises RealtimeError if refused."""
+    """Set priority and processor of this thread. Raises RealtimeError unless `best_effort`."""
     refusals = []
     if task.cpu is not None:
         cpus = {task.cpu}
@@ -163,7 +163,7 @@ def counted_collections(releases: Releases) -> Iterator[None]:
 
 
 def reason(error: Exception) -> str:
-    """Return the text of an error; if it is not Catenary's own, with the line that raised it."""
+    """Return the text of an error, with its source line unless it is a CatenaryError."""
     if isinstance(error, CatenaryError):
         return str(error)
     frames = traceback.extract_tb(error.__traceback__)

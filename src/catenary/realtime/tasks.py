@@ -117,7 +117,7 @@ class Tasks:
         """Wait until all tasks have ended. On a virtual clock, time passes during this call.
 
         Args:
-            seconds: timeout on the tasks' clock [s]; None: no timeout.
+            seconds: timeout on the tasks' clock [s]; None for no timeout.
 
         Returns:
             True if all tasks have ended.
@@ -221,7 +221,7 @@ class Tasks:
         self.stop(raising=error is None)
 
     def _own_session(self) -> contextlib.AbstractContextManager[object]:
-        """Return the session, or a null context if this process has entered it for threads."""
+        """Return the session if the tasks are processes, otherwise a null context."""
         if self._session is None or self.workers == "threads":
             return contextlib.nullcontext()
         return self._session
@@ -291,8 +291,8 @@ def run_at(
 def share_one_cpu(undo: contextlib.ExitStack) -> None:
     """Bind this thread, and the threads and processes that it starts, to one processor.
 
-    On a virtual clock, only one of them runs at a time. A switch on one processor takes 8 us; to
-    wake another processor takes 18 us.
+    On a virtual clock, only one of them runs at a time. A switch on one processor takes 8 us, and a
+    switch to another processor takes 18 us.
     """
     thread = threading.get_native_id()
     undo.callback(os.sched_setaffinity, thread, os.sched_getaffinity(thread))
@@ -340,7 +340,7 @@ def check_cpus(tasks: tuple[Task, ...]) -> None:
 
 
 def may_have(cpu: int, allowed: set[int]) -> bool:
-    """Return True if the process may use `cpu`, also if it is isolated (isolcpus)."""
+    """Return True if the process may use `cpu`, even if it is isolated (isolcpus)."""
     thread = threading.get_native_id()
     try:
         os.sched_setaffinity(thread, {cpu})

@@ -28,7 +28,7 @@ class Signal:
         self._place, self._ends = place, None
 
     def set(self) -> bool:
-        """Release the task once, as soon as its period allows. Never waits.
+        """Release the task once, as soon as its period allows. This never blocks.
 
         Return False if 64 releases are already pending; this one is dropped and counted.
         Raises RuntimeError if no task has this trigger.
