@@ -231,7 +231,7 @@ cdef class Block:
 
     cdef const cat_histogram *histogram(self, int number) except NULL:
         if not 0 <= number < FIGURES:
-            raise ValueError(f"there is no figure {number}")
+            raise ValueError(f"figure {number} is not within 0..{FIGURES - 1}")
         return &self.c.figures[number]
 
 
