@@ -112,7 +112,7 @@ def test_without_qemu_one_line_names_the_package(tmp_path: Path) -> None:
     )
     assert done.returncode == 1
     assert done.stderr == (
-        "rtlab: there is no qemu-system-x86_64: `sudo apt-get install qemu-system-x86`\n"
+        "rtlab: qemu-system-x86_64 is not installed: `sudo apt-get install qemu-system-x86`\n"
     )
     assert list(tmp_path.iterdir()) == []
 
@@ -162,5 +162,5 @@ def test_a_guest_that_dies_before_its_first_word_is_started_again(
 
 def test_a_job_that_the_kernel_would_cut_off_is_refused() -> None:
     kernel = Kernel(Path("vmlinuz"), Path("modules"), "a kernel")
-    with pytest.raises(LabError, match="understands 2047"):
+    with pytest.raises(LabError, match="at most 2047"):
         machine.command(kernel, Path("root"), Path("results"), {"arguments": ["x" * 1800]})

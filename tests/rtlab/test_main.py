@@ -99,4 +99,4 @@ def test_a_record_says_what_its_figures_depend_on(monkeypatch: pytest.MonkeyPatc
     assert made["ns_per_instruction"] == 1
     assert made["command"].startswith("python -m benchmarks loop")
     assert (made["kernel_package"], made["qemu"]) == ("linux_1", "7.2.22")
-    assert "no latency measurement of hardware" in made["note"]
+    assert "does not measure the latency of hardware" in made["note"]
