@@ -63,20 +63,20 @@ class Machine:
         self._found = MachineParts()
 
     def __enter__(self) -> Self:
-        self.open()
-        return self
+        return self.open()
 
     def __exit__(self, *exc_info: object) -> None:
         self.close()
 
-    def open(self) -> None:
-        """Open the link, check the identities, and bring the devices to PRE-OP."""
+    def open(self) -> Self:
+        """Open the link, check the identities, and bring the devices to PRE-OP; return self."""
         self._main.open()
         try:
             self._found = self._find()
         except BaseException:
             self._main.close()
             raise
+        return self
 
     def close(self) -> None:
         """Bring all devices to INIT and close the link."""
