@@ -671,7 +671,7 @@ def test_a_loop_that_cannot_run_in_the_background_keeps_its_late_limits(
 def test_an_exit_in_the_thread_stops_the_axes(monkeypatch: pytest.MonkeyPatch) -> None:
     cell = Cell("csp", servos=1)
 
-    def leave(self: Session, flags: int, *, faults: bool) -> None:
+    def leave(self: Session, flags: int) -> None:
         raise SystemExit(1)
 
     monkeypatch.setattr(Session, "judge", leave)

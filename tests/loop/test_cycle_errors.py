@@ -1,6 +1,12 @@
 """Errors that name the device."""
 
-from catenary.loop.cycle_errors import AxisTrouble, drive_error, silence_error, state_error
+from catenary.loop.cycle_errors import (
+    AxisTrouble,
+    Evidence,
+    drive_error,
+    silence_error,
+    state_error,
+)
 from catenary.procedure.al_status_poll import Answer
 from catenary.procedure.station import Station
 from catenary.wire.al import AlState
@@ -14,23 +20,24 @@ LOG = object()
 
 def test_silent_devices_are_named() -> None:
     answers = [Answer(COUPLER, AlState.OP), Answer(SERVO, None), Answer(LAMP, None)]
-    error = silence_error(answers, [1, 2], 3, LOG)
+    error = silence_error(Evidence(answers), [1, 2], 3, LOG)
     assert "device 1 (Servo), device 2 (Lamp)" in str(error)
     assert error.log is LOG
 
 
 def test_silence_of_all_is_the_cable() -> None:
-    error = silence_error([Answer(COUPLER, None), Answer(SERVO, None)], [1], 3, LOG)
+    error = silence_error(Evidence([Answer(COUPLER, None), Answer(SERVO, None)]), [1], 3, LOG)
     assert "no device answers" in str(error)
 
 
 def test_a_device_that_came_back_is_not_silent_but_not_in_op() -> None:
     answers = [Answer(COUPLER, AlState.OP), Answer(SERVO, AlState.INIT)]
-    assert "device 1 (Servo) is in INIT" in str(silence_error(answers, [1], 3, LOG))
+    assert "device 1 (Servo) is in INIT" in str(silence_error(Evidence(answers), [1], 3, LOG))
 
 
 def test_lost_frames_without_a_silent_device_are_said_as_such() -> None:
-    error = silence_error([Answer(COUPLER, AlState.OP), Answer(SERVO, AlState.OP)], [1], 5, LOG)
+    answers = [Answer(COUPLER, AlState.OP), Answer(SERVO, AlState.OP)]
+    error = silence_error(Evidence(answers), [1], 5, LOG)
     assert str(error).startswith("5 cycles in a row")
     assert "frames are lost" in error.hint
 

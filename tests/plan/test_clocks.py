@@ -11,6 +11,7 @@ from catenary.errors import ConfigurationError
 from catenary.model.device import DeviceDescription, OpMode
 from catenary.plan.clocks import SyncPlan, make_sync, start_time_ns
 from catenary.plan.cycle import DatagramKind
+from catenary.plan.options import PlanOptions
 from catenary.plan.planner import Plan, make_plan
 from catenary.plan.request import DeviceRequest, DistributedClock
 from catenary.wire.datagram import EcatCommand, decode_datagram
@@ -38,7 +39,7 @@ def asking(*positions: int, clock: DistributedClock | None = None) -> Asking:
 
 
 def planned(devices: list[DeviceDescription], *positions: int, **options: object) -> Plan:
-    return make_plan(devices, [asking(*positions)], **options)  # type: ignore[arg-type]
+    return make_plan(devices, [asking(*positions)], PlanOptions(**options))  # type: ignore[arg-type]
 
 
 def clock_datagrams(plan: Plan) -> list[tuple[EcatCommand, int, int, int]]:

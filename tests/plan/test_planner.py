@@ -10,7 +10,7 @@ import pytest
 
 from catenary.errors import ConfigurationError, MappingError
 from catenary.model.device import Direction
-from catenary.plan import Number, NumberKind, make_plan
+from catenary.plan import Number, NumberKind, PlanOptions, make_plan
 from catenary.plan.cycle import Copy, DatagramKind, DatagramPlan
 from catenary.plan.layout import MailboxFmmu
 from catenary.plan.request import DeviceRequest, RequestTables
@@ -64,7 +64,7 @@ def test_the_template_is_a_frame_of_its_datagrams() -> None:
 
 
 def test_mailboxes_ride_in_the_cycle_without_a_part_in_its_verdict() -> None:
-    plan = make_plan(demo(), optional=[3])
+    plan = make_plan(demo(), options=PlanOptions(optional=[3]))
     assert plan.mailboxes.devices == (2, 3, 4)
     [column] = plan.cycle.input_columns
     assert column.number == Number(8 * 39, 3, NumberKind.UNSIGNED)
@@ -127,7 +127,7 @@ def test_what_each_device_is_told() -> None:
 
 def test_equal_plans_are_equal() -> None:
     assert make_plan(demo()) == make_plan(demo())
-    assert make_plan(demo()) != make_plan(demo(), period=2e-3)
+    assert make_plan(demo()) != make_plan(demo(), options=PlanOptions(period=2e-3))
 
 
 def test_a_plan_prints_what_it_holds() -> None:
@@ -185,7 +185,7 @@ def test_devices_in_no_request_are_required_if_any_other_is(required: bool) -> N
 
 
 def test_an_optional_device_is_a_unit_of_its_own() -> None:
-    cycle = make_plan(demo(), optional=[3]).cycle
+    cycle = make_plan(demo(), options=PlanOptions(optional=[3])).cycle
     assert [(unit.devices, unit.optional) for unit in cycle.sync_units] == [
         ((1, 2, 4, 5), False),
         ((3,), True),
@@ -265,10 +265,12 @@ def test_a_device_that_exceeds_a_datagram_is_refused_with_both_numbers(
     exact: bool, limit: int
 ) -> None:
     fits = block(0, outputs=700, inputs=limit - 700)
-    plan = make_plan([fits], exact_matching=exact)
+    plan = make_plan([fits], options=PlanOptions(exact_matching=exact))
     assert len(plan.cycle.frames) == 1
     with pytest.raises(MappingError) as caught:
-        make_plan([block(0, outputs=701, inputs=limit - 700)], exact_matching=exact)
+        make_plan(
+            [block(0, outputs=701, inputs=limit - 700)], options=PlanOptions(exact_matching=exact)
+        )
     text = str(caught.value)
     assert f"701 bytes of outputs and {limit - 700} bytes of inputs" in text
     assert f"{limit + 1} bytes of process data" in text
@@ -278,44 +280,48 @@ def test_a_device_that_exceeds_a_datagram_is_refused_with_both_numbers(
 
 def test_more_frames_in_a_cycle_than_indices_are_refused_by_the_plan() -> None:
     devices = [block(k, outputs=1000, inputs=0) for k in range(33)]
-    assert len(make_plan(devices[:32], period=5e-3).cycle.frames) == 32
+    assert len(make_plan(devices[:32], options=PlanOptions(period=5e-3)).cycle.frames) == 32
     with pytest.raises(ConfigurationError) as caught:
-        make_plan(devices, period=5e-3)
+        make_plan(devices, options=PlanOptions(period=5e-3))
     assert "33 frames in one cycle, at most 32" in str(caught.value)
     assert "exact_matching=True" in str(caught.value)
-    assert len(make_plan(devices, period=5e-3, exact_matching=True).cycle.frames) == 33
+    exact = make_plan(devices, options=PlanOptions(period=5e-3, exact_matching=True))
+    assert len(exact.cycle.frames) == 33
 
 
 def test_cyclic_frames_that_exceed_the_period_are_refused() -> None:
     devices = [block(k, outputs=1000, inputs=0) for k in range(12)]
     with pytest.raises(ConfigurationError) as caught:
-        make_plan(devices, period=1e-3)
+        make_plan(devices, options=PlanOptions(period=1e-3))
     assert str(caught.value).startswith(
         "the cyclic frames take 1011.04 us at 100 Mbit/s, the period is 1000 us"
     )
     assert "divider=" in str(caught.value)
-    turns = make_plan(devices, [Slow(2, *range(12))], period=1e-3).cycle
+    turns = make_plan(devices, [Slow(2, *range(12))], PlanOptions(period=1e-3)).cycle
     assert turns.wire_ns < 600_000  # of the busiest cycle, not of all frames
 
 
 def test_frames_that_cannot_be_back_in_time_are_refused() -> None:
     devices = [block(k, outputs=1000, inputs=0) for k in range(10)]
     with pytest.raises(ConfigurationError) as caught:
-        make_plan(devices, period=1e-3)
+        make_plan(devices, options=PlanOptions(period=1e-3))
     assert str(caught.value).startswith(
         "period=0.001 s is too short: the cyclic frames take 842.72 us at 100 Mbit/s, and must be "
         "back 800 us after the cycle start"
     )
-    make_plan(devices, period=1e-3, execution="inline")
+    make_plan(devices, options=PlanOptions(period=1e-3, execution="inline"))
 
 
 def test_acyclic_frames_get_what_the_cyclic_ones_and_the_guard_leave() -> None:
-    plan = make_plan([block(k, outputs=1000, inputs=0) for k in range(2)], period=1e-3)
+    plan = make_plan(
+        [block(k, outputs=1000, inputs=0) for k in range(2)], options=PlanOptions(period=1e-3)
+    )
     assert plan.cycle.acyclic_ns == 1_000_000 - plan.cycle.wire_ns - 100_000
     left = f"{plan.cycle.acyclic_ns / 1e3:g}"
     assert f"of 1000 us for cyclic frames, up to {left} us for acyclic frames, 10%" in str(plan)
     full = make_plan(
-        [block(k, outputs=1000, inputs=0) for k in range(11)], period=1e-3, collect_share=1.0
+        [block(k, outputs=1000, inputs=0) for k in range(11)],
+        options=PlanOptions(period=1e-3, collect_share=1.0),
     )
     assert full.cycle.acyclic_ns == 0
     assert "one frame for acyclic frames" in str(full)
@@ -341,11 +347,11 @@ def test_a_request_for_a_device_that_is_not_there() -> None:
 )
 def test_times_that_cannot_be(period: float, watchdog: float, match: str) -> None:
     with pytest.raises(ValueError, match=match):
-        make_plan(demo(), period=period, watchdog=watchdog)
+        make_plan(demo(), options=PlanOptions(period=period, watchdog=watchdog))
 
 
 def test_the_watchdog_can_be_off() -> None:
-    plan = make_plan(demo(), watchdog=0)
+    plan = make_plan(demo(), options=PlanOptions(watchdog=0))
     assert plan.devices[2].watchdog_count == 0
     assert plan.devices[2].layout.sync_managers[0].control == 0x24
     assert "13 out, 13 in, watchdog off" in str(plan)

@@ -7,6 +7,7 @@ from dataclasses import replace
 import pytest
 
 from catenary.model.device import DeviceDescription
+from catenary.plan.options import PlanOptions
 from catenary.plan.planner import make_plan
 from catenary.plan.request import DeviceRequest, ObjectReference
 from tests.plan.devices import Asking, lamps, servo
@@ -29,7 +30,8 @@ def watchdog_ns(
     *outputs: ObjectReference, divider: int = 1, period: float = 1e-3, watchdog: float | None = None
 ) -> int:
     request = Asking({0: DeviceRequest(outputs=outputs, divider=divider)})
-    return make_plan([servo(0)], [request], period=period, watchdog=watchdog).devices[0].watchdog_ns
+    options = PlanOptions(period=period, watchdog=watchdog)
+    return make_plan([servo(0)], [request], options).devices[0].watchdog_ns
 
 
 def test_100_ms_unless_torques_are_commanded() -> None:
@@ -78,7 +80,7 @@ def test_a_period_too_long_for_the_register() -> None:
 @pytest.mark.parametrize("control", [0x24, 0x64, 0x04, 0x44])
 def test_the_trigger_bit_agrees_with_the_time(control: int) -> None:
     for watchdog, expected in ((None, control | 0x40), (0, control & ~0x40)):
-        plan = make_plan([with_control(servo(0), control)], watchdog=watchdog)
+        plan = make_plan([with_control(servo(0), control)], options=PlanOptions(watchdog=watchdog))
         outputs, inputs = plan.devices[0].layout.sync_managers
         assert outputs.control == expected
         assert outputs.triggers_watchdog is (watchdog is None)

@@ -313,7 +313,8 @@ class MainDevice:
         """Return the plan for these requests, from the present mapping of the devices. Print it.
 
         The devices must be in PRE-OP. Nothing is written. For further options use `read_mappings`,
-        then `catenary.plan.make_plan`.
+        then `catenary.plan.make_plan`
+        with `PlanOptions`.
 
         Args:
             requests: `Drives`, `Inputs`, `Outputs` and other process-data requests.
@@ -326,18 +327,18 @@ class MainDevice:
         Raises:
             MappingError: A device cannot map an object.
         """
+        from catenary.plan.options import PlanOptions
         from catenary.plan.planner import make_plan
 
         self.read_mappings(*requests, period=period)
-        return make_plan(
-            [sub.description for sub in self.subs],
-            requests,
+        options = PlanOptions(
             period=period,
             execution=execution,
             receive_mode=receive_mode,
             optional=optional,
             watchdog=watchdog,
         )
+        return make_plan([sub.description for sub in self.subs], requests, options)
 
     def read_mappings(self, *requests: ProcessDataRequest, period: float = 1e-3) -> None:
         """Update the descriptions of the devices: mappings, and requested objects.
@@ -350,7 +351,7 @@ class MainDevice:
             CatenaryError: A device is not in PRE-OP; this is its error from the scan.
         """
         self._raise_errors()
-        from catenary.plan.planner import period_in_ns
+        from catenary.plan.options import period_in_ns
 
         self.master.read_mappings(requests, period_in_ns(period))
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import NamedTuple
 
 from catenary.errors import DriveError, StateError, WorkingCounterError
@@ -14,26 +15,30 @@ from catenary.wire.cia402 import IN_FAULT, AxisState
 from catenary.wire.drive_error import error_text
 
 
+@dataclass(frozen=True, slots=True)
+class Evidence:
+    """Answers of all devices to a read of the AL status, and further findings."""
+
+    answers: Sequence[Answer]
+    findings: Sequence[Finding] = ()  # faults that silent devices or error counters indicate
+    mute: Sequence[int] = ()  # positions of devices without inputs even in a separate frame
+    tight: str = ""  # hint that the period may be too short; or empty
+    without_address: Sequence[Answer] = ()  # silent at their addresses while others answer
+    other_masters: Sequence[str] = ()  # evidence of another master, as text
+
+
 def silence_error(
-    answers: Sequence[Answer],
-    suspects: Sequence[int],
-    lost: int,
-    log: Log | None,
-    findings: Sequence[Finding] = (),
-    mute: Sequence[int] = (),
-    tight: str = "",
+    evidence: Evidence, suspects: Sequence[int], lost: int, log: Log | None
 ) -> WorkingCounterError:
     """Return the error for `lost` bad cycles in a row.
 
     Args:
-        answers: Answers of all devices to a read of the AL status.
+        evidence: Answers of all devices, and further findings.
         suspects: Positions of the devices whose sync units failed.
         lost: Number of bad cycles.
         log: The last cycles.
-        findings: Faults that silent devices or error counters point to.
-        mute: Positions of devices whose inputs are missing even in a separate frame.
-        tight: Hint that the period may be too short; or empty.
     """
+    answers, findings = evidence.answers, evidence.findings
     silent = [answer.station for answer in answers if answer.word is None]
     others = [a for a in answers if a.station.position in suspects and a.word is not None]
     stray = [answer for answer in others if is_astray(answer)]
@@ -46,8 +51,8 @@ def silence_error(
     elif stray:
         who = f"not in OP: {'; '.join(map(described, stray))}"
         hint = "a device that was switched off and on again must be brought to OP again"
-    elif mute:
-        named = ", ".join(str(a.station) for a in answers if a.station.position in mute)
+    elif evidence.mute:
+        named = ", ".join(str(a.station) for a in answers if a.station.position in evidence.mute)
         who = f"in OP, but without process data: {named}"
         hint = (
             "its FMMU or SyncManager was switched off by another program on this segment or by "
@@ -56,7 +61,7 @@ def silence_error(
     else:
         who = f"all devices answer single reads; affected: devices {listed(suspects)}"
         who += "".join(f"; {each.where}: {each.evidence}" for each in findings)
-        hint = tight or (
+        hint = evidence.tight or (
             "frames are lost, corrupted or late: check the cables and other traffic on the "
             "port; if the segment is a program on a busy machine, allow more lost cycles with "
             "StopPolicy(lost_limit=...)"
@@ -117,7 +122,7 @@ def _suspicion(answer: Answer, other_masters: Sequence[str]) -> str:
     )
 
 
-def forgetful_error(silent: Sequence[Answer], al_status: int, log: Log | None) -> StateError:
+def address_error(silent: Sequence[Answer], al_status: int, log: Log | None) -> StateError:
     """Return the error for devices that lost their addresses while all frames return.
 
     Such a device was switched off for a moment.

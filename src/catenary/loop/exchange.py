@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Protocol
 
 from catenary.bus import CycleClock, Pending
 from catenary.core import Engine
-from catenary.errors import CatenaryError
+from catenary.loop.cycle_errors import Evidence
 from catenary.loop.watches.device import Attendance
 
 
@@ -29,11 +30,11 @@ class Exchange(Protocol):
     def bring_to_op(self) -> list[Pending[None]]:
         """Bring the devices from SAFE-OP to OP while cycles flow; return the watches that run."""
 
-    def silence_error(self) -> CatenaryError:
-        """Query the devices, and return the error for cycles without answers."""
+    def query_silence(self, suspects: Sequence[int]) -> Evidence:
+        """Query all devices about cycles without answers of the `suspects`."""
 
-    def raise_astray(self) -> None:
-        """Raise StateError if a required device is out of OP."""
+    def query_states(self) -> Evidence:
+        """Query all devices for their states."""
 
     def error_code(self, axis: int) -> int | None:
         """Return object 0x603F of an axis; None if the drive does not answer."""

@@ -9,7 +9,7 @@ from catenary.bus import Carrier, CycleClock, MainDevice, Pending, SubDevice
 from catenary.bus.event_types import DeviceLost, DeviceReturned, StateLost
 from catenary.core import Engine
 from catenary.errors import CatenaryError, ConfigurationError
-from catenary.loop.cycle_errors import described, is_astray, silence_error, state_error
+from catenary.loop.cycle_errors import Evidence, described, is_astray
 from catenary.loop.session import FATAL, Session
 from catenary.loop.watches.device import LOOK, Attendance
 from catenary.plan.cycle import DatagramKind
@@ -66,21 +66,14 @@ class CarriedExchange:
             sub.state = AlState.OP
         return [self._session.service.runner.submit(self.watch.run())]
 
-    def silence_error(self) -> CatenaryError:
-        """Query all devices through the carrier, and return the error."""
-        session = self._session
-        lost, log, suspects = session.engine.lost_in_row, session.log(), session.suspects()
-        session.stop_axes_at_once()
-        [answers] = session.service.converse(self._carrier.survey())
-        return silence_error(answers, suspects, lost, log)
+    def query_silence(self, suspects: Sequence[int]) -> Evidence:
+        """Query all devices through the carrier."""
+        return self.query_states()
 
-    def raise_astray(self) -> None:
-        log = self._session.log()
+    def query_states(self) -> Evidence:
+        """Query all devices through the carrier for their states."""
         [answers] = self._session.service.converse(self._carrier.survey())
-        needed = [a for a in answers if self.watch.requires(a.station.position)]
-        error = state_error(needed, log)
-        if error is not None:
-            raise error
+        return Evidence(answers)
 
     def error_code(self, axis: int) -> int | None:
         plan = self._session.plan.cycle.axes[axis]

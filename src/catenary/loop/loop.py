@@ -11,7 +11,6 @@ import warnings
 import weakref
 from collections.abc import Iterator, Sequence
 from contextlib import AbstractContextManager
-from functools import partial
 from types import TracebackType
 
 from catenary.bus import SubDevice
@@ -40,7 +39,8 @@ from catenary.loop.signals import SignalGuard
 from catenary.loop.stream import Stream
 from catenary.loop.timing import Timing
 from catenary.plan.cycle import ExecutionMode
-from catenary.plan.planner import Plan, period_in_ns
+from catenary.plan.options import period_in_ns
+from catenary.plan.planner import Plan
 from catenary.plan.sink import Sink
 from catenary.wire.al import AlState
 
@@ -135,7 +135,6 @@ class Loop:
         )
         self._quorum = checked_quorum(scheduling.quorum, count)
         self._enable = enable
-        self._faults = stop.raise_faults
         leaving = (Loop.close, Loop.__exit__, Loop._leave, leave_open_loop)
         self._guard = SignalGuard(tuple(each.__code__ for each in leaving))
         self._leaving = threading.RLock()
@@ -296,10 +295,10 @@ class Loop:
     def _make_iteration(self) -> Iteration | NetworksIteration:
         first = self._opened
         if len(self._networks) > 1:
-            return NetworksIteration(self._networks, self._quorum, faults=self._faults)
+            return NetworksIteration(self._networks, self._quorum)
         return Iteration(
             first.engine,
-            partial(first.judge, faults=self._faults),
+            first.judge,
             trouble=TROUBLE,
             al_status=AlState.OP,
             beside=first.service.beside,

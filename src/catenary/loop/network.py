@@ -25,7 +25,8 @@ from catenary.loop.options import ClockOptions, Scheduling, StopPolicy
 from catenary.loop.session import Session
 from catenary.loop.stream import Stream
 from catenary.loop.timing import Timing
-from catenary.plan.cycle import ExecutionMode
+from catenary.plan.cycle import ExecutionMode, ReceiveMode
+from catenary.plan.options import PlanOptions
 from catenary.plan.planner import Plan, make_plan
 from catenary.plan.sink import Sink
 from catenary.wire.al import AlState
@@ -48,6 +49,45 @@ class Settings:
     stop: StopPolicy
     scheduling: Scheduling
     clocks: ClockOptions
+
+    def plan_options(self, main: MainDevice, cpu: int | None) -> PlanOptions:
+        """Return the options of one network's plan.
+
+        Args:
+            main: MainDevice of the network.
+            cpu: CPU of its native thread; None: unchanged.
+        """
+        late_position, late_velocity, late_torque = self.stop.late_limits
+        command_velocity, command_torque = self.stop.command_timeouts
+        reference = self.clocks.reference
+        if reference is not None and reference.main is not main:
+            reference = None  # a device of another network of the loop
+        by_execution: ReceiveMode = "poll" if self.execution == "inline" else "wait"
+        return PlanOptions(
+            period=self.period,
+            execution=self.execution,
+            receive_mode=self.scheduling.receive or by_execution,
+            watchdog=self.watchdog,
+            lost_limit=self.stop.lost_limit,
+            late_limit_position=late_position,
+            late_limit_velocity=late_velocity,
+            late_limit_torque=late_torque,
+            handover=self.stop.handover,
+            command_timeout_velocity=command_velocity,
+            command_timeout_torque=command_torque,
+            stop_deadline=self.stop.stop_deadline,
+            busy_wait=self.scheduling.busy_wait,
+            collect_share=self.scheduling.collect_deadline,
+            log=self.log,
+            log_axes=self.log_axes,
+            cpu=cpu,
+            priority=self.priority,
+            clock=self.clocks.lead or "reference",
+            reference=None if reference is None else reference.position,
+            margin=self.clocks.margin,
+            burst=self.clocks.burst,
+            exact_matching=self.scheduling.exact_matching,
+        )
 
 
 class Network:
@@ -143,46 +183,15 @@ class Network:
         """Return the plan of the requests. Nothing is written to the devices yet."""
         its = self._settings
         self.main.read_mappings(*self._requests, period=its.period)
-        late_position, late_velocity, late_torque = its.stop.late_limits
-        command_velocity, command_torque = its.stop.command_timeouts
-        reference = its.clocks.reference
-        if reference is not None and reference.main is not self.main:
-            reference = None  # a device of another network of the loop
-        receive = its.scheduling.receive
-        return make_plan(
-            [sub.description for sub in self.main.subs],
-            self._requests,
-            period=its.period,
-            execution=its.execution,
-            receive_mode=receive or ("poll" if its.execution == "inline" else "wait"),
-            watchdog=its.watchdog,
-            lost_limit=its.stop.lost_limit,
-            late_limit_position=late_position,
-            late_limit_velocity=late_velocity,
-            late_limit_torque=late_torque,
-            handover=its.stop.handover,
-            command_timeout_velocity=command_velocity,
-            command_timeout_torque=command_torque,
-            stop_deadline=its.stop.stop_deadline,
-            busy_wait=its.scheduling.busy_wait,
-            collect_share=its.scheduling.collect_deadline,
-            log=its.log,
-            clock=its.clocks.lead or "reference",
-            reference=None if reference is None else reference.position,
-            margin=its.clocks.margin,
-            burst=its.clocks.burst,
-            exact_matching=its.scheduling.exact_matching,
-            cpu=self._cpu,
-            priority=its.priority,
-            log_axes=its.log_axes,
-        )
+        devices = [sub.description for sub in self.main.subs]
+        return make_plan(devices, self._requests, its.plan_options(self.main, self._cpu))
 
     def advance(self, flags: int) -> None:
         """Do the work that belongs to a cycle without an iteration, and raise its error, if any."""
         session = self.session
         session.service.step_without_thread()
         if flags & TROUBLE or session.engine.al_status != AlState.OP:
-            session.judge(flags, faults=self._settings.stop.raise_faults)
+            session.judge(flags)
 
     def wait_locked(self, within: float, timeout: float) -> None:
         """Wait until the clocks are locked: see `Loop.wait_locked`.
@@ -192,7 +201,7 @@ class Network:
             timeout: Longest wait [s].
         """
         self.clocks.wait(within, timeout, self.advance)
-        self.session.judge(CYCLE_CLOCKS, faults=self._settings.stop.raise_faults)
+        self.session.judge(CYCLE_CLOCKS)
 
 
 def leave_method(loop_leave: Callable[[], None]) -> Callable[[], object]:

@@ -71,10 +71,9 @@ class NetworksCycle(Cycle):
 class NetworksIteration:
     """Iterator that steps all networks once per `next` and yields their common NetworksCycle."""
 
-    def __init__(self, networks: Sequence[Network], quorum: int, *, faults: bool) -> None:
+    def __init__(self, networks: Sequence[Network], quorum: int) -> None:
         self._sessions = [network.session for network in networks]
         self._quorum = quorum
-        self._faults = faults
         self._dead: set[int] = set()  # identities of the failed networks that have not returned
         self._cycle: NetworksCycle | None = None
         self.commit_lock: Lock | None = None  # see core.Iteration
@@ -129,7 +128,7 @@ class NetworksIteration:
             if mine & TROUBLE or one.engine.al_status != AlState.OP:
                 if not lives:
                     self._stop_others(one)
-                one.judge(mine, faults=self._faults)
+                one.judge(mine)
 
     def _lives(self, one: Session, flags: int) -> bool:
         """Return whether a network is alive.

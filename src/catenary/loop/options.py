@@ -10,16 +10,17 @@ from typing import Literal
 from catenary.bus import SubDevice
 from catenary.plan.clocks import BURST
 from catenary.plan.cycle import FollowedClock, ReceiveMode
+from catenary.plan.options import (
+    COMMAND_TIMEOUT_TORQUE,
+    COMMAND_TIMEOUT_VELOCITY,
+    HANDOVER,
+    LATE_LIMIT_POSITION,
+    LATE_LIMIT_TORQUE,
+    LATE_LIMIT_VELOCITY,
+)
 
 AxisStopReaction = Literal["raise", "event"]
 ReturnPolicy = Literal["restore", "hold"]
-
-HANDOVER = 0.020  # [s], CST
-LATE_LIMIT_POSITION = 0.050  # [s], CSP
-LATE_LIMIT_VELOCITY = 0.050  # [s], CSV
-LATE_LIMIT_TORQUE = 0.010  # [s], CST
-COMMAND_TIMEOUT_VELOCITY = 0.200  # [s], CSV
-COMMAND_TIMEOUT_TORQUE = 0.020  # [s], CST
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -14,42 +14,33 @@ from catenary.core import (
     AXIS_FOLLOWED,
     CYCLE_CLOCKS,
     CYCLE_DROPPED,
-    CYCLE_LAW_FAILED,
     CYCLE_NONE,
     CYCLE_OK,
     CYCLE_STOPPED,
     CYCLE_WORKING_COUNTER,
     REQUEST_ENABLED,
-    REQUEST_QUICK_STOP,
     REQUEST_RESET,
 )
-from catenary.errors import CatenaryError, DriveError, LinkError, LoopError
+from catenary.errors import CatenaryError, LinkError, LoopError
 from catenary.link import forget_in_child
 from catenary.log import Log
 from catenary.loop.acyclic_service import Service
 from catenary.loop.buffers import bind_requests
 from catenary.loop.clocks import Clocks
-from catenary.loop.cycle_errors import (
-    AxisTrouble,
-    drive_error,
-)
 from catenary.loop.exchange import Exchange
+from catenary.loop.fault_report import FaultReport
 from catenary.loop.interpreter import switch_interval
 from catenary.loop.laws.runner import LawRunner
-from catenary.loop.log_rows import read_log
 from catenary.loop.options import StopPolicy
 from catenary.loop.publishing import Publisher
 from catenary.loop.safe_outputs import confirm_safe, make_safe
 from catenary.loop.signals import SignalGuard
-from catenary.loop.stop_error import stopped_error
 from catenary.loop.timing import Timing
-from catenary.loop.watches.axis import AxisWatch, RefusedMode, StoppedAxis
 from catenary.plan.planner import Plan
 from catenary.plan.request import ProcessDataRequest
 from catenary.plan.sink import Sink
-from catenary.plan.stop_reason import UNASKED, StopReason
 from catenary.wire.al import AlState
-from catenary.wire.cia402 import IN_FAULT, AxisState, Mode, state_of
+from catenary.wire.cia402 import IN_FAULT, AxisState, Mode
 
 FATAL = CYCLE_WORKING_COUNTER | CYCLE_STOPPED | CYCLE_NONE
 ENABLE_TIMEOUT_NS = 5_000_000_000  # longer than slow mains contactors and brakes need
@@ -82,13 +73,12 @@ class Session:
             is_open=lambda: self.is_open,
             is_led=lambda: self.engine.led,
         )
-        self._axis_watch = AxisWatch(self.views, plan.cycle.axes)
         self.stop = stop
         self.laws = LawRunner(self.engine, plan)
-        clock = plan.cycle.clock
-        self.clocks: Clocks | None = None
-        if clock is not None:
-            self.clocks = Clocks(main, self.engine, self.exchange.cycle_clock(), clock, self.cycle)
+        self.faults = FaultReport(
+            main, plan.cycle, self.engine, self.views, self.exchange, self.laws, stop
+        )
+        self.clocks = self._make_clocks()
         self.service = Service(main, self.engine, plan)
         self.exchange.attend()
         self.watch = self.exchange.watch
@@ -104,6 +94,12 @@ class Session:
         self._counted: Mapping[str, int] = {}  # counters of the engine when the loop was entered
         self.end_background: Callable[[], None] = _no_background  # the thread that iterates
         self.service.cycle = self.cycle
+
+    def _make_clocks(self) -> Clocks | None:
+        clock = self.plan.cycle.clock
+        if clock is None:
+            return None
+        return Clocks(self.main, self.engine, self.exchange.cycle_clock(), clock, self.cycle)
 
     # Opening
 
@@ -191,14 +187,14 @@ class Session:
         while True:
             flags = self.cycle()
             if flags & CYCLE_DROPPED:
-                self._announce_axes()
+                self.faults.report_axes()
             axes = np.flatnonzero(waiting()).tolist()
             if not axes:
                 return
             if flags & FATAL or self.engine.al_status != AlState.OP:
-                self.judge(flags, faults=False)
+                self.judge(flags, enabling=True)
             if self.engine.now() > deadline:
-                raise self._drive_error(axes, "cannot be enabled")
+                raise self.faults.drive_error(axes, "cannot be enabled")
 
     def refuse_powered_torque(self, call: str) -> None:
         """Raise LoopError for axes that are powered in CST: a waiting call commits no torque."""
@@ -221,7 +217,7 @@ class Session:
             self.raise_ended(flags)
             if flags & CYCLE_OK:
                 return
-        raise self.exchange.silence_error()
+        raise self.faults.silence()
 
     # Session
 
@@ -239,86 +235,33 @@ class Session:
         period = self.plan.cycle.period_ns * 1e-9
         return Timing(engine.histograms(), since, period=period, scheduling=engine.scheduling)
 
-    def judge(self, flags: int, *, faults: bool) -> None:
-        """Announce the events of a cycle in trouble, and raise its error, if any.
+    def judge(self, flags: int, *, enabling: bool = False) -> None:
+        """Put the events of a cycle, and raise the exception that ends the loop, if any.
 
         Args:
             flags: Flags of the cycle.
-            faults: True to raise DriveError for drives in fault or stopped by themselves.
+            enabling: True while the drives are being enabled: a fault is then not an error.
         """
         for mover in list(self.views.movers):
             mover.check()
-        self.raise_ended(flags)
-        stops = self._announce_axes() if flags & CYCLE_DROPPED else []
+        error = self.faults.error(flags, enabling=enabling)
         if flags & CYCLE_CLOCKS:
             self.announce_clocks()
-        if flags & CYCLE_WORKING_COUNTER:
-            raise self.exchange.silence_error()
-        if flags & CYCLE_LAW_FAILED:
-            self.laws.raise_failure(self.log())
-        if self.engine.al_status != AlState.OP and not self.watch.excuses:
-            self.exchange.raise_astray()
-            stops += self._announce_axes(explained=True)  # the flags of its cycles are lost
-        states = [state_of(word) for word in self.views.statusword.tolist()]
-        faulty = [
-            axis
-            for axis, state in enumerate(states)
-            if state in IN_FAULT and self.watch.requires(self.plan.cycle.axes[axis].device)
-        ]
-        if faulty and faults:
-            if self.engine.al_status != AlState.OP:
-                self.exchange.raise_astray()  # the fault may be its consequence
-            raise self._drive_error(faulty, "in fault")
-        self._raise_stopped([s for s in stops if self.watch.requires(s.device)], faults=faults)
-
-    def _announce_axes(self, *, explained: bool = False) -> list[StoppedAxis]:
-        """Put an event for each axis that the core stopped unasked and each refused mode.
-
-        Args:
-            explained: True if no flag of a cycle caused the call: see `new_refusals`.
-
-        Returns:
-            The new stops.
-        """
-        stops = self._axis_watch.new_stops()
-        refusals = self._axis_watch.new_refusals(explained=explained or bool(stops))
-        now = self.engine.now() * 1e-9
-        news: list[StoppedAxis | RefusedMode] = [stop for stop in stops if not stop.requested]
-        for each in [*news, *refusals]:
-            self.main.events.put(each.event(now, self.main.subs[each.device]))
-        return stops
-
-    def _raise_stopped(self, stops: Sequence[StoppedAxis], *, faults: bool) -> None:
-        """Raise DriveError for required axes that stopped without a request."""
-        left = [s.axis for s in stops if s.reason is StopReason.LEFT_OPERATION]
-        faulty = [s.axis for s in stops if s.reason is StopReason.FAULT]
-        if faults and faulty:
-            raise self._drive_error(faulty, "in fault")
-        if faults and left:
-            raise self._drive_error(left, "left OPERATION_ENABLED by itself")
-        unasked = [s for s in stops if s.reason in UNASKED]
-        if unasked and self.stop.on_axis_stopped == "raise":
-            log = self.log()
-            self.stop_axes_at_once()
-            raise stopped_error(unasked, self.plan.cycle, log)
+        if error is not None:
+            raise error
 
     def announce_clocks(self) -> None:
         if self.clocks is not None:
             self.clocks.announce()
 
     def raise_ended(self, flags: int) -> None:
-        if flags & CYCLE_STOPPED:
-            raise LoopError("the cycle has ended: the link failed", log=self.log())
-        if flags & CYCLE_NONE:
-            raise LoopError(
-                "cycle thread stalled: no cycle completed within 1 s",
-                log=self.log(),
-                hint="the native thread does not get the CPU: see loop.scheduling",
-            )
+        """Raise LoopError for a cycle that was not run."""
+        if (error := self.faults.ended(flags)) is not None:
+            raise error
 
     def log(self) -> Log:
         """Return the last cycles, oldest first."""
-        return read_log(self.engine, self.plan.cycle)
+        return self.faults.log()
 
     # Leaving
 
@@ -379,9 +322,7 @@ class Session:
 
     def stop_axes_at_once(self) -> None:
         """Stop all axes from the next cycle on; replace requests that are not committed yet."""
-        self.views.requested_state[:] = REQUEST_QUICK_STOP
-        self.views.request[:] += 1
-        self.engine.quick_stop_all()
+        self.faults.stop_axes()
 
     def _stop_cycle(self, guard: SignalGuard) -> None:
         try:
@@ -404,30 +345,6 @@ class Session:
         except LinkError:
             if any(self.watch.requires(sub.position) for sub in self.main.subs):
                 raise  # otherwise the loop ends without its optional devices, as it ran
-
-    # Errors
-
-    def suspects(self) -> list[int]:
-        """Return the positions of required devices in units without a last answer."""
-        units = self.plan.cycle.sync_units
-        valid = self.engine.buffers["unit_valid"].tolist()
-        return [
-            position
-            for unit, answered in zip(units, valid, strict=True)
-            if not answered and not unit.optional
-            for position in unit.devices
-        ]
-
-    def _drive_error(self, axes: Sequence[int], what: str) -> DriveError:
-        """Return the error for some axes, with the state and error code of each drive."""
-        log = self.log()
-        states = [state_of(self.views.statusword.item(axis)) for axis in axes]
-        self.stop_axes_at_once()
-        troubles = [
-            AxisTrouble(self.plan.cycle.axes[axis].name, state, self.exchange.error_code(axis))
-            for axis, state in zip(axes, states, strict=True)
-        ]
-        return drive_error(troubles, what, log)
 
 
 def _no_background() -> None:

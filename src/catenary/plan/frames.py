@@ -86,8 +86,7 @@ def make_frames(
     """
     pieces = [_al_status(device_count), *_of_clocks(clocks)]
     for number, unit in enumerate(units):
-        for piece in _of_unit(unit, number):
-            pieces.append(replace(piece, divider=unit.divider, phase=unit.phase))
+        pieces.extend(_of_unit(unit, number))
     pieces.extend(_of_mailboxes(mailboxes))
     room = MAXIMUM_PAYLOAD - (CYCLE_NUMBER_SIZE if exact_matching else 0)
     batches = _batches(pieces, room)
@@ -237,48 +236,37 @@ def _of_mailboxes(area: MailboxArea | None) -> list[_Piece]:
 
 
 def _of_unit(unit: UnitLayout, number: int) -> list[_Piece]:
-    out_size, in_size = unit.output_size, unit.input_size
-    if unit.logical_read_write and out_size and in_size:
-        return [
-            _Piece(
-                DatagramKind.PROCESS_DATA,
-                EcatCommand.LRW,
-                unit.logical_start,
-                out_size + in_size,
-                2 * unit.output_devices + unit.input_devices,
-                number,
-                outputs=(Copy(0, unit.output_offset, out_size),),
-                inputs=(Copy(out_size, unit.input_offset, in_size),),
-            )
-        ]
-    pieces = []
-    if out_size:
-        outputs = (Copy(0, unit.output_offset, out_size),)
-        pieces.append(
-            _Piece(
-                DatagramKind.PROCESS_DATA,
-                EcatCommand.LWR,
-                unit.logical_start,
-                out_size,
-                unit.output_devices,
-                number,
-                outputs=outputs,
-            )
-        )
-    if in_size:
-        inputs = (Copy(0, unit.input_offset, in_size),)
-        pieces.append(
-            _Piece(
-                DatagramKind.PROCESS_DATA,
-                EcatCommand.LRD,
-                unit.logical_start + out_size,
-                in_size,
-                unit.input_devices,
-                number,
-                inputs=inputs,
-            )
-        )
-    return pieces
+    """Return the datagrams of a unit: one LRW if its devices allow it, otherwise LWR and LRD."""
+    outputs = _Piece(
+        DatagramKind.PROCESS_DATA,
+        EcatCommand.LWR,
+        unit.logical_start,
+        unit.output_size,
+        unit.output_devices,
+        number,
+        outputs=(Copy(0, unit.output_offset, unit.output_size),),
+        divider=unit.divider,
+        phase=unit.phase,
+    )
+    inputs = replace(
+        outputs,
+        command=EcatCommand.LRD,
+        address=unit.logical_start + unit.output_size,
+        length=unit.input_size,
+        expected_counter=unit.input_devices,
+        outputs=(),
+        inputs=(Copy(0, unit.input_offset, unit.input_size),),
+    )
+    if not (unit.logical_read_write and outputs.length and inputs.length):
+        return [piece for piece in (outputs, inputs) if piece.length]
+    both = replace(
+        outputs,
+        command=EcatCommand.LRW,
+        length=outputs.length + inputs.length,
+        expected_counter=2 * unit.output_devices + unit.input_devices,
+        inputs=(Copy(unit.output_size, unit.input_offset, unit.input_size),),
+    )
+    return [both]
 
 
 def _batches(pieces: Sequence[_Piece], room: int) -> list[list[_Piece]]:

@@ -14,7 +14,7 @@ import struct
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from typing import cast
+from typing import TYPE_CHECKING, cast
 
 from catenary.errors import ConfigurationError
 from catenary.model.device import (
@@ -33,6 +33,9 @@ from catenary.plan.pdo_mapping import ASSIGNMENT_BASE, Mapping, shape
 from catenary.plan.start_up_object import StartUp
 from catenary.types import Scalar, by_index
 from catenary.wire.register import watchdog_unit_ns
+
+if TYPE_CHECKING:  # request.py needs NumPy; a scan does not
+    from catenary.plan.request import DeviceRequest
 
 WATCHDOG_DIVIDER = 2498  # the controller's reset value
 WATCHDOG_UNIT_NS = watchdog_unit_ns(WATCHDOG_DIVIDER)  # 100 µs
@@ -93,33 +96,36 @@ class DevicePlan:
 
 def make_device_plan(
     device: DeviceDescription,
+    request: DeviceRequest,
     outputs: Mapping,
     inputs: Mapping,
     layout: DeviceLayout,
-    start_up: Sequence[tuple[int, int, bytes]],
     watchdog_ns: int,
     sync: SyncPlan | None = None,
-    objects: Sequence[StartUp] = (),
 ) -> DevicePlan:
     """Return the plan of one device.
 
     Args:
         device: Description of the device.
+        request: Its combined request, with the objects to write.
         outputs: Mapping of the outputs.
         inputs: Mapping of the inputs.
         layout: Place of its process data.
-        start_up: Our own objects: index, subindex, data.
         watchdog_ns: Watchdog time of the process data; 0: off.
         sync: Settings of the SYNC unit; None: no SYNC signals.
-        objects: Start-up objects of the application.
 
     Raises:
         ConfigurationError: The device cannot have a start-up object, or its type is unknown.
     """
-    requested = tuple(Download(index, subindex, data) for index, subindex, data in start_up)
-    before, after = object_downloads(device, objects)
-    told = sync.objects if sync is not None and device.coe else ()
-    clocks = tuple(Download(*each, optional=True) for each in told)
+    before, after = object_downloads(device, request.objects)
+    of_sync = sync.objects if sync is not None and device.coe else ()
+    start_up = (
+        *(Download(*each) for each in request.start_up),
+        *(Download(*each, optional=True) for each in of_sync),
+        *after,
+    )
+    written = [(each.index, each.subindex, each.data) for each in (*before, *start_up)]
+    left_out = outputs.left_out + inputs.left_out
     return DevicePlan(
         position=device.position,
         name=device.name,
@@ -130,22 +136,17 @@ def make_device_plan(
         layout=layout,
         before_mapping=before,
         mapping=(*mapping_downloads(outputs), *mapping_downloads(inputs)),
-        start_up=(*requested, *clocks, *after),
+        start_up=start_up,
         mapping_changed=outputs.changed or inputs.changed,
         watchdog_ns=watchdog_ns,
         sync=sync,
         changes=(
             *mapping_changes(device, Direction.OUTPUT, outputs),
             *mapping_changes(device, Direction.INPUT, inputs),
-            *value_changes(
-                device,
-                [(d.index, d.subindex, d.data) for d in (*before, *requested, *clocks, *after)],
-            ),
+            *value_changes(device, written),
         ),
         rejected=outputs.rejected + inputs.rejected,
-        left_out=tuple(
-            f"0x{each.index:04X}:{each.subindex:02X}" for each in outputs.left_out + inputs.left_out
-        ),
+        left_out=tuple(f"0x{each.index:04X}:{each.subindex:02X}" for each in left_out),
     )
 
 

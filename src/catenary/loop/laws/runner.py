@@ -114,15 +114,20 @@ class LawRunner:
         """
         while run.running:
             judge(self._engine.run_law(SLICE_NS, trouble))
-        self.raise_failure(None)
+        if (failure := self.failure(None)) is not None:
+            raise failure
 
-    def raise_failure(self, log: Log | None) -> None:
-        """Raise the error of the law if it has failed."""
+    def failure(self, log: Log | None) -> LawError | None:
+        """Return the error of the law if it has failed, once.
+
+        Args:
+            log: The last cycles.
+        """
         run = self._run
         error = run.error(self._axes, log, lambda: self._replay(run)) if run else None
         if error is not None:
             self._run = None
-            raise error
+        return error
 
     def _replay(self, run: LawRun) -> str:
         """Run the last step again as Python on copies; return its exception as text."""
