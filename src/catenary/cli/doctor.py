@@ -40,6 +40,19 @@ def add_parser(commands: Commands) -> None:
     parser.add_argument(
         "nic", metavar="NIC", nargs="?", help="the network card of the segment: eth0"
     )
+    _add_measurement(parser)
+    add_json(parser)
+    action = parser.add_mutually_exclusive_group()
+    action.add_argument(
+        "--apply", action="store_true", help="list reversible changes, ask, then apply them"
+    )
+    action.add_argument("--undo", action="store_true", help="undo the changes of --apply")
+    parser.add_argument("--yes", action="store_true", help="with --apply: do not ask")
+    parser.set_defaults(run=run)
+
+
+def _add_measurement(parser: argparse.ArgumentParser) -> None:
+    """Add the options of the thread that measures the wake-up latency."""
     parser.add_argument(
         "--seconds",
         type=seconds,
@@ -61,14 +74,6 @@ def add_parser(commands: Commands) -> None:
         type=number,
         help="CPU of its thread (default: the last isolated one, else the last)",
     )
-    add_json(parser)
-    doing = parser.add_mutually_exclusive_group()
-    doing.add_argument(
-        "--apply", action="store_true", help="list reversible changes, ask, then apply them"
-    )
-    doing.add_argument("--undo", action="store_true", help="undo the changes of --apply")
-    parser.add_argument("--yes", action="store_true", help="with --apply: do not ask")
-    parser.set_defaults(run=run)
 
 
 def run(arguments: argparse.Namespace) -> int:

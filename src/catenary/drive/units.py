@@ -143,8 +143,10 @@ class AxisUnits:
 
 
 def per_axis(name: str, value: V | Sequence[V], n: int) -> tuple[V, ...]:
-    """Return one value for each of n axes, from one value or from n values."""
-    return one_each(name, value, n) if isinstance(value, Sequence) else (value,) * n
+    """Return one value for each of n axes, from one value (a str is one) or from n values."""
+    if isinstance(value, str) or not isinstance(value, Sequence):
+        return (value,) * n
+    return one_each(name, value, n)
 
 
 def one_each(name: str, values: Sequence[V], n: int) -> tuple[V, ...]:

@@ -110,6 +110,14 @@ def _upload(
             f"the limit is {limit}",
             hint="if the object is that large, increase the limit; else its firmware is at fault",
         )
+    return (yield from _upload_segments(channel, first, timeout))
+
+
+def _upload_segments(
+    channel: MailboxChannel, first: UploadResponse, timeout: float
+) -> Procedure[bytes]:
+    """Read the segments of an object after its first response, ETG.1000.6 §5.6.2.6."""
+    index, subindex = first.index, first.subindex
     data = bytearray(first.data)
     toggle, last = False, False
     deadline = Deadline(timeout)

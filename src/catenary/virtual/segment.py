@@ -94,10 +94,7 @@ class Segment:
         ring: bool = False,
         link_loss_detection: float | Literal["enhanced", "standard"] = "enhanced",
     ) -> None:
-        if clock not in ("virtual", "monotonic") and not isinstance(clock, SharedClock):
-            raise ValueError(
-                f'clock must be "virtual", "monotonic" or a VirtualClock, not {clock!r}'
-            )
+        _check_clock(clock)
         self._devices = list(devices)
         self.clock: ClockKind = "monotonic" if clock == "monotonic" else "virtual"
         wiring = Wiring([device.ports for device in devices], behind or {}, ring=ring)
@@ -251,6 +248,11 @@ class Segment:
     def _plug_first(self, devices: int) -> None:
         for number in range(len(self._devices)):
             self._wires.plug_cable(number, number < devices, at_once=True)
+
+
+def _check_clock(clock: object) -> None:
+    if clock not in ("virtual", "monotonic") and not isinstance(clock, SharedClock):
+        raise ValueError(f'clock must be "virtual", "monotonic" or a VirtualClock, not {clock!r}')
 
 
 def _detection_ns(given: float | str) -> int:
