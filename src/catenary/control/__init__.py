@@ -5,6 +5,8 @@ A block is two things: a value that holds its numbers (`Cascade(...)`, with `.pa
 (`cascade(memory, parameters, i, ...)`). State is nowhere but in the memory; zeros begin anew.
 """
 
+# Steps take their numbers one by one, up to ten parameters: laws call them compiled by numba, where
+# a frozen options class is not available.
 from catenary.control.admittance import NaturalAdmittance, natural_admittance
 from catenary.control.cascade import Cascade, cascade
 from catenary.control.collision import Residual, Threshold, model_residual, residual, threshold

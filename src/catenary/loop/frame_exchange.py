@@ -62,8 +62,7 @@ class FrameExchange:
             now=now,
             rejoin=None if session.clocks is None else session.clocks.rejoin,
             cables_seen=session.announce_clocks,
-            on_return=session.stop.on_return,
-            on_replacement=session.stop.on_replacement,
+            policy=session.stop,
         )
         self.errors = ErrorWatch(session.main, now=now)
         self.frames = FrameWatch(self._repeated_frames, put=put, now=now)

@@ -19,7 +19,7 @@ from catenary.errors import LawError
 from catenary.log import Log
 from catenary.loop.background import Background, program_ends
 from catenary.loop.clocks import Clocks
-from catenary.loop.devices import LoopRequest, by_network
+from catenary.loop.devices import LoopRequest
 from catenary.loop.laws.law import Law, LawFunction
 from catenary.loop.laws.law import law as made_law
 from catenary.loop.laws.run import LawRun, Numbers
@@ -27,24 +27,20 @@ from catenary.loop.moves import Awaited, require_move, wait_for_move
 from catenary.loop.network import ENDING, TROUBLE, Network, Settings, leave_method
 from catenary.loop.networks import (
     NetworksIteration,
-    clocks_of_several,
-    cpus_for,
     leave_all,
+    make_networks,
     share_time,
 )
-from catenary.loop.options import ClockOptions, Scheduling, StopPolicy, check_groups, one_of
-from catenary.loop.publishing import one_sink_each
+from catenary.loop.options import ClockOptions, Scheduling, StopPolicy
 from catenary.loop.session import Session, take_down
 from catenary.loop.signals import SignalGuard
 from catenary.loop.stream import Stream
 from catenary.loop.timing import Timing
 from catenary.plan.cycle import ExecutionMode
-from catenary.plan.options import period_in_ns
 from catenary.plan.planner import Plan
 from catenary.plan.sink import Sink
 from catenary.wire.al import AlState
 
-LOG_LIMIT = 2**24  # cycles, about a gigabyte
 LEAVE_TIMEOUT = 60.0  # [s] to wait for another thread that leaves the loop
 
 
@@ -100,22 +96,6 @@ class Loop:
         clocks: ClockOptions = ClockOptions(),
         log_axes: bool = False,
     ) -> None:
-        one_of("execution", execution, ("threaded", "inline"))
-        check_groups(stop, scheduling, clocks)
-        period_in_ns(period)
-        if scheduling.busy_wait >= period:
-            raise ValueError(
-                f"busy_wait={scheduling.busy_wait} s: must be less than the period of {period} s"
-            )
-        if not 1 <= log <= LOG_LIMIT:
-            raise ValueError(f"log={log} cycles: must be 1 to {LOG_LIMIT}")
-        groups = by_network(requests)
-        count = len(groups)
-        if count > 1:
-            refuse_for_several(execution, laws)
-            clocks = clocks_of_several(clocks)
-        elif cpu is not None and not isinstance(cpu, int):
-            raise ValueError(f"cpu={cpu}: one network has one thread, on one CPU")
         settings = Settings(
             period=period,
             execution=execution,
@@ -128,12 +108,8 @@ class Loop:
             scheduling=scheduling,
             clocks=clocks,
         )
-        cpus = cpus_for(count, cpu) if count > 1 else [cpu if isinstance(cpu, int) else None]
-        self._networks = tuple(
-            Network(main, mine, settings, cpu=one, sink=its)
-            for (main, mine), one, its in zip(groups, cpus, one_sink_each(sink, count), strict=True)
-        )
-        self._quorum = checked_quorum(scheduling.quorum, count)
+        self._networks = make_networks(requests, settings, cpu, sink)
+        self._quorum = checked_quorum(scheduling.quorum, len(self._networks))
         self._enable = enable
         leaving = (Loop.close, Loop.__exit__, Loop._leave, leave_open_loop)
         self._guard = SignalGuard(tuple(each.__code__ for each in leaving))
@@ -540,17 +516,6 @@ class Loop:
             if is_ours:
                 self._leaving.release()
         return problems
-
-
-def refuse_for_several(execution: ExecutionMode, laws: Sequence[Law | LawFunction]) -> None:
-    """Raise ValueError for options that only one network can have."""
-    if execution != "threaded":
-        raise ValueError(
-            'several networks need execution="threaded": a thread that iterates can only keep the '
-            "cycle starts of one"
-        )
-    if laws:
-        raise ValueError("laws work on one network: make a separate Loop for that network")
 
 
 def checked_quorum(quorum: int | None, count: int) -> int:

@@ -21,23 +21,24 @@ from catenary.loop.devices import LoopRequest
 from catenary.loop.external_cycle import CarriedExchange, carried
 from catenary.loop.frame_exchange import FrameExchange
 from catenary.loop.laws.law import Law
-from catenary.loop.options import ClockOptions, Scheduling, StopPolicy
+from catenary.loop.options import ClockOptions, Scheduling, StopPolicy, check_groups, one_of
 from catenary.loop.session import Session
 from catenary.loop.stream import Stream
 from catenary.loop.timing import Timing
 from catenary.plan.cycle import ExecutionMode, ReceiveMode
-from catenary.plan.options import PlanOptions
+from catenary.plan.options import PlanOptions, period_in_ns
 from catenary.plan.planner import Plan, make_plan
 from catenary.plan.sink import Sink
 from catenary.wire.al import AlState
 
 ENDING = CYCLE_WORKING_COUNTER | CYCLE_DROPPED | CYCLE_STOPPED | CYCLE_NONE | CYCLE_LAW_FAILED
 TROUBLE = ENDING | CYCLE_CLOCKS
+LOG_LIMIT = 2**24  # cycles, about a gigabyte
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Settings:
-    """Options of a loop that all of its networks share."""
+    """Options of a loop that all of its networks share. ValueError if one is impossible."""
 
     period: float
     execution: ExecutionMode
@@ -49,6 +50,18 @@ class Settings:
     stop: StopPolicy
     scheduling: Scheduling
     clocks: ClockOptions
+
+    def __post_init__(self) -> None:
+        one_of("execution", self.execution, ("threaded", "inline"))
+        check_groups(self.stop, self.scheduling, self.clocks)
+        period_in_ns(self.period)
+        busy_wait = self.scheduling.busy_wait
+        if busy_wait >= self.period:
+            raise ValueError(
+                f"busy_wait={busy_wait} s: must be less than the period of {self.period} s"
+            )
+        if not 1 <= self.log <= LOG_LIMIT:
+            raise ValueError(f"log={self.log} cycles: must be 1 to {LOG_LIMIT}")
 
     def plan_options(self, main: MainDevice, cpu: int | None) -> PlanOptions:
         """Return the options of one network's plan.

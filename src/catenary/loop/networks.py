@@ -14,10 +14,13 @@ from threading import Lock
 from catenary.core import CYCLE_NONE, CYCLE_STOPPED, CYCLE_WORKING_COUNTER, Cycle
 from catenary.errors import CatenaryError, LoopError
 from catenary.link import Link
-from catenary.loop.network import TROUBLE, Network
+from catenary.loop.devices import LoopRequest, by_network
+from catenary.loop.network import TROUBLE, Network, Settings
 from catenary.loop.options import ClockOptions
+from catenary.loop.publishing import one_sink_each
 from catenary.loop.session import STOP_SLICE_NS, Session
 from catenary.loop.signals import SignalGuard
+from catenary.plan.sink import Sink
 from catenary.wire.al import AlState
 
 NETWORK_TROUBLE = CYCLE_WORKING_COUNTER | CYCLE_STOPPED | CYCLE_NONE
@@ -148,6 +151,47 @@ class NetworksIteration:
                 one.stop_axes_at_once()
 
 
+def make_networks(
+    requests: Sequence[LoopRequest],
+    settings: Settings,
+    cpu: int | Sequence[int] | None,
+    sink: Sink | Sequence[Sink] | None,
+) -> tuple[Network, ...]:
+    """Return one network for each MainDevice of the requests.
+
+    Args:
+        requests: Process-data requests.
+        settings: Options that all networks share.
+        cpu: CPU of the native thread, or one for each network; None: see `cpus_for`.
+        sink: Receiver of every cycle, or one for each network.
+
+    Raises:
+        ValueError: An option is impossible for this number of networks.
+    """
+    groups = by_network(requests)
+    count = len(groups)
+    if count > 1:
+        refuse_for_several(settings)
+        settings = replace(settings, clocks=clocks_of_several(settings.clocks))
+    return tuple(
+        Network(main, mine, settings, cpu=one, sink=its)
+        for (main, mine), one, its in zip(
+            groups, cpus_for(count, cpu), one_sink_each(sink, count), strict=True
+        )
+    )
+
+
+def refuse_for_several(settings: Settings) -> None:
+    """Raise ValueError for options that only one network can have."""
+    if settings.execution != "threaded":
+        raise ValueError(
+            'several networks need execution="threaded": a thread that iterates can only keep the '
+            "cycle starts of one"
+        )
+    if settings.laws:
+        raise ValueError("laws work on one network: make a separate Loop for that network")
+
+
 def share_time(sessions: Sequence[Session]) -> None:
     """In virtual time, let this thread run the cycles of all networks in turns.
 
@@ -224,12 +268,14 @@ def cpus_for(count: int, cpu: int | Sequence[int] | None) -> list[int | None]:
 
     Args:
         count: Number of networks.
-        cpu: Requested CPU or CPUs. None: the last ones, if there are more CPUs than networks; else
-            unchanged.
+        cpu: Requested CPU or CPUs. None: unchanged; for several networks the last CPUs, if there
+            are more CPUs than networks.
 
     Raises:
         ValueError: The number of CPUs is not the number of networks.
     """
+    if count == 1 and isinstance(cpu, Sequence):
+        raise ValueError(f"cpu={cpu}: one network has one thread, on one CPU")
     if isinstance(cpu, int):
         return [cpu] * count
     if cpu is not None:
@@ -237,7 +283,7 @@ def cpus_for(count: int, cpu: int | Sequence[int] | None) -> list[int | None]:
             raise ValueError(f"cpu: {len(cpu)} CPUs for {count} networks; give one CPU for each")
         return list(cpu)
     allowed = sorted(os.sched_getaffinity(0))
-    if len(allowed) <= count:
+    if count == 1 or len(allowed) <= count:
         return [None] * count
     return list(allowed[-count:])
 

@@ -37,7 +37,7 @@ from catenary.loop.safe_outputs import confirm_safe, make_safe
 from catenary.loop.signals import SignalGuard
 from catenary.loop.timing import Timing
 from catenary.plan.planner import Plan
-from catenary.plan.request import ProcessDataRequest
+from catenary.plan.request import ProcessDataRequest, Views
 from catenary.plan.sink import Sink
 from catenary.wire.al import AlState
 from catenary.wire.cia402 import IN_FAULT, AxisState, Mode
@@ -66,13 +66,7 @@ class Session:
         self.plan = plan
         self.exchange: Exchange = exchange(self)
         self.engine = self.exchange.make_engine()
-        self.views = bind_requests(
-            requests,
-            plan.tables,
-            self.engine.buffers,
-            is_open=lambda: self.is_open,
-            is_led=lambda: self.engine.led,
-        )
+        self.views = self._bind(requests)
         self.stop = stop
         self.laws = LawRunner(self.engine, plan)
         self.faults = FaultReport(
@@ -94,6 +88,16 @@ class Session:
         self._counted: Mapping[str, int] = {}  # counters of the engine when the loop was entered
         self.end_background: Callable[[], None] = _no_background  # the thread that iterates
         self.service.cycle = self.cycle
+
+    def _bind(self, requests: Sequence[ProcessDataRequest]) -> Views:
+        """Give the requests their parts of the engine's buffers, and return all of them."""
+        return bind_requests(
+            requests,
+            self.plan.tables,
+            self.engine.buffers,
+            is_open=lambda: self.is_open,
+            is_led=lambda: self.engine.led,
+        )
 
     def _make_clocks(self) -> Clocks | None:
         clock = self.plan.cycle.clock

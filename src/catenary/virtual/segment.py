@@ -94,9 +94,8 @@ class Segment:
         ring: bool = False,
         link_loss_detection: float | Literal["enhanced", "standard"] = "enhanced",
     ) -> None:
-        _check_clock(clock)
         self._devices = list(devices)
-        self.clock: ClockKind = "monotonic" if clock == "monotonic" else "virtual"
+        self.clock = _clock_kind(clock)
         wiring = Wiring([device.ports for device in devices], behind or {}, ring=ring)
         self._core = Core(
             len(self._devices),
@@ -250,9 +249,10 @@ class Segment:
             self._wires.plug_cable(number, number < devices, at_once=True)
 
 
-def _check_clock(clock: object) -> None:
+def _clock_kind(clock: object) -> ClockKind:
     if clock not in ("virtual", "monotonic") and not isinstance(clock, SharedClock):
         raise ValueError(f'clock must be "virtual", "monotonic" or a VirtualClock, not {clock!r}')
+    return "monotonic" if clock == "monotonic" else "virtual"
 
 
 def _detection_ns(given: float | str) -> int:

@@ -25,7 +25,7 @@ from catenary.bus.pending import Pending
 from catenary.errors import CatenaryError
 from catenary.link import ring_of
 from catenary.loop.cycle_errors import described
-from catenary.loop.options import ReturnPolicy
+from catenary.loop.options import StopPolicy
 from catenary.loop.watches.ring import RingWatch
 from catenary.model.device import Identity
 from catenary.model.device_matching import vacancies
@@ -104,8 +104,7 @@ class Watch:
         now: Callable[[], float],
         rejoin: Callable[[int, DevicePlan], Procedure[None]] | None = None,
         cables_seen: Callable[[], None] = lambda: None,
-        on_return: ReturnPolicy = "restore",
-        on_replacement: ReturnPolicy = "hold",
+        policy: StopPolicy = StopPolicy(),
     ) -> None:
         required = required_positions(plan)
         self._charges = [
@@ -119,8 +118,7 @@ class Watch:
         self._now = now
         self._rejoin = rejoin
         self._cables_seen = cables_seen
-        self._on_return = on_return
-        self._on_replacement = on_replacement
+        self._policy = policy
         ring = ring_of(main.link)
         self._ring = (
             None
@@ -313,7 +311,7 @@ class Watch:
     ) -> Procedure[Charge | None]:
         """Handle a replacement: the same product with another serial number."""
         self._report_replaced(charge, presence, found)
-        if self._on_replacement == "restore" or charge.released:
+        if self._policy.on_replacement == "restore" or charge.released:
             charge.identity = found  # the place now belongs to this device
             self._strangers = {each for each in self._strangers if each[0] != charge.plan.position}
             return charge
@@ -340,7 +338,7 @@ class Watch:
             self._lead(charge, self._waiting(charge))
 
     def _lets_in(self, charge: Charge) -> bool:
-        return self._on_return == "restore" or charge.released or charge.required
+        return self._policy.on_return == "restore" or charge.released or charge.required
 
     def _back_to_op(self, charge: Charge) -> Procedure[None]:
         """Acknowledge the error; the configuration is usually intact. On failure, start at INIT."""

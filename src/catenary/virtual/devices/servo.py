@@ -29,7 +29,7 @@ from catenary.virtual.coe.quirks import NO_MAILBOX_QUIRKS, MailboxQuirks
 from catenary.virtual.crystal import EXACT, ClockBits, Crystal
 from catenary.virtual.description import Description, MappedEntry, Pdo
 from catenary.virtual.devices.application import Application, mailbox_of, sync_managers_of
-from catenary.virtual.devices.applied import AppliedDevice
+from catenary.virtual.devices.applied import AppliedDevice, MailboxOptions
 from catenary.virtual.devices.servo_homing import add_homing, homing_presets
 from catenary.virtual.devices.servo_objects import (
     BITS,
@@ -171,12 +171,10 @@ class Servo(AppliedDevice):
             alias=alias,
             serial=serial,
             lrw=lrw,
-            mailbox_bytes=mailbox_bytes,
-            mailbox_delay=mailbox_delay,
             crystal=crystal,
             clock_bits=clock_bits,
-            mailbox_quirks=mailbox_quirks,
             sii_quirks=sii_quirks,
+            mailbox=MailboxOptions(mailbox_bytes, mailbox_delay, mailbox_quirks),
         )
         self.axes = axes
         self.counts_per_turn = counts_per_turn
