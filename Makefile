@@ -1,6 +1,7 @@
 # Two commands for a newcomer: `make demo` and `make test`. Both do all the set-up, once.
 #
 # PYTHON=/path/to/python3.12 takes another interpreter, and makes .venv anew for it.
+# `make docs` builds the documentation site into out/docs.
 # TEST="-k axis" passes options to pytest, COBOT=--realtime to `make cobot`. `make rtlab` runs the
 # benchmarks on a real-time kernel in QEMU: TABLE=quick or TABLE=pyigh,tasks instead of all of them,
 # RTLAB="--out FOLDER" keeps the results there. TABLE=igh wants IGH=path, a build of IgH's master.
@@ -13,7 +14,7 @@ RTLAB ?=
 IGH ?=
 SOURCES := CMakeLists.txt pyproject.toml \
            $(shell find src -name '*.pyx' -o -name '*.pxd' -o -name '*.pxi' -o -name '*.h')
-CHECKED := src tests tools examples benchmarks
+CHECKED := src tests tools examples benchmarks docs
 
 ifneq ($(origin PYTHON),file)
   PREFIX := -c 'import sys; print(sys.base_prefix)'
@@ -29,7 +30,7 @@ ifeq ($(wildcard $(VENV)/.built)$(filter clean,$(MAKECMDGOALS)),)
   endif
 endif
 
-.PHONY: demo cobot rtlab test lint hooks build clean
+.PHONY: demo cobot rtlab test lint docs hooks build clean
 
 demo: $(VENV)/.built
 	@$(VENV)/bin/catenary demo
@@ -48,6 +49,12 @@ lint: $(VENV)/.with-lint
 	@$(VENV)/bin/ruff format --check $(wildcard $(CHECKED))
 	@$(VENV)/bin/mypy
 	@$(VENV)/bin/lint-imports --no-logo
+
+docs: $(VENV)/.with-docs
+	@missing=$$(tools/missing_prerequisites $(PYTHON) docs); \
+	if [ -n "$$missing" ]; then echo "$$missing" >&2; exit 1; fi
+	@$(VENV)/bin/python -m sphinx -q -W --keep-going -b html -d out/docs-cache docs out/docs
+	@echo "out/docs/index.html"
 
 hooks: $(VENV)/.with-lint
 	@$(VENV)/bin/pre-commit install

@@ -1,7 +1,7 @@
 """Benchmarks of Catenary: `python -m benchmarks COMMAND`, from the repository's root.
 
 They compare the loop with C and PySOEM and with published figures, and let random faults happen to
-it. `results/` holds the figures of docs/benchmarks.md. The wheel has none of this.
+it. `results/` holds the figures of docs/explanation/benchmarks.md. The wheel has none of this.
 
 `catenary.bench.enter_private_network` comes first: it may run the program again, which NumPy's
 threads would spoil. So nothing here imports anything before it is used.

@@ -1,7 +1,8 @@
 """Commands that a servo took from its frames, against the limits that the core promises.
 
-docs/safety.md: velocity_limit bounds every command. Acceleration and deceleration bound fallback
-and return, beyond the set-points of the application. A frame that carries a stop keeps the torque.
+docs/explanation/safety.md: velocity_limit bounds every command. Acceleration and deceleration bound
+fallback and return, beyond the set-points of the application. A frame that carries a stop keeps the
+torque.
 """
 
 from __future__ import annotations

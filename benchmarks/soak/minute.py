@@ -1,7 +1,8 @@
 """One minute of a soak: an application on a segment on which one incident follows another.
 
-The application does what docs/safety.md leaves to applications. It waits until faults are over,
-enables stopped axes again, restores devices that are held, and opens a new loop after an error.
+The application does what docs/explanation/safety.md leaves to applications. It waits until faults
+are over, enables stopped axes again, restores devices that are held, and opens a new loop after an
+error.
 """
 
 from __future__ import annotations

@@ -26,7 +26,7 @@ class Log:
 
     A structured array, shape (cycles,): `numpy.asarray(log)` returns it. `time` [s] is the clock of
     `cycle.time`: negative before the first iteration. With `Loop(log_axes=True)` each axis has its
-    own fields, such as `shoulder.actual.position`. docs/recording.md lists all fields.
+    own fields, such as `shoulder.actual.position`. docs/how_to/recording.md lists all fields.
     """
 
     def __init__(self, rows: Rows) -> None:

@@ -13,7 +13,7 @@ from benchmarks.cli import main as benchmarks
 from catenary.cli import main as catenary
 
 ROOT = Path(__file__).resolve().parent.parent.parent
-DOCUMENTS = (ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md")))
+DOCUMENTS = (ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md")))
 CALL = re.compile(
     r"(?:^ {4}|`)(?:sudo )?(?:\.venv/bin/)?(catenary|python -m benchmarks) ([^`\n]+)", re.MULTILINE
 )

@@ -79,7 +79,7 @@ def test_json_is_as_promised(tmp_path):
 def test_ids_are_the_headings_of_the_manual(tmp_path):
     from tests.conftest import ROOT
 
-    manual = (ROOT / "docs" / "doctor.md").read_text()
+    manual = (ROOT / "docs" / "how_to" / "doctor.md").read_text()
     ids = {check.id for check in examine(machines.controller(tmp_path / "a")).checks}
     ids |= {check.id for check in examine(machines.make(tmp_path / "b", {})).checks}
     headings = {

@@ -20,9 +20,9 @@ from catenary.realtime import (
     Tasks,
     Value,
     VirtualClock,
-    preparation,
     session,
 )
+from catenary.realtime.system import preparation
 from tests.realtime import bodies
 from tests.realtime.test_clock import MS, records
 

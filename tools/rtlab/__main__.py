@@ -4,7 +4,8 @@
     python -m tools.rtlab --compare A B   how far the medians of two results, or folders, are apart
 
 The same software gives the same figures, whatever this machine does meanwhile. It compares software
-and shows schedules; it is no latency measurement of hardware (docs/benchmarks.md, "rtlab").
+and shows schedules; it is no latency measurement of hardware (docs/explanation/benchmarks.md,
+"rtlab").
 """
 
 from __future__ import annotations

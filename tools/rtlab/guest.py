@@ -42,7 +42,8 @@ def main() -> None:
     print("rtlab: the guest is up", flush=True)  # its machine is made anew where this is missing
     job = json.loads(base64.b64decode(os.environ["RTLAB_JOB"]))
     make_system()
-    # Real-time tasks may have all of the processor (-1), as on a tuned machine (docs/doctor.md).
+    # Real-time tasks may have all of the processor (-1), as on a machine tuned by
+    # docs/how_to/doctor.md.
     runtime = job.get("real_time_us", -1)  # [us] of every second
     Path("/proc/sys/kernel/sched_rt_runtime_us").write_text(str(runtime))
     say(run(job))

@@ -27,7 +27,7 @@ class NotThere(LabError):
 def provide(folder: Path | None, kernel: Kernel) -> list[Entry]:
     """Return what the guest gets of a build in `folder`. NotThere says what is missing."""
     if folder is None:
-        raise NotThere("IGH=path names no build of the IgH EtherCAT master (docs/igh.md)")
+        raise NotThere("IGH=path names no build of the IgH EtherCAT master (docs/how_to/igh.md)")
     found = [*modules(folder, kernel), library(folder)]
     program = Path(__file__).with_name(TABLE)
     return [*found, archive.text(f"{FOLDER}/{TABLE}", program.read_text())]

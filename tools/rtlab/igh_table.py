@@ -104,7 +104,7 @@ def run(found: dict[str, Any], way: str, rate: int, clock: str | None) -> None:
             execution="inline" if way == "inline" else "threaded",
             scheduling=cat.Scheduling(
                 switch_interval=20e-6 if way == "inline" else None
-            ),  # docs/benchmarks.md
+            ),  # docs/explanation/benchmarks.md
             priority=PRIORITY,
             stop=cat.StopPolicy(lost_limit=1000, late_limit=10.0),
             laws=[sine] if way == "law" else [],

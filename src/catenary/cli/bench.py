@@ -18,7 +18,7 @@ def add_parser(commands: Commands) -> None:
         "bench",
         help="measure the loop on this machine",
         description="Measures this machine. Comparisons with C, PySOEM and published figures are "
-        "`python -m benchmarks` in a clone of the repository (docs/benchmarks.md).",
+        "`python -m benchmarks` in a clone of the repository (docs/explanation/benchmarks.md).",
         example="catenary bench loop --seconds 10 --json loop.json\n"
         "catenary bench latency --seconds 60\n"
         "catenary bench report loop.json",

@@ -33,8 +33,8 @@ def add_parser(commands: Commands) -> None:
         help="check if this machine is fit for real time",
         description="Checks the kernel, processors, clocks, permissions and a network card, and "
         "measures the wake-up latency of threads. Shows the commands that solve a problem. Sends "
-        "nothing, and changes nothing without --apply. docs/doctor.md explains every check. Exit "
-        "status 1 if a check failed.",
+        "nothing, and changes nothing without --apply. docs/how_to/doctor.md explains every "
+        "check. Exit status 1 if a check failed.",
         example=EXAMPLE,
     )
     parser.add_argument(

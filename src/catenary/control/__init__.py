@@ -1,4 +1,4 @@
-"""Control blocks for laws and for plain Python, and trajectories (docs/control.md).
+"""Control blocks for laws and for plain Python, and trajectories (docs/how_to/control_blocks.md).
 
 A block is two things: a value that holds its numbers (`Cascade(...)`, with `.parameters` and
 `.memory` as flat rows of float64), and its step, a function of those rows and of an axis

@@ -101,7 +101,7 @@ def frequency_response(
             of the record. The resolution is 1 / (segment · period) [Hz].
 
     Source: H₁ = S_xy / S_xx by Welch's averaged periodograms with Hann windows, each piece's mean
-    taken away; coherence |S_xy|² / (S_xx S_yy). Bendat and Piersol, Random Data, ch. 6 and 9.
+    taken away; coherence `|S_xy|² / (S_xx S_yy)`. Bendat and Piersol, Random Data, ch. 6 and 9.
     """
     x, y = (np.asarray(row, dtype=np.float64) for row in (given, measured))
     if x.ndim != 1 or x.shape != y.shape:

@@ -3,7 +3,7 @@
 
 Every frame is stamped when it leaves. The time that the reference clock put into it gives the phase of
 its cycle start. A PI controller of rising inertia turns phase errors into longer or shorter periods
-(docs/clocks.md explains its gains); plan/clocks.py has the numbers. If the clocks follow the
+(docs/how_to/clocks.md explains its gains); plan/clocks.py has the numbers. If the clocks follow the
 MainDevice, the cycle starts are set into phase once and stay on their grid.
 Its twin in Python: tests/core/phase_twin.py. Budget: 60 ns per cycle.
 

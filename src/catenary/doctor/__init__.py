@@ -1,4 +1,4 @@
-"""Checks whether this machine suits a real-time EtherCAT loop: `catenary doctor`, docs/doctor.md.
+"""Checks of a machine for a real-time loop: `catenary doctor`, docs/how_to/doctor.md.
 
     machine = this_machine("eth0")              # asks the kernel and the driver, changes nothing
     machine, latency = watch(machine, 3.0, cpu=None)

@@ -17,7 +17,8 @@ class Check:
     PASS: good. WARN: cycles may be late. FAIL: cycles will be late, or nothing runs at all.
     SKIP: unknown on this machine; `found` has the reason.
 
-    id: its heading in docs/doctor.md. advice: commands to type; empty if there is nothing to do.
+    id: its heading in docs/how_to/doctor.md.
+    advice: commands to type; empty if there is nothing to do.
     changes: what `--apply` would change; all of them can be undone.
     """
 

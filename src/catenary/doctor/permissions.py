@@ -175,7 +175,7 @@ def realtime_runtime(machine: Machine) -> int | None:
 
 
 def share_folder(machine: Machine) -> Check:
-    """Check the folder in which several users share memory: docs/share.md."""
+    """Check the folder in which several users share memory: docs/how_to/share.md."""
     id = "share-folder"
     here = machine.path(SHARES)
     known = machine.text("/etc/group")

@@ -104,7 +104,7 @@ def summary_lines(examination: Examination, width: int) -> Iterator[str]:
             "1 setting" if len(examination.changes) == 1 else f"{len(examination.changes)} settings"
         )
         yield f"--apply can change {settings}, until the next start"
-    yield "What each check means, and why: docs/doctor.md"
+    yield "What each check means, and why: docs/how_to/doctor.md"
 
 
 def change_lines(changes: Sequence[Change], ground: Ground) -> Iterator[str]:

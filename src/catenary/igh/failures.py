@@ -96,7 +96,7 @@ def _unusable_node(index: int, node: str) -> LinkError:
             return LinkError(
                 f"master {index}: the kernel module ec_master is not loaded, {node} does not exist",
                 hint="sudo systemctl start ethercat; if that fails, the module was not built "
-                "for this kernel: docs/igh.md",
+                "for this kernel: docs/how_to/igh.md",
             )
         return LinkError(
             f"master {index}: the module ec_master is loaded, but {node} does not exist",

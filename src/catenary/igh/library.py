@@ -18,7 +18,7 @@ PLACES = (
     "/usr/local/etherlab/lib/libethercat.so.1",
 )
 INSTALL = (
-    "install IgH's EtherCAT master (docs/igh.md), or set the library's path: "
+    "install IgH's EtherCAT master (docs/how_to/igh.md), or set the library's path: "
     f"{VARIABLE}=/opt/etherlab/lib/libethercat.so.1"
 )
 

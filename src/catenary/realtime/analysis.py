@@ -23,14 +23,17 @@ MOST_STEPS = 1_000_000  # iterations for one task; reached only if the load is c
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Demand:
-    """The load that a task puts on its processor. Times in [s].
+    """Processor load of a task.
 
-    execution: longest execution time of one job.
-    deadline: relative to the release; None: the period. It may be longer than the period.
-    blocking: longest time for which a task of lower priority blocks it.
-    jitter: longest delay of a release after its nominal time.
-    priority: greater is higher; None for all tasks: deadline-monotonic.
-    cpu: its processor; None for all tasks: they share one.
+    Args:
+        name: Name of the task.
+        period: Minimum time between two releases [s].
+        execution: Longest execution time of one job [s].
+        deadline: Deadline after the release [s]. None: the period. It may exceed the period.
+        blocking: Longest time for which a task of lower priority blocks the task [s].
+        jitter: Longest delay of a release after its nominal time [s].
+        priority: Priority; a larger number is higher. None for all tasks: deadline-monotonic.
+        cpu: Processor of the task. None for all tasks: they share one.
     """
 
     name: str

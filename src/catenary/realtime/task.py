@@ -25,17 +25,20 @@ PAGE = 4096
 class Task:
     """A function that runs as a task: `function(task, *arguments)` with `for job in task:`.
 
-    period: [s] from release to release; with a `trigger`, the minimum time between two releases.
-    name: name in reports and errors; default: the function's name.
-    priority: 1..99, greater is higher (SCHED_FIFO); None: ordinary scheduling.
-    cpu: the processor it is bound to; None: any.
-    stack_size: [bytes], a multiple of 4096 from 32 KiB.
-    deadline: [s] after its release; None: the period.
-    trigger: a Signal makes the task sporadic: it sleeps until the signal is set.
-    on_miss: "count" the job and continue with the next release, late or not; "skip" the releases
-        that have passed; "stop" the task with an error; or a function, called with the late job.
-    on_failure: if the task raises or its process dies: "stop" all tasks with an error, "restart"
-        it at its next release, or "continue" without it.
+    Args:
+        period: Time between two releases [s]. With a `trigger`: the minimum time between them.
+        name: Name in reports and errors. Default: the name of the function.
+        priority: SCHED_FIFO priority, 1 to 99; a larger number is higher. None: ordinary
+            scheduling.
+        cpu: Processor on which the task runs. None: any.
+        stack_size: Size of the stack, a multiple of 4096 from 32 KiB [bytes].
+        deadline: Deadline after the release [s]. None: the period.
+        trigger: Signal of a sporadic task. The task sleeps until the signal is set.
+        on_miss: Reaction to a missed deadline. "count": count the job and continue with the next
+            release, late or not. "skip": skip the releases that have passed. "stop": stop the task
+            with an error. A function: call it with the late job.
+        on_failure: Reaction if the task raises or its process ends. "stop": stop all tasks with an
+            error. "restart": restart the task at its next release. "continue": continue without it.
     """
 
     function: Callable[..., object]

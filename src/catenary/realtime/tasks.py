@@ -41,10 +41,13 @@ class Tasks:
     `with Tasks(a, b) as tasks:` starts them together; the end of the block ends them. `tasks["a"]`
     is one of them; `print(tasks)` shows the statistics of their jobs.
 
-    workers: "processes" or "threads"; None: processes for more than one task.
-    clock: a VirtualClock simulates them by priority and processor (`cpu`; None counts as 0).
-    session: `realtime.session()`, entered in each process, or in this one for threads.
-    best_effort: continue without the priorities and processors that are refused.
+    Args:
+        tasks: Tasks to run.
+        workers: "processes" or "threads". None: processes for more than one task.
+        clock: VirtualClock that simulates the tasks by priority and processor. A `cpu` of None
+            counts as 0.
+        session: `realtime.session()` to enter in each process; for threads, in this process.
+        best_effort: True: continue without the priorities and processors that are refused.
     """
 
     def __init__(

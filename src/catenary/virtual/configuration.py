@@ -238,7 +238,8 @@ class SegmentFile(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
 
 OUT_OF_RANGE = (ArithmeticError, LookupError, ValueError, struct.error)
 HINT = (
-    "see docs/virtual.md for the fields of devices and plants, docs/faults.md for those of faults"
+    "see docs/explanation/virtual_segment.md for the fields of devices and plants, "
+    "docs/how_to/faults.md for those of faults"
 )
 
 

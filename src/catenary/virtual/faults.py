@@ -3,8 +3,9 @@
     Segment(devices, faults=[lose_frames(3, at=2.0), power_cycle(2, at=1.5, for_=0.8)])
     segment.inject(cut(between=(4, 5)))          # no `at`: at once
 
-Every fault has a start time `at` [s] on the segment's clock (docs/faults.md defines its zero).
-Without `at` the fault starts at once. `for_` is its duration [s]; without it the fault never ends.
+Every fault has a start time `at` [s] on the segment's clock; docs/how_to/faults.md defines its
+zero. Without `at` the fault starts at once. `for_` is its duration [s]; without it the fault never
+ends.
 In TOML the field `kind` names the fault, and `for_` and `with_` are written `for` and `with`.
 """
 

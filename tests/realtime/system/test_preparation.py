@@ -11,7 +11,8 @@ from catenary.realtime import session
 
 STATE = """
 import gc, os, sys
-from catenary.realtime.system import libc, session
+from catenary.realtime import session
+from catenary.realtime.system import libc
 from catenary.realtime.system.scheduling import locked_kilobytes
 
 def state():
