@@ -29,7 +29,7 @@ def test_the_report_has_a_section_of_axes() -> None:
     assert (
         "axes: late limit CSP off, CSV 50 ms, CST 10 ms; "
         "CST keeps its torque for 5 ms after a law or stream ended\n"
-        "    in the background, an update counts for 200 ms in CSV and PV, 20 ms in CST\n"
+        "    in the background, an update is valid for 200 ms in CSV and PV, 20 ms in CST\n"
         "    axis 0  2 Servo  CSP, CST\n"
         "        on_loss: disable\n"
         "    axis 1  3 Servo  CSV\n"

@@ -124,7 +124,7 @@ def test_the_controller_slows_down_to_the_same_time_at_any_period() -> None:
     [
         ((1,), {}, r"device 1 \(Lamps\): dc= was requested, but it has no"),
         ((2,), {"reference": 1}, "given as the reference clock, but it has no"),
-        ((2,), {"reference": 3}, r"device 2 \(Servo\) lies before device 3 \(Servo\)"),
+        ((2,), {"reference": 3}, r"device 2 \(Servo\) precedes device 3 \(Servo\)"),
         ((2,), {"reference": 4}, "there is no device 4, the segment has 4"),
     ],
 )
@@ -138,7 +138,7 @@ def test_what_cannot_be(
 def test_a_clock_that_only_stamps() -> None:
     devices = cell()
     devices[2] = replace(devices[2], system_time=False)
-    with pytest.raises(ConfigurationError, match="only stamps receive times"):
+    with pytest.raises(ConfigurationError, match="only latches receive times"):
         planned(devices, 2)
 
 
@@ -247,7 +247,7 @@ def test_sync_as_requested() -> None:
         (
             DistributedClock(assign_activate=0x0100),
             OpMode(),
-            r"device 0 \(Servo\): AssignActivate 0x0100 starts no SYNC signal",
+            r"device 0 \(Servo\): AssignActivate 0x0100 does not start a SYNC signal",
         ),
         (DistributedClock(shift=1e-3), OpMode(), r"device 0 \(Servo\): a shift of 1000 us"),
         (
@@ -285,7 +285,7 @@ def test_the_image_of_an_easycat_tells_each_step() -> None:
     """As EasyConfigurator leaves it: its OpMode lacks AssignActivate, and the shift is one too."""
     mode = OpMode("DC_Sync", "DC_Sync", shift_ns=1_882_234_944)  # pollen_Orbita2d.bin
     asked = DistributedClock(op_mode="DC_Sync")
-    with pytest.raises(ConfigurationError, match="starts no SYNC signal") as refused:
+    with pytest.raises(ConfigurationError, match="does not start a SYNC signal") as refused:
         sync(asked, FREE, mode)
     assert "DistributedClock(op_mode='DC_Sync', assign_activate=0x0300)" in refused.value.hint
     asked = DistributedClock(op_mode="DC_Sync", assign_activate=0x0300)

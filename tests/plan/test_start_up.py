@@ -53,7 +53,7 @@ def test_the_order_of_writing() -> None:
 
 def test_a_value_that_is_there_already_is_shown_as_such() -> None:
     plan = plan_of(DeviceRequest(objects=(StartUp(0x6065, 0, 5000, type=types.UDINT),)))
-    assert "0x6065:00  5000 (UDINT) (as it is)" in str(plan)
+    assert "0x6065:00  5000 (UDINT) (unchanged)" in str(plan)
 
 
 def test_without_downloads_there_is_no_section() -> None:
@@ -73,7 +73,7 @@ def test_the_type_comes_from_the_dictionary() -> None:
     [
         ((), "the object dictionary does not describe it"),
         ((ObjectInformation(0x6065, 0, 0),), "the object dictionary does not describe it"),
-        ((ObjectInformation(0x6065, 0, 32),), r"does not tell its data type \(32 bits\)"),
+        ((ObjectInformation(0x6065, 0, 32),), r"does not report its data type \(32 bits\)"),
         ((ObjectInformation(0x6065, 0, 16, 0x0800),), "0x0800 is not a base data type"),
     ],
 )
@@ -106,7 +106,7 @@ def test_a_value_of_another_kind_names_the_object() -> None:
         StartUp(0x2000, 0, 5, type=types.VISIBLE_STRING)
     with pytest.raises(ValueError, match="an index has 16 bits"):
         StartUp(0x16065, 0, b"")
-    with pytest.raises(TypeError, match="index and subindex are numbers, not '0x6065' and 0"):
+    with pytest.raises(TypeError, match="index and subindex must be numbers, not '0x6065' and 0"):
         StartUp("0x6065", 0, 5)  # type: ignore[arg-type]
     with pytest.raises(TypeError, match=r"0x6065:00: 'UDINT' is not a type of catenary\.types"):
         StartUp(0x6065, 0, 5, type="UDINT")  # type: ignore[arg-type]

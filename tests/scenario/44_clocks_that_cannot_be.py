@@ -29,7 +29,7 @@ def test_a_reference_without_a_clock(cell: Cell) -> None:
 
 
 def test_a_reference_behind_its_followers(cell: Cell) -> None:
-    with pytest.raises(ConfigurationError, match=r"device 2 .* lies before device 3"):
+    with pytest.raises(ConfigurationError, match=r"device 2 .* precedes device 3"):
         enter(cell, cell.drives(dc=True), reference=cell.subs[3])
 
 

@@ -23,7 +23,7 @@ def gather_requests(
 
     Args:
         requests: Process-data requests.
-        period_ns: Period of the cycle.
+        period_ns: Period of the cycle [ns].
     """
     gathered: dict[int, DeviceRequest] = {}
     for request in requests:
@@ -56,14 +56,14 @@ def _one_clock(
 def _one_mapping(
     position: int, first: tuple[WrittenPdo, ...], second: tuple[WrittenPdo, ...]
 ) -> tuple[WrittenPdo, ...]:
-    """Return the PDOs that two requests write down: per direction, one of them or equal ones."""
+    """Return the PDOs that two requests specify. They must not contradict each other."""
     directions = {pdo.direction for pdo in first} & {pdo.direction for pdo in second}
     for direction in directions:
         if [p for p in first if p.direction is direction] != [
             p for p in second if p.direction is direction
         ]:
             raise ConfigurationError(
-                f"device {position}: two requests write down different PDOs for {direction.noun}",
+                f"device {position}: two requests specify different PDOs for {direction.noun}",
                 hint="give both the same pdos=, or only one of them",
             )
     return first + tuple(pdo for pdo in second if pdo not in first)

@@ -43,8 +43,8 @@ from catenary.wire.cia402 import Mode
 class Plan:
     """Complete configuration of one network: `print(plan)` shows it. Plans compare by value.
 
-    `tables[k]` has the axes and columns of the k-th request. In `cycle` the tables follow one
-    another, and then come the columns of the `mailboxes`.
+    `tables[k]` has the axes and columns of the k-th request. `cycle` has those of all requests in
+    order, followed by the columns of the `mailboxes`.
     """
 
     cycle: CyclePlan
@@ -164,7 +164,7 @@ def _check_positions(
 ) -> None:
     known = [device.position for device in devices]
     if known != list(range(len(devices))):
-        raise ValueError(f"devices must be all of a segment in order, not positions {known}")
+        raise ValueError(f"devices must have the positions 0, 1, 2, ... of a segment, not {known}")
     for position in combined:
         if position not in range(len(devices)):
             raise ConfigurationError(
