@@ -383,9 +383,9 @@ def test_a_thread_iterates_so_the_program_must_not(cell: Cell) -> None:
 
 def test_calls_inside_an_update(cell: Cell) -> None:
     with cell.loop.update():
-        with pytest.raises(RuntimeError, match=r"update\(\) inside"), cell.loop.update():
+        with pytest.raises(RuntimeError, match=r"update\(\) was called inside"), cell.loop.update():
             raise AssertionError
-        with pytest.raises(RuntimeError, match=r"wait\(\) inside"):
+        with pytest.raises(RuntimeError, match=r"wait\(\) was called inside"):
             cell.loop.wait(Condition(lambda: True))
 
 

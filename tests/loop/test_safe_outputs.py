@@ -134,7 +134,7 @@ def test_a_device_that_is_gone_is_named(cell: Cell) -> None:
     with pytest.raises(cat.WorkingCounterError) as caught:
         run(cell, pull, safe={"Lamp": 7})
     notes = "\n".join(caught.value.__notes__)
-    assert "device 2 Force sensor: did not confirm the safe values" in notes
+    assert "device 2 Force sensor did not confirm the safe values" in notes
 
 
 def test_a_device_gets_them_while_another_one_of_its_unit_is_silent() -> None:

@@ -46,5 +46,5 @@ def test_a_late_limit_of_zero_is_refused_in_cst() -> None:
 
 @pytest.mark.parametrize("handover", [0.0, -1.0, math.inf, math.nan])
 def test_the_handover_must_be_a_time(handover: float) -> None:
-    with pytest.raises(ValueError, match="handover must be positive"):
+    with pytest.raises(ValueError, match="must be positive and finite"):
         make_plan(demo(), options=PlanOptions(handover=handover))

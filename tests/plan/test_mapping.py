@@ -156,7 +156,7 @@ def test_a_written_mapping_that_the_device_has_changes_nothing() -> None:
 
 def test_a_written_mapping_without_a_required_object_is_refused() -> None:
     written = [WrittenPdo(0x1A00, (FOLLOWING_ERROR,))]
-    with pytest.raises(MappingError, match=r"written down \(0x1A00\): 0x6064:00 \(32 bits\)"):
+    with pytest.raises(MappingError, match=r"as specified \(0x1A00\): 0x6064:00 \(32 bits\)"):
         make_mapping(servo(0), Direction.INPUT, [POSITION], written)
 
 

@@ -55,8 +55,8 @@ def silence_error(
         named = ", ".join(str(a.station) for a in answers if a.station.position in evidence.mute)
         who = f"in OP, but without process data: {named}"
         hint = (
-            "its FMMU or SyncManager was switched off by another program on this segment or by "
-            "the device itself; read its registers with `catenary reg read`"
+            "another program on this segment or the device itself has switched off its FMMU or "
+            "SyncManager; read its registers with `catenary reg read`"
         )
     else:
         who = f"all devices answer single reads; affected: devices {listed(suspects)}"
@@ -72,7 +72,12 @@ def silence_error(
 
 
 def tight_period(wire_ns: int, period_ns: int) -> str:
-    """Return a hint if the cyclic frames take most of the period; else an empty text."""
+    """Return a hint if the cyclic frames take most of the period, otherwise an empty text.
+
+    Args:
+        wire_ns: Wire time of the cyclic frames [ns].
+        period_ns: Period of the cycle [ns].
+    """
     if 2 * wire_ns < period_ns:
         return ""
     return (
@@ -111,21 +116,22 @@ def state_error(
 
 
 def _suspicion(answer: Answer, other_masters: Sequence[str]) -> str:
-    """Return evidence of another master. A device that leaves OP by itself gives a reason."""
+    """Return the hint that another master is the cause; empty if the device gives a reason."""
     if other_masters:
         return f"another EtherCAT master is live: {'; '.join(other_masters)}; end it"
     if answer.code or (answer.word or 0) & ERROR_FLAG:
         return ""
     return (
-        "it gives no reason, so its state was probably requested: check for a second master on "
-        "this line or in another container; a device that was switched off and on also shows INIT"
+        "it gives no reason, so another program probably requested the state: check for a second "
+        "master on this line or in another container. A device that was switched off and on also "
+        "shows INIT"
     )
 
 
 def address_error(silent: Sequence[Answer], al_status: int, log: Log | None) -> StateError:
     """Return the error for devices that lost their addresses while all frames return.
 
-    Such a device was switched off for a moment.
+    Such a device was switched off for a short time.
 
     Args:
         silent: Answers of the devices that do not answer to their addresses.
@@ -141,8 +147,8 @@ def address_error(silent: Sequence[Answer], al_status: int, log: Log | None) -> 
         actual=int(AlState.INIT),
         code=0,
         log=log,
-        hint="it was replaced, or switched off and on in less time than the loop tolerates lost "
-        "frames: check its supply; a new scan() and Loop bring it up again",
+        hint="it was replaced, or switched off and on in a shorter time than lost_limit: check its "
+        "supply; a new scan() and Loop start it again",
     )
     for other in silent[1:]:
         error.add_note(f"also: {other.station}")
@@ -157,7 +163,7 @@ class AxisTrouble(NamedTuple):
     code: int | None  # object 0x603F; None: it could not be read
 
     def __str__(self) -> str:
-        state = self.state.name if self.state is not None else "in no state of CiA 402"
+        state = self.state.name if self.state is not None else "not in a state of CiA 402"
         if self.code is None:
             return f"{self.name}: {state}, its error code cannot be read"
         return f"{self.name}: {state}, error code 0x{self.code:04X} ({error_text(self.code)})"
@@ -203,4 +209,5 @@ def described(answer: Answer) -> str:
 
 
 def listed(positions: Sequence[int]) -> str:
+    """Return positions as text."""
     return ", ".join(map(str, positions)) or "none"

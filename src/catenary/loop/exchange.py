@@ -16,7 +16,7 @@ class Exchange(Protocol):
 
     @property
     def watch(self) -> Attendance:
-        """The watch over lost and returning devices; after `attend`."""
+        """Watch of lost and returning devices; available after `attend`."""
 
     def make_engine(self) -> Engine:
         """Return the engine of the session's plan."""
@@ -28,10 +28,10 @@ class Exchange(Protocol):
         """Make the watches that run while the loop is open."""
 
     def bring_to_op(self) -> list[Pending[None]]:
-        """Bring the devices from SAFE-OP to OP while cycles flow; return the watches that run."""
+        """Bring the devices from SAFE-OP to OP while cycles flow; return the running watches."""
 
     def query_silence(self, suspects: Sequence[int]) -> Evidence:
-        """Query all devices about cycles without answers of the `suspects`."""
+        """Query all devices after cycles without answers from the suspected positions."""
 
     def query_states(self) -> Evidence:
         """Query all devices for their states."""

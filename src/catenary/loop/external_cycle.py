@@ -1,4 +1,4 @@
-"""Loop whose frames another master exchanges (`bus.Carrier`) and whose devices it controls."""
+"""Loop whose frames and devices belong to another master (`bus.Carrier`)."""
 
 from __future__ import annotations
 
@@ -28,15 +28,18 @@ class CarriedExchange:
         self._session = session
 
     def make_engine(self) -> Engine:
+        """Return the engine over the carrier's images."""
         cycle = replace(self._session.plan.cycle, clock=None)  # the carrier keeps the clocks
         return Engine(cycle, self._session.main.link.capsule, self._carrier.image)
 
     def cycle_clock(self) -> CycleClock:
+        """Return the carrier's view of the distributed clocks."""
         clock = self._carrier.clock
         assert clock is not None  # `configure` has made it
         return clock
 
     def attend(self) -> None:
+        """Make the watch of devices."""
         optional = {
             position
             for unit in self._session.plan.cycle.sync_units
@@ -76,6 +79,7 @@ class CarriedExchange:
         return Evidence(answers)
 
     def error_code(self, axis: int) -> int | None:
+        """Return object 0x603F of the axis; None if the drive does not answer."""
         plan = self._session.plan.cycle.axes[axis]
         sub = self._session.main.subs[plan.device]
         try:
@@ -120,7 +124,7 @@ class CarriedWatch:
 
     @property
     def excuses(self) -> bool:
-        """True if all devices that are out of OP are optional, as of the last look."""
+        """True if all devices that are out of OP are optional, as of the last survey."""
         required = (a for a in self._answers if self.requires(a.station.position))
         return bool(self._optional) and not any(is_astray(answer) for answer in required)
 
@@ -129,10 +133,13 @@ class CarriedWatch:
         return position not in self._optional
 
     def release(self, sub: SubDevice) -> None:
-        """Raise ValueError: the carrier holds no device, it brings devices back itself."""
-        raise ValueError(f"{sub.station} is not held: the kernel master leads devices back itself")
+        """Raise ValueError: a carrier does not hold devices, but brings them back itself."""
+        raise ValueError(
+            f"{sub.station} is not held: the kernel master brings devices back to OP itself"
+        )
 
     def _report(self, answers: Sequence[Answer]) -> None:
+        """Put an event for each change since the last answers."""
         before = {answer.station.position: answer.word for answer in self._answers}
         now = self._engine.now() * 1e-9
         for answer in answers:
@@ -163,7 +170,7 @@ def carried(plan: Plan) -> Plan:
     kinds = {datagram.kind for frame in plan.cycle.frames for datagram in frame.datagrams}
     if DatagramKind.CYCLE_NUMBER in kinds:
         raise ConfigurationError(
-            "exact_matching=True: another master makes the frames on this network",
+            "exact_matching=True is not possible: another master makes the frames on this network",
             hint="omit the option, or open the network interface directly",
         )
     return replace(plan, cycle=replace(plan.cycle, frames=()))

@@ -1,4 +1,4 @@
-"""Exchange of a session's own frames."""
+"""Exchange of a session that sends its own frames."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ class FrameExchange:
         return clock
 
     def attend(self) -> None:
-        """Make the watches over devices, error counters and repeated frames."""
+        """Make the watches of devices, error counters and repeated frames."""
         session = self._session
         engine, put = session.engine, session.main.events.put
 
@@ -68,7 +68,7 @@ class FrameExchange:
         self.frames = FrameWatch(self._repeated_frames, put=put, now=now)
 
     def _repeated_frames(self) -> int:
-        """Return the number of frames that returned repeatedly, or that a ring could not assign."""
+        """Return the number of frames that returned again or that a ring could not assign."""
         ring = ring_of(self._session.main.link)
         unassigned = 0 if ring is None else ring.counts["alien"]
         return self._session.engine.counters["repeated"] + unassigned

@@ -104,7 +104,7 @@ class Settings:
 
 
 class Network:
-    """Owns the session of one MainDevice in a loop: its plan, timing, clocks and log."""
+    """Owns the session of one MainDevice in a loop, with its plan, timing, clocks and log."""
 
     def __init__(
         self,
@@ -170,7 +170,7 @@ class Network:
         """Bring all devices to SAFE-OP and compile all laws.
 
         Args:
-            abandon: Leaves the loop; called when the MainDevice is closed.
+            abandon: Function that leaves the loop. It is called when the MainDevice is closed.
         """
         self.current_session = None
         plan = self._make_plan()
@@ -193,14 +193,14 @@ class Network:
         return session
 
     def _make_plan(self) -> Plan:
-        """Return the plan of the requests. Nothing is written to the devices yet."""
+        """Return the plan of the requests. Nothing is written to the devices."""
         its = self._settings
         self.main.read_mappings(*self._requests, period=its.period)
         devices = [sub.description for sub in self.main.subs]
         return make_plan(devices, self._requests, its.plan_options(self.main, self._cpu))
 
     def advance(self, flags: int) -> None:
-        """Do the work that belongs to a cycle without an iteration, and raise its error, if any."""
+        """Do the work of an iteration after a cycle without one, and raise its error, if any."""
         session = self.session
         session.service.step_without_thread()
         if flags & TROUBLE or session.engine.al_status != AlState.OP:

@@ -1,7 +1,7 @@
-"""Several networks in one loop: a common schedule, and an engine and native thread for each.
+"""Several networks in one loop: one schedule, and an engine and a native thread for each network.
 
-All networks use the cycle starts of the first. A failed network never delays the others: its own
-thread continues to send, and its cycles are not good.
+All networks use the cycle starts of the first. A failed network never delays the others. Its own
+thread continues to send, and its cycles are bad.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ class NetworksCycle(Cycle):
 
     @property
     def ok(self) -> bool:
-        """True if at least as many networks as the quorum were good.
+        """True if the number of good networks reached the quorum.
 
         A network with devices out of OP is not good, even if it answers.
         """
@@ -122,7 +122,7 @@ class NetworksIteration:
                 mover.step(its.time)
 
     def _judge(self, cycle: NetworksCycle, flags: Sequence[int]) -> None:
-        """Raise the error that ends the loop: too few networks, or trouble in a live one."""
+        """Raise the error that ends the loop: too few networks, or a fault in a live one."""
         alive = [self._lives(one, mine) for one, mine in zip(self._sessions, flags, strict=True)]
         cycle.alive = tuple(alive)
         for one, mine, lives in zip(self._sessions, flags, alive, strict=True):
@@ -134,10 +134,10 @@ class NetworksIteration:
                 one.judge(mine)
 
     def _lives(self, one: Session, flags: int) -> bool:
-        """Return whether a network is alive.
+        """Return True if a network is alive.
 
-        A failed network that answers again counts once its devices are in OP. Devices that were
-        stopped by their watchdogs thus do not stop the other networks.
+        A failed network is alive again when its devices are in OP. Thus, devices that their
+        watchdogs stopped do not stop the other networks.
         """
         if flags & NETWORK_TROUBLE:
             self._dead.add(id(one))
@@ -203,7 +203,7 @@ def share_time(sessions: Sequence[Session]) -> None:
         return
     if not all(virtual) or not _have_one_clock([one.main.link for one in sessions]):
         raise ValueError(
-            "the networks of one loop need a common time: give their segments the same clock, "
+            "the networks of one loop need the same clock: give it to their segments, "
             "Segment(..., clock=VirtualClock())"
         )
     for one in sessions:
@@ -211,11 +211,11 @@ def share_time(sessions: Sequence[Session]) -> None:
 
 
 def leave_all(sessions: Sequence[Session], guard: SignalGuard) -> list[Exception]:
-    """Stop every network that answers, whatever happens to the others; return the problems.
+    """Stop every network, regardless of errors in the others; return the problems.
 
     Args:
         sessions: Sessions of the loop.
-        guard: Shortens the waits at a second signal.
+        guard: Signal handlers; a second signal shortens the waits.
     """
     problems: list[Exception] = []
     try:
@@ -231,11 +231,11 @@ def leave_all(sessions: Sequence[Session], guard: SignalGuard) -> list[Exception
 
 
 def brake(sessions: Sequence[Session], guard: SignalGuard) -> None:
-    """Stop all axes of all networks together; wait for standstill, or until the deadline.
+    """Stop all axes of all networks together, and wait for standstill, or until the deadline.
 
     Args:
         sessions: Sessions of the loop.
-        guard: Ends the wait at a second signal.
+        guard: Signal handlers; a second signal ends the wait.
     """
     for one in sessions:
         one.make_outputs_safe()
@@ -289,7 +289,7 @@ def cpus_for(count: int, cpu: int | Sequence[int] | None) -> list[int | None]:
 
 
 def _have_one_clock(links: Sequence[Link]) -> bool:
-    """Return whether advancing the first clock advances all clocks."""
+    """Return True if advancing the first clock advances all clocks."""
     first, *others = links
     later = max(link.now() for link in links) + 1000
     first.wait_until(later, False)
@@ -302,4 +302,4 @@ def _stands(session: Session) -> bool:
     try:
         return session.engine.run_until_stopped(STOP_SLICE_NS)
     except (CatenaryError, OSError):
-        return True  # the link failed: no further action is possible
+        return True  # the link failed, so that no further action is possible

@@ -43,10 +43,10 @@ from catenary.wire.al import AlState
 from catenary.wire.cia402 import IN_FAULT, AxisState, Mode
 
 FATAL = CYCLE_WORKING_COUNTER | CYCLE_STOPPED | CYCLE_NONE
-ENABLE_TIMEOUT_NS = 5_000_000_000  # longer than slow mains contactors and brakes need
-ENABLE_CYCLES = 20  # at least, for long periods
-SETTLE_CYCLES = 50  # at most, until the first cycle with all answers
-STOP_SLICE_NS = 20_000_000  # between checks of "hurry" while the drives brake
+ENABLE_TIMEOUT_NS = 5_000_000_000  # longer than slow mains contactors and brakes take
+ENABLE_CYCLES = 20  # shortest timeout [cycles], for long periods
+SETTLE_CYCLES = 50  # longest wait for the first cycle with all answers
+STOP_SLICE_NS = 20_000_000  # between checks of `guard.hurry` while the drives brake
 
 
 class Session:
@@ -79,7 +79,7 @@ class Session:
         self.switch_interval: float | None = None  # [s] of the interpreter, inline
         self._attached = ExitStack()
         self._opened = self._left = False
-        self._abandon = abandon  # leaves the loop if the MainDevice is closed before it
+        self._abandon = abandon  # leaves the loop if the MainDevice is closed first
         self._process = os.getpid()
         forget_in_child(self)
         self._companions: Sequence[Session] = ()
@@ -167,10 +167,12 @@ class Session:
     def enable(self) -> None:
         """Reset faults and enable all axes.
 
-        Position axes hold when this returns; velocity and torque axes wait for their first targets.
+        Position axes hold when this returns. Velocity and torque axes wait for their first targets.
         """
         in_position = np.isin(self.views.mode_target, (Mode.CSP, Mode.PP))
-        if (~in_position & self._in_fault()).any():  # enabling resets too late for their targets
+        if (
+            ~in_position & self._in_fault()
+        ).any():  # the reset by `enable` would come after their first targets
             self._request(REQUEST_RESET, ~in_position & self._in_fault())
             self._await(lambda: ~in_position & self._in_fault())
         self._request(REQUEST_ENABLED, np.ones_like(in_position))
@@ -185,9 +187,9 @@ class Session:
         return np.isin(self.views.axis_state, [int(state) for state in IN_FAULT])
 
     def _await(self, waiting: Callable[[], npt.NDArray[np.bool_]]) -> None:
-        """Run cycles until no axis is waiting; raise DriveError for axes that still wait."""
-        patience = max(ENABLE_TIMEOUT_NS, ENABLE_CYCLES * self.plan.cycle.period_ns)
-        deadline = self.engine.now() + patience
+        """Run cycles until no axis is waiting; raise DriveError at the timeout."""
+        timeout_ns = max(ENABLE_TIMEOUT_NS, ENABLE_CYCLES * self.plan.cycle.period_ns)
+        deadline = self.engine.now() + timeout_ns
         while True:
             flags = self.cycle()
             if flags & CYCLE_DROPPED:
@@ -201,7 +203,7 @@ class Session:
                 raise self.faults.drive_error(axes, "cannot be enabled")
 
     def refuse_powered_torque(self, call: str) -> None:
-        """Raise LoopError for axes that are powered in CST: a waiting call commits no torque."""
+        """Raise LoopError if an axis is powered in CST, since `call` commits no torque."""
         views = self.views
         in_torque = (views.mode_target == Mode.CST) | (views.mode_actual == Mode.CST)
         powered = (views.axis_state == AxisState.OPERATION_ENABLED) & in_torque
@@ -209,7 +211,8 @@ class Session:
             return
         names = [self.plan.cycle.axes[i].name for i in np.flatnonzero(powered).tolist()]
         raise LoopError(
-            f"{call}: {', '.join(names)} powered in CST, but the call commits no torque set-points",
+            f"{call}: {', '.join(names)} powered in CST, and "
+            "the call commits no torque set-points during its wait",
             log=self.log(),
             hint="call it before the first torque is committed, disable the axes, or switch to CSP",
         )
@@ -255,6 +258,7 @@ class Session:
             raise error
 
     def announce_clocks(self) -> None:
+        """Put an event if the clocks have become locked or unlocked."""
         if self.clocks is not None:
             self.clocks.announce()
 
@@ -275,7 +279,7 @@ class Session:
         self.engine.forget()
 
     def leave(self, guard: SignalGuard) -> list[Exception]:
-        """Stop the loop and return the problems. No step depends on the success of another.
+        """Stop the loop and return the problems. A failed step does not prevent the next ones.
 
         No effect on a second call, or in a forked child.
         """
@@ -297,13 +301,15 @@ class Session:
         for step in steps:
             try:
                 step(guard)
-            except Exception as problem:  # the next step matters more; all problems are returned
+            except (
+                Exception
+            ) as problem:  # the next steps are more important; all problems are returned
                 problems.append(problem)
         self.main.events.end_loop()
         return problems
 
     def make_outputs_safe(self) -> None:
-        """Set bytes of process data to their safe values. The next cycle sends them."""
+        """Set the output bytes of process data to their safe values. The next cycle sends them."""
         make_safe(self.plan.cycle, self.views)
 
     def _confirm_safe_outputs(self, guard: SignalGuard) -> None:
@@ -315,7 +321,7 @@ class Session:
             mover.end()
 
     def _stop_axes(self, guard: SignalGuard) -> None:
-        """Stop all axes quickly (the drive's 0x605A), and run cycles until they stand."""
+        """Request a quick stop of all axes (0x605A), and run cycles until they are at rest."""
         self.engine.stop_law()
         if not self.plan.cycle.axes:
             return
@@ -338,7 +344,7 @@ class Session:
                 self._publisher.close()
 
     def _report_watches(self, guard: SignalGuard) -> None:
-        """Raise the error of a watch: watches are endless, so one that has ended has failed."""
+        """Raise the error of a watch. A watch is endless, so one that has ended has failed."""
         for watch in self._watches:
             if watch.error is not None and not isinstance(watch.error, LoopError):
                 raise watch.error
@@ -348,7 +354,7 @@ class Session:
             self.main.leave()
         except LinkError:
             if any(self.watch.requires(sub.position) for sub in self.main.subs):
-                raise  # otherwise the loop ends without its optional devices, as it ran
+                raise  # otherwise only optional devices are missing, as before
 
 
 def _no_background() -> None:
@@ -356,7 +362,7 @@ def _no_background() -> None:
 
 
 def take_down(main: MainDevice) -> list[Exception]:
-    """Bring down the devices of a loop that never started to cycle; return the problems."""
+    """Bring down the devices of a loop that never ran a cycle; return the problems."""
     try:
         main.leave()
     except CatenaryError as problem:

@@ -247,7 +247,7 @@ def _with_options(cycle: CyclePlan, options: PlanOptions) -> CyclePlan:
 def _check_times(tables: Sequence[RequestTables], options: PlanOptions) -> None:
     """Raise ValueError for times that would leave an axis in CST under torque indefinitely."""
     if not 0 < options.handover < math.inf:
-        raise ValueError(f"handover must be positive and finite [s], not {options.handover}")
+        raise ValueError(f"handover={options.handover} s: must be positive and finite")
     if options.late_limit_torque:
         return
     for table in tables:

@@ -29,6 +29,7 @@ def check_source(function: Callable[..., Any]) -> None:
 
 
 def place(function: Callable[..., Any], line: int) -> str:
+    """Return a line of a function's source as text: `file:line`."""
     return f"{inspect.getsourcefile(function) or '?'}:{line}"
 
 
@@ -40,7 +41,7 @@ def forbidden(tree: ast.AST, *, handled: bool) -> Iterator[tuple[ast.stmt | ast.
             yield (
                 node,
                 f"`{word}` without a handler",
-                "return True to end the law, or write what is wrong into memory",
+                "return True to end the law, or write an error code to memory",
             )
         elif isinstance(node, ast.Call) and called(node) == "print":
             yield node, "`print` takes the GIL", "write to memory and print it from Python"
@@ -60,10 +61,12 @@ def forbidden(tree: ast.AST, *, handled: bool) -> Iterator[tuple[ast.stmt | ast.
 
 
 def called(node: ast.Call) -> str:
+    """Return the name of the called function; empty if it has none."""
     return node.func.id if isinstance(node.func, ast.Name) else ""
 
 
 def is_object_mode(item: ast.withitem) -> bool:
+    """Return True if a `with` statement enters Numba's object mode."""
     expression = item.context_expr
     function = expression.func if isinstance(expression, ast.Call) else expression
     name = function.attr if isinstance(function, ast.Attribute) else getattr(function, "id", "")
