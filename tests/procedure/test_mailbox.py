@@ -224,7 +224,7 @@ def test_a_repetition_of_an_accepted_message_is_dropped() -> None:
 @pytest.mark.parametrize("counter", [0, 1])
 def test_repetitions_do_not_hide_the_next_answer(counter: int) -> None:
     """Two reads of one answer are lost, so two repetitions are requested and one arrives. Equal
-    answers to the next questions are not repetitions."""
+    answers to the next requests are not repetitions."""
     device = MailboxDevice(lambda message: Dictionary({(0x2000, 0): values.pop(0)})(message))
     values = [b"\x01", b"\x02", b"\x02", b"\x02"]
     device.next_counter = lambda: counter
@@ -305,9 +305,9 @@ def play_on(procedure: Procedure[bytes], device: MailboxDevice) -> bytes:
 
 
 def test_the_first_poll_adapts_to_the_answer_time() -> None:
-    """20 ms: looked at again and again for the first answers, a few times for the later ones."""
+    """The device takes 20 ms: the first answers are polled often, later ones only a few times."""
     mailbox = channel()
-    looks: list[int] = []
+    polls: list[int] = []
     answers = Dictionary(OBJECT)
     device = MailboxDevice(lambda _: [])
     now = [0]
@@ -315,7 +315,7 @@ def test_the_first_poll_adapts_to_the_answer_time() -> None:
 
     def answer(request: Request) -> Reply:
         if request.address >> 16 == 0x080D and len(request.data) == 1:
-            looks[-1] += 1
+            polls[-1] += 1
             if due and now[0] >= due[0]:
                 due.clear()
                 for message in answers(device.received[-1]):
@@ -327,10 +327,10 @@ def test_the_first_poll_adapts_to_the_answer_time() -> None:
         return reply
 
     for _ in range(20):
-        looks.append(0)
+        polls.append(0)
         assert play_timed(upload(mailbox, 0x2000, 0), answer, now) == OBJECT[0x2000, 0]
-    assert looks[0] > 8
-    assert max(looks[10:]) <= 5
+    assert polls[0] > 8
+    assert max(polls[10:]) <= 5
 
 
 def play_timed(
