@@ -360,7 +360,7 @@ def test_a_reference_is_checked_for_its_length() -> None:
     with MainDevice(demo_segment()) as main:
         main.scan()
         asked = Asking({2: DeviceRequest(inputs=(ObjectReference(0x60F4, 0, 16),))})
-        with pytest.raises(MappingError, match="has 32 bits, 16 were asked for"):
+        with pytest.raises(MappingError, match="has 32 bits, 16 were requested"):
             main.plan(asked)
 
 
