@@ -152,7 +152,7 @@ def test_plot_errors(recording: Path, capsys: pytest.CaptureFixture[str]) -> Non
     )
     status, _, err = call(f"plot {recording} --axis elbow", capsys)
     assert status == 1
-    assert err == "catenary: cell-1 has no axis 'elbow'\n  hint: it has joint0, joint1\n"
+    assert err == "catenary: cell-1 has no axis 'elbow'\n  hint: its axes are joint0, joint1\n"
     status, _, err = call(f"plot {recording} --start 99", capsys)
     assert status == 2
     assert err.startswith(f"catenary: {recording} has no cycles in this time range")

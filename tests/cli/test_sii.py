@@ -116,7 +116,7 @@ def test_categories_without_an_end_are_reported(
     status, out, err = call("sii read eth9 1", capsys)
     assert status == 1
     assert out.splitlines()[-1] == "001000"
-    assert "no end mark: 4096 bytes are used" in err
+    assert "no end mark, 4096 bytes are used" in err
 
 
 def test_an_image_for_another_product_needs_force(
@@ -157,7 +157,7 @@ def test_an_image_larger_than_the_eeprom_is_refused(
     assert "the image has 4096 bytes, but its EEPROM has only 2048" in err
     status, _, err = call(f"sii write eth9 1 {path} --force", capsys)
     assert status == 1
-    assert "SII word 0x0400 cannot be written to 0x5555: the EEPROM does not acknowledge" in err
+    assert "SII word 0x0400 cannot be set to 0x5555: the EEPROM does not acknowledge" in err
     assert "mixture of old and new" in err
 
 

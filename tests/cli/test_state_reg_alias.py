@@ -36,7 +36,7 @@ def test_state_names_the_devices_that_refuse(capsys: pytest.CaptureFixture[str])
     assert status == 1
     assert "SAFE-OP + ERROR  0x0019: No valid outputs" in out
     assert "device 3 (Catenary virtual servo 2) refused OP" in err
-    assert "is the loop running?" in err
+    assert "check that the loop runs" in err
 
 
 def test_state_as_json(capsys: pytest.CaptureFixture[str]) -> None:

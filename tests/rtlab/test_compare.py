@@ -40,7 +40,7 @@ def test_folders_are_compared_table_by_table(tmp_path: Path, capsys) -> None:
 
 
 @pytest.mark.parametrize(
-    ("text", "said"), [("[]", "is no result of the lab"), ("{", "is no result of the lab")]
+    ("text", "said"), [("[]", "is not a result of the lab"), ("{", "is not a result of the lab")]
 )
 def test_an_invalid_result_is_an_error_of_one_line(
     tmp_path: Path, capsys, text: str, said: str

@@ -70,7 +70,7 @@ def test_without_a_build_the_table_is_skipped(
     monkeypatch.setattr(kernel, "provide", lambda _: system)
     monkeypatch.setattr(image, "provide", refuse)
     assert lab.main(["igh", "--out", str(tmp_path)]) == 0
-    assert "igh: skipped: IGH=path names no build" in capsys.readouterr().out
+    assert "igh: skipped: IGH=path is not a build" in capsys.readouterr().out
 
 
 def test_the_makefile_passes_the_folder() -> None:

@@ -82,7 +82,7 @@ def test_without_apt_the_error_names_debian(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("PATH", str(tmp_path))
-    with pytest.raises(LabError, match="there is no apt here"):
+    with pytest.raises(LabError, match="apt is not installed here"):
         kernel.provide(tmp_path)
 
 

@@ -110,7 +110,7 @@ def test_a_missing_qemu_names_the_package(tmp_path: Path) -> None:
     )
     assert done.returncode == 1
     assert done.stderr == (
-        "rtlab: there is no qemu-system-x86_64: `sudo apt-get install qemu-system-x86`\n"
+        "rtlab: qemu-system-x86_64 is not installed: `sudo apt-get install qemu-system-x86`\n"
     )
     assert list(tmp_path.iterdir()) == []
 
@@ -160,5 +160,5 @@ def test_a_guest_that_ends_before_its_first_output_is_restarted(
 
 def test_a_job_that_exceeds_the_kernel_command_line_is_refused() -> None:
     kernel = Kernel(Path("vmlinuz"), Path("modules"), "a kernel")
-    with pytest.raises(LabError, match="understands 2047"):
+    with pytest.raises(LabError, match="at most 2047"):
         machine.command(kernel, Path("root"), Path("results"), {"arguments": ["x" * 1800]})

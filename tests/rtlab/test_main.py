@@ -101,4 +101,4 @@ def test_a_record_contains_the_conditions_of_its_figures(monkeypatch: pytest.Mon
     assert made["ns_per_instruction"] == 1
     assert made["command"].startswith("python -m benchmarks loop")
     assert (made["kernel_package"], made["qemu"]) == ("linux_1", "7.2.22")
-    assert "no latency measurement of hardware" in made["note"]
+    assert "does not measure the latency of hardware" in made["note"]

@@ -116,7 +116,7 @@ cdef class MachineTimer(Timer):
 
 
 cdef class VirtualTime:
-    """View of the table of participants, in memory that all participants share."""
+    """Table of the participants of a virtual clock, in shared memory."""
     cdef Memory memory
     cdef virtual_time *time
 

@@ -66,7 +66,11 @@ cdef void write_text(char *text, str value, size_t size):
 
 
 cdef class Block:
-    """View of one task's memory."""
+    """One task's memory.
+
+    The task's thread writes the job and the figures. Other threads stop it, change its period and
+    signal it.
+    """
     cdef Memory memory
     cdef task_block *c
 
