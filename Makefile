@@ -1,10 +1,11 @@
-# Two commands for a newcomer: `make demo` and `make test`. Both do all the set-up, once.
+# Start with `make demo` and `make test`. Both do the complete set-up the first time.
 #
-# PYTHON=/path/to/python3.12 takes another interpreter, and makes .venv anew for it.
+# PYTHON=/path/to/python3.12 selects another interpreter and recreates .venv.
 # `make docs` builds the documentation site into out/docs.
-# TEST="-k axis" passes options to pytest, COBOT=--realtime to `make cobot`. `make rtlab` runs the
-# benchmarks on a real-time kernel in QEMU: TABLE=quick or TABLE=pyigh,tasks instead of all of them,
-# RTLAB="--out FOLDER" keeps the results there. TABLE=igh wants IGH=path, a build of IgH's master.
+# TEST="-k axis" passes options to pytest, and COBOT=--realtime to `make cobot`. `make rtlab` runs
+# the benchmarks on a real-time kernel in QEMU. TABLE=quick or TABLE=pyigh,tasks selects tables, and
+# RTLAB="--out FOLDER" selects the folder of the results. TABLE=igh needs IGH=path, the path of a
+# build of IgH's master.
 PYTHON ?= python3
 VENV := .venv
 TEST ?=
@@ -47,6 +48,7 @@ test: $(VENV)/.with-test
 lint: $(VENV)/.with-lint
 	@$(VENV)/bin/ruff check $(wildcard $(CHECKED))
 	@$(VENV)/bin/ruff format --check $(wildcard $(CHECKED))
+	@$(VENV)/bin/python tools/words.py src benchmarks tools examples README.md CONTRIBUTING.md
 	@$(VENV)/bin/mypy
 	@$(VENV)/bin/lint-imports --no-logo
 

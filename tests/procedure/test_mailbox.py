@@ -1,4 +1,4 @@
-"""What the mailbox does when frames are lost: no message lost, none executed twice."""
+"""Mailbox transfers with lost frames: no message is lost or executed twice."""
 
 from __future__ import annotations
 
@@ -14,37 +14,37 @@ from catenary.procedure.mailbox import drain
 from catenary.procedure.sdo import download, upload
 from catenary.wire.coe import UploadRequest
 from catenary.wire.mailbox import Mailbox, Type
-from tests.procedure.by_hand import Dictionary, MailboxDevice, channel, play
+from tests.procedure.player import Dictionary, MailboxDevice, channel, play
 
 OBJECT = {(0x2000, 0): b"\x11\x22\x33\x44"}
 
 
-def test_a_read_lost_on_its_way_back_is_repeated_by_the_toggle() -> None:
+def test_a_lost_read_reply_is_repeated_by_the_toggle() -> None:
     device = MailboxDevice(Dictionary(OBJECT))
     device.lose_back = {1}  # 0 is the write, 1 the read
-    lane = channel()
-    assert play(upload(lane, 0x2000, 0), device) == OBJECT[0x2000, 0]
-    assert lane.repeat_requested
+    mailbox = channel()
+    assert play(upload(mailbox, 0x2000, 0), device) == OBJECT[0x2000, 0]
+    assert mailbox.repeat_requested
     assert len(device.received) == 1
 
 
-def test_a_read_lost_on_its_way_out_is_read_again() -> None:
+def test_a_lost_read_request_is_read_again() -> None:
     device = MailboxDevice(Dictionary(OBJECT))
     device.lose_out = {1}
     assert play(upload(channel(), 0x2000, 0), device) == OBJECT[0x2000, 0]
 
 
-def test_a_write_lost_on_its_way_out_is_written_again() -> None:
+def test_a_lost_write_request_is_written_again() -> None:
     device = MailboxDevice(Dictionary(OBJECT))
     device.lose_out = {0}
     assert play(upload(channel(), 0x2000, 0), device) == OBJECT[0x2000, 0]
     assert len(device.received) == 1
 
 
-def test_a_write_lost_on_its_way_back_is_not_written_again() -> None:
+def test_a_lost_write_reply_is_not_written_again() -> None:
     dictionary = Dictionary({})
     device = MailboxDevice(dictionary)
-    device.deduplicates = False  # as stacks that ignore the counter
+    device.deduplicates = False  # like stacks that ignore the counter
     device.lose_back = {0}
     play(download(channel(), 0x2000, 0, b"\x01"), device)
     assert dictionary.written == [(0x2000, 0, b"\x01")]
@@ -55,7 +55,7 @@ def test_a_write_lost_on_its_way_back_is_not_written_again() -> None:
     out=st.sets(st.integers(0, 40), max_size=6),
     back=st.sets(st.integers(0, 40), max_size=6),
 )
-def test_whatever_is_lost_a_segmented_download_arrives_once(out: set[int], back: set[int]) -> None:
+def test_a_segmented_download_arrives_once_despite_losses(out: set[int], back: set[int]) -> None:
     data = bytes(i & 0xFF for i in range(700))
     dictionary = Dictionary({})
     device = MailboxDevice(dictionary)
@@ -64,31 +64,31 @@ def test_whatever_is_lost_a_segmented_download_arrives_once(out: set[int], back:
         play(download(channel(), 0x2000, 1, data), device)
     except ResponseTimeout:
         longest = _longest_run(out | back)
-        assert longest >= 5  # only when as many in a row were lost as are forgiven
+        assert longest >= 5  # only if the tolerated number of frames in a row was lost
         return
     assert dictionary.written == [(0x2000, 1, data)]
 
 
-def test_a_device_that_never_answers_is_named_in_time() -> None:
+def test_a_device_that_never_answers_times_out() -> None:
     with pytest.raises(ResponseTimeout, match=r"device 3 \(Probe\): no answer"):
         play(upload(channel(), 0x2000, 0), MailboxDevice(lambda _: []))
 
 
-def test_a_device_that_does_not_read_its_mailbox_is_named_in_time() -> None:
+def test_a_device_that_does_not_read_its_mailbox_times_out() -> None:
     device = MailboxDevice(lambda _: [])
     device.deaf = True
-    lane = channel()
+    mailbox = channel()
     with pytest.raises(ResponseTimeout):
-        play(upload(lane, 0x2000, 0), device)
+        play(upload(mailbox, 0x2000, 0), device)
     with pytest.raises(MailboxError, match="has not read its mailbox"):
-        play(upload(lane, 0x2000, 0), device)
+        play(upload(mailbox, 0x2000, 0), device)
 
 
-def test_counters_go_from_1_to_7_and_again() -> None:
+def test_counters_cycle_from_1_to_7() -> None:
     device = MailboxDevice(Dictionary(OBJECT))
-    lane = channel()
+    mailbox = channel()
     for _ in range(9):
-        play(upload(lane, 0x2000, 0), device)
+        play(upload(mailbox, 0x2000, 0), device)
     assert [message.counter for message in device.received] == [1, 2, 3, 4, 5, 6, 7, 1, 2]
 
 
@@ -113,27 +113,27 @@ def _longest_run(numbers: set[int]) -> int:
     return longest
 
 
-def test_a_lost_look_needs_no_repeating_where_the_message_is_still_there() -> None:
+def test_a_lost_poll_that_left_the_message_needs_no_repetition() -> None:
     device = MailboxDevice(Dictionary(OBJECT))
     device.repeats = False
-    lane = channel()
-    play(upload(lane, 0x2000, 0), device)
-    device.lose_out = {3}  # the look of the second upload: 0 to 2 are write, read, write
-    assert play(upload(lane, 0x2000, 0), device) == OBJECT[0x2000, 0]
-    assert not lane.repeat_requested
+    mailbox = channel()
+    play(upload(mailbox, 0x2000, 0), device)
+    device.lose_out = {3}  # the poll of the second upload: 0 to 2 are write, read, write
+    assert play(upload(mailbox, 0x2000, 0), device) == OBJECT[0x2000, 0]
+    assert not mailbox.repeat_requested
 
 
-def test_a_look_that_took_the_message_and_was_lost_is_repeated() -> None:
+def test_a_lost_poll_that_took_the_message_is_repeated() -> None:
     device = MailboxDevice(Dictionary(OBJECT))
-    lane = channel()
-    play(upload(lane, 0x2000, 0), device)
+    mailbox = channel()
+    play(upload(mailbox, 0x2000, 0), device)
     device.lose_back = {3}
-    assert play(upload(lane, 0x2000, 0), device) == OBJECT[0x2000, 0]
-    assert lane.repeat_requested
+    assert play(upload(mailbox, 0x2000, 0), device) == OBJECT[0x2000, 0]
+    assert mailbox.repeat_requested
     assert len(device.received) == 2
 
 
-# What devices do against the protocol.
+# Violations of the protocol by devices
 
 
 def test_a_device_that_answers_twice_stays_in_step() -> None:
@@ -143,29 +143,29 @@ def test_a_device_that_answers_twice_stays_in_step() -> None:
         answer = Dictionary({(0x2000, 0): bytes([next(values)])})(message)
         return [*answer, *answer]
 
-    lane = channel()
+    mailbox = channel()
     device = MailboxDevice(twice)
-    assert [play(upload(lane, 0x2000, 0), device) for _ in range(5)] == [
+    assert [play(upload(mailbox, 0x2000, 0), device) for _ in range(5)] == [
         bytes([k]) for k in range(5)
     ]
-    assert lane.dropped == 4
+    assert mailbox.dropped == 4
 
 
-def test_an_answer_of_another_kind_is_no_answer_and_is_told() -> None:
+def test_an_answer_of_another_kind_is_dropped_and_reported() -> None:
     device = MailboxDevice(lambda _: [Mailbox(Type.EOE, bytes(20))])
-    lane = channel()
+    mailbox = channel()
     with pytest.raises(ResponseTimeout, match="1 other messages arrived"):
-        play(upload(lane, 0x2000, 0), device)
-    assert lane.dropped == 1
+        play(upload(mailbox, 0x2000, 0), device)
+    assert mailbox.dropped == 1
 
 
-def test_a_device_that_babbles_is_an_error_soon() -> None:
+def test_endless_unexpected_messages_are_an_error() -> None:
     device = MailboxDevice(lambda _: [Mailbox(Type.EOE, bytes(20))] * 500)
     with pytest.raises(MailboxError, match="64 unexpected mailbox messages in a row"):
         play(upload(channel(), 0x2000, 0), device)
 
 
-def test_draining_one_that_babbles_ends_too() -> None:
+def test_draining_endless_messages_ends() -> None:
     device = MailboxDevice(lambda _: [])
     for _ in range(500):
         device.send(Mailbox(Type.EOE, bytes(20)))
@@ -175,14 +175,14 @@ def test_draining_one_that_babbles_ends_too() -> None:
 @pytest.mark.parametrize(
     "counters", [[0, 0, 0, 0], [5, 1, 7, 2], [3, 3, 3, 3], [1, 1, 2, 2], [7, 7, 7, 1]]
 )
-def test_counters_that_stand_still_or_jump_mean_nothing(counters: list[int]) -> None:
+def test_constant_or_jumping_counters_are_accepted(counters: list[int]) -> None:
     device = MailboxDevice(Dictionary(OBJECT))
     given = iter(counters)
     device.next_counter = lambda: next(given)
-    lane = channel()
+    mailbox = channel()
     for _ in counters:
-        assert play(upload(lane, 0x2000, 0), device) == OBJECT[0x2000, 0]
-    assert lane.dropped == 0
+        assert play(upload(mailbox, 0x2000, 0), device) == OBJECT[0x2000, 0]
+    assert mailbox.dropped == 0
 
 
 @pytest.mark.parametrize("counter", [0, 1, None])
@@ -191,7 +191,7 @@ def test_counters_that_stand_still_or_jump_mean_nothing(counters: list[int]) -> 
     out=st.sets(st.integers(0, 40), max_size=3),
     back=st.sets(st.integers(0, 40), max_size=3),
 )
-def test_whatever_is_lost_segments_are_joined_with_any_counter(
+def test_segments_are_joined_despite_losses_with_any_counter(
     counter: int | None, out: set[int], back: set[int]
 ) -> None:
     """Counters of 0, always 1, or as in the standard. Segments differ in their toggle bit."""
@@ -204,83 +204,85 @@ def test_whatever_is_lost_segments_are_joined_with_any_counter(
     assert play(upload(channel(), 0x2000, 1), device) == data
 
 
-def test_a_repetition_of_what_was_accepted_before_is_dropped() -> None:
-    """The read is lost on its way out: the device repeats the answer before, then sends the new
+def test_a_repetition_of_an_accepted_message_is_dropped() -> None:
+    """The read request is lost: the device repeats the previous answer, then sends the new
     one."""
     values = iter([b"\x01", b"\x01", b"\x02"])
     device = MailboxDevice(lambda message: Dictionary({(0x2000, 0): next(values)})(message))
-    device.next_counter = lambda: 0  # looked at first, so that a lost read is repeated at once
+    device.next_counter = lambda: (
+        0
+    )  # check the status first, so that a lost read is repeated at once
     device.repeats_first = True
-    lane = channel()
-    assert [play(upload(lane, 0x2000, 0), device) for _ in range(2)] == [b"\x01"] * 2
-    assert lane.dropped == 0
+    mailbox = channel()
+    assert [play(upload(mailbox, 0x2000, 0), device) for _ in range(2)] == [b"\x01"] * 2
+    assert mailbox.dropped == 0
     device.lose_out = {5}  # 0 to 3 are two writes and reads, 4 is the third write
-    assert play(upload(lane, 0x2000, 0), device) == b"\x02"
-    assert lane.dropped == 1
+    assert play(upload(mailbox, 0x2000, 0), device) == b"\x02"
+    assert mailbox.dropped == 1
 
 
 @pytest.mark.parametrize("counter", [0, 1])
-def test_repetitions_of_one_question_do_not_hide_the_answer_to_the_next(counter: int) -> None:
+def test_repetitions_do_not_hide_the_next_answer(counter: int) -> None:
     """Two reads of one answer are lost, so two repetitions are requested and one arrives. Equal
-    answers to the next questions are not repetitions."""
+    answers to the next requests are not repetitions."""
     device = MailboxDevice(lambda message: Dictionary({(0x2000, 0): values.pop(0)})(message))
     values = [b"\x01", b"\x02", b"\x02", b"\x02"]
     device.next_counter = lambda: counter
-    lane = channel()
-    assert play(upload(lane, 0x2000, 0), device) == b"\x01"
+    mailbox = channel()
+    assert play(upload(mailbox, 0x2000, 0), device) == b"\x01"
     device.lose_back = {3, 4}  # 0 and 1 are the first write and read
-    assert [play(upload(lane, 0x2000, 0), device) for _ in range(3)] == [b"\x02"] * 3
+    assert [play(upload(mailbox, 0x2000, 0), device) for _ in range(3)] == [b"\x02"] * 3
 
 
-def test_a_device_that_cannot_repeat_answers_the_next_question() -> None:
-    """The read is lost, and so is the answer. The next one equals the last accepted one."""
+def test_a_device_that_cannot_repeat_answers_the_next_request() -> None:
+    """Both the read and the answer are lost. The next answer equals the last accepted one."""
     device = MailboxDevice(Dictionary(OBJECT))
     device.next_counter = lambda: 1
     device.repeats = False
-    lane = channel()
-    assert [play(upload(lane, 0x2000, 0), device) for _ in range(2)] == [OBJECT[0x2000, 0]] * 2
+    mailbox = channel()
+    assert [play(upload(mailbox, 0x2000, 0), device) for _ in range(2)] == [OBJECT[0x2000, 0]] * 2
     device.lose_back = {5}
     with pytest.raises(MailboxError, match="does not acknowledge the repeat request"):
-        play(upload(lane, 0x2000, 0), device)
-    assert play(upload(lane, 0x2000, 0), device) == OBJECT[0x2000, 0]
+        play(upload(mailbox, 0x2000, 0), device)
+    assert play(upload(mailbox, 0x2000, 0), device) == OBJECT[0x2000, 0]
 
 
-def test_a_length_beyond_the_mailbox_is_the_devices_fault() -> None:
+def test_a_length_beyond_the_mailbox_is_a_mailbox_error() -> None:
     device = MailboxDevice(Dictionary(OBJECT))
     device.spoil = lambda data: (60000).to_bytes(2, "little") + data[2:]
     with pytest.raises(MailboxError, match=r"device 3 \(Probe\): invalid mailbox message"):
         play(upload(channel(), 0x2000, 0), device)
 
 
-def test_an_answer_that_came_too_late_is_not_the_next_ones() -> None:
-    lane = channel()
+def test_a_late_answer_is_not_taken_for_the_next_one() -> None:
+    mailbox = channel()
     answers = Dictionary({(0x2000, 0): b"\x01"})
     device = MailboxDevice(lambda _: [])
     with pytest.raises(ResponseTimeout):
-        play(upload(lane, 0x2000, 0), device)
+        play(upload(mailbox, 0x2000, 0), device)
     for answer in answers(device.received[-1]):
         device.send(answer)  # after the deadline
     device.respond = Dictionary({(0x2000, 0): b"\x02"})
-    assert play(upload(lane, 0x2000, 0), device) == b"\x02"
+    assert play(upload(mailbox, 0x2000, 0), device) == b"\x02"
 
 
-def test_a_question_given_up_owes_its_answer_to_nobody() -> None:
-    lane = channel()
+def test_the_answer_to_an_abandoned_request_is_dropped() -> None:
+    mailbox = channel()
     device = MailboxDevice(Dictionary({(0x2000, 0): b"\x01"}))
-    broken_off = upload(lane, 0x2000, 0)
-    device(next(broken_off)[1])  # type: ignore[index]
-    broken_off.close()  # Ctrl-C
+    abandoned = upload(mailbox, 0x2000, 0)
+    device(next(abandoned)[1])  # type: ignore[index]
+    abandoned.close()  # Ctrl-C
     device.respond = Dictionary({(0x2000, 0): b"\x02"})
-    assert play(upload(lane, 0x2000, 0), device) == b"\x02"
+    assert play(upload(mailbox, 0x2000, 0), device) == b"\x02"
 
 
-def test_conversations_take_place_in_the_order_they_were_begun() -> None:
-    lane = channel()
+def test_conversations_run_in_the_order_of_their_start() -> None:
+    mailbox = channel()
     device = MailboxDevice(Dictionary(OBJECT))
-    first, second = upload(lane, 0x2000, 0), upload(lane, 0x2000, 0)
+    first, second = upload(mailbox, 0x2000, 0), upload(mailbox, 0x2000, 0)
     next(first)
     next(second)
-    third = upload(lane, 0x2000, 0)
+    third = upload(mailbox, 0x2000, 0)
     first.close()
     assert isinstance(next(third), After)  # the second one's turn
     assert play_on(second, device) == OBJECT[0x2000, 0]
@@ -288,7 +290,7 @@ def test_conversations_take_place_in_the_order_they_were_begun() -> None:
 
 
 def play_on(procedure: Procedure[bytes], device: MailboxDevice) -> bytes:
-    """From a pause on."""
+    """Continue a procedure after a pause."""
 
     def rest() -> Procedure[bytes]:
         replies: list[Reply] = []
@@ -302,10 +304,10 @@ def play_on(procedure: Procedure[bytes], device: MailboxDevice) -> bytes:
     return play(rest(), device)
 
 
-def test_a_device_that_thinks_is_not_looked_at_meanwhile() -> None:
-    """20 ms: looked at again and again for the first answers, a few times for the later ones."""
-    lane = channel()
-    looks: list[int] = []
+def test_the_first_poll_adapts_to_the_answer_time() -> None:
+    """The device takes 20 ms: the first answers are polled often, later ones only a few times."""
+    mailbox = channel()
+    polls: list[int] = []
     answers = Dictionary(OBJECT)
     device = MailboxDevice(lambda _: [])
     now = [0]
@@ -313,7 +315,7 @@ def test_a_device_that_thinks_is_not_looked_at_meanwhile() -> None:
 
     def answer(request: Request) -> Reply:
         if request.address >> 16 == 0x080D and len(request.data) == 1:
-            looks[-1] += 1
+            polls[-1] += 1
             if due and now[0] >= due[0]:
                 due.clear()
                 for message in answers(device.received[-1]):
@@ -325,10 +327,10 @@ def test_a_device_that_thinks_is_not_looked_at_meanwhile() -> None:
         return reply
 
     for _ in range(20):
-        looks.append(0)
-        assert play_timed(upload(lane, 0x2000, 0), answer, now) == OBJECT[0x2000, 0]
-    assert looks[0] > 8
-    assert max(looks[10:]) <= 5
+        polls.append(0)
+        assert play_timed(upload(mailbox, 0x2000, 0), answer, now) == OBJECT[0x2000, 0]
+    assert polls[0] > 8
+    assert max(polls[10:]) <= 5
 
 
 def play_timed(

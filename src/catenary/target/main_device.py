@@ -1,4 +1,4 @@
-"""The public MainDevice: takes the name of a segment, or a link source."""
+"""The public MainDevice, which accepts the name of a segment or a link source."""
 
 from __future__ import annotations
 
@@ -47,5 +47,5 @@ def source_of(target: str | LinkSource) -> LinkSource:
     if isinstance(target, str):
         return parse(target)
     if isinstance(target, type) or not hasattr(target, "open_link"):
-        raise TypeError(f'a target is a name such as "eth0", or a Segment; not {target!r}')
+        raise TypeError(f'{target!r} is not a target: pass a name such as "eth0", or a Segment')
     return target
