@@ -1,4 +1,4 @@
-"""Compiled laws are kept only where no other user can write; otherwise there is a warning."""
+"""Compiled laws are cached only where no other user can write; otherwise there is a warning."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Options of a loop: impossible ones are refused when they are written, before anything is sent."""
+"""Impossible options of a loop are refused before a frame is sent."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The figures of a loop as numbers, as a table and in words."""
+"""Figures of a loop as numbers, as a table and as advice."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The process-data watchdog of each device: its time, and the trigger bit that goes with it."""
+"""Process-data watchdog of each device: its time and its trigger bit."""
 
 from __future__ import annotations
 
@@ -67,7 +67,7 @@ def test_only_the_device_in_cst_has_the_short_watchdog() -> None:
     assert "device   1  Servo  station 0x1002  13 out, 13 in, watchdog 10 ms" in str(plan)
 
 
-def test_what_the_application_says_counts() -> None:
+def test_the_requested_time_is_used() -> None:
     assert watchdog_ns(TORQUE, watchdog=0.05) == 50 * MILLISECOND
     assert watchdog_ns(TORQUE, watchdog=0) == 0
 
