@@ -130,7 +130,7 @@ def test_an_sii_without_the_permissions_is_honoured() -> None:
     with scanned(coe_details=0x23) as main:
         with pytest.raises(MappingError, match="does not allow changes of 0x1C13"):
             main.plan(asking(FOLLOWING_ERROR))
-        with pytest.raises(MappingError, match="the entries of PDOs cannot be changed"):
+        with pytest.raises(MappingError, match="does not allow changes of PDO entries"):
             main.plan(asking(DEMAND))
         main.configure(main.plan(asking(POSITION)))
 

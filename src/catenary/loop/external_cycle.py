@@ -1,4 +1,4 @@
-"""Loop whose frames and devices belong to another master (`bus.Carrier`)."""
+"""Exchange of a session on frames and devices of another master (`bus.Carrier`)."""
 
 from __future__ import annotations
 

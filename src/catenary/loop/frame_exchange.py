@@ -121,7 +121,12 @@ class FrameExchange:
             required = [a for a in answers if self.watch.requires(a.station.position)]
             silent = [answer for answer in required if answer.word is None]
             all_in_op = session.engine.al_status == AlState.OP
-            if any(map(is_astray, required)) or not silent or all_in_op or silent == answers:
+            if (
+                any(map(is_astray, required))
+                or not silent
+                or all_in_op
+                or len(silent) == len(answers)
+            ):
                 return Evidence(answers, other_masters=others)
         return Evidence(answers, without_address=silent, other_masters=others)
 

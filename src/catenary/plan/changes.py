@@ -45,7 +45,7 @@ def mapping_changes(
 def value_changes(
     device: DeviceDescription, start_up: Sequence[tuple[int, int, bytes]]
 ) -> list[Change]:
-    """Return the objects of a start-up list whose values differ from those in the device."""
+    """Return the objects of a start-up list that differ from the values in the device."""
     changes = []
     for index, subindex, data in start_up:
         old = device.known_value(index, subindex)

@@ -126,7 +126,7 @@ class FramePlan:
 
 @dataclass(frozen=True, slots=True)
 class SyncUnit:
-    """Unit of validity: devices whose data is valid or stale together."""
+    """Unit of validity: the data of its devices is valid or stale together."""
 
     name: str
     devices: tuple[int, ...]  # positions
