@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import pytest
 
-from catenary.doctor.share_folder import wanted
+from catenary.doctor.share_folder import expected
 from tests.attack.users import ALICE, BOB, MALLORY, Machine, operators
 
 LOOP = """
@@ -56,7 +56,7 @@ def said(action):
 
 
 def make_group_folder(machine: Machine) -> None:
-    assert machine.run(0, MAKE_FOLDER, wanted(operators().gr_name)) == []
+    assert machine.run(0, MAKE_FOLDER, expected(operators().gr_name)) == []
 
 
 def test_operators_share_a_robot(machine: Machine) -> None:

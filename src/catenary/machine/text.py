@@ -19,7 +19,8 @@ ENCODER = (0x608F, 1), (0x608F, 2)  # counts of the encoder, turns of the motor
 _HEAD = """\
 # Written by `catenary init`. Check it against the segment: catenary check FILE
 # A number is in SI units (rad, s, N·m). Text carries a unit: "170 deg", "500 us", "90 rpm".
-# Complete the lines marked {mark} and remove the "#" before them. All keys: docs/machine.md
+# Complete the lines marked {mark} and remove the "#" before them.
+# All keys: docs/reference/machine_file.md
 format = "{format}"
 name = "machine"
 target = {target}                      # cat.Machine(..., target="virtual:FILE.toml") overrides it

@@ -59,4 +59,4 @@ class CycleWriter(Ring):
     ) -> None: ...
     @property
     def capsule(self) -> object:
-        """Capsule with the sink table of native/sink.h."""
+        """Capsule of the sink table; it keeps the writer and its memory alive."""

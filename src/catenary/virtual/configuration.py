@@ -238,7 +238,10 @@ class SegmentFile(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
 
 
 OUT_OF_RANGE = (ArithmeticError, LookupError, ValueError, struct.error)
-HINT = "docs/virtual.md lists the fields of devices and plants, and docs/faults.md those of faults"
+HINT = (
+    "docs/explanation/virtual_segment.md lists the fields of devices and plants, "
+    "docs/how_to/faults.md those of faults"
+)
 
 
 @contextmanager

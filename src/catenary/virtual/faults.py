@@ -3,8 +3,8 @@
     Segment(devices, faults=[lose_frames(3, at=2.0), power_cycle(2, at=1.5, for_=0.8)])
     segment.inject(cut(between=(4, 5)))          # without `at`: immediately
 
-Every fault has a start time `at` [s] on the segment's clock (docs/faults.md defines its zero).
-Without `at`, the fault starts immediately. `for_` is its duration [s]; without it, the fault
+Every fault has a start time `at` [s] on the clock of the segment; docs/how_to/faults.md defines its
+zero. Without `at`, the fault starts immediately. `for_` is its duration [s]; without it, the fault
 lasts. In TOML, the field `kind` names the fault, and `for_` and `with_` are written `for` and
 `with`.
 """
