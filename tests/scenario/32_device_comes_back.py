@@ -321,7 +321,7 @@ def test_a_question_it_was_asked_before_it_fell_does_not_hold_it_up(cell: Cell) 
         if cycle.number == 600:
             assert cell.states == [OP] * 5
             assert isinstance(answers[0].error, MailboxError)
-            assert "started up again" in str(answers[0].error)
+            assert "restarted before it answered" in str(answers[0].error)
 
     silent = mailbox_silent(TOOL, at=0.19, for_=0.05)
     run(cell, silent, leave_state(TOOL, at=0.2, state="INIT", code=0x001A), each=look)
