@@ -170,7 +170,7 @@ def test_an_unknown_name_has_the_nearest_one(tmp_path: Path) -> None:
     with Machine(write_small(tmp_path)) as machine:
         with pytest.raises(KeyError, match='no drives "amr"; did you mean "arm"'):
             _ = machine.drives["amr"]
-        with pytest.raises(KeyError, match='no process data "x"; known: valves, gauge'):
+        with pytest.raises(KeyError, match='no process data "x"; known names are valves, gauge'):
             _ = machine.process_data["x"]
 
 
@@ -185,7 +185,7 @@ def test_another_device_is_refused_before_a_device_changes(tmp_path: Path) -> No
     assert "position 0" in error.message
     assert "expected vendor 0x43544E59 product 0x00010001" in error.message
     assert "found vendor 0x43544E59 product 0x00020004" in error.message
-    assert 'it has the identity of "valves": swapped' in error.hint
+    assert 'it has the identity of "valves"; check' in error.hint
     assert error.position == 0
     assert states(segment) == {INIT}
     assert len(error.__notes__) == 4  # valves, and what is missing
@@ -237,8 +237,11 @@ def test_two_devices_with_one_alias_are_refused(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("axes", "message"),
     [
-        ('"j1", "wrist/0", "wrist/2"', '"wrist/2": .* no axis in slot 2; "wrist/0", "wrist/1"'),
-        ('"j1", "hand", "wrist"', '"wrist" has 2 axes: write "wrist/0", "wrist/1"'),
+        (
+            '"j1", "wrist/0", "wrist/2"',
+            '"wrist/2": .* no axis in slot 2; its axes are "wrist/0", "wrist/1"',
+        ),
+        ('"j1", "hand", "wrist"', '"wrist" has 2 axes; write one of "wrist/0", "wrist/1"'),
         ('"j1", "coupler", "valves"', "is not a drive"),
     ],
 )
