@@ -1,9 +1,11 @@
-# Two commands for a newcomer: `make demo` and `make test`. Both do all the set-up, once.
+# Start with `make demo` and `make test`. Both do the complete set-up the first time.
 #
-# PYTHON=/path/to/python3.12 takes another interpreter, and makes .venv anew for it.
-# TEST="-k axis" passes options to pytest, COBOT=--realtime to `make cobot`. `make rtlab` runs the
-# benchmarks on a real-time kernel in QEMU: TABLE=quick or TABLE=pyigh,tasks instead of all of them,
-# RTLAB="--out FOLDER" keeps the results there. TABLE=igh wants IGH=path, a build of IgH's master.
+# PYTHON=/path/to/python3.12 selects another interpreter and recreates .venv.
+# `make docs` builds the documentation site into out/docs.
+# TEST="-k axis" passes options to pytest, and COBOT=--realtime to `make cobot`. `make rtlab` runs
+# the benchmarks on a real-time kernel in QEMU. TABLE=quick or TABLE=pyigh,tasks selects tables, and
+# RTLAB="--out FOLDER" selects the folder of the results. TABLE=igh needs IGH=path, the path of a
+# build of IgH's master.
 PYTHON ?= python3
 VENV := .venv
 TEST ?=
@@ -13,7 +15,7 @@ RTLAB ?=
 IGH ?=
 SOURCES := CMakeLists.txt pyproject.toml \
            $(shell find src -name '*.pyx' -o -name '*.pxd' -o -name '*.pxi' -o -name '*.h')
-CHECKED := src tests tools examples benchmarks
+CHECKED := src tests tools examples benchmarks docs
 
 ifneq ($(origin PYTHON),file)
   PREFIX := -c 'import sys; print(sys.base_prefix)'
@@ -29,7 +31,7 @@ ifeq ($(wildcard $(VENV)/.built)$(filter clean,$(MAKECMDGOALS)),)
   endif
 endif
 
-.PHONY: demo cobot rtlab test lint hooks build clean
+.PHONY: demo cobot rtlab test lint docs hooks build clean
 
 demo: $(VENV)/.built
 	@$(VENV)/bin/catenary demo
@@ -46,8 +48,15 @@ test: $(VENV)/.with-test
 lint: $(VENV)/.with-lint
 	@$(VENV)/bin/ruff check $(wildcard $(CHECKED))
 	@$(VENV)/bin/ruff format --check $(wildcard $(CHECKED))
+	@$(VENV)/bin/python tools/words.py src benchmarks tools examples README.md CONTRIBUTING.md
 	@$(VENV)/bin/mypy
 	@$(VENV)/bin/lint-imports --no-logo
+
+docs: $(VENV)/.with-docs
+	@missing=$$(tools/missing_prerequisites $(PYTHON) docs); \
+	if [ -n "$$missing" ]; then echo "$$missing" >&2; exit 1; fi
+	@$(VENV)/bin/python -m sphinx -q -W --keep-going -b html -d out/docs-cache docs out/docs
+	@echo "out/docs/index.html"
 
 hooks: $(VENV)/.with-lint
 	@$(VENV)/bin/pre-commit install

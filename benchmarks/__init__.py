@@ -1,10 +1,10 @@
 """Benchmarks of Catenary: `python -m benchmarks COMMAND`, from the repository's root.
 
-They compare the loop with C and PySOEM and with published figures, and let random faults happen to
-it. `results/` holds the figures of docs/benchmarks.md. The wheel has none of this.
+They compare the loop with C, PySOEM and published figures, and expose it to random faults.
+`results/` holds the figures of docs/explanation/benchmarks.md. The wheel contains none of this.
 
-`catenary.bench.enter_private_network` comes first: it may run the program again, which NumPy's
-threads would spoil. So nothing here imports anything before it is used.
+`catenary.bench.enter_private_network` must be called first. It may restart the program, which
+fails after NumPy has started its threads. Imports are therefore inside the functions.
 """
 
 from __future__ import annotations
@@ -28,18 +28,18 @@ def measure_loop(
     """Print the timing of every peer, and write it to `file` as JSON.
 
     Args:
-        drives: number of drives.
-        rate: of the loops [Hz].
-        seconds: of every peer.
-        peers: names of peers in addition to ours.
+        drives: Number of drives.
+        rate: Rate of the loops [Hz].
+        seconds: Run time of every peer [s].
+        peers: Names of peers in addition to ours.
         body: "sine" or "pd".
-        spin: a Python thread spins next to every loop.
-        rounds: of every peer; None: as many as keep a round below a second.
-        busy_wait: of our loops and of `c-busy` before each cycle start [s].
-        file: of the figures.
+        spin: True to run a busy Python thread next to every loop.
+        rounds: Rounds of every peer; None for rounds of at most one second.
+        busy_wait: Busy-wait of our loops and of `c-busy` before each cycle start [s].
+        file: File for the figures.
 
     Raises:
-        ValueError: unknown peer, or a busy-wait that is not less than the period.
+        ValueError: A peer is unknown, or the busy-wait is not less than the period.
     """
     from benchmarks import loop
     from catenary.bench.setting import Setting
@@ -57,29 +57,54 @@ def measure_loop(
 
 
 def measure_storm(*, drives: int, rate: int, seconds: float, file: Path | None = None) -> None:
-    """Prints the phases of the cycle with and without a storm of SDOs, and what a large object
-    takes on an idle bus, beside PySOEM's."""
+    """Print the phases of the cycle with and without an SDO storm, and the time of a large upload.
+
+    The upload runs on an idle bus, with Catenary and with PySOEM.
+
+    Args:
+        drives: Number of drives.
+        rate: Rate of the loops [Hz].
+        seconds: Run time of every variant [s].
+        file: File for the figures.
+    """
     from benchmarks import storm
 
     storm.measure(drives=drives, rate=rate, seconds=seconds, file=file)
 
 
 def measure_share(*, drives: int, rate: int, seconds: float, file: Path | None = None) -> None:
-    """Prints what reading a cycle takes, and what readers cost the loop that shares it."""
+    """Print the time to read a cycle from a share, and the cost of readers for the loop.
+
+    Args:
+        drives: Number of drives.
+        rate: Rate of the loops [Hz].
+        seconds: Run time of every variant [s].
+        file: File for the figures.
+    """
     from benchmarks import share
 
     share.measure(drives=drives, rate=rate, seconds=seconds, file=file)
 
 
 def measure_cost(*, seconds: float, file: Path | None = None) -> None:
-    """Prints what a cycle costs as a + b·axes + c·bytes."""
+    """Print the cost of a cycle as a + b·axes + c·bytes.
+
+    Args:
+        seconds: Run time of every segment [s].
+        file: File for the figures.
+    """
     from benchmarks import cost
 
     cost.measure(seconds=seconds, file=file)
 
 
 def measure_scan(*, drives: int, file: Path | None = None) -> None:
-    """Prints frames and time from nothing to PRE-OP, beside PySOEM's."""
+    """Print the number of frames and the time to PRE-OP, for Catenary and PySOEM.
+
+    Args:
+        drives: Number of drives.
+        file: File for the figures.
+    """
     from benchmarks import scan
 
     scan.measure(drives=drives, file=file)
@@ -88,22 +113,38 @@ def measure_scan(*, drives: int, file: Path | None = None) -> None:
 def measure_virtual(
     *, drives: int, seconds: float, file: Path | None = None, config: Path | None = None
 ) -> None:
-    """Prints how much faster than real time a segment in this process runs: so many drives, or
-    those of a file."""
+    """Print how much faster than real time a virtual segment runs in this process.
+
+    Args:
+        drives: Number of drives.
+        seconds: Virtual time [s].
+        file: File for the figures.
+        config: Segment file; None for a segment of `drives` drives.
+    """
     from benchmarks import virtual_time
 
     virtual_time.measure(drives=drives, seconds=seconds, file=file, config=config)
 
 
 def measure_tasks(*, seconds: float, file: Path | None = None) -> None:
-    """Prints the response of a task beside a busy one, as processes and as threads."""
+    """Print the response time of a task next to a busy one, as processes and as threads.
+
+    Args:
+        seconds: Run time of every variant [s].
+        file: File for the figures.
+    """
     from benchmarks import tasks
 
     tasks.measure(seconds=seconds, file=file)
 
 
 def measure_law(*, axes: int, file: Path | None = None) -> None:
-    """Prints what one call of a compiled law on so many axes takes."""
+    """Print the time of one call of a compiled law.
+
+    Args:
+        axes: Number of axes of the law.
+        file: File for the figures.
+    """
     from benchmarks import law_call
 
     law_call.measure(axes=axes, file=file)
@@ -118,15 +159,18 @@ def measure_soak(
     mode: str | None = None,
     file: Path | None = None,
 ) -> bool:
-    """Print what random faults in virtual time did to a loop; return True if all invariants held.
+    """Run a loop under random faults in virtual time, and print the results.
 
     Args:
-        minutes: of virtual time.
-        seed: of the first minute.
-        wiring: "line" or "ring"; None: both, in turn.
-        clocks: drives with distributed clocks; None: with and without, in turn.
-        mode: "csp", "csv" or "cst"; None: all, in turn.
-        file: of the figures.
+        minutes: Virtual time [min].
+        seed: Seed of the first minute.
+        wiring: "line" or "ring"; None for both in turn.
+        clocks: True for drives with distributed clocks; None for with and without in turn.
+        mode: "csp", "csv" or "cst"; None for all in turn.
+        file: File for the figures.
+
+    Returns:
+        True if all invariants held.
     """
     from benchmarks.soak import run
     from benchmarks.soak.setting import settings
@@ -149,14 +193,30 @@ def measure_clocks(
     seed: int,
     file: Path | None = None,
 ) -> bool:
-    """Prints how soon clocks come together, and how long they stay within 1 us. Whether all did."""
+    """Print how fast clocks synchronise, and whether they stay within 1 us.
+
+    Args:
+        devices: Numbers of drives, one segment each.
+        minutes: Virtual time [min].
+        jitter: Jitter of a time stamp [s].
+        seed: Seed of the random numbers.
+        file: File for the figures.
+
+    Returns:
+        True if all clocks stayed within 1 us.
+    """
     from benchmarks import clocks
 
     return clocks.measure(devices=devices, minutes=minutes, jitter=jitter, seed=seed, file=file)
 
 
 def measure_igh(*, library: Path | None, file: Path | None = None) -> None:
-    """Prints what a cycle over libethercat takes, beside C and beside one call after the other."""
+    """Print the time of a cycle over libethercat, for Catenary, C and separate calls from Python.
+
+    Args:
+        library: Path of libethercat; None to search for it.
+        file: File for the figures.
+    """
     from benchmarks import igh
 
     igh.measure(library=library, file=file)
@@ -165,7 +225,14 @@ def measure_igh(*, library: Path | None, file: Path | None = None) -> None:
 def measure_networks(
     *, rates: Sequence[int], seconds: float, rounds: int, file: Path | None = None
 ) -> None:
-    """Prints what 18 + 15 axes on two networks lose, beside C programs under the same load."""
+    """Print the losses of a loop with 18 + 15 axes on two networks, and those of C programs.
+
+    Args:
+        rates: Rates of the loops [Hz].
+        seconds: Run time of each [s].
+        rounds: Number of rounds in which the programs take turns.
+        file: File for the figures.
+    """
     from benchmarks import networks
 
     networks.measure(rates=rates, seconds=seconds, rounds=rounds, file=file)
@@ -189,8 +256,8 @@ def measure_table(
 ) -> None:
     """Print a published table next to our figures.
 
-    An option that is None has the value of the table. Parts that this machine cannot run are left
-    out, and the output names them.
+    An option that is None takes the value of the table. Parts that this machine cannot run are
+    omitted and named in the output. `python -m benchmarks table --help` describes the options.
 
     Raises:
         ValueError: There is no such table.

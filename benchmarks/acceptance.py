@@ -1,11 +1,11 @@
-"""Aims of the execution modes: run `python -m benchmarks loop` in three settings, judge the ratios.
+"""Performance limits of the execution modes, checked by `python -m benchmarks loop`.
 
     .venv/bin/python -m benchmarks.acceptance --seconds 20 --out benchmarks/results/MACHINE/DATE
     .venv/bin/python -m benchmarks.acceptance --judge benchmarks/results/amd-epyc/2026-11-22
 
-The first command runs the settings and writes acceptance-3.json, acceptance-33.json and
-acceptance-busy.json. The second one judges these files again. The exit status does not depend on
-the aims: a benchmark on a shared machine is not a test.
+The first command runs three settings and writes acceptance-3.json, acceptance-33.json and
+acceptance-busy.json. The second one judges existing files. The exit status does not depend on the
+limits, because a benchmark on a shared machine is not a test.
 """
 
 from __future__ import annotations
@@ -66,17 +66,25 @@ def main(arguments: Sequence[str]) -> int:
 def parse(arguments: Sequence[str]) -> argparse.Namespace:
     parser = argparse.ArgumentParser(
         prog="python -m benchmarks.acceptance",
-        description="Runs `python -m benchmarks loop` with 3 drives, with 33 drives and with a "
-        "busy-wait, and compares the ratios with the aims.",
+        description="Run `python -m benchmarks loop` with 3 drives, with 33 drives and with a "
+        "busy-wait, and compare the ratios with their limits.",
     )
     parser.add_argument(
-        "--seconds", type=float, default=20.0, metavar="S", help="of every peer, per setting (20)"
+        "--seconds",
+        type=float,
+        default=20.0,
+        metavar="S",
+        help="run time of every peer in each setting (default: 20)",
     )
     parser.add_argument(
-        "--out", type=Path, default=Path(), metavar="FOLDER", help="of the JSON files (.)"
+        "--out",
+        type=Path,
+        default=Path(),
+        metavar="FOLDER",
+        help="folder for the JSON files (default: .)",
     )
     parser.add_argument(
-        "--judge", type=Path, metavar="FOLDER", help="judge the JSON files there, run nothing"
+        "--judge", type=Path, metavar="FOLDER", help="judge the JSON files there without a run"
     )
     return parser.parse_args(arguments)
 
@@ -93,7 +101,7 @@ def result(folder: Path, setting: str) -> Path:
 
 
 def verdicts(found: Mapping[str, Mapping[str, float]]) -> list[str]:
-    """Return one line per aim. `found`: the ratios of each setting."""
+    """Return one line per limit. `found` holds the ratios of each setting."""
     lines = [f"{'setting':8}{'ratio':46}{'limit':>7}{'found':>8}"]
     for setting, ratio, limit in AIMS:
         value = found[setting].get(ratio)

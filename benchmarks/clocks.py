@@ -1,9 +1,7 @@
-"""`python -m benchmarks clocks`: how soon distributed clocks come together and how long they stay,
-on a segment in this process whose crystals differ, drift with the temperature and scatter. Virtual
-time.
+"""`python -m benchmarks clocks`: synchronisation of distributed clocks, in virtual time.
 
-The truth is the segment's own: what each clock says less what the reference says, at one moment,
-which nobody on the bus can read.
+The crystals of the virtual segment differ, drift with the temperature and have jitter. The true
+difference of a clock from the reference is taken from the model. It cannot be read on the bus.
 """
 
 from __future__ import annotations
@@ -22,25 +20,25 @@ from catenary.virtual import Coupler, Crystal, Segment, Servo
 
 PERIOD = 1e-3  # [s]
 BOUND = 1e-6  # [s]
-LOCK_TIMEOUT = 2.0  # [s] of the loop's start, its burst included
-PPM = 100.0  # crystals lie within ± so much
-DRIFT_PPM, DRIFT_PERIOD = 2.0, 600.0  # of the temperature, on top
-LOOKS = 5  # cycles from one look at the truth to the next
+LOCK_TIMEOUT = 2.0  # [s] from the start of the loop, including the burst
+PPM = 100.0  # largest deviation of a crystal, positive or negative
+DRIFT_PPM, DRIFT_PERIOD = 2.0, 600.0  # additional drift with the temperature; [s]
+LOOKS = 5  # cycles between two readings of the true differences
 
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
-    """What one segment came to. Differences in us."""
+    """Results of one segment. Differences in us."""
 
     devices: int
     seconds: float  # of virtual time
     locked_after: float  # [s] from entering the loop
-    worst_reported: float  # the largest that `loop.clocks.differences` showed
+    worst_reported: float  # largest value of `loop.clocks.differences`
     worst_true: float
     rms_true: float
-    looks: int  # at all clocks
-    looks_beyond: int  # with one of them beyond the bound
-    worst_phase: float  # of the instants, mean of some cycles
+    looks: int  # readings of all clocks
+    looks_beyond: int  # readings with a clock beyond the bound
+    worst_phase: float  # phase error of the cycle starts, mean over some cycles
     times_unlocked: int
     took: float  # [s]
 
@@ -52,10 +50,10 @@ class Outcome:
 def measure(
     *, devices: Sequence[int], minutes: float, jitter: float, seed: int, file: Path | None
 ) -> bool:
-    """Prints and writes the outcome of each. Whether every clock stayed within the bound."""
+    """Print and write the results. Return True if every clock stayed within the bound."""
     print(
-        f"{machine()}\ncrystals within ±{PPM:g} ppm and {DRIFT_PPM:g} ppm of drift; stamps scatter "
-        f"over {jitter * 1e6:g} us, a difference is made of two; {1 / PERIOD:.0f} Hz, "
+        f"{machine()}\ncrystals within ±{PPM:g} ppm, {DRIFT_PPM:g} ppm of drift; time stamps with "
+        f"{jitter * 1e6:g} us of jitter, two per difference; {1 / PERIOD:.0f} Hz, "
         f"{minutes:g} min of virtual time"
     )
     outcomes = [run(count, minutes * 60, jitter, seed) for count in devices]
@@ -64,8 +62,9 @@ def measure(
             f"  {outcome.devices:3} devices: within {BOUND * 1e6:g} us after "
             f"{outcome.locked_after:.3f} s; then at most {outcome.worst_true:.3f} us "
             f"(rms {outcome.rms_true:.3f}), reported {outcome.worst_reported:.3f} us; beyond in "
-            f"{outcome.looks_beyond} of {outcome.looks} looks; instants {outcome.worst_phase:.3f} "
-            f"us; unlocked {outcome.times_unlocked} times; took {outcome.took:.0f} s"
+            f"{outcome.looks_beyond} of {outcome.looks} readings; cycle starts "
+            f"{outcome.worst_phase:.3f} us; unlocked {outcome.times_unlocked} times; took "
+            f"{outcome.took:.0f} s"
         )
     write(
         file,
@@ -81,7 +80,7 @@ def measure(
 
 
 def make_segment(count: int, jitter: float, seed: int) -> Segment:
-    """A coupler with the reference clock, and servos."""
+    """Return a segment of a coupler with the reference clock, and servos."""
     random = Random(seed)
 
     def crystal() -> Crystal:
@@ -122,7 +121,7 @@ def run(count: int, seconds: float, jitter: float, seed: int) -> Outcome:
 
 
 class Truth:
-    """Owns what has been seen of a segment's clocks."""
+    """Owns the readings of a segment's clocks."""
 
     def __init__(self, segment: Segment) -> None:
         self._segment = segment

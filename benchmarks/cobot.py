@@ -1,5 +1,5 @@
-"""What the cobot of `examples/cobot` came to: the published table with ours beside it, the verdict
-of the analysis, how well it tracked."""
+"""Results of the cobot of `examples/cobot`: timing next to the published table, the verdict of the
+schedulability analysis, and the tracking error."""
 
 from __future__ import annotations
 
@@ -26,14 +26,16 @@ from catenary.wire.cia402 import STATE_CODING, AxisState
 
 MAIN, PRIORITY = "main control", 90
 DEVICES = "virtual devices"
-STOP = "stop: "  # how the markers of stops begin; the reason follows
-MOVES = 1e-7  # [rad] of the reference in one cycle
+STOP = "stop: "  # prefix of the markers of stops; the reason follows
+MOVES = 1e-7  # [rad] smallest step of a moving reference in one cycle
 
 
 class Measured:
-    """Owns what the main control measures of itself: how many times faster than real time it was
-    (`speed`); on the machine's clock also `executions`, the longest processor times from one look
-    to the next [s], of its thread and of the process that plays the devices, where there is one."""
+    """Owns the measurements of the main control about itself.
+
+    `speed` is the ratio of loop time to real time. On the machine's clock, `executions` holds the
+    longest processor time per cycle [s] of its thread and of the process of the virtual devices.
+    """
 
     def __init__(self, *, virtual: bool) -> None:
         devices = None if virtual else child_that_runs(wire.__name__)
@@ -46,7 +48,7 @@ class Measured:
         self.speed = 0.0
 
     def look(self, cycle_time: float) -> None:
-        """Once a cycle, at its end; `cycle_time` [s] of the loop."""
+        """Measure at the end of a cycle. `cycle_time` [s] is the time of the loop."""
         self.speed = cycle_time / (time.perf_counter() - self._began)
         for name, clock in self._clocks.items():
             now = time.clock_gettime(clock)
@@ -57,9 +59,9 @@ class Measured:
 
 
 def child_that_runs(module: str) -> int | None:
-    """The process id."""
+    """Return the ID of the child process that runs a module; None if there is none."""
     for folder in Path("/proc").glob("[0-9]*"):
-        with contextlib.suppress(OSError):  # it has ended meanwhile
+        with contextlib.suppress(OSError):  # the process has ended
             parent = int((folder / "stat").read_text().rpartition(")")[2].split()[1])
             words = (folder / "cmdline").read_bytes().split(b"\0")
             if parent == os.getpid() and module.encode() in words:
@@ -69,7 +71,7 @@ def child_that_runs(module: str) -> int | None:
 
 @dataclass(frozen=True)
 class Outcome:
-    """One run: its recording, timing of its loop, its stops, what it measured, its tasks."""
+    """Results of one run: recording, timing of the loop, stops, measurements and tasks."""
 
     path: Path
     timing: Mapping[str, Mapping[str, float]]
@@ -78,15 +80,18 @@ class Outcome:
     tasks: Tasks
 
     def times(self) -> dict[str, TaskTimes]:
-        """Of the tasks and the loop, in the order of the published table."""
+        """Return the times of the tasks and the loop, in the order of the published table."""
         ours = {each.name: of_task(each.statistics) for each in self.tasks}
         ours[MAIN] = of_loop(self.timing)
         return {name: ours[name] for name in COBOT}
 
     def verdict(self) -> Verdict:
-        """Of the tasks and the loop, by the longest execution times measured. On the machine's
-        clock with the devices, where they are played here, and a release for every job: timer
-        interrupt, wake-up, switch, at most as long as the first task was ever late to start."""
+        """Return the verdict on the tasks and the loop, by their longest execution times.
+
+        On the machine's clock, the virtual devices count as a task, and each job has a release
+        cost: timer interrupt, wake-up and switch. Its bound is the largest start jitter of the
+        first task.
+        """
         first, executions = next(iter(self.tasks)), self.measured.executions
         main = executions.get(MAIN, self.timing["in_controller"]["max"])
         others = [(MAIN, main, PRIORITY)]
@@ -109,7 +114,7 @@ class Outcome:
         return analyse([replace(each, execution=each.execution + release) for each in demands])
 
     def tracking(self) -> float:
-        """[deg] rms of reference less actual, of all joints, while the reference moves."""
+        """Return the rms tracking error of all joints while the reference moves [deg]."""
         recording = record.read(self.path)
         wanted, actual = recording["target_position"], recording["position"]
         moving = abs(np.diff(wanted, axis=0, prepend=wanted[:1])).max(axis=1) > MOVES
@@ -119,17 +124,22 @@ class Outcome:
 
 @dataclass(frozen=True)
 class Reaction:
-    """To a cause that stops the arm: until the frame with quick stop for every axis that is
-    enabled. `cycles`: 0, the frame of the cycle that ran; 1, of the first that began after it."""
+    """Reaction to a cause that stops the arm: a frame with a quick stop for all enabled axes.
+
+    `cycles` is 0 for the frame of the running cycle, and 1 for the first cycle that began later.
+    """
 
     reason: str
     cycles: int
-    seconds: float  # from the cause to the instant of that cycle's frame
+    seconds: float  # from the cause to the sending of that frame
 
 
 def reactions(recording: record.Recording) -> list[Reaction]:
-    """Of every stop that a marker tells of, by the controlwords that were sent. ValueError: no
-    quick stop followed."""
+    """Return the reaction to each marked stop, from the controlwords that were sent.
+
+    Raises:
+        ValueError: No quick stop followed.
+    """
     mask, value = STATE_CODING[AxisState.OPERATION_ENABLED]
     moving = (recording["statusword"] & mask) == value
     stopping = (braking(recording) | ~moving).all(axis=1)
@@ -139,7 +149,7 @@ def reactions(recording: record.Recording) -> list[Reaction]:
         if event.kind != "Marker" or not event.message.startswith(STOP):
             continue
         cause = round(event.time * 1e9)
-        begun = int(np.searchsorted(instants, cause))  # the first cycle that began after it
+        begun = int(np.searchsorted(instants, cause))  # first cycle that began later
         running = max(begun - 1, 0)
         if not stopping[running:].any():
             raise ValueError(f"{event.message} at {event.time:.3f} s: no quick stop was sent")
@@ -155,7 +165,14 @@ def reactions(recording: record.Recording) -> list[Reaction]:
 def report(
     folder: Path, outcome: Outcome, without: Outcome | None = None, *, plots: bool = True
 ) -> None:
-    """Prints it all, beside the run `without` gravity fed forward; writes `cobot.json`, plots."""
+    """Print the results, and write `cobot.json` and plots.
+
+    Args:
+        folder: Folder for the files.
+        outcome: Results of the run.
+        without: Results of a run without gravity compensation.
+        plots: True to plot the recordings.
+    """
     times, verdict = outcome.times(), outcome.verdict()
     answers = reactions(record.read(outcome.path))
     bounds = {each.name: each.response for each in verdict.responses}
@@ -181,7 +198,7 @@ def report(
     print(f"{outcome.measured.speed:.1f} times real time")
     for each, answer in zip(outcome.stopped, answers, strict=True):
         print(f"stopped in cycle {each.number}, at {each.time:.3f} s: {each.reason}; ", end="")
-        print(f"quick stop on the wire {answer.cycles} cycle after its cause, ", end="")
+        print(f"quick stop on the wire {answer.cycles} cycles after its cause, ", end="")
         print(f"{answer.seconds * 1e3:.3f} ms")
     (folder / "cobot.json").write_text(json.dumps(found, indent=1) + "\n")
     for one in filter(None, (outcome, without)) if plots else ():
@@ -191,7 +208,7 @@ def report(
 
 
 def beyond(times: Mapping[str, TaskTimes], bounds: Mapping[str, float | None]) -> list[str]:
-    """Those whose longest response is longer than the analysis says."""
+    """Return the names whose longest response exceeds the bound of the analysis."""
     found = []
     for name, each in times.items():
         bound, longest = bounds[name], each.response[FIGURES.index("max")]  # [s], [us]

@@ -1,7 +1,8 @@
-"""Compiles the C peers on the spot, from the package's own data, with the machine's compiler.
+"""Compilation of the C peers with the compiler of the machine.
 
-For a machine without one, `compile_all` makes them elsewhere: the folder they lie in goes into the
-variable CATENARY_BENCH_PROGRAMS."""
+For a machine without a compiler, run `compile_all` on another one, and set the environment variable
+CATENARY_BENCH_PROGRAMS to the folder of the programs.
+"""
 
 from __future__ import annotations
 
@@ -25,21 +26,21 @@ VARIABLE = "CATENARY_BENCH_PROGRAMS"
 
 
 class CompilerError(CatenaryError):
-    """A C peer cannot be compiled here."""
+    """Error if a C peer cannot be compiled."""
 
 
 def has_programs() -> bool:
-    """Whether `compile_peer` can do something here."""
+    """Return True if there is a compiler, or a folder of compiled programs."""
     return VARIABLE in os.environ or shutil.which("cc") is not None
 
 
 def compile_all(folder: Path) -> list[Path]:
-    """Programs of all C peers, in `folder`, for a machine that has no compiler."""
+    """Compile all C peers into `folder`, for a machine without a compiler."""
     return [compile_peer(name, folder) for name in PROGRAMS]
 
 
 def compile_peer(name: str, folder: Path) -> Path:
-    """The program of the C peer `name`, in `folder` or brought along; compiled once."""
+    """Return the program of a C peer. Compile it into `folder` if it does not exist."""
     program = Path(os.environ.get(VARIABLE, folder), name)
     if not program.exists():
         sources = [str(SOURCES / source) for source in PROGRAMS[name]]
@@ -48,7 +49,7 @@ def compile_peer(name: str, folder: Path) -> Path:
 
 
 def compile_library(name: str, folder: Path) -> Path:
-    """The C peer `name`.c as a library that this process can load."""
+    """Compile `name`.c as a shared library, and return its path."""
     library = folder / f"{name}.so"
     _compile(name, [*FLAGS, "-shared", "-fPIC", "-o", str(library), str(SOURCES / f"{name}.c")])
     return library
@@ -58,8 +59,8 @@ def _compile(name: str, arguments: list[str]) -> None:
     compiler = shutil.which("cc")
     if compiler is None:
         raise CompilerError(
-            f"the peer {name} needs a C compiler, and there is no `cc`",
-            hint="sudo apt install gcc libc6-dev, or leave it out: --peers pysoem",
+            f"the peer {name} needs a C compiler, and `cc` was not found",
+            hint="sudo apt install gcc libc6-dev, or omit the peer: --peers pysoem",
         )
     done = subprocess.run(
         [compiler, *arguments],

@@ -1,7 +1,8 @@
-"""`python -m benchmarks cost`: what a cycle costs, as a + b·axes + c·bytes.
+"""`python -m benchmarks cost`: cost of a cycle, as a + b·axes + c·bytes.
 
-A least-squares fit over segments that differ in both, so that the work per axis and the work per
-byte come apart."""
+The result is a least-squares fit over segments with different numbers of axes and bytes, so that
+the cost per axis and the cost per byte can be separated.
+"""
 
 from __future__ import annotations
 
@@ -39,7 +40,7 @@ class Cost:
     base_us: float
     per_axis_us: float
     per_byte_us: float
-    residual_us: float  # root mean square of what the line does not explain
+    residual_us: float  # root mean square of the residuals
 
     def __str__(self) -> str:
         return (
@@ -51,7 +52,7 @@ class Cost:
 def measure(*, seconds: float, file: Path | None) -> None:
     rounds = math.ceil(seconds * 1000 / ROUND_CYCLES)
     found: dict[tuple[str, int, int], list[Round]] = {}  # by peer, axes, terminals
-    for _ in range(rounds):  # all segments in turn, so that drift of the machine is not a cost
+    for _ in range(rounds):  # all segments in turn: drift of the machine affects all equally
         for drives, axes, terminals in COST_SEGMENTS:
             with served(drives, terminals, axes) as segment:
                 jobs = make_jobs(
@@ -89,10 +90,14 @@ def measure(*, seconds: float, file: Path | None) -> None:
 
 
 def fit(points: Sequence[Point]) -> Cost:
-    """At least three segments; axes and bytes must not be proportional."""
+    """Fit the cost model. At least three segments are needed, with axes not proportional to bytes.
+
+    Raises:
+        ValueError: The segments cannot separate the cost of an axis from that of a byte.
+    """
     terms = np.array([(1.0, point.axes, point.size) for point in points])
     if np.linalg.matrix_rank(terms) < 3:
-        raise ValueError("the segments do not tell the cost of an axis from that of a byte")
+        raise ValueError("the segments cannot separate the cost of an axis from that of a byte")
     costs = np.array([point.cost_us for point in points])
     solution, *_ = np.linalg.lstsq(terms, costs, rcond=None)
     residual = float(np.sqrt(np.mean((terms @ solution - costs) ** 2)))

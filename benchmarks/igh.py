@@ -1,7 +1,7 @@
-"""`python -m benchmarks igh`: what a cycle over libethercat takes.
+"""`python -m benchmarks igh`: time of a cycle over libethercat.
 
-Our step, the same calls hand-written in C, and one ctypes call for each function, as PyIgH makes
-them. In turns, on one activated master.
+Three variants take turns on one activated master: our step, the same calls hand-written in C, and
+one ctypes call for each function, as in PyIgH.
 """
 
 from __future__ import annotations
@@ -57,7 +57,7 @@ def measure(*, library: str | os.PathLike[str] | None, file: Path | None) -> Non
 
 
 def cycle_times(library: str | os.PathLike[str] | None) -> dict[str, list[float]]:
-    """[ns] a cycle of every way, in every round."""
+    """Return the time per cycle [ns] of each variant, in each round."""
     with (
         tempfile.TemporaryDirectory() as folder,
         MainDevice(igh.Master(library=library)) as main,
@@ -95,7 +95,7 @@ def cycle_times(library: str | os.PathLike[str] | None) -> dict[str, list[float]
 
 
 def _in_turns(ways: dict[str, Callable[[], object]]) -> Iterator[tuple[str, Callable[[], object]]]:
-    """Every way once a round, each round beginning with another."""
+    """Yield each variant once per round. Each round starts with a different one."""
     names = list(ways)
     for number in range(ROUNDS):
         first = number % len(names)
@@ -114,7 +114,7 @@ def _published(master: MasterBase, servos: list[SlaveServo]) -> None:
 
 
 def _peer(kernel: igh.KernelMaster, domain: Domain) -> tuple[Peer, list[object]]:
-    """The C program's own numbers, and what keeps them alive."""
+    """Return the structure of the C program, and the objects that must outlive it."""
     library = kernel.reservation.library
     sides = [
         (ctypes.c_uint32 * (3 * len(copies)))(*(number for copy in copies for number in copy))

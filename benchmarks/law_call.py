@@ -1,6 +1,8 @@
-"""`python -m benchmarks law`: what one call of a compiled law takes, called again and again from
-native code: the law with its bounds checks and the function that turns what it raises into a
-status. A PD law, and a cascade of `catenary.control` with friction and feed-forward."""
+"""`python -m benchmarks law`: time of one call of a compiled law, from native code.
+
+The time includes the bounds checks and the function that converts exceptions into a status. The
+laws are a PD law, and a cascade of `catenary.control` with friction and feed-forward.
+"""
 
 from __future__ import annotations
 
@@ -60,7 +62,7 @@ def measure(*, axes: int, file: Path | None) -> None:
 
 
 def numbers_of(axes: int, of_law: Law) -> tuple[Numbers, Numbers]:
-    """Its memory and its parameters."""
+    """Return the memory and the parameters of a law."""
     if of_law is pd:
         return np.zeros(axes), np.array([4.0, 0.2])
     block = control.Cascade(
@@ -72,7 +74,7 @@ def numbers_of(axes: int, of_law: Law) -> tuple[Numbers, Numbers]:
 
 
 def call_times(axes: int, of_law: Law = pd) -> list[float]:
-    """[ns] a call, of every round."""
+    """Return the time per call [ns] of each round."""
     numba: Any = import_module("numba")
     block = 8 * axes
     layout = LawLayout(

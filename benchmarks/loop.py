@@ -1,4 +1,4 @@
-"""`python -m benchmarks loop`: the loop beside C programs and PySOEM."""
+"""`python -m benchmarks loop`: the loop compared with C programs and PySOEM."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ def measure(setting: Setting, peers: Sequence[str], file: Path | None) -> None:
     """Print the timing of every peer, and write it to `file` as JSON.
 
     Args:
-        setting: what is measured.
-        peers: names of peers in addition to ours.
-        file: of the figures.
+        setting: What to measure.
+        peers: Names of peers in addition to ours.
+        file: File for the figures.
 
     Raises:
-        ValueError: unknown peer, or a busy-wait that is not less than the period.
+        ValueError: A peer is unknown, or the busy-wait is not less than the period.
     """
     names = peer_names(peers)
     check_busy_peer(setting.busy_wait, names)
@@ -36,15 +36,15 @@ def peer_names(peers: Sequence[str]) -> list[str]:
     """Return our peers and the chosen ones.
 
     Raises:
-        ValueError: unknown peer.
-        PackageError: a chosen peer needs a package that is not installed.
+        ValueError: A peer is unknown.
+        PackageError: A chosen peer needs a package that is not installed.
     """
     for name in peers:
         if name not in MODULES:
             known = ", ".join(name for name in MODULES if name not in (*OURS, LAW))
             raise ValueError(f"unknown peer {name!r}; known: {known}")
         if name in NEEDS:
-            need(NEEDS[name], instead=f"; or leave {name} out: --peers c")
+            need(NEEDS[name], instead=f"; or omit {name}: --peers c")
     ours = own_names()
     return [*ours, *(name for name in peers if name not in ours)]
 

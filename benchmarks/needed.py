@@ -1,4 +1,4 @@
-"""Packages that benchmarks need and Catenary does without: asked for before the work begins."""
+"""Packages that benchmarks need and Catenary does not, checked before a benchmark starts."""
 
 from __future__ import annotations
 
@@ -10,11 +10,19 @@ EXTRAS = {"pysoem": "peers", "numba": "law"}
 
 
 class PackageError(CatenaryError):
-    """A package is not installed here."""
+    """Error if a package is not installed."""
 
 
 def need(package: str, *, instead: str = "") -> None:
-    """PackageError: it is not installed; `instead` says what goes without it."""
+    """Check that a package is installed.
+
+    Args:
+        package: Name of the package.
+        instead: Alternative, as the end of the hint.
+
+    Raises:
+        PackageError: The package is not installed.
+    """
     if find_spec(package) is None:
         raise PackageError(
             f"the benchmark needs {package}, which is not installed",

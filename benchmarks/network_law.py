@@ -1,7 +1,9 @@
-"""One network's loop with a law, in a process of its own, as the published humanoid has one for
-each network: `python -m benchmarks.network_law JOB`. It says "here" once all is imported,
-opens the loop at SIGUSR1, says "ready" once the law runs, measures from the next SIGUSR1 on, and
-says what it came to. So no loop takes the processor from another one that still comes up."""
+"""Loop of one network with a law, in a separate process: `python -m benchmarks.network_law JOB`.
+
+The published humanoid has one such process for each network. The process prints "here" after its
+imports and opens the loop at SIGUSR1. It prints "ready" when the law runs, measures from the next
+SIGUSR1 on, and prints its results. A running loop therefore cannot delay one that is starting.
+"""
 
 from __future__ import annotations
 
@@ -21,8 +23,8 @@ from catenary.bench.python_loop import opened
 from catenary.errors import CatenaryError
 
 GO = signal.SIGUSR1
-PATIENCE = 120.0  # [s] for the others to be ready
-LOOK = 500  # cycles from one look at the counters to the next
+GO_TIMEOUT = 120.0  # [s] for the other processes to be ready
+POLL_CYCLES = 500  # cycles between two readings of the counters
 NEVER = 1e9  # [s]
 BUDGET_SHARE = 0.1  # of the period: the frames of two networks on one processor need the rest
 
@@ -40,18 +42,18 @@ def run_law(job: Job) -> NetworkRound:
         return count(loop, job)
 
 
-def wait_to_go(said: str) -> None:
-    print(said, flush=True)
-    if signal.sigtimedwait({GO}, PATIENCE) is None:
-        raise CatenaryError(f"nobody said go within {PATIENCE:.0f} s")
+def wait_to_go(state: str) -> None:
+    print(state, flush=True)
+    if signal.sigtimedwait({GO}, GO_TIMEOUT) is None:
+        raise CatenaryError(f"no start signal (SIGUSR1) within {GO_TIMEOUT:.0f} s")
 
 
 def count(loop: cat.Loop, job: Job) -> NetworkRound:
-    """The law needs nobody meanwhile; a loop that stands still is asked why."""
+    """Count the losses of a job. If the loop stands still, `next` raises its error."""
     before = loop.timing.counters
     first = now = before["cycles"]
     while (left := first + job.cycles - now) > 0:
-        time.sleep(max(min(left, LOOK), 1) * job.period_ns * 1e-9)
+        time.sleep(max(min(left, POLL_CYCLES), 1) * job.period_ns * 1e-9)
         seen, now = now, loop.timing.counters["cycles"]
         if now == seen:
             next(loop)
@@ -64,7 +66,7 @@ def count(loop: cat.Loop, job: Job) -> NetworkRound:
 
 
 def main(arguments: Sequence[str]) -> None:
-    signal.pthread_sigmask(signal.SIG_BLOCK, {GO})  # who starts us has done so before any import
+    signal.pthread_sigmask(signal.SIG_BLOCK, {GO})  # the parent process blocked it, too
     job = msgspec.json.decode(arguments[0], type=Job)
     print(msgspec.json.encode(run_law(job)).decode(), flush=True)
 

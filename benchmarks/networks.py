@@ -1,8 +1,8 @@
-"""`python -m benchmarks networks`: 18 and 15 axes on two networks in one loop, beside two C
-programs under the same load; and the same loop in virtual time.
+"""`python -m benchmarks networks`: a loop with 18 and 15 axes on two networks, and two C programs.
 
-Each network is a pair of interfaces with a segment of its own. The C programs run at once, one a
-network, as the native threads of the loop do; segments share one processor, masters the other.
+The C programs run at the same time under the same load, one for each network, like the native
+threads of the loop. Each network is a pair of interfaces with a separate segment. The segments
+share one processor, and the masters share the other. The same loop also runs in virtual time.
 """
 
 from __future__ import annotations
@@ -35,19 +35,19 @@ Positions = npt.NDArray[np.float64]  # [rad]
 
 DRIVES = (18, 15)  # of the published humanoid's upper and lower network
 OURS, C = "catenary", "c"
-BRING_UP = 2.0  # [s] that two programs together take at most
+BRING_UP = 2.0  # [s] longest bring-up of two programs together
 KEPT = ("lateness", "receive", "send", "output_delay")  # phases
 
 
 @dataclass(frozen=True, slots=True)
 class Tally:
-    """What one network came to, over all rounds."""
+    """Results of one network, over all rounds."""
 
     name: str
     network: int
     cycles: int
     lost: int
-    late: int  # instants that passed without a cycle (ours), cycles begun a period late (C's)
+    late: int  # missed cycle starts (ours), cycles that began a period late (C)
     lateness_us: dict[str, float]  # max, p50, p99
 
 
@@ -76,7 +76,7 @@ def measure(*, rates: Sequence[int], seconds: float, rounds: int, file: Path | N
 
 
 def on_wires(rate: int, seconds: float, rounds: int) -> list[Tally]:
-    """Catenary's loop and the C programs in turn, round by round."""
+    """Run Catenary's loop and the C programs in turn, round by round."""
     cycles = round(seconds * rate / rounds)
     with contextlib.ExitStack() as stack:
         segments = [stack.enter_context(served(drives)) for drives in DRIVES]
@@ -96,8 +96,10 @@ def on_wires(rate: int, seconds: float, rounds: int) -> list[Tally]:
 
 
 def run_c(jobs: Sequence[Job], folder: Path) -> list[NetworkRound]:
-    """One program for each network, at the same time. Each is brought up by Python on the masters'
-    processor: what is counted begins once all of them run."""
+    """Run one program for each network at the same time.
+
+    Python brings each segment up on the masters' processor. Counting begins when all programs run.
+    """
     start = round(BRING_UP / (jobs[0].period_ns * 1e-9))
     jobs = [replace(job, warm_up=start) for job in jobs]
     places = [folder / str(number) for number in range(len(jobs))]
@@ -115,13 +117,13 @@ def of_samples(lost: int, samples: Nanoseconds, period_ns: int) -> NetworkRound:
 
 
 def run_ours(jobs: Sequence[Job]) -> list[NetworkRound]:
-    """The loop over all networks, in a process of its own like the C programs."""
+    """Run the loop over all networks in a separate process, like the C programs."""
     arguments = ["-m", "benchmarks.networks", msgspec.json.encode(jobs).decode()]
     seconds = BRING_UP_SECONDS + (jobs[0].warm_up + jobs[0].cycles) * jobs[0].period_ns * 1e-9
     with start_python(arguments) as worker:
         said = worker.read_line(seconds)
     if said is None or not said.startswith("["):
-        raise RoundError(f"the loop over {len(jobs)} networks failed: {said or 'it said nothing'}")
+        raise RoundError(f"the loop over {len(jobs)} networks failed: {said or 'no output'}")
     return msgspec.json.decode(said, type=list[NetworkRound])
 
 
@@ -158,7 +160,7 @@ def as_text(tallies: Sequence[Tally]) -> str:
 
 
 def in_virtual_time(rate: int, seconds: float) -> tuple[int, int]:
-    """Cycles of the loop, and how many were not complete on some network."""
+    """Return the number of cycles, and the number of cycles that were incomplete on a network."""
     incomplete = 0
     cycles = round(seconds * rate)
     with VirtualClock() as clock, contextlib.ExitStack() as stack:
@@ -192,7 +194,7 @@ def follow(bodies: Sequence[cat.Drives], homes: Sequence[Positions], t: float) -
         body.target.position[:] = home + 0.1 * np.sin(np.pi * t)
 
 
-# ---- the process of one round
+# Process of one round
 
 
 def main(arguments: Sequence[str]) -> None:
@@ -227,13 +229,13 @@ def run_loop(jobs: Sequence[Job]) -> list[NetworkRound]:
 
 
 def follow_and_count(loop: cat.Loop, bodies: Sequence[cat.Drives], job: Job) -> list[NetworkRound]:
-    """Counted from the end of the warm-up; lateness from each network's log."""
+    """Run the loop, and return the counts and the phases of each network after the warm-up."""
     networks = loop.networks
     before, counted = [network.timing.counters for network in networks], False
     homes = homes_of(bodies)
     for cycle in loop:
         follow(bodies, homes, cycle.time)
-        if not counted and cycle.number >= job.warm_up:  # late, it skips numbers
+        if not counted and cycle.number >= job.warm_up:  # a late loop skips numbers
             before, counted = [network.timing.counters for network in networks], True
         if cycle.number >= job.warm_up + job.cycles:
             break
@@ -249,7 +251,7 @@ def follow_and_count(loop: cat.Loop, bodies: Sequence[cat.Drives], job: Job) -> 
 
 
 def phases_of(network: Network | cat.Loop, cycles: int) -> dict[str, list[int]]:
-    """Of the last cycles."""
+    """Return the phases of the last cycles [ns]."""
     last = network.log[-cycles:]
     return {name: last[f"{name}_ns"].tolist() for name in KEPT}
 

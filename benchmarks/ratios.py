@@ -1,4 +1,4 @@
-"""Ratios of our figures to those of the peers that ran beside us."""
+"""Ratios of our figures to those of the peers in the same run."""
 
 from __future__ import annotations
 
@@ -27,7 +27,8 @@ def ratios(runs: Sequence[Run]) -> dict[str, float]:
     """Return the ratios of our figures to those of the peers that ran.
 
     A ratio is computed in each interleaved round, from the medians of that round (CPU: its mean).
-    The result is the median over the rounds: a slow minute of the machine affects both sides.
+    The result is the median over the rounds, because a slow minute of the machine affects both
+    sides.
     """
     by_name = {run.name: run for run in runs}
     found: dict[str, float] = {}

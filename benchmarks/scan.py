@@ -1,5 +1,7 @@
-"""`python -m benchmarks scan`: frames and time from nothing to PRE-OP, counted on the wire by the
-kernel, beside PySOEM's. Each brings the same served segment up in a process of its own."""
+"""`python -m benchmarks scan`: number of frames and time to PRE-OP, for Catenary and PySOEM.
+
+The kernel counts the frames on the wire. Each master brings up the same segment in a new process.
+"""
 
 from __future__ import annotations
 
@@ -22,7 +24,7 @@ from catenary.errors import CatenaryError
 from catenary.realtime.child import start_python
 
 REPEATS = 5
-SECONDS = 120.0  # at most, for one bring-up
+SECONDS = 120.0  # [s] limit of one bring-up
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,7 +59,7 @@ def repeat(name: str, interface: str) -> BringUp:
 
 
 def once(name: str, interface: str) -> BringUp:
-    """One bring-up in a fresh process."""
+    """Bring the segment up in a new process, and return the result."""
     with start_python(["-m", "benchmarks.scan", name, interface]) as worker:
         line = worker.read_line(SECONDS)
     if line is None:
@@ -67,7 +69,7 @@ def once(name: str, interface: str) -> BringUp:
 
 @contextmanager
 def with_catenary(interface: str) -> Iterator[int]:
-    # PySOEM does not look for another master either.
+    # PySOEM does not check for another master, either.
     with cat.MainDevice(interface, force=True) as main:
         yield len(main.scan())
 
@@ -94,13 +96,13 @@ WAYS: dict[str, Callable[[str], AbstractContextManager[int]]] = {
 
 
 def sent(interface: str) -> tuple[int, int]:
-    """(frames, bytes) sent so far, as the kernel counts them in this namespace: proc(5)."""
+    """Return the frames and bytes sent in this namespace so far, as counted by the kernel."""
     for line in Path("/proc/self/net/dev").read_text().splitlines():
         name, _, counts = line.partition(":")
         if name.strip() == interface:
             numbers = counts.split()
             return int(numbers[9]), int(numbers[8])
-    raise CatenaryError(f"the kernel counts nothing for {interface}")
+    raise CatenaryError(f"the kernel has no counters for {interface}")
 
 
 def main(arguments: Sequence[str]) -> None:

@@ -1,6 +1,8 @@
-"""`python -m benchmarks share`: what reading a cycle takes beyond copying it, and what 16 readers
-cost the loop that shares it: the same loop without a share, with one nobody reads, and with
-readers."""
+"""`python -m benchmarks share`: time to read a cycle, and the cost of 16 readers for the loop.
+
+The time to read is compared with a plain copy. The loop runs without a share, with a share that is
+not read, and with readers.
+"""
 
 from __future__ import annotations
 
@@ -27,8 +29,8 @@ NAMES = tuple(f"{order}{way}" for order in ORDERS for way in ("", SHARED, READ, 
 AXES = (3, 33)
 READS = 20_000
 CYCLES = 100
-READ_LIMIT_US = 1.0  # beyond the copy
-LOOP_LIMIT = 1.05  # medians with readers over those without
+READ_LIMIT_US = 1.0  # in addition to the copy
+LOOP_LIMIT = 1.05  # ratio of the medians with readers to those without
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,7 +40,7 @@ class Reading:
     axes: int
     bytes: int
     read: float
-    copy: float  # np.copyto of as many bytes
+    copy: float  # np.copyto of the same number of bytes
 
     @property
     def beyond(self) -> float:
@@ -61,7 +63,7 @@ def measure(*, drives: int, rate: int, seconds: float, file: Path | None) -> Non
 
 
 def measure_reading(axes: int) -> Reading:
-    """Of a loop that has stopped for the while, in this process."""
+    """Measure reading from a loop that stands still in this process."""
     name = f"bench-read-{os.getpid()}"
     with cat.MainDevice(make_segment(axes, clock="virtual")) as main:
         arm = cat.Drives(main.scan().drives, counts_per_turn=COUNTS_PER_TURN, velocity_limit=100.0)
@@ -81,7 +83,7 @@ def measure_reading(axes: int) -> Reading:
 
 
 def median_us(action: Callable[[], object]) -> float:
-    """Of one call, the call of the clock not counted."""
+    """Return the median time of one call, without the time of reading the clock."""
     return max(_median_ns(action) - _median_ns(lambda: None), 0.0) * 1e-3
 
 
@@ -96,8 +98,11 @@ def _median_ns(action: Callable[[], object]) -> float:
 
 
 def share_ratios(runs: Sequence[Run]) -> dict[str, float]:
-    """Medians with readers over those with as busy processes that do not read and those with a
-    share nobody reads, and of that over those of no share. The first is what reading costs."""
+    """Return the ratios of the medians between the variants.
+
+    The first ratio is the cost of reading: 16 readers to 16 equally busy processes that do not
+    read. The others are readers to a share without readers, and that to no share.
+    """
     timing = {run.name: run.timing_us for run in runs}
     return {
         f"{phase}: {order}{one} / {order}{other}": round(
@@ -112,15 +117,15 @@ def share_ratios(runs: Sequence[Run]) -> dict[str, float]:
 
 
 def as_aims(readings: Sequence[Reading], quotients: dict[str, float]) -> str:
-    """Every aim beside what was found."""
+    """Return one line per limit, with the measured value."""
     lines = [
         f"  read {each.bytes} bytes ({each.axes} axes): {each.read:.2f} us, the copy alone "
-        f"{each.copy:.2f} us: {each.beyond:.2f} beyond it, aim <= {READ_LIMIT_US:g}: "
+        f"{each.copy:.2f} us: difference {each.beyond:.2f} us, limit {READ_LIMIT_US:g} us: "
         + verdict(each.beyond <= READ_LIMIT_US)
         for each in readings
     ]
     lines += [
-        f"  {name}: {found:.3f}, aim <= {LOOP_LIMIT:g}: {verdict(found <= LOOP_LIMIT)}"
+        f"  {name}: {found:.3f}, limit {LOOP_LIMIT:g}: {verdict(found <= LOOP_LIMIT)}"
         for name, found in quotients.items()
         if name.endswith(BESIDE)
     ]

@@ -1,6 +1,8 @@
-"""`python -m benchmarks storm`: the loop while other threads of the program read objects of all
-devices, all the time, beside the same loop without; and the throughput of a large object on an idle
-bus beside PySOEM's."""
+"""`python -m benchmarks storm`: a loop with and without an SDO storm, and the upload throughput.
+
+In a storm, other threads of the program read objects of all devices without a pause. The throughput
+is that of a large object on an idle bus, for Catenary and PySOEM.
+"""
 
 from __future__ import annotations
 
@@ -33,11 +35,11 @@ def measure(*, drives: int, rate: int, seconds: float, file: Path | None) -> Non
         )
         uploads = measure_uploads(segment.interface, segment.drives[0])
     quotients = storm_ratios(runs)
-    print(f"{machine()}\n{drives} drives at {rate} Hz, with and without a storm of SDOs\n")
+    print(f"{machine()}\n{drives} drives at {rate} Hz, with and without an SDO storm\n")
     print(as_text(runs, quotients))
     for run in runs:
         if run.answers:
-            print(f"  {run.name}: {run.answers * rate / run.cycles:.0f} answers a second")
+            print(f"  {run.name}: {run.answers * rate / run.cycles:.0f} answers per second")
     print("\na large object, idle bus")
     for upload in uploads:
         print(f"  {upload}")
@@ -47,7 +49,7 @@ def measure(*, drives: int, rate: int, seconds: float, file: Path | None) -> Non
 
 
 def storm_ratios(runs: Sequence[Run]) -> dict[str, float]:
-    """Medians with the storm over those without."""
+    """Return the ratios of the medians with the storm to those without."""
     timing = {run.name: run.timing_us for run in runs}
     return {
         f"{phase}: {name}-sdo / {name}": round(

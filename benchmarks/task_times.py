@@ -1,5 +1,7 @@
-"""What tasks and a loop among them came to, as a table. Other machines: compare shapes, not
-numbers."""
+"""Times of tasks and of a loop, as a table.
+
+Across machines, compare the shape of the tables, not the numbers.
+"""
 
 from __future__ import annotations
 
@@ -14,7 +16,7 @@ Row: TypeAlias = tuple[float, float, float, float]
 
 
 class TaskTimes(NamedTuple):
-    """Each mean, max, min, sd: period [ms], jitter of the start and response [us]."""
+    """Mean, max, min and sd of the period [ms], the start jitter [us] and the response [us]."""
 
     period: Row
     jitter: Row
@@ -22,7 +24,7 @@ class TaskTimes(NamedTuple):
 
 
 def of_task(statistics: Statistics) -> TaskTimes:
-    """What a task of `realtime.Tasks` came to."""
+    """Return the times of a task of `realtime.Tasks`."""
 
     def row(name: str, scale: float) -> Row:
         figure = getattr(statistics, name)
@@ -33,9 +35,12 @@ def of_task(statistics: Statistics) -> TaskTimes:
 
 
 def of_loop(timing: Mapping[str, Mapping[str, float]]) -> TaskTimes:
-    """What a loop came to: its lateness is a task's jitter; lateness and in_controller together
-    its response, which the frame that was sent ends. (Minima and maxima of the two need not be of
-    one cycle: the response is safe, not exact.)"""
+    """Return the times of a loop, in the terms of a task.
+
+    The lateness of a loop is the jitter of a task. The sum of lateness and in_controller is the
+    response, which ends with the sent frame. The minima and maxima of the two may be from different
+    cycles, so the response is a bound.
+    """
 
     def row(scale: float, *phases: str) -> Row:
         mean, high, low, sd = (
@@ -49,7 +54,7 @@ def of_loop(timing: Mapping[str, Mapping[str, float]]) -> TaskTimes:
 
 
 def as_table(ours: Mapping[str, TaskTimes], published: Mapping[str, TaskTimes]) -> str:
-    """Two lines a task. Of ours that are not published one."""
+    """Return a table with our line of each task, followed by the published one, if any."""
     columns = ("period [ms] mean/max/min/sd", "jitter [us]", "response [us]")
     lines = [f"{'task':14}" + "".join(f"{column:>31}" for column in columns)]
     for name, times in ours.items():

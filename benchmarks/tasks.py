@@ -1,6 +1,6 @@
-"""`python -m benchmarks tasks`: effect of a busy task of low priority on one of high priority.
+"""`python -m benchmarks tasks`: effect of a busy low-priority task on a high-priority task.
 
-The tasks run in separate processes, then as threads under one interpreter lock.
+The tasks run in separate processes, then as threads that share the GIL.
 """
 
 from __future__ import annotations
@@ -22,14 +22,14 @@ ROUND_SECONDS = 1.0
 HIGH_PERIOD, LOW_PERIOD, LOW_BUSY = 1e-3, 10e-3, 8e-3  # [s]
 HIGH_PRIORITY, LOW_PRIORITY = 80, 10
 WAYS = ("alone", "processes", "threads", "threads-5ms")
-SWITCH_INTERVALS = {"threads-5ms": 5e-3}  # [s] as Python has it; others as a session has it
+SWITCH_INTERVALS = {"threads-5ms": 5e-3}  # [s] Python's default; otherwise that of a session
 FIGURES = {"max": 1.0, "p50": 0.5, "p99": 0.99, "p999": 0.999}
-AIM = 1.2  # processes / alone, medians
+AIM = 1.2  # limit of processes / alone, medians
 
 
 @dataclass(slots=True)
 class Found:
-    """Owns the responses of the task of high priority over all rounds of one way."""
+    """Owns the response times of the high-priority task over all rounds of one variant."""
 
     responses: Counter[float]  # [s]
     jobs: int = 0
@@ -37,7 +37,7 @@ class Found:
     scheduling: str = ""
 
     def percentile(self, fraction: float) -> float:
-        """[us]"""
+        """Return a percentile of the response times [us]."""
         rank, below = fraction * (self.responses.total() - 1), 0
         for seconds in sorted(self.responses):
             below += self.responses[seconds]
@@ -91,7 +91,7 @@ def run_round(way: str, found: Found) -> None:
 
 
 def as_text(found: Mapping[str, Found], ratio: float) -> str:
-    lines = [f"{machine()}\nresponse of a 1 kHz task beside one that is busy at low priority [us]"]
+    lines = [f"{machine()}\nresponse of a 1 kHz task next to a busy low-priority task [us]"]
     lines.append(
         f"{'':12}{'jobs':>8}{'missed':>8}" + "".join(f"{heading(name):>12}" for name in FIGURES)
     )
@@ -100,7 +100,7 @@ def as_text(found: Mapping[str, Found], ratio: float) -> str:
         lines.append(
             f"{way:12}{one.jobs:8d}{one.missed:8d}" + "".join(f"{us:12.2f}" for us in figures)
         )
-    lines.append(f"processes / alone, medians: {ratio:.2f} (aim: {AIM} at most)")
+    lines.append(f"processes / alone, medians: {ratio:.2f} (limit: {AIM})")
     return "\n".join(lines)
 
 

@@ -1,10 +1,12 @@
-"""Whether two programs have the same distribution of a duration: a test that holds for samples of
-loops, an effect with its interval, and the goodness-of-fit test that is often published instead.
+"""Comparison of the distributions of a duration in two programs.
 
-Durations of cycles that follow each other depend on each other: the machine is slow for a while,
-and a long period makes the next one short. What is independent are *rounds*: each in a process of
-its own, programs in turn, so that round i of one and round i of the other met the same machine.
-Here the unit is therefore the pair of rounds, and a cycle is never counted as evidence of its own.
+The module has a test that is valid for loops, an effect with its confidence interval, and the
+goodness-of-fit test that is often published instead.
+
+Durations of successive cycles are not independent: the machine may be slow for a while, and a long
+period makes the next one short. *Rounds* are independent. Each round is a new process, and the
+programs take turns, so round i of both programs meets the same conditions. The unit of the test is
+therefore a pair of rounds. A single cycle does not count as independent evidence.
 """
 
 from __future__ import annotations
@@ -19,17 +21,17 @@ import numpy.typing as npt
 
 Values = npt.NDArray[np.float64]
 
-BINS = 30  # of the published test
-ALPHA = 0.01  # of both
-GRID = 512  # places at which distributions are compared
-EXACT_PAIRS = 14  # of more, signs are drawn
+BINS = 30  # bins of the published test
+ALPHA = 0.01  # significance level of both tests
+GRID = 512  # points at which distributions are compared
+EXACT_PAIRS = 14  # largest number of pairs with all signs; for more, signs are drawn
 DRAWN = 19_999
 CONFIDENCE = 0.95
 
 
 @dataclass(frozen=True, slots=True)
 class GoodnessOfFit:
-    """Pearson's statistic; beyond `critical` the hypothesis would be rejected."""
+    """Pearson's statistic. Above `critical`, the hypothesis is rejected."""
 
     statistic: float
     degrees: int
@@ -42,9 +44,12 @@ class GoodnessOfFit:
 
 @dataclass(frozen=True, slots=True)
 class PairedRounds:
-    """`distance`: the largest between the two distributions (Kolmogorov and Smirnov), 0 to 1.
-    `p_value`: how often chance alone makes it as large. `least_p_value`: the smallest that so many
-    pairs can give."""
+    """Result of the permutation test.
+
+    `distance` is the largest difference between the two distribution functions, 0 to 1
+    (Kolmogorov-Smirnov). `p_value` is the probability of a distance at least as large by chance.
+    `least_p_value` is the smallest value that this number of pairs can give.
+    """
 
     distance: float
     p_value: float
@@ -59,8 +64,10 @@ class PairedRounds:
 
 @dataclass(frozen=True, slots=True)
 class Effect:
-    """Median over the pairs, and an interval that covers it with at least `confidence`; without
-    bounds where there are too few pairs."""
+    """Median over the pairs, and an interval that covers it with at least `confidence`.
+
+    `low` and `high` are None if there are too few pairs.
+    """
 
     estimate: float
     low: float | None
@@ -69,8 +76,10 @@ class Effect:
 
 
 def chi_squared_tail(x: float, degrees: int) -> float:
-    """P(X > x), in closed form for whole degrees of freedom: Abramowitz and Stegun, 26.4.4 and
-    26.4.5."""
+    """Return P(X > x) of a chi-squared distribution.
+
+    The closed form for integer degrees of freedom is from Abramowitz and Stegun, 26.4.4 and 26.4.5.
+    """
     if x <= 0:
         return 1.0
     if degrees % 2 == 0:
@@ -88,7 +97,7 @@ def chi_squared_tail(x: float, degrees: int) -> float:
 
 
 def chi_squared_critical(degrees: int, alpha: float = ALPHA) -> float:
-    """The x with P(X > x) = alpha, by halving."""
+    """Return the x with P(X > x) = alpha, by bisection."""
     low, high = 0.0, 1.0
     while chi_squared_tail(high, degrees) > alpha:
         high *= 2
@@ -99,9 +108,11 @@ def chi_squared_critical(degrees: int, alpha: float = ALPHA) -> float:
 
 
 def goodness_of_fit(sample: Values, reference: Values, bins: int = BINS) -> GoodnessOfFit:
-    """The published test: counts of `sample` in bins, against those of `reference` as if these
-    were known beforehand. The bins hold equally many of the reference, the outer ones are open;
-    values that occur often make them fewer."""
+    """Run the published test on the counts of `sample` in bins.
+
+    The counts of `reference` are taken as the known distribution. Each bin holds the same number of
+    reference values, and the outer bins are open. Frequent values reduce the number of bins.
+    """
     edges = np.unique(np.quantile(reference, np.linspace(0, 1, bins + 1)[1:-1]))
     places = len(edges) + 1
     known = np.bincount(np.searchsorted(edges, reference, "right"), minlength=places)
@@ -116,14 +127,23 @@ def goodness_of_fit(sample: Values, reference: Values, bins: int = BINS) -> Good
 def compare_rounds(
     ours: Sequence[Values], theirs: Sequence[Values], *, seed: int = 1
 ) -> PairedRounds:
-    """A permutation test on whole rounds. Were the programs alike, the two rounds of a pair could
-    as well have been each other's: all signs of the pairs' differences are equally likely. So the
-    p-value is right whatever depends on what within a round, for any number of cycles.
+    """Run a permutation test on whole rounds.
 
-    ValueError: the numbers of rounds differ, or there are none."""
+    If the programs are alike, the two rounds of a pair are exchangeable, and all signs of the
+    differences are equally likely. The p-value is therefore valid for any dependence within a
+    round, and for any number of cycles.
+
+    Args:
+        ours: Values of each of our rounds.
+        theirs: Values of each of the other program's rounds.
+        seed: Seed for the drawn signs.
+
+    Raises:
+        ValueError: The numbers of rounds differ or are zero.
+    """
     pairs = len(ours)
     if pairs != len(theirs) or not pairs:
-        raise ValueError(f"{pairs} rounds and {len(theirs)}: pairs are needed")
+        raise ValueError(f"{pairs} and {len(theirs)} rounds are not pairs of rounds")
     everything = np.concatenate([*ours, *theirs])
     grid = np.unique(np.quantile(everything, np.linspace(0, 1, GRID)))
     differences = np.stack(
@@ -133,14 +153,14 @@ def compare_rounds(
     signs = _signs(pairs, seed)
     chance = abs(signs @ differences).max(axis=1) / pairs
     reached = int(np.count_nonzero(chance >= distance * (1 - 1e-12)))
-    itself = pairs > EXACT_PAIRS  # the signs as they came; among all there are, they are already
+    itself = pairs > EXACT_PAIRS  # add the observed signs, which all signs already contain
     p_value = (reached + itself) / (len(signs) + itself)
-    # All signs turned round give the same distance.
+    # Inverting all signs gives the same distance.
     return PairedRounds(distance, p_value, max(2.0 ** (1 - pairs), 1 / (len(signs) + 1)))
 
 
 def _shares(values: Values, grid: Values) -> Values:
-    """The distribution function at the places of the grid."""
+    """Return the distribution function at the points of the grid."""
     return np.searchsorted(np.sort(values), grid, "right") / len(values)
 
 
@@ -151,8 +171,11 @@ def _signs(pairs: int, seed: int) -> Values:
 
 
 def effect_of(differences: Sequence[float]) -> Effect:
-    """The median of the pairs' differences, with the interval of the sign test: from the k-th
-    smallest to the k-th largest. It assumes that pairs are independent, and no distribution."""
+    """Return the median of the pairs' differences, with the interval of the sign test.
+
+    The interval is from the k-th smallest to the k-th largest difference. It assumes independent
+    pairs, but no particular distribution.
+    """
     ordered = sorted(differences)
     pairs = len(ordered)
     estimate = float(np.median(ordered))
@@ -166,12 +189,12 @@ def effect_of(differences: Sequence[float]) -> Effect:
 
 
 def _binomial_tail(k: int, n: int) -> float:
-    """P(at most k heads in n throws)."""
+    """Return P(at most k heads in n tosses of a coin)."""
     return float(sum(math.comb(n, i) for i in range(k + 1)) / 2**n)
 
 
 def quantile_effect(ours: Sequence[Values], theirs: Sequence[Values], quantile: float) -> Effect:
-    """How much larger a quantile of ours is, round by round."""
+    """Return the effect on a quantile: ours minus theirs, round by round."""
     return effect_of(
         [
             float(np.quantile(a, quantile) - np.quantile(b, quantile))

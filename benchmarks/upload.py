@@ -1,5 +1,7 @@
-"""How fast a large object comes in segments on an idle bus: Catenary and PySOEM in turn, each in a
-process of its own: `python -m benchmarks.upload NAME NIC POSITION`."""
+"""Throughput of a segmented upload on an idle bus, for Catenary and PySOEM in turn.
+
+Each run is a new process: `python -m benchmarks.upload NAME NIC POSITION`.
+"""
 
 from __future__ import annotations
 
@@ -15,15 +17,15 @@ import catenary as cat
 from catenary.errors import CatenaryError
 from catenary.realtime.child import start_python
 
-LARGE = 0x2100  # of the virtual servo: 2048 bytes, segments of at most 119
-TIMES = 20  # uploads of one process
+LARGE = 0x2100  # object of the virtual servo: 2048 bytes, in segments of at most 119 bytes
+TIMES = 20  # uploads per process
 ROUNDS = 5
-SECONDS = 60.0  # at most, for one process
+SECONDS = 60.0  # [s] limit of one process
 
 
 @dataclass(frozen=True, slots=True)
 class Upload:
-    """The median of all uploads."""
+    """Median of all uploads."""
 
     name: str
     size: int  # bytes

@@ -1,5 +1,7 @@
-"""`python -m benchmarks virtual`: how much faster than real time a loop runs on a segment in this
-process, whose clock advances only while everybody waits."""
+"""`python -m benchmarks virtual`: speed of a loop in virtual time, relative to real time.
+
+The segment runs in this process. Its clock advances only while all threads wait.
+"""
 
 from __future__ import annotations
 
@@ -22,7 +24,14 @@ EXECUTION_MODES: tuple[ExecutionMode, ...] = ("inline", "threaded")
 
 
 def measure(*, drives: int, seconds: float, file: Path | None, config: Path | None = None) -> None:
-    """`config`: a segment's file instead of so many drives."""
+    """Print and write the speed in each execution mode.
+
+    Args:
+        drives: Number of drives.
+        seconds: Virtual time [s].
+        file: File for the figures.
+        config: Segment file; None for a segment of `drives` drives.
+    """
 
     def segment() -> Segment:
         return make_segment(drives, clock="virtual") if config is None else read_segment(config)
@@ -58,7 +67,7 @@ def sine(actual, target, memory, time, parameters):  # type: ignore[no-untyped-d
 
 
 def run_law(segment: Segment, seconds: float) -> float:
-    """The same for a law, without compiling it."""
+    """Return the run time of a loop with a law [s], without the compilation."""
     with cat.MainDevice(segment) as main:
         arm = cat.Drives(
             main.scan().drives, mode="csp", counts_per_turn=COUNTS_PER_TURN, velocity_limit=100.0
@@ -72,7 +81,7 @@ def run_law(segment: Segment, seconds: float) -> float:
 
 
 def run(segment: Segment, seconds: float, execution: ExecutionMode) -> float:
-    """How long the loop took [s], without bring-up and leaving."""
+    """Return the run time of a loop [s], without bring-up and leaving."""
     with cat.MainDevice(segment) as main:
         arm = cat.Drives(
             main.scan().drives, mode="csp", counts_per_turn=COUNTS_PER_TURN, velocity_limit=100.0

@@ -19,7 +19,7 @@ async def visit(loop: cat.Loop, arm: cat.Drives, axis: int, goals: list[float]) 
 
 
 async def report(loop: cat.Loop, arm: cat.Drives) -> None:
-    """Print the positions every 0.2 s, until it is cancelled or the loop has ended."""
+    """Print the positions every 0.2 s until the loop ends or the task is cancelled."""
     while loop.error is None:
         print("now", arm.actual.position.round(2))
         await asyncio.sleep(0.2)
@@ -28,7 +28,7 @@ async def report(loop: cat.Loop, arm: cat.Drives) -> None:
 async def work(target: str) -> None:
     with cat.MainDevice(target) as main:
         arm = cat.Drives(main.scan().drives, counts_per_turn=2**20, velocity_limit=2.0)
-        with cat.Loop(arm, period=1e-3) as loop:  # leaving raises an error of the loop
+        with cat.Loop(arm, period=1e-3) as loop:  # at the end, raises an error of the loop, if any
             loop.run_in_background()
             reporter = asyncio.create_task(report(loop, arm))
             await asyncio.gather(

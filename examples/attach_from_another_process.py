@@ -1,6 +1,6 @@
 """Read the state of a loop in another process, and command one of its axes for a while.
 
-python examples/attach_from_another_process.py        # with a virtual arm in a process of its own
+python examples/attach_from_another_process.py        # with a virtual arm in a separate process
 python examples/attach_from_another_process.py arm    # with yours: cat.Share("arm"), share.apply
 """
 
@@ -17,7 +17,7 @@ def move(name: str, started: Event) -> None:
         arm = cat.Drives(main.scan().drives, counts_per_turn=2**20, velocity_limit=2.0)
         with cat.Share(name) as share, cat.Loop(arm, period=1e-3, sink=share) as loop:
             started.set()
-            while not share.apply(arm):  # until a client gives its axes back, or dies: they hold
+            while not share.apply(arm):  # until a client releases its axes or ends; they then hold
                 next(loop)
 
 

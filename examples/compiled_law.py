@@ -22,11 +22,11 @@ with cat.MainDevice(sys.argv[1] if len(sys.argv) > 1 else "virtual") as main:
     with cat.Loop(arm, period=1e-3, laws=[pd]) as loop:  # compiled before the devices go to OP
         goal = arm.actual.position + 0.5  # [rad]
         run = loop.start(pd, memory=goal, parameters=[4.0, 0.2])  # N·m/rad, N·m/(rad/s)
-        for cycle in loop:  # only to observe: the law runs by itself
+        for cycle in loop:  # only to observe; the law runs in the cycle thread
             if cycle.number == 1000:
-                run.parameters = [8.0, 0.4]  # both at once
+                run.parameters = [8.0, 0.4]  # both in the same cycle
             if not run.running:
                 break
-        print(f"{run.steps} steps, the longest {run.longest * 1e6:.1f} us")
+        print(f"{run.steps} steps, longest {run.longest * 1e6:.1f} us")
         print("error [rad]:", goal - arm.actual.position)
     print(loop.timing)

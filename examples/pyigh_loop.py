@@ -1,4 +1,4 @@
-"""The measured loop: receive, process, compute, queue, send, by the published interface of PyIgH.
+"""A measured loop with the interface of PyIgH: receive, process, compute, queue, send.
 
 python examples/pyigh_loop.py igh:0     on the IgH kernel master
 python examples/pyigh_loop.py           on virtual drives
@@ -35,6 +35,6 @@ with MasterBase(target, period=PERIOD_NS * 1e-9) as master:
         master.ecat_write_apptime(cycle * PERIOD_NS)
         master.ecat_master_send()
     print(f"{len(servos)} servos, {len(goals)} enabled, status {master.ecat_master_status()}")
-    print(f"in Python: {statistics.median(in_python) / 1e3:.1f} us a cycle")
+    print(f"in Python: {statistics.median(in_python) / 1e3:.1f} us per cycle")
     for servo in servos:
         servo.disable()

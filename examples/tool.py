@@ -1,8 +1,8 @@
 """A tool that may be unplugged and plugged in while the arm moves: `python tool.py eth0`.
 
-Without an argument it runs on the virtual segment of tool.toml, where the tool loses power once.
-On yours, the first device of the tool needs the alias 20: `catenary alias eth0 POSITION 20`, then
-switch it off and on.
+Without an argument, the program uses the virtual segment of tool.toml, where the tool loses power
+once. On your segment, the first device of the tool needs the alias 20: run `catenary alias eth0
+POSITION 20`, then switch the device off and on.
 """
 
 import sys
@@ -25,4 +25,4 @@ with cat.MainDevice(sys.argv[1] if len(sys.argv) > 1 else f"virtual:{HERE}/tool.
                 print(event)
             if cycle.time > 3.0:
                 break
-        print("the tool is", "there" if all(grip.present) else "gone")
+        print("the tool is", "present" if all(grip.present) else "missing")

@@ -1,4 +1,4 @@
-"""One axis holds its position (CSP) and is then moved by torque (CST), without leaving the loop."""
+"""One axis holds its position (CSP), then moves by torque (CST) in the same loop."""
 
 import sys
 

@@ -1,4 +1,4 @@
-"""Upper and lower body of a humanoid on two networks, in one loop: here on virtual ones."""
+"""Upper and lower body of a humanoid on two virtual networks, in one loop."""
 
 import math
 

@@ -1,11 +1,11 @@
 """Positions and targets of drives over HTTP: `python web_server.py eth0`, until Ctrl-C.
 
-    curl localhost:8080                                positions [rad], state, error
+    curl localhost:8080                                 positions [rad], state, error
     curl -d '{"position": [0.1, 0, 0]}' localhost:8080  targets, in one cycle
-    curl -d '{"move_to": [0.5, 0, 0]}' localhost:8080   a move; the answer comes when it is done
+    curl -d '{"move_to": [0.5, 0, 0]}' localhost:8080   a move; the answer follows its end
 
-Without arguments it serves virtual drives and asks itself. It listens on this machine only: whoever
-reaches it moves the drives.
+Without arguments, it serves virtual drives and sends requests to itself. It listens on this machine
+only, because every client can move the drives.
 """
 
 import json
@@ -32,7 +32,7 @@ class Axes(BaseHTTPRequestHandler):
             if "move_to" in request:
                 loop.wait(arm.move_to(request["move_to"], velocity=0.5), timeout=30.0)
             else:
-                with loop.update():  # all of it in the same cycle, or nothing
+                with loop.update():  # all targets in the same cycle
                     arm.target.position[:] = request["position"]
         except (ValueError, TypeError, KeyError) as mistake:
             self.answer(400, {"error": repr(mistake)})
@@ -48,11 +48,11 @@ class Axes(BaseHTTPRequestHandler):
         self.wfile.write(json.dumps(content).encode())
 
     def log_message(self, format: str, *arguments: object) -> None:
-        """Print nothing for a request."""
+        """Do not log requests."""
 
 
 def ask(url: str) -> None:
-    """Move there and back, like a client."""
+    """Move the drives forth and back, like a client."""
     for request in ({"position": [0.05, 0, 0]}, {"move_to": [0.3, 0, 0]}, {"move_to": [0, 0, 0]}):
         with urlopen(url, json.dumps(request).encode(), timeout=60) as answer:
             print(request, "→", answer.read().decode())

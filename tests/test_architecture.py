@@ -1,4 +1,4 @@
-"""docs/architecture.md names what there is, and all of it."""
+"""docs/explanation/architecture.md names what there is, and all of it."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import pytest
 
 ROOT = Path(__file__).resolve().parent.parent
 PACKAGE = ROOT / "src" / "catenary"
-TEXT = (ROOT / "docs" / "architecture.md").read_text()
+TEXT = (ROOT / "docs" / "explanation" / "architecture.md").read_text()
 NAMED = sorted(set(re.findall(r"`([^`\s]+)`", TEXT)))
 PLACES = (ROOT, PACKAGE, *(path for path in PACKAGE.rglob("*") if path.is_dir()))
 FILE = re.compile(r"[\w/]+\.(py|pyx|h|c|toml|md)|\w+(/\w+)+/?")

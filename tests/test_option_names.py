@@ -11,7 +11,7 @@ import pytest
 import catenary as cat
 
 ROOT = Path(__file__).parent.parent
-PAGES = sorted([*ROOT.glob("src/**/*.py"), *ROOT.glob("docs/*.md"), ROOT / "README.md"])
+PAGES = sorted([*ROOT.glob("src/**/*.py"), *ROOT.glob("docs/**/*.md"), ROOT / "README.md"])
 
 
 @pytest.mark.parametrize(

@@ -22,9 +22,9 @@ def bare_path(tmp_path):
     return tmp_path
 
 
-def missing(path: str, python: str) -> str:
+def missing(path: str, python: str, *kind: str) -> str:
     done = subprocess.run(
-        [str(TOOL), python], capture_output=True, text=True, check=True, env={"PATH": path}
+        [str(TOOL), python, *kind], capture_output=True, text=True, check=True, env={"PATH": path}
     )
     assert done.stderr == ""
     return done.stdout
@@ -37,6 +37,11 @@ def test_nothing_is_said_where_all_is_there():
 def test_one_line_names_the_packages(bare_path):
     [line] = missing(str(bare_path), sys.executable).splitlines()
     assert line.endswith("apt-get install gcc make iproute2 util-linux")
+
+
+def test_the_documentation_needs_graphviz(bare_path):
+    line = missing(str(bare_path), sys.executable, "docs")
+    assert line.endswith("apt-get install gcc make iproute2 util-linux graphviz\n")
 
 
 def test_a_missing_python_is_three_packages(bare_path):

@@ -1,9 +1,9 @@
-"""The binary interface of libethercat, measured from a release's own ecrt.h: sizes, offsets, types.
+"""The binary interface of libethercat, measured from ecrt.h of a release: sizes, offsets, types.
 
     tools/igh_abi.py 1.6.1=/path/to/1.6.1/include/ecrt.h 1.5.2=... > tests/igh/abi.json
 
 Structures are measured by a C program compiled against the header; prototypes are read from the
-preprocessed header. Only numbers and type codes leave this program, never text of the header.
+preprocessed header. The output contains only numbers and type codes, and no text of the header.
 Codes: v void, p pointer, u8 ... s64 integers, f32, f64, n struct by value (4 bytes, in_addr).
 """
 
@@ -61,7 +61,7 @@ PROTOTYPE = re.compile(r"([\w\s*]+?)\b(ecrt_\w+)\s*\(([^;{]*?)\)\s*;")
 
 
 def code_of(text: str) -> str:
-    """The type code of a parameter or return type, its name left out."""
+    """Return the type code of a parameter or return type, without its name."""
     words = re.sub(r"\b(const|extern|__attribute__.*)\b", " ", text)
     if "*" in words or "[" in words or "(" in words:
         return "p"
@@ -69,11 +69,11 @@ def code_of(text: str) -> str:
     for count in (2, 1):
         if " ".join(names[:count]) in CODES:
             return CODES[" ".join(names[:count])]
-    raise SystemExit(f"no code for {text!r}")
+    raise SystemExit(f"no type code for {text!r}")
 
 
 def prototypes(header: Path) -> dict[str, str]:
-    """Function → type codes, the return type first."""
+    """Return the type codes of each function, return type first."""
     text = subprocess.run(
         ["gcc", "-E", "-P", "-x", "c", header], capture_output=True, text=True, check=True
     ).stdout
@@ -87,7 +87,7 @@ def prototypes(header: Path) -> dict[str, str]:
 
 
 def measured(header: Path) -> dict[str, object]:
-    """What a compiled program says of structures and constants."""
+    """Return the structures and constants, as measured by a compiled program."""
     text = header.read_text()
     lines = []
     for name, members in MEMBERS.items():

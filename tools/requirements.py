@@ -1,4 +1,4 @@
-"""Prints the requirements of `build`, or of an extra, as pyproject.toml lists them."""
+"""Print the requirements of `build` or of an extra, from pyproject.toml."""
 
 import sys
 import tomllib
@@ -7,7 +7,7 @@ from pathlib import Path
 project = tomllib.loads(Path("pyproject.toml").read_text())
 kind = sys.argv[1]
 if kind == "build":
-    # scikit-build-core asks for the last two itself, but not without build isolation
+    # scikit-build-core requests the last two itself, but only with build isolation.
     print(*project["build-system"]["requires"], "cmake", "ninja", sep="\n")
 else:
     print(*project["project"]["optional-dependencies"][kind], sep="\n")

@@ -1,4 +1,4 @@
-"""`python -m benchmarks table`: published tables with ours beside them."""
+"""`python -m benchmarks table`: published tables next to our figures."""
 
 from __future__ import annotations
 
@@ -24,30 +24,36 @@ def add_table(group: Commands) -> None:
     parser = add_command(
         group,
         "table",
-        help="a published table, and ours beside it",
-        description="Prints a published table with ours beside it, both with their conditions. "
-        "What this machine lacks (a compiler, PySOEM, permissions) is left out, and said.\n\n"
-        f"tables:\n{lines}",
+        help="print a published table and our figures",
+        description="Print a published table next to our figures, both with their conditions. "
+        "Parts that this machine cannot run (no compiler, PySOEM or permissions) are omitted and "
+        f"named.\n\ntables:\n{lines}",
         example=textwrap.dedent(EXAMPLE),
     )
     parser.add_argument("name", metavar="NAME", help=f"one of {', '.join(TABLES)}")
     parser.add_argument(
-        "--seconds", type=positive_seconds, metavar="S", help="of each column (the table's own)"
+        "--seconds",
+        type=positive_seconds,
+        metavar="S",
+        help="run time of each column (default: that of the table)",
     )
     parser.add_argument(
         "--rounds",
         type=positive_number,
         metavar="N",
-        help="in which programs take turns, each in a fresh process; tests want 8 (pyigh: 10)",
+        help="rounds in which the programs take turns, each in a new process; the tests of pyigh "
+        "need 8 (default for pyigh: 10)",
     )
     parser.add_argument(
         "--rates",
         type=positive_numbers,
         metavar="HZ,HZ",
-        help="of loops (tocabi: 4000,8000; rteml: 5000)",
+        help="rates of the loops (default for tocabi: 4000,8000; rteml: 5000)",
     )
     parser.add_argument(
-        "--peers", metavar="A,B", help="of tocabi: loop, law, c (those that this machine can)"
+        "--peers",
+        metavar="A,B",
+        help="peers of tocabi: loop, law, c (default: all that this machine can run)",
     )
     parser.add_argument(
         "--axes",
@@ -55,28 +61,33 @@ def add_table(group: Commands) -> None:
         metavar="N,N",
         help="tocabi: drives on each of its two networks (default: 18,15)",
     )
-    parser.add_argument("--ring", action="store_true", help="each network a ring, not a line")
+    parser.add_argument("--ring", action="store_true", help="use rings instead of lines")
     parser.add_argument(
         "--busy-wait",
         type=seconds,
         default=0.0,
         metavar="S",
-        help="busy-wait of our loops before each cycle start (default: none)",
+        help="busy-wait of our loops before each cycle start (default: 0)",
     )
     parser.add_argument(
-        "--example", type=Path, metavar="FILE", help="of cobot (examples/cobot/cobot.py)"
+        "--example",
+        type=Path,
+        metavar="FILE",
+        help="program of cobot (default: examples/cobot/cobot.py)",
     )
     parser.add_argument(
-        "--realtime", action="store_true", help="cobot on the machine's clock, not in virtual time"
+        "--realtime",
+        action="store_true",
+        help="run cobot on the machine's clock, not in virtual time",
     )
     parser.add_argument(
         "--stretch",
         type=positive_seconds,
         metavar="N",
-        help="cobot's periods N times as long, for a slow processor",
+        help="multiply the periods of cobot by N, for a slow processor",
     )
     parser.add_argument(
-        "--short", action="store_true", help="cobot: one run, with gravity compensated"
+        "--short", action="store_true", help="run cobot only once, with gravity compensation"
     )
     add_file(parser)
     parser.set_defaults(run=run_table)

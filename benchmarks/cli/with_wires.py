@@ -1,4 +1,4 @@
-"""`python -m benchmarks`, what needs wires: the loop next to its peers, and the bring-up."""
+"""Commands of `python -m benchmarks` that need network interfaces."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ def add_loop(group: Commands) -> None:
     parser = add_command(
         group,
         "loop",
-        help="the cyclic exchange beside C and PySOEM, phase by phase",
-        description="Runs catenary-inline, catenary-threaded, catenary-law (where Numba is "
-        "installed) and the peers in short rounds, in turn, on the same segment with the same "
-        "scheduling. Prints output delay, input age and CPU time per cycle, then the phases.",
+        help="compare the phases of a cycle with C and PySOEM",
+        description="Run catenary-inline, catenary-threaded, catenary-law (if Numba is installed) "
+        "and the peers in short rounds, in turn, on the same segment with the same scheduling. "
+        "Print the output delay, the input age and the CPU time per cycle, then the phases.",
         example="python -m benchmarks loop --seconds 10 --peers c,c-ring,pysoem --json loop.json\n"
         "python -m benchmarks loop --drives 33 --body pd --peers pysoem\n"
         "python -m benchmarks loop --busy-wait 0.00005 --peers c,c-busy",
@@ -26,7 +26,7 @@ def add_loop(group: Commands) -> None:
         "--peers",
         default="c,pysoem",
         metavar="A,B",
-        help="of c, c-ring, c-busy, pysoem, catenary-law-storm (c,pysoem)",
+        help="peers from c, c-ring, c-busy, pysoem, catenary-law-storm (default: c,pysoem)",
     )
     parser.set_defaults(run=run_loop)
 
@@ -35,14 +35,14 @@ def add_storm(group: Commands) -> None:
     parser = add_command(
         group,
         "storm",
-        help="the loop while objects of all devices are read all the time",
-        description="Runs the loop with and without threads that read objects of all devices, in "
-        "turn; then reads a large object on an idle bus, beside PySOEM.",
+        help="measure the loop during an SDO storm",
+        description="Run the loop with and without threads that read objects of all devices, in "
+        "turn. Then read a large object on an idle bus, with Catenary and with PySOEM.",
         example="python -m benchmarks storm --drives 3 --seconds 10 --json storm.json",
     )
     add_drives(parser)
     add_rate(parser)
-    add_seconds(parser, 10.0, "of every way")
+    add_seconds(parser, 10.0, "run time of every variant")
     add_file(parser)
     parser.set_defaults(run=run_storm)
 
@@ -51,14 +51,15 @@ def add_share(group: Commands) -> None:
     parser = add_command(
         group,
         "share",
-        help="what reading along takes, and costs the loop",
-        description="Reads the newest cycle again and again beside a plain copy; runs the loop "
-        "without a share, with one, and with 16 readers in processes of their own, in turn.",
+        help="measure the time to read a share, and its cost for the loop",
+        description="Measure reading the newest cycle from a share, compared with a plain copy. "
+        "Then run the loop without a share, with one, and with 16 readers in separate processes, "
+        "in turn.",
         example="python -m benchmarks share --seconds 5 --json share.json",
     )
     add_drives(parser)
     add_rate(parser)
-    add_seconds(parser, 5.0, "of every way")
+    add_seconds(parser, 5.0, "run time of every variant")
     add_file(parser)
     parser.set_defaults(run=run_share)
 
@@ -67,12 +68,12 @@ def add_cost(group: Commands) -> None:
     parser = add_command(
         group,
         "cost",
-        help="what an axis and a byte cost",
-        description="Measures segments that differ in axes and in bytes, and fits "
+        help="measure the cost of an axis and of a byte",
+        description="Measure segments with different numbers of axes and bytes, and fit "
         "a + b·axes + c·bytes.",
         example="python -m benchmarks cost --seconds 3",
     )
-    add_seconds(parser, 3.0, "of every segment")
+    add_seconds(parser, 3.0, "run time of every segment")
     add_file(parser)
     parser.set_defaults(run=run_cost)
 
@@ -81,8 +82,8 @@ def add_scan(group: Commands) -> None:
     parser = add_command(
         group,
         "scan",
-        help="bring-up: frames and time",
-        description="Brings a segment to PRE-OP with Catenary and with PySOEM and counts frames.",
+        help="measure frames and time of the bring-up",
+        description="Bring a segment to PRE-OP with Catenary and with PySOEM, and count frames.",
         example="python -m benchmarks scan --drives 100",
     )
     add_drives(parser, 100)
@@ -94,9 +95,10 @@ def add_networks(group: Commands) -> None:
     parser = add_command(
         group,
         "networks",
-        help="18 + 15 axes on two networks, beside C",
-        description="Runs one loop over two networks, and two C programs on the same networks, in "
-        "turn: cycles lost, instants missed. Then the loop in virtual time.",
+        help="compare 18 + 15 axes on two networks with C",
+        description="Run one loop over two networks, and two C programs on the same networks, in "
+        "turn. Print the lost cycles and the missed cycle starts. Then run the loop in virtual "
+        "time.",
         example="python -m benchmarks networks --rates 4000,8000 --seconds 10 --json networks.json",
     )
     parser.add_argument(
@@ -104,15 +106,15 @@ def add_networks(group: Commands) -> None:
         type=positive_numbers,
         default="4000,8000",
         metavar="HZ,HZ",
-        help="of the loops, one after the other (4000,8000)",
+        help="rates of the loops, one after the other (default: 4000,8000)",
     )
-    add_seconds(parser, 10.0, "of each")
+    add_seconds(parser, 10.0, "run time of each")
     parser.add_argument(
         "--rounds",
         type=positive_number,
         default=5,
         metavar="N",
-        help="in which the programs take turns, each in a fresh process (5)",
+        help="rounds in which the programs take turns, each in a new process (default: 5)",
     )
     add_file(parser)
     parser.set_defaults(run=run_networks)

@@ -1,5 +1,4 @@
-"""`python -m benchmarks`, what needs no wires: virtual time, tasks, laws, the kernel master's
-library."""
+"""Commands of `python -m benchmarks` that need no network interface."""
 
 from __future__ import annotations
 
@@ -20,15 +19,18 @@ def add_virtual(group: Commands) -> None:
     parser = add_command(
         group,
         "virtual",
-        help="how much faster than real time a virtual segment runs",
-        description="Runs a loop on a segment in this process, in virtual time.",
+        help="measure the speed of a virtual segment, relative to real time",
+        description="Run a loop on a segment in this process, in virtual time.",
         example="python -m benchmarks virtual --drives 3 --seconds 20",
     )
     add_drives(parser)
     parser.add_argument(
-        "--config", type=Path, metavar="FILE.toml", help="the drives of this segment, and its arm"
+        "--config",
+        type=Path,
+        metavar="FILE.toml",
+        help="use the drives and the arm of this segment",
     )
-    add_seconds(parser, 20.0, "of virtual time")
+    add_seconds(parser, 20.0, "virtual time")
     add_file(parser)
     parser.set_defaults(run=run_virtual)
 
@@ -37,12 +39,16 @@ def add_law(group: Commands) -> None:
     parser = add_command(
         group,
         "law",
-        help="what a call of a compiled law takes",
-        description="Calls a compiled PD law again and again from native code (needs Numba).",
+        help="measure the time of a call of a compiled law",
+        description="Call compiled laws repeatedly from native code (needs Numba).",
         example="python -m benchmarks law --axes 12",
     )
     parser.add_argument(
-        "--axes", type=positive_number, default=12, metavar="N", help="of the law (12)"
+        "--axes",
+        type=positive_number,
+        default=12,
+        metavar="N",
+        help="axes of the law (default: 12)",
     )
     add_file(parser)
     parser.set_defaults(run=run_law)
@@ -52,12 +58,12 @@ def add_tasks(group: Commands) -> None:
     parser = add_command(
         group,
         "tasks",
-        help="a task beside a busy one: processes and threads",
-        description="Measures the response of a 1 kHz task of high priority: alone, beside a "
-        "process that is busy at low priority, and beside a thread that is.",
+        help="measure a task next to a busy one, as processes and as threads",
+        description="Measure the response of a 1 kHz task of high priority: alone, next to a busy "
+        "low-priority process, and next to a busy low-priority thread.",
         example="python -m benchmarks tasks --seconds 10",
     )
-    add_seconds(parser, 10.0, "of every way")
+    add_seconds(parser, 10.0, "run time of every variant")
     add_file(parser)
     parser.set_defaults(run=run_tasks)
 
@@ -66,37 +72,43 @@ def add_soak(group: Commands) -> None:
     parser = add_command(
         group,
         "soak",
-        help="random faults in virtual time, invariants checked in every cycle",
-        description="Runs a loop on a virtual segment while random faults of all kinds happen, and "
-        "checks the invariants by the virtual devices' own truth. The minutes take wiring, clocks "
-        "and mode of operation in turn; the options select some of them. The same seed and options "
-        "give the same run. A violation is printed with the command that repeats its minute. Exit "
-        "status 1 on any violation.",
+        help="inject random faults in virtual time, and check invariants in every cycle",
+        description="Run a loop on a virtual segment while random faults of all kinds occur, and "
+        "check the invariants against the true state of the virtual devices. The minutes use all "
+        "wirings, clocks and modes of operation in turn; the options select some of them. The same "
+        "seed and options give the same run. A violation is printed with the command that repeats "
+        "its minute. The exit status is 1 after any violation.",
         example="python -m benchmarks soak --minutes 10 --seed 7 --wiring ring --json soak.json",
     )
     parser.add_argument(
-        "--minutes", type=positive_minutes, default=1.0, metavar="N", help="of virtual time (1)"
+        "--minutes",
+        type=positive_minutes,
+        default=1.0,
+        metavar="N",
+        help="minutes of virtual time (default: 1)",
     )
     parser.add_argument(
         "--seed",
         type=int,
         default=1,
         metavar="S",
-        help="of the first minute; minute k has S + k - 1 (1)",
+        help="seed of the first minute; minute k uses S + k - 1 (default: 1)",
     )
     parser.add_argument(
-        "--wiring", choices=("line", "ring"), help="of the segment (line and ring in turn)"
+        "--wiring",
+        choices=("line", "ring"),
+        help="wiring of the segment (default: line and ring in turn)",
     )
     parser.add_argument(
         "--clocks",
         action=argparse.BooleanOptionalAction,
         default=None,
-        help="drives with distributed clocks (with and without in turn)",
+        help="use distributed clocks (default: with and without in turn)",
     )
     parser.add_argument(
         "--mode",
         choices=("csp", "csv", "cst"),
-        help="mode of operation of the drives (all in turn)",
+        help="mode of operation of the drives (default: all in turn)",
     )
     add_file(parser)
     parser.set_defaults(run=run_soak)
@@ -106,9 +118,9 @@ def add_clocks(group: Commands) -> None:
     parser = add_command(
         group,
         "clocks",
-        help="how soon distributed clocks come together, and how long they stay",
-        description="Lets crystals differ, drift and scatter, in virtual time, and compares what "
-        "each clock says with the reference. Exit status 1 where one was beyond 1 us.",
+        help="measure the synchronisation of distributed clocks",
+        description="Simulate crystals with deviation, drift and jitter in virtual time, and "
+        "compare each clock with the reference. The exit status is 1 if a difference exceeds 1 us.",
         example="python -m benchmarks clocks --devices 10,33 --minutes 10",
     )
     parser.add_argument(
@@ -116,19 +128,25 @@ def add_clocks(group: Commands) -> None:
         type=positive_numbers,
         default="10,33",
         metavar="N,M",
-        help="segments of so many drives (10,33)",
+        help="numbers of drives, one segment each (default: 10,33)",
     )
     parser.add_argument(
-        "--minutes", type=positive_minutes, default=10.0, metavar="M", help="of virtual time (10)"
+        "--minutes",
+        type=positive_minutes,
+        default=10.0,
+        metavar="M",
+        help="minutes of virtual time (default: 10)",
     )
     parser.add_argument(
         "--jitter",
         type=positive_seconds,
         default=0.5e-6,
         metavar="S",
-        help="seconds over which a time stamp scatters; a difference is made of two (0.5e-6)",
+        help="jitter of a time stamp; a difference consists of two (default: 0.5e-6)",
     )
-    parser.add_argument("--seed", type=int, default=1, metavar="N", help="of chance (1)")
+    parser.add_argument(
+        "--seed", type=int, default=1, metavar="N", help="seed of the random numbers (default: 1)"
+    )
     add_file(parser)
     parser.set_defaults(run=run_clocks)
 
@@ -137,13 +155,16 @@ def add_igh(group: Commands) -> None:
     parser = add_command(
         group,
         "igh",
-        help="a cycle over the IgH kernel master's library, beside C",
-        description="Runs our step, the same calls hand-written in C and one ctypes call for each "
-        "function on one activated master, in turns. All devices go to OP; drives stay disabled.",
+        help="compare a cycle over the library of the IgH kernel master with C",
+        description="Run our step, the same calls hand-written in C, and one ctypes call for each "
+        "function, in turn on one activated master. All devices go to OP; drives stay disabled.",
         example="python -m benchmarks igh --library libethercat-1.6.1.so.1 --json igh.json",
     )
     parser.add_argument(
-        "--library", type=Path, metavar="FILE", help="another libethercat than the machine's"
+        "--library",
+        type=Path,
+        metavar="FILE",
+        help="path of libethercat (default: the installed one)",
     )
     add_file(parser)
     parser.set_defaults(run=run_igh)

@@ -1,4 +1,4 @@
-/* One cycle over libethercat as a C program writes it: no tables, no judgement, the same calls. */
+/* One cycle over libethercat in a plain C program: the same calls, without tables or checks. */
 #include <stdint.h>
 #include <string.h>
 

@@ -1,6 +1,6 @@
-/* What the C programs of the benchmarks ask of the machine: instants, a processor, priority, memory.
+/* Time, processor affinity, priority and memory locking for the C programs of the benchmarks.
  *
- * What an ordinary user is refused is said, and done without. */
+ * If a request is refused, the program prints a message (except for memory) and continues. */
 #ifndef CATENARY_BENCH_MACHINE_H
 #define CATENARY_BENCH_MACHINE_H
 
@@ -29,7 +29,7 @@ static inline void wait_until(int64_t instant) {
     while (clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &t, NULL) == EINTR) {}
 }
 
-/* -1: any processor. */
+/* Pin the process to a processor; -1 for any processor. */
 static inline void stay_on(int cpu) {
     if (cpu < 0) return;
     cpu_set_t only;
@@ -38,14 +38,14 @@ static inline void stay_on(int cpu) {
     if (sched_setaffinity(0, sizeof only, &only)) perror("CPU");
 }
 
-/* Of the calling thread. */
+/* Set the priority of the calling thread. */
 static inline void be_real_time(int priority) {
     struct sched_param parameter = {.sched_priority = priority};
     if (pthread_setschedparam(pthread_self(), SCHED_FIFO, &parameter))
         fprintf(stderr, "SCHED_FIFO %d refused\n", priority);
 }
 
-/* Refused to ordinary users: it goes on without. */
+/* Lock the memory. No effect without permission. */
 static inline void lock_memory(void) { mlockall(MCL_CURRENT | MCL_FUTURE); }
 
 #endif

@@ -1,8 +1,8 @@
-/* The part of the C peers that does not depend on how a frame is received: see peer.h.
+/* Common code of the C peers, independent of how a frame is received: see peer.h.
  *
- * The job comes on stdin, one `key value...` a line; the result goes to stdout as one line of JSON
- * and, as PHASES int64 nanoseconds per cycle, to the file of samples. Scheduling and processor are
- * inherited from the worker that starts the program, the same as for every peer. */
+ * The program reads the job from stdin, one `key value...` per line. It prints the result as one
+ * line of JSON, and writes PHASES int64 [ns] per cycle to the file of samples. Like every peer, it
+ * inherits scheduling and processor from the worker that starts it. */
 #include "peer.h"
 
 #include <math.h>
@@ -54,7 +54,7 @@ static void read_job(void) {
                           &a.actual_velocity) == 7 && job.axis_count < AXES_MAX) {
             job.axes[job.axis_count++] = a;
         } else {
-            fprintf(stderr, "a line of the job is not understood: %.60s\n", line);
+            fprintf(stderr, "invalid line in the job: %.60s\n", line);
             exit(2);
         }
     }
@@ -67,7 +67,7 @@ static void emit(void) {
     if (send(raw_socket, sent, job.length, 0) < 0) fail("send");
 }
 
-/* Whether the answer to the last emit is there; drains older frames. */
+/* Return true if the answer to the last emit has arrived. Discard older frames. */
 static int collect(void) {
     unsigned length;
     while ((length = peer_receive(raw_socket, received)) > 0)
@@ -91,7 +91,8 @@ static unsigned enable_word(uint16_t status) {
     return 0x06;
 }
 
-/* One step of every drive towards "operation enabled", holding; true when all are there. */
+/* Move every drive one step towards "operation enabled" at a constant position. Return true if all
+ * are enabled. */
 static int enable(void) {
     unsigned enabled = 0;
     for (unsigned i = 0; i < job.axis_count; i++) {
@@ -132,7 +133,8 @@ static int64_t wait_for_start(int64_t start) {
     return now;
 }
 
-/* Cycles until `state` is seen in the BRD of the frame (state 0: until the drives are enabled). */
+/* Run cycles until the BRD of the frame returns `state`, or for state 0 until the drives are
+ * enabled. */
 static int64_t reach(unsigned state, int64_t deadline) {
     for (int i = 0; i < 5000; i++) {
         deadline += job.period_ns;

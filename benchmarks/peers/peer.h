@@ -10,7 +10,7 @@
 #ifndef CATENARY_BENCH_PEER_H
 #define CATENARY_BENCH_PEER_H
 
-#include "machine.h" /* first: it asks for all that Linux has */
+#include "machine.h" /* first, because it defines _GNU_SOURCE */
 
 #include <arpa/inet.h>
 #include <linux/if_ether.h>
@@ -41,7 +41,7 @@ struct datagram {
     unsigned offset, length, expected_counter;
 };
 
-/* A state to ask for once the frames of the cycle flow: the frame that asks and the state to see. */
+/* A state to request while the cycle runs: the frame of the request, and the expected state. */
 struct request {
     unsigned state, length;
     uint8_t frame[FRAME_MAX];
@@ -61,7 +61,7 @@ struct job {
 };
 
 /* The two functions in which the peers differ. `peer_receive` copies the oldest frame that has
- * arrived into `frame` and returns its length, or 0 at once when none is there. */
+ * arrived into `frame` and returns its length, or 0 if there is none. It does not wait. */
 int peer_open(unsigned interface_index);
 unsigned peer_receive(int socket, uint8_t *frame);
 

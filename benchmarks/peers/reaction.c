@@ -1,9 +1,9 @@
-/* How long a thread that waits for an event takes to run, in C.
+/* Reaction time of a thread that waits for an event, in C.
  *
  *     reaction eventfd|timerfd CPU PRIORITY COUNT PERIOD_NS FILE
  *
- * eventfd: another thread of lower priority says the time in the event itself. timerfd: the kernel's
- * timer expires at a known instant. CPU -1: any. FILE gets one int64 [ns] for each event. */
+ * eventfd: another thread of lower priority writes the time as the value of the event. timerfd: the
+ * kernel's timer expires at a known time. CPU -1: any. FILE receives one int64 [ns] per event. */
 #include "machine.h"
 
 #include <stdlib.h>
@@ -48,11 +48,11 @@ int main(int words, char **word) {
         if (pthread_create(&thread, NULL, trigger, &priority)) { perror("thread"); return 1; }
     }
     for (long i = 0; i < count; i++) {
-        uint64_t said;
-        if (read(event, &said, sizeof said) != sizeof said) { perror("read"); return 1; }
+        uint64_t value; /* time of the event, or number of expirations */
+        if (read(event, &value, sizeof value) != sizeof value) { perror("read"); return 1; }
         int64_t now = now_ns(CLOCK_MONOTONIC);
-        expiry += by_timer ? (int64_t)said * period_ns : 0; /* said: how many expired */
-        samples[i] = now - (by_timer ? expiry : (int64_t)said);
+        expiry += by_timer ? (int64_t)value * period_ns : 0;
+        samples[i] = now - (by_timer ? expiry : (int64_t)value);
     }
     if (!by_timer) pthread_join(thread, NULL);
     FILE *file = fopen(word[6], "wb");

@@ -1,4 +1,4 @@
-/* `c`: one recv system call a frame, as in every textbook. */
+/* `c`: one recv system call per frame. */
 #include "peer.h"
 
 int peer_open(unsigned interface_index) {

@@ -1,5 +1,5 @@
-/* `c-ring`: frames arrive in memory mapped from the kernel (PACKET_MMAP, TPACKET_V2): receiving
- * needs no system call; the queueing discipline is passed by when sending. */
+/* `c-ring`: frames arrive in memory mapped from the kernel (PACKET_MMAP, TPACKET_V2), so receiving
+ * needs no system call. Sending bypasses the queueing discipline. */
 #include "peer.h"
 
 #include <sys/mman.h>

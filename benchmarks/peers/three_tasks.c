@@ -1,18 +1,18 @@
-/* Three tasks that spin, as the published experiment has them, in C.
+/* The three busy tasks of the published experiment, in C.
  *
  *     three_tasks CPU SECONDS FILE  PERIOD_NS EXECUTION_NS PRIORITY ...
  *
- * CPU -1: any. Each task is a thread under SCHED_FIFO, where that is permitted, and spins for so much
- * of its own processor time in every job. FILE gets, task by task, the number of its jobs and four
- * int64 [ns] for each: start to start, release to start, release to end, and its processor time from
- * this start to the next, with what waiting and waking take (the last job: to its end). */
+ * CPU -1: any. Each task is a thread under SCHED_FIFO, if permitted. In every job, it uses its
+ * execution time of processor time. For each task, FILE receives the number of jobs and four int64
+ * [ns] per job: start to start, release to start, release to end, and the processor time from this
+ * start to the next, including waiting and waking (for the last job, to its end). */
 #include "machine.h"
 
 #include <stdlib.h>
 #include <string.h>
 
 enum { TASKS_MAX = 8, FIGURES = 4 };
-enum { LEAD_NS = 100000000 }; /* for threads, whose stacks are locked whole */
+enum { LEAD_NS = 100000000 }; /* time to create the threads, whose whole stacks are locked */
 
 struct task {
     int64_t period, execution, origin, jobs, done;
@@ -54,7 +54,8 @@ int main(int count, char **words) {
     }
     stay_on(cpu);
     lock_memory();
-    /* Above all tasks, which inherit it: else the last would begin behind the spinning first. */
+    /* Above all tasks, which inherit it. Otherwise, the first task would delay the creation of the
+     * last. */
     struct sched_param above = {.sched_priority = sched_get_priority_max(SCHED_FIFO) - 1};
     if (sched_setscheduler(0, SCHED_FIFO, &above)) perror("SCHED_FIFO");
     int64_t origin = now_ns(CLOCK_MONOTONIC) + LEAD_NS;

@@ -2,7 +2,8 @@
 
 Catenary brings the segment to PRE-OP, sets SyncManagers and FMMUs, and closes its link. The C
 program receives the frame of the cycle and the offsets of the words in it. It requests SAFE-OP and
-OP itself, since valid outputs must flow meanwhile, and runs the same cycle as the other peers.
+OP itself, since valid outputs must be sent during the transition. It runs the same cycle as the
+other peers.
 """
 
 from __future__ import annotations
@@ -61,8 +62,8 @@ def run(job: Job) -> Round:
 def ordinary_scheduling() -> Iterator[None]:
     """Run the block with ordinary scheduling.
 
-    The program inherits the priority of this process; the bring-up does not need it. On a shared
-    processor it would keep another network's segment from answering in time.
+    The C program needs the priority of this process, but the bring-up does not. On a shared
+    processor, it would prevent another network's segment from answering in time.
     """
     policy, parameters = os.sched_getscheduler(0), os.sched_getparam(0)
     os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))
@@ -73,7 +74,7 @@ def ordinary_scheduling() -> Iterator[None]:
 
 
 def bring_up(job: Job) -> CyclePlan:
-    """Prepare the segment for SAFE-OP. The plan is that of Catenary's loop, so the frame is too."""
+    """Prepare the segment for SAFE-OP. Plan and frame are those of Catenary's loop."""
     with cat.MainDevice(job.interface) as main:
         subs = main.scan()
         arm = cat.Drives(

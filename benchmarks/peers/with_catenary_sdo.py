@@ -21,12 +21,14 @@ def run(job: Job) -> Round:
 
 @contextlib.contextmanager
 def storm(subs: Sequence[cat.SubDevice]) -> Iterator[list[int]]:
-    """Run one thread per device that reads one object repeatedly; yield the number of answers of
-    each. The threads run on the other processors, as in an application with a reserved one."""
+    """Run one thread per device that reads one object repeatedly, and yield the answer counts.
+
+    The threads run on the other processors, as in an application with a reserved processor.
+    """
     answers = [0] * len(subs)
     stop = threading.Event()
     here = os.sched_getaffinity(0)
-    elsewhere = os.sched_getaffinity(os.getppid()) - here or here  # of the benchmark's own process
+    elsewhere = os.sched_getaffinity(os.getppid()) - here or here  # CPUs of the benchmark's process
 
     def ask(rank: int) -> None:
         os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))
@@ -36,7 +38,7 @@ def storm(subs: Sequence[cat.SubDevice]) -> Iterator[list[int]]:
                 subs[rank].sdo.read(IDENTITY, SERIAL, type=cat.types.UDINT)
                 answers[rank] += 1
             except cat.CatenaryError:
-                if not stop.is_set():  # after the last cycle nothing is sent
+                if not stop.is_set():  # after the last cycle, requests are not sent
                     raise
 
     threads = [threading.Thread(target=ask, args=(rank,)) for rank in range(len(subs))]

@@ -1,5 +1,8 @@
-"""Catenary with a share: nobody reads it; 16 processes do, a hundred times a second each; or they
-do as much with memory of their own: a busy neighbour of a processor slows it, share or not."""
+"""Catenary with a share: without readers, with 16 readers, or with 16 bystanders.
+
+A reader is a process that reads a hundred times a second. A bystander does the same work with
+private memory. It shows how much a busy neighbour slows a processor without reading.
+"""
 
 from __future__ import annotations
 
@@ -41,7 +44,7 @@ def run(job: Job) -> Round:
 
 
 def attend(loop: cat.Loop, child: Child, body: Callable[[float], None]) -> None:
-    """Cycles until every reader has read: a loop must not stand still for them."""
+    """Run cycles until every reader has read, so that the loop does not stand still."""
     missing = READERS
     deadline = time.monotonic() + START_SECONDS
     for cycle in loop:
@@ -51,15 +54,17 @@ def attend(loop: cat.Loop, child: Child, body: Callable[[float], None]) -> None:
         if missing == 0:
             return
         if time.monotonic() > deadline:
-            raise RuntimeError(f"{missing} readers did not come")
+            raise RuntimeError(f"{missing} readers did not start within {START_SECONDS:.0f} s")
 
 
 @contextlib.contextmanager
 def readers(name: str, reading: bool) -> Iterator[Child]:
-    """They look for the loop before it is there. They run anywhere but where the loop was put, with
-    ordinary scheduling."""
+    """Run the readers, which wait for the share of the loop.
+
+    They have ordinary scheduling and do not run on the processor of the loop.
+    """
     here = os.sched_getaffinity(0)
-    elsewhere = os.sched_getaffinity(os.getppid()) - here or here  # of the benchmark's own process
+    elsewhere = os.sched_getaffinity(os.getppid()) - here or here  # CPUs of the benchmark's process
     arguments = ["-m", __name__, name, ",".join(map(str, elsewhere)), str(int(reading))]
     with start_python(arguments) as child:
         if child.read_line(START_SECONDS) is None:
@@ -68,7 +73,7 @@ def readers(name: str, reading: bool) -> Iterator[Child]:
 
 
 def main(arguments: Sequence[str]) -> None:
-    """All readers: one process each, of one start of the interpreter. They end with the loop."""
+    """Run all readers, as forks of one interpreter. They end with the loop."""
     name, cpus, reading = arguments
     os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))
     os.sched_setaffinity(0, map(int, cpus.split(",")))
@@ -88,7 +93,7 @@ def main(arguments: Sequence[str]) -> None:
 
 
 def attached(name: str) -> cat.share.Reader:
-    """As soon as the loop is there."""
+    """Attach to the share as soon as it exists."""
     deadline = time.monotonic() + START_SECONDS
     while True:
         try:

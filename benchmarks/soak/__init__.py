@@ -1,7 +1,13 @@
-"""The soak: random faults in virtual time against a running loop, and invariants that must hold.
+"""Soak test: random faults in virtual time on a running loop, and invariants that must hold.
 
-setting: line or ring, clocks, mode of operation. cell: the machine. faults: incidents drawn by
-chance. effects: the devices that each fault affects. injected: the faults that were on, and when.
-witness: the invariants. commands: the limits of commands. objects: objects read meanwhile. minute:
-the application. run: all minutes, and the report.
+- setting: line or ring, clocks, mode of operation
+- cell: the machine
+- faults: random incidents
+- effects: the devices that each fault affects
+- injected: the active faults, and their times
+- witness: the invariants
+- commands: the limits of commands
+- objects: objects that are read during the run
+- minute: the application
+- run: all minutes, and the report
 """

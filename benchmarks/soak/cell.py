@@ -1,5 +1,7 @@
-"""The machine of a soak: an arm and lamps that the loop requires, then a tool, a gripper and a
-sensor that it does not require."""
+"""The machine of a soak test.
+
+The loop requires an arm and lamps. A tool, a gripper and a sensor are optional.
+"""
 
 from __future__ import annotations
 
@@ -28,15 +30,15 @@ WITH_MAILBOX = (*SERVOS, SENSOR)
 OUTPUTS = (LAMPS, GRIPPER)
 COUNTS_PER_TURN = 2**20
 PERIOD = 1e-3  # [s]
-LATE_LIMIT, LATE_LIMIT_TORQUE = 0.05, 0.01  # [s], of the loop; the second one in CST
+LATE_LIMIT, LATE_LIMIT_TORQUE = 0.05, 0.01  # [s] of the loop; the second in CST
 AMPLITUDE, FREQUENCY = 0.2, 1.5  # [rad], [rad/s]: motion of the axes
 VELOCITY_LIMIT = 2.0  # [rad/s]
 ACCELERATION = 20.0  # [rad/s²], of fallback and return
 TORQUE_LIMIT, TORQUE_SLOPE = 1.0, 100.0  # [N·m], [N·m/s]
 INERTIA, FRICTION = 2e-3, 0.05  # [kg·m²], [N·m]
-LOAD = 0.3  # [N·m], in CST: the motor carries it while it is powered
-STIFFNESS, DAMPING = 1.25, 0.1  # [N·m/rad], [N·m·s/rad], in CST: 25 rad/s, critically damped
-GAP = 5  # cycles: an axis that is not enabled for longer begins again where it is
+LOAD = 0.3  # [N·m] in CST; the motor carries it while it is powered
+STIFFNESS, DAMPING = 1.25, 0.1  # [N·m/rad], [N·m·s/rad] in CST: 25 rad/s, critically damped
+GAP = 5  # cycles; an axis that is disabled for longer restarts at its actual position
 PPM, DRIFT_PPM, DRIFT_PERIOD, JITTER = 100.0, 2.0, 60.0, 0.5e-6  # of crystals; [s], [s]
 POWERED = ("OPERATION ENABLED", "QUICK STOP ACTIVE", "FAULT REACTION ACTIVE")
 
@@ -68,7 +70,7 @@ def make_servo(name: str, serial: int, random: Random, setting: Setting) -> Serv
 
 
 def make_crystal(random: Random, setting: Setting) -> Crystal:
-    """Return a crystal that is off, drifts and scatters; an exact one without clocks."""
+    """Return a crystal with deviation, drift and jitter; an exact one without clocks."""
     if not setting.clocks:
         return Crystal()
     return Crystal(
@@ -80,7 +82,7 @@ def make_crystal(random: Random, setting: Setting) -> Crystal:
 
 
 def apply_loads(segment: Segment) -> None:
-    """Load each motor that is powered; a brake carries the load of the others."""
+    """Apply the load to each powered motor. A brake carries the load of the others."""
     for position in SERVOS:
         servo = segment[position]
         if isinstance(servo, Servo) and servo.state:
@@ -88,17 +90,17 @@ def apply_loads(segment: Segment) -> None:
 
 
 class Part:
-    """Owns the motion of some drives: each swings about the position where it was enabled."""
+    """Owns the motion of some drives. Each oscillates from the position where it was enabled."""
 
     def __init__(self, drives: cat.Drives, mode: Mode) -> None:
         self.drives = drives
         self._mode = mode
         self._home: Array = np.zeros(len(drives))
-        self._begin: Array = np.zeros(len(drives))  # [s] time at which each began to swing
-        self._away = np.full(len(drives), GAP + 1)  # cycles that each was not enabled
+        self._begin: Array = np.zeros(len(drives))  # [s] start of each oscillation
+        self._away = np.full(len(drives), GAP + 1)  # cycles since each was enabled
 
     def step(self, time: float) -> None:
-        """Write the targets of the cycle at `time` [s]: a late application loses no phase."""
+        """Write the targets of the cycle at `time` [s]. A late application keeps its phase."""
         actual, target = self.drives.actual, self.drives.target
         begins = self._away > GAP
         self._away = np.where(self.drives.enabled, 0, self._away + 1)
@@ -123,7 +125,7 @@ class Part:
 
 
 class Requests:
-    """Owns what one loop exchanges."""
+    """Owns the process-data requests of one loop."""
 
     def __init__(self, main: cat.MainDevice, setting: Setting) -> None:
         subs = main.subs
@@ -141,7 +143,7 @@ class Requests:
         return (*drives, self.lamps, self.gripper, self.sensor)
 
     def step(self, time: float) -> None:
-        """Write what the application writes in every cycle."""
+        """Write the outputs of the application in every cycle."""
         for part in self.parts.values():
             part.step(time)
         self.lamps.bits[:] = 1

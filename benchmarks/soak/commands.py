@@ -1,7 +1,8 @@
-"""Commands that a servo took from its frames, against the limits that the core promises.
+"""Commands that a servo took from its frames, checked against the limits of the core.
 
-docs/safety.md: velocity_limit bounds every command. Acceleration and deceleration bound fallback
-and return, beyond the set-points of the application. A frame that carries a stop keeps the torque.
+The limits are in docs/explanation/safety.md. velocity_limit bounds every command. Acceleration and
+deceleration bound fallback and return, but not the set-points of the application. A frame that
+carries a stop keeps the torque.
 """
 
 from __future__ import annotations
@@ -25,21 +26,21 @@ from catenary.virtual import Servo
 COUNT = 2 * math.pi / COUNTS_PER_TURN  # [rad]
 SETTLED = 8  # cycles after enabling: the core's view of the drive is some cycles old
 ENABLE, QUICK_STOP, DISABLE_OPERATION = 0x0F, 0x02, 0x07
-# The application changes its velocity while it is late, and the core learns of it in one cycle. A
-# return ends within one step of velocity and one of position. Three positions are rounded.
+# While the application is late, its velocity changes. The core receives the change in one cycle.
+# A return ends within one step of velocity and one of position. Three positions are rounded.
 OWN = AMPLITUDE * FREQUENCY**2 * LATE_LIMIT / PERIOD
 FASTEST_CHANGE = {
     "csp": 2 * ACCELERATION + OWN + 2 * COUNT / PERIOD**2,
     "csv": ACCELERATION + OWN + COUNT / PERIOD,
 }
 TOLERANCE = 1.001
-NOTEWORTHY = 50  # per mille of the rated torque: less may be zero in the next cycle by itself
+NOTEWORTHY = 50  # per mille of the rated torque; less may reach zero in one cycle without a stop
 
-Broken = tuple[str, str]  # invariant, what
+Broken = tuple[str, str]  # invariant, description
 
 
 class Taken(NamedTuple):
-    """Outputs that a servo took at one moment."""
+    """Outputs that a servo took at one time."""
 
     time_ns: int
     controlword: int
@@ -48,20 +49,20 @@ class Taken(NamedTuple):
 
 
 class Commands:
-    """Owns the commands that one servo took last while it was enabled."""
+    """Owns the last commands that one servo took while it was enabled."""
 
     def __init__(self, mode: Mode) -> None:
         self._mode = mode
         self.reset()
 
     def reset(self) -> None:
-        """Forget: the drive was not enabled, or excused."""
+        """Discard the commands, because the drive was not enabled or was excused."""
         self._last: Taken | None = None
         self._velocity: float | None = None  # of the command in the last cycle [rad/s]
         self._settled = 0
 
     def look(self, servo: Servo, drive_state: str) -> list[Broken]:
-        """Return what new commands break, once a millisecond."""
+        """Return the violations of new commands. Called once a millisecond."""
         taken = self._take(servo)
         last = self._last
         if taken is None or (last is not None and taken.time_ns == last.time_ns):

@@ -1,4 +1,4 @@
-"""Effects of faults on devices: the witness excuses nothing else."""
+"""Effects of faults on devices. The witness excuses no other effects."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ NO_DEVICE: frozenset[int] = frozenset()
 
 
 def out_of_reach(faults: Iterable[Fault], *, ring: bool) -> frozenset[int]:
-    """Return the devices that no outputs reach while all these faults are on."""
+    """Return the devices that receive no outputs while all these faults are active."""
     cables: set[int] = set()  # broken, by number
     gone: set[int] = set()  # devices without power
     deaf: set[int] = set()
@@ -35,7 +35,7 @@ def out_of_reach(faults: Iterable[Fault], *, ring: bool) -> frozenset[int]:
                 spoilt.append(cable_between(fault.between))
             case _:
                 pass
-    first = min(cables | gone, default=DEVICES)  # reached from the first end: those before it
+    first = min(cables | gone, default=DEVICES)  # the first end reaches the devices before it
     reached = set(range(min([first, *spoilt])))
     if ring and first < DEVICES:
         second = max(cables | {device + 1 for device in gone})
@@ -46,7 +46,7 @@ def out_of_reach(faults: Iterable[Fault], *, ring: bool) -> frozenset[int]:
 
 
 def disturbed(faults: Iterable[Fault], *, ring: bool) -> frozenset[int]:
-    """Return the devices whose process data may be missing, without a frame being lost."""
+    """Return the devices whose process data may be missing although no frame is lost."""
     faults = tuple(faults)
     found = set(out_of_reach(faults, ring=ring))
     for fault in faults:
@@ -54,7 +54,7 @@ def disturbed(faults: Iterable[Fault], *, ring: bool) -> frozenset[int]:
             case f.Garble() | f.Delay() | f.Duplicate():
                 return ALL_DEVICES
             case f.LoseFrames(every=2) | f.Corrupt(every=2) if ring:
-                return ALL_DEVICES  # of the two copies of each frame, always the same is hit
+                return ALL_DEVICES  # it always hits the same one of a frame's two copies
             case f.LeaveState() | f.RefuseState():
                 found.add(fault.device)
             case _:
@@ -63,12 +63,12 @@ def disturbed(faults: Iterable[Fault], *, ring: bool) -> frozenset[int]:
 
 
 def breaks_cable(fault: Fault) -> bool:
-    """Return True if frames under way can be lost by it."""
+    """Return True if the fault can lose frames in flight."""
     return isinstance(fault, (f.Cut, f.Join, f.Unplug, f.Replug, f.PowerCycle, f.Swap, f.Exchange))
 
 
 def may_end(faults: Iterable[Fault], *, ring: bool) -> bool:
-    """Return True if a loop may end by these faults: frames or a required device are hit."""
+    """Return True if these faults may end a loop: they hit frames or a required device."""
     faults = tuple(faults)
     together = out_of_reach(faults, ring=ring)
     return not together <= frozenset(OPTIONAL) or any(map(_may_end_alone, faults))
@@ -85,10 +85,10 @@ def _may_end_alone(fault: Fault) -> bool:
 
 
 def fits(drawn: Iterable[Fault], others: Iterable[Fault], *, ring: bool) -> bool:
-    """Return True if faults may be on together with others.
+    """Return True if faults may be active together with others.
 
-    Not at the same place, because the first end would end both. In a ring, two gaps may isolate
-    only devices that are not required.
+    Faults at the same place may not, because the first end would end both. In a ring, two gaps may
+    isolate only optional devices.
     """
     drawn, others = tuple(drawn), tuple(others)
     if places(drawn) & places(others):
@@ -100,7 +100,7 @@ def fits(drawn: Iterable[Fault], others: Iterable[Fault], *, ring: bool) -> bool
 
 
 def mends(fault: Fault, earlier: Fault) -> bool:
-    """Return True if it ends an earlier one."""
+    """Return True if a fault ends an earlier one."""
     return (
         isinstance(fault, (f.Join, f.Replug))
         and isinstance(earlier, (f.Cut, f.Unplug))
@@ -109,7 +109,7 @@ def mends(fault: Fault, earlier: Fault) -> bool:
 
 
 def places(faults: Iterable[Fault]) -> frozenset[int]:
-    """Return where something is taken away: numbers of cables, and of the devices below them."""
+    """Return the numbers of the cables and devices that the faults interrupt."""
     found: set[int] = set()
     for fault in faults:
         match fault:
@@ -125,14 +125,17 @@ def places(faults: Iterable[Fault]) -> frozenset[int]:
 
 
 def cable_of(fault: f.Cut | f.Join | f.Unplug | f.Replug) -> int:
-    """Return the number of its cable."""
+    """Return the number of the fault's cable."""
     if isinstance(fault, (f.Unplug, f.Replug)):
         return fault.device
     return cable_between(fault.between)
 
 
 def cable_between(between: tuple[Neighbour, Neighbour]) -> int:
-    """Return the number of a cable: of the device below it; DEVICES: back to the MainDevice."""
+    """Return the number of a cable: that of the device below it.
+
+    The number of the cable back to the MainDevice is DEVICES.
+    """
     one, other = between
     if one == "main" or other == "main":
         return 0 if 0 in between else DEVICES

@@ -1,4 +1,4 @@
-"""Incidents of a soak, drawn by chance."""
+"""Random incidents of a soak test."""
 
 from __future__ import annotations
 
@@ -23,13 +23,13 @@ from catenary.virtual import Fault
 from catenary.virtual import faults as f
 from catenary.virtual.wiring import Neighbour
 
-OFTEN = 0.75  # it hits what nobody requires
-SHORTEST, LONGEST = 1e-3, 0.8  # [s] that a fault lasts
-PYTHON_LATE = "python_late"  # no fault of the segment: the application does not come
+OFTEN = 0.75  # probability that a fault hits an optional device
+SHORTEST, LONGEST = 1e-3, 0.8  # [s] duration of a fault
+PYTHON_LATE = "python_late"  # not a fault of the segment: the application is late
 
 
 class Incident(NamedTuple):
-    """Faults that come together, and how long the application stays away [s]."""
+    """Faults that occur together, and the delay of the application [s]."""
 
     faults: tuple[Fault, ...]
     late: float = 0.0
@@ -44,18 +44,18 @@ class Incident(NamedTuple):
 
 
 class Moment(NamedTuple):
-    """Source of one fault: chance, its begin [s], and the setting."""
+    """Source of one fault: the random numbers, its start [s], and the setting."""
 
     random: Random
     at: float
     setting: Setting
 
     def lasting(self) -> float:
-        """[s], all orders of magnitude alike."""
+        """Return a duration [s]; all orders of magnitude are equally likely."""
         return math.exp(self.random.uniform(math.log(SHORTEST), math.log(LONGEST)))
 
     def device(self) -> int:
-        """Mostly one that nobody requires, else the loop would begin anew all the time."""
+        """Return a device, mostly an optional one, so that the loop does not end too often."""
         return self.random.choice(OPTIONAL if self.random.random() < OFTEN else range(DEVICES))
 
     def with_mailbox(self) -> int:
@@ -66,7 +66,7 @@ class Moment(NamedTuple):
         return TOOL if self.random.random() < OFTEN else self.random.choice(ARM)
 
     def between(self) -> tuple[Neighbour, Neighbour]:
-        """Return the ends of a cable. In a ring each one, because it carries on without it."""
+        """Return the ends of a cable. In a ring it may be any, because one cut does no harm."""
         below = self.random.randrange(DEVICES + 1) if self.setting.is_ring else self.device()
         if below == DEVICES:
             return (DEVICES - 1, "main")
@@ -158,7 +158,7 @@ def _refuse_state(m: Moment) -> Drawn:
 
 
 def _falls(m: Moment, device: int) -> Drawn:
-    """What makes a device need its mailbox and its states."""
+    """Return a fault after which the device needs its mailbox and state changes, or none."""
     if m.random.random() < 0.4:
         return ()
     return (f.LeaveState(device=device, state="PRE-OP", code=0x001A, at=m.at + 1e-3),)
@@ -229,7 +229,7 @@ def draw(random: Random, now: float, setting: Setting) -> Incident:
 
 
 def told(fault: Fault) -> str:
-    """In one line, the same in every run."""
+    """Return a fault as one line, which is the same in every run."""
     fields = {name: getattr(fault, name) for name in fault.__struct_fields__}
     if isinstance(fault, f.Swap):
         fields["with_"] = fault.with_.serial

@@ -1,4 +1,4 @@
-"""Faults injected into a segment, from its own log, and the devices that they isolate."""
+"""Faults injected into a segment, from its log, and the devices that they isolate."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ from benchmarks.soak.effects import mends, out_of_reach
 from catenary.virtual import Fault, Segment
 from catenary.virtual import faults as f
 
-KEPT = 60.0  # [s] after its end
+KEPT = 60.0  # [s] for which a fault is kept after its end
 MOMENTARY = (f.LeaveState, f.Join, f.Replug)
 
 
 @dataclass(slots=True)
 class Span:
-    """A fault and when it was on [s]."""
+    """A fault and its time span [s]."""
 
     fault: Fault
     begin: float
@@ -25,17 +25,17 @@ class Span:
 
 
 class Injected:
-    """Owns the faults of one segment that are on, or were on not long ago."""
+    """Owns the active and recent faults of one segment."""
 
     def __init__(self, segment: Segment) -> None:
         self._segment = segment
         self._seen = 0
         self._spans: list[Span] = []
         self._on: list[Span] = []
-        self._isolated: dict[int, float] = {}  # device → since when
+        self._isolated: dict[int, float] = {}  # device → start of its isolation [s]
 
     def update(self) -> None:
-        """Take what is new in the segment's log."""
+        """Read the new entries of the segment's log."""
         log = self._segment.fault_log
         for event in log[self._seen :]:
             if event.what == "begins":
@@ -60,18 +60,18 @@ class Injected:
         self._on = [span for span in self._on if span.end == inf]
 
     def _isolate(self, time: float) -> None:
-        """Follow which devices are isolated, after a change at `time`."""
+        """Update the isolated devices after a change at `time`."""
         isolated = out_of_reach([span.fault for span in self._on], ring=self._segment.ring)
         self._isolated = {device: self._isolated.get(device, time) for device in isolated}
 
     def between(self, start: float, end: float) -> Iterator[Fault]:
-        """Yield the faults that were on then, the latest first."""
+        """Yield the faults that were active in a time span, the latest first."""
         for span in reversed(self._spans):
             if span.begin <= end and span.end >= start:
                 yield span.fault
 
     def isolated_since(self, device: int) -> float:
-        """Return since when no outputs reach a device; infinity if they do."""
+        """Return the time since which a device gets no outputs; infinity if it gets them."""
         return self._isolated.get(device, inf)
 
 

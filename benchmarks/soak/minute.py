@@ -1,7 +1,8 @@
-"""One minute of a soak: an application on a segment on which one incident follows another.
+"""One minute of a soak test: an application on a segment with one incident after another.
 
-The application does what docs/safety.md leaves to applications. It waits until faults are over,
-enables stopped axes again, restores devices that are held, and opens a new loop after an error.
+The application performs the duties of applications in docs/explanation/safety.md. It waits until
+faults are over, enables stopped axes again, restores held devices, and opens a new loop after an
+error.
 """
 
 from __future__ import annotations
@@ -28,13 +29,13 @@ from catenary.virtual import Segment
 PRE_OP = 2
 RECOVERY = 5.0  # [s] after the last fault of an incident, until all devices are back
 CLOCK_RECOVERY = 10.0  # [s] until their clocks are within the bound, too
-FAILURES_MAX = 4  # sessions in a row that fail
+FAILURES_MAX = 4  # consecutive sessions that may fail
 STEP = 0.01  # [s]
 BOOT = 0.3  # [s] after the last fault, before a scan
-ASK_AGAIN = 0.1  # [s]
+ASK_AGAIN = 0.1  # [s] between two requests to enable
 EFFECT = 0.02  # [s] after the end of a fault in which it may still have effects
-SESSION = 10  # incidents, after which a loop is left unasked
-AT_START = 0.15  # of the sessions have an incident while they begin
+SESSION = 10  # incidents after which the application leaves a loop
+AT_START = 0.15  # fraction of the sessions with an incident at their start
 
 
 @dataclass(slots=True)
@@ -47,8 +48,8 @@ class Figures:
     incidents: int = 0
     faults: Counter[str] = field(default_factory=Counter)
     losses: Counter[str] = field(default_factory=Counter)
-    ended: Counter[str] = field(default_factory=Counter)  # loops, by what ended them
-    objects: int = 0  # read while running
+    ended: Counter[str] = field(default_factory=Counter)  # number of loops, by reason of the end
+    objects: int = 0  # objects read while a loop ran
     longest_return: float = 0.0  # [s] from the end of an incident until all devices are back
     longest_lock: float = 0.0  # [s] until their clocks are within the bound, too
 
@@ -62,7 +63,7 @@ class Figures:
 
 
 class Minute:
-    """Owns a segment, the application of its MainDevice, and chance."""
+    """Owns a segment, the application of its MainDevice, and the random numbers."""
 
     def __init__(
         self,
@@ -109,14 +110,14 @@ class Minute:
                 failures = 0 if self._session() else failures + 1
                 self._wait_until_over()
         if failures:
-            self.witness.violate("all back", f"{failures} times in a row no loop could be opened")
+            self.witness.violate("all back", f"no loop could be opened in {failures} attempts")
         self.figures.losses = self.witness.losses
 
     def _note(self, *what: object) -> None:
         """Add to the digest."""
         self._trace.update(repr((round(self.segment.time, 9), *what)).encode())
 
-    # A session: scan, loop, leave
+    # Session: scan, loop, leave
 
     def _session(self) -> bool:
         """Run one session and return True if its loop ran cycles."""
@@ -156,12 +157,15 @@ class Minute:
         self.figures.ended["left unasked"] += 1
 
     def _judge_end(self, error: CatenaryError, running: float | None) -> None:
-        """Judge an error. `running`: time of the last cycle; None: none ran, any fault excuses."""
+        """Judge an error. `running` is the time of the last cycle.
+
+        If no cycle ran (None), any fault excuses the error.
+        """
         kind = type(error).__name__
         self.figures.ended[kind] += 1
         self._note(kind, error.message)
         since = self._began if running is None else running
-        self.witness.injected.update()  # a scan can fail before the witness looks again
+        self.witness.injected.update()  # a scan can fail before the next check of the witness
         faults = list(self.witness.injected.between(since - 0.1, self.segment.time))
         excused = faults if running is None else may_end(faults, ring=self.segment.ring)
         if not excused:
@@ -186,7 +190,7 @@ class Minute:
     def _run(self, loop: cat.Loop, requests: Requests) -> None:
         objects = Objects(self._main.subs, self.witness, self._random)
         incidents = 0
-        # Not in the first cycle: what is enabled there holds until the first targets are committed.
+        # Not in the first cycle: axes that are enabled there hold until the first targets are set.
         self._next_at = self.segment.time + self._random.uniform(2 * PERIOD, 0.2)
         for cycle in loop:
             self._cycled = now = self.segment.time
@@ -222,7 +226,7 @@ class Minute:
         return incident
 
     def _be_late(self, incident: Incident, cycle: cat.Cycle, requests: Requests) -> None:
-        """Keep the application from running for a while."""
+        """Delay the application for a while."""
         if not incident.late:
             return
         self.witness.late_since = self.segment.time
@@ -246,7 +250,7 @@ class Minute:
     # After an incident
 
     def _is_over(self, loop: cat.Loop, requests: Requests, now: float) -> bool:
-        """Restore what waits for the application; return False if it took too long."""
+        """Restore held devices and stopped axes. Return False if the recovery took too long."""
         if not self.segment.faults_done:
             return True
         if self._over_at is None:
@@ -285,7 +289,7 @@ class Minute:
         self.witness.all_well()
 
     def _wrong_clock(self, loop: cat.Loop) -> str:
-        """Return which clock is not within the bound; empty: none."""
+        """Return a text on the worst clock if it is not within the bound; otherwise empty."""
         if not self.setting.clocks:
             return ""
         position, difference = self.witness.worst_clock()
@@ -295,7 +299,7 @@ class Minute:
         return f"clocks {locked}, device {position} is {difference * 1e6:+.3f} us off"
 
     def _wrong(self, requests: Requests) -> str:
-        """Return what is not back; empty: all is."""
+        """Return a text on devices that have not recovered; empty if all have."""
         states = [device.state for device in self.segment]
         if any(state != OP for state in states):
             return f"states {states}"

@@ -1,4 +1,4 @@
-"""Objects that are read during a soak: each answer comes, and is right."""
+"""Objects that are read during a soak test. Each answer must arrive and be correct."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from catenary.types import UDINT
 from catenary.virtual import faults as f
 
 EVERY = 25  # cycles
-ANSWERED = 20.0  # [s]: the deadlines of a mailbox, and what waits before it
+ANSWERED = 20.0  # [s] deadline, including earlier requests in the mailbox
 IDENTITY, PRODUCT = 0x1018, 2
 
 
 class Asked(NamedTuple):
-    """One object that was asked for."""
+    """One requested object."""
 
     position: int
     time: float
@@ -28,7 +28,7 @@ class Asked(NamedTuple):
 
 
 class Objects:
-    """Owns the answers that are still to come in one loop."""
+    """Owns the pending answers of one loop."""
 
     def __init__(self, subs: SubDevices, witness: Witness, random: Random) -> None:
         self._subs = subs
@@ -37,7 +37,7 @@ class Objects:
         self._pending: list[Asked] = []
 
     def step(self, cycle: int) -> int:
-        """Asks for one now and then; how many answers came in this cycle."""
+        """Request an object every `EVERY` cycles. Return the number of answers in this cycle."""
         now = self._witness.segment.time
         if cycle % EVERY == 0:
             sub = self._subs[self._random.choice(WITH_MAILBOX)]

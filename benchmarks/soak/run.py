@@ -1,5 +1,4 @@
-"""`python -m benchmarks soak`: random faults of all kinds, in virtual time, against a running
-loop."""
+"""`python -m benchmarks soak`: random faults of all kinds on a running loop, in virtual time."""
 
 from __future__ import annotations
 
@@ -23,7 +22,7 @@ SHOWN = 3  # incidents before a violation
 
 @dataclass(slots=True)
 class Found:
-    """One violation and how to repeat it."""
+    """One violation, and the command that repeats it."""
 
     minute: int  # of the soak, from 1
     seed: int  # of this minute
@@ -45,7 +44,7 @@ class Found:
 
 @dataclass(slots=True)
 class Soaked:
-    """Results of a soak."""
+    """Results of a soak test."""
 
     figures: Figures = field(default_factory=Figures)
     minutes: Counter[str] = field(default_factory=Counter)  # by setting
@@ -53,15 +52,21 @@ class Soaked:
     digests: list[str] = field(default_factory=list)
 
     def add(self, minute: Minute, seed: int, seconds: float) -> None:
-        """Add the figures of one minute, or of the part of one."""
+        """Add the results of one minute, or of a part of one.
+
+        Args:
+            minute: The minute.
+            seed: Its seed.
+            seconds: Its duration [s].
+        """
         self.figures.add(minute.figures)
         self.digests.append(minute.digest)
         self.minutes[str(minute.setting)] += 1
         number = len(self.digests)
         for violation in minute.violations:
             before = [each for each in minute.incidents if each[0] <= violation.time][-SHOWN:]
-            told = [f"    {when:9.4f} s  {incident}" for when, incident in before]
-            found = Found(number, seed, seconds, minute.setting, violation, told)
+            lines = [f"    {when:9.4f} s  {incident}" for when, incident in before]
+            found = Found(number, seed, seconds, minute.setting, violation, lines)
             self.violations.append(found)
 
 
@@ -75,10 +80,10 @@ def measure(
     """Print the results and return True if all invariants held.
 
     Args:
-        minutes: of virtual time. Minute k has seed `seed` + k and can be repeated alone.
-        seed: of the first minute.
-        choices: settings that the minutes take in turn, by their seeds.
-        file: of the figures, as JSON.
+        minutes: Virtual time [min]. Minute k has the seed `seed` + k and can be repeated alone.
+        seed: Seed of the first minute.
+        choices: Settings that the minutes use in turn, by their seeds.
+        file: File for the figures, as JSON.
     """
     start = time.perf_counter()
     soaked = soak(minutes * MINUTE, seed, choices)
@@ -86,7 +91,7 @@ def measure(
     speed = minutes * MINUTE / took
     print(
         f"{machine()}\n{minutes:g} minutes of virtual time, seed {seed}, in {took:.0f} s: "
-        f"{speed:.1f} times real"
+        f"{speed:.1f} times real time"
     )
     print(as_text(soaked))
     write(

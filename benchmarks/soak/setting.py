@@ -1,4 +1,4 @@
-"""Settings of a soak: wiring, clocks and mode of operation, one setting for each minute."""
+"""Settings of a soak test: wiring, clocks and mode of operation, one setting per minute."""
 
 from __future__ import annotations
 

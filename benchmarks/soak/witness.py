@@ -1,7 +1,7 @@
-"""Invariants that hold in spite of all faults, judged by the virtual devices' own truth.
+"""Invariants that hold despite all faults, checked against the true state of the virtual devices.
 
-`Witness` checks every device once a millisecond of virtual time, even while no cycle runs. The
-application reports its requests, the stops it was told of, and the result of each cycle.
+`Witness` checks every device once per millisecond of virtual time, even while no cycle runs. The
+application reports its requests, the stops that it was notified of, and the result of each cycle.
 """
 
 from __future__ import annotations
@@ -30,18 +30,18 @@ from benchmarks.soak.setting import Setting
 from catenary.virtual import DigitalOutputs, Segment, Servo
 from catenary.virtual import faults as f
 
-LOOK = 1_000_000  # [ns] between two looks
+LOOK = 1_000_000  # [ns] between two checks
 OP, AL_STATE = 8, 0x0F
-WATCHDOG, WATCHDOG_TORQUE = 0.1, 0.01  # [s], of the loop; the second one in CST
-MARGIN = 0.003  # [s]: steps of device models and looks
-BRAKING = 0.1  # [s] that a drive may take to stand
+WATCHDOG, WATCHDOG_TORQUE = 0.1, 0.01  # [s] of the loop; the second in CST
+MARGIN = 0.003  # [s] for the steps of device models and checks
+BRAKING = 0.1  # [s] in which a drive must come to a standstill
 STILL = 0.05  # [rad/s]
-FASTEST = 3.0  # [rad/s]: ten times the application's own velocity; a jump is faster
+FASTEST = 3.0  # [rad/s] ten times the velocity of the application; a jump is faster
 ANNOUNCED = 20  # cycles from a stop to its event and reason
-CLOCK_BOUND = 2e-6  # [s], true difference from the reference clock: twice what the loop reports
+CLOCK_BOUND = 2e-6  # [s] true difference from the reference clock: twice the reported bound
 FLIGHT = 2.5 * PERIOD  # [s] from the sending of a frame to the end of its cycle
-AFTERWARDS = 0.012  # [s]: late frames arrive, controllers detect dark cables
-DETECTED = 0.002  # [s], in a ring: dark cables are detected; the other way round carries on
+AFTERWARDS = 0.012  # [s] for late frames, and for controllers to detect dead cables
+DETECTED = 0.002  # [s] in a ring, to detect dead cables; the other direction continues
 REQUIRED = frozenset(range(DEVICES)) - frozenset(OPTIONAL)
 
 
@@ -73,8 +73,8 @@ class Witness:
         self.injected = Injected(segment)
         self.violations: list[Violation] = []
         self.phase = Phase.LEFT
-        self.calm = False  # no fault is on, and all devices are back
-        self.late_since = inf  # [s]: the last time the application ran
+        self.calm = False  # True if no fault is active, and all devices have recovered
+        self.late_since = inf  # [s] last time at which the application ran
         self.losses: Counter[str] = Counter()
         torque = setting.mode == "cst"
         self._late_limit = LATE_LIMIT_TORQUE if torque else LATE_LIMIT
@@ -89,14 +89,20 @@ class Witness:
         self._idle_since = dict.fromkeys(SERVOS, 0.0)
         self._op_since = dict.fromkeys(range(DEVICES), inf)
         self._unannounced: dict[int, int] = {}  # stopped axis → cycles without event and reason
-        self._announced: set[int] = set()  # since their last request
-        self._told: set[tuple[str, str]] = set()
-        self._look()
+        self._announced: set[int] = set()  # stops reported since the last request
+        self._reported: set[tuple[str, str]] = set()
+        self._check()
 
     def violate(self, invariant: str, what: str, *, about: str = "") -> None:
-        """Note a violation, once for each `about` until all devices are back."""
-        if (invariant, about) not in self._told:
-            self._told.add((invariant, about))
+        """Record a violation, once for each `about` until all devices have recovered.
+
+        Args:
+            invariant: Name of the invariant.
+            what: Description of the violation.
+            about: Device of the violation.
+        """
+        if (invariant, about) not in self._reported:
+            self._reported.add((invariant, about))
             self.violations.append(Violation(self.segment.time, invariant, what))
 
     # Reports of the application
@@ -108,15 +114,22 @@ class Witness:
             self._running_since = self.segment.time
         if phase is Phase.LEFT:
             self._left = self.segment.time
-            self._asked &= self._enabled  # those out of reach go on until their watchdogs expire
+            self._asked &= (
+                self._enabled
+            )  # unreachable ones stay enabled until their watchdogs expire
 
     def ask(self, positions: tuple[int, ...]) -> None:
-        """The application requests that drives be enabled."""
+        """Record that the application has requested to enable drives."""
         self._asked.update(positions)
         self._announced.difference_update(positions)
 
     def take_stop(self, position: int, *, reason: bool) -> None:
-        """The application received the event of a stop; `reason`: `Drives.stopped` has one."""
+        """Record that the application received the event of a stop.
+
+        Args:
+            position: Position of the drive.
+            reason: True if `Drives.stopped` has a reason.
+        """
         self._announced.add(position)
         self._unannounced.pop(position, None)
         if not reason:
@@ -124,16 +137,16 @@ class Witness:
             self.violate("no silent stop", what, about=str(position))
 
     def all_well(self) -> None:
-        """All devices are back after an incident."""
+        """Record that all devices have recovered after an incident."""
         self.calm, self._quiet_since = True, self.segment.time
-        self._told.clear()
+        self._reported.clear()
 
     def disturb(self) -> None:
-        """An incident begins."""
+        """Record the start of an incident."""
         self.calm, self._quiet_since = False, inf
 
     def give_up(self) -> None:
-        """The loop of an incident was left; the next one begins anew."""
+        """Record that the loop of an incident was left. The next loop starts without one."""
         self._quiet_since = self.segment.time
 
     def quiet_since(self, time: float) -> bool:
@@ -142,31 +155,31 @@ class Witness:
 
     # Checks of the devices
 
-    def _look(self) -> None:
-        self.segment.service.agenda.after(LOOK, self._look)
+    def _check(self) -> None:
+        self.segment.service.agenda.after(LOOK, self._check)
         self.injected.update()
         if self.setting.mode == "cst":
             apply_loads(self.segment)
         now = self.segment.time
         states = [device.state for device in self.segment]
         for position, state in enumerate(states):
-            self._look_at_state(position, state, now)
+            self._check_state(position, state, now)
             silent = now - self._silent_since(position)
             if silent > self._watchdogs.get(position, WATCHDOG) + MARGIN:
-                self._look_for_safety(position, silent)
+                self._check_safety(position, silent)
         for position in SERVOS:
-            self._look_at_drive(position, states[position], now)
+            self._check_drive(position, states[position], now)
         if self.setting.clocks and self.calm and self.phase is Phase.RUNNING:
-            self._look_at_clocks()
+            self._check_clocks()
 
-    def _look_at_clocks(self) -> None:
+    def _check_clocks(self) -> None:
         position, difference = self.worst_clock()
         if abs(difference) > CLOCK_BOUND:
             what = f"device {position} is {difference * 1e6:+.3f} us off without a fault"
             self.violate("clocks within bound", what, about=str(position))
 
     def worst_clock(self) -> tuple[int, float]:
-        """Return the drive whose clock is furthest off the reference's, and its difference [s]."""
+        """Return the drive with the largest clock difference, and the difference [s]."""
         core = self.segment.core
         reference = core.system_time(COUPLER)
         found = {p: (core.system_time(p) - reference) * 1e-9 for p in SERVOS}
@@ -174,11 +187,11 @@ class Witness:
         return position, found[position]
 
     def _silent_since(self, position: int) -> float:
-        """Return since when a device has had no outputs; infinity if it has them."""
+        """Return the time since which a device has no outputs; infinity if it has them."""
         since = self.injected.isolated_since(position)
         return min(since, self._left) if self.phase is Phase.LEFT else since
 
-    def _look_at_state(self, position: int, state: int, now: float) -> None:
+    def _check_state(self, position: int, state: int, now: float) -> None:
         if state != OP:
             self._op_since[position] = inf
             if self.calm and self.phase is Phase.RUNNING:
@@ -187,7 +200,7 @@ class Witness:
         elif self._op_since[position] == inf:
             self._op_since[position] = now
 
-    def _look_for_safety(self, position: int, silent: float) -> None:
+    def _check_safety(self, position: int, silent: float) -> None:
         device = self.segment[position]
         what = f"device {position}, {silent:.4f} s without outputs"
         if isinstance(device, DigitalOutputs) and device.outputs:
@@ -195,15 +208,17 @@ class Witness:
         if isinstance(device, Servo) and self._is_enabled(device) and not self._is_frozen(position):
             self.violate("outputs safe", f"{what}: {device.drive_state()}", about=str(position))
 
-    def _look_at_drive(self, position: int, state: int, now: float) -> None:
+    def _check_drive(self, position: int, state: int, now: float) -> None:
         servo = self.segment[position]
         if not isinstance(servo, Servo):
             return
         if state == 0:
-            self._idle_since[position] = now  # the model stands still, and goes on when it returns
+            self._idle_since[position] = (
+                now  # without power, the model stands still until it returns
+            )
         moving = state != 0 and not self._is_frozen(position)
         velocity = abs(servo.velocity_rad_s) if moving else 0.0
-        self._look_at_commands(position, servo, state, now)
+        self._check_commands(position, servo, state, now)
         if not self._is_enabled(servo):
             if position in self._enabled:
                 self._enabled.discard(position)
@@ -227,7 +242,7 @@ class Witness:
             what = f"device {position} is enabled {late:.3f} s after the last set-points"
             self.violate("outputs safe", what, about=str(position))
 
-    def _look_at_commands(self, position: int, servo: Servo, state: int, now: float) -> None:
+    def _check_commands(self, position: int, servo: Servo, state: int, now: float) -> None:
         commands, drive = self._commands[position], servo.drive_state() if state else ""
         excused = self._is_frozen(position) or self._is_garbled(now)
         if state & AL_STATE != OP or drive not in POWERED or excused:
@@ -240,7 +255,7 @@ class Witness:
         return servo.state != 0 and servo.drive_state() == "OPERATION ENABLED"
 
     def _is_frozen(self, position: int) -> bool:
-        """Return True if its model stands still, or has to catch up."""
+        """Return True if the model of a device stands still, or is catching up."""
         now = self.segment.time
         return any(
             isinstance(fault, f.Freeze) and fault.device == position
@@ -248,14 +263,19 @@ class Witness:
         )
 
     def _is_garbled(self, now: float) -> bool:
-        """Return True if wrong positions came that cannot be detected: they may be followed."""
+        """Return True if undetectable wrong positions were received, which may be followed."""
         recent = self.injected.between(now - 0.5, now)
         return any(isinstance(fault, f.Garble) for fault in recent)
 
-    # Judging what the application sees
+    # Checks of the application's view
 
     def judge_cycle(self, ok: bool, present: Mapping[int, bool]) -> None:
-        """Judge one cycle of the loop as the application saw it."""
+        """Judge one cycle of the loop from the view of the application.
+
+        Args:
+            ok: `ok` of the cycle.
+            present: True for each device that answered, by position.
+        """
         self.injected.update()
         now = self.segment.time
         self._take_losses(now)
@@ -275,11 +295,11 @@ class Witness:
                 self.violate("no undeclared loss", what, about=str(position))
             gone = now - self.injected.isolated_since(position) > FLIGHT
             if gone and not garbled and (there or (ok and position in REQUIRED)):
-                what = f"device {position} is out of reach, and its inputs are given for good"
+                what = f"device {position} is out of reach, but its inputs are reported as valid"
                 self.violate("no silent loss", what, about=str(position))
 
     def _judge_stops(self, present: Mapping[int, bool]) -> None:
-        """An axis that was stopped is announced while its device answers."""
+        """Check that each stopped axis is announced while its device answers."""
         for position in list(self._unannounced):
             self._unannounced[position] += present[position]
             if self._unannounced[position] > ANNOUNCED:
@@ -299,7 +319,7 @@ class Witness:
     def _declared(self, sent: float, cause: str) -> bool:
         faults = list(self.injected.between(sent - self._detected(cause), sent + FLIGHT))
         if cause == "closed port" and self.setting.clocks and sent < self._running_since:
-            return self.segment.ring  # it is a line while the delays of its cables are measured
+            return self.segment.ring  # the ring is open while its delays are measured
         if cause == "injected":
             return any(isinstance(fault, f.LoseFrames) for fault in faults)
         if cause == "corrupt":
@@ -307,7 +327,7 @@ class Witness:
         return any(breaks_cable(fault) for fault in faults)
 
     def _detected(self, cause: str) -> float:
-        """Return how long before a loss its fault may have begun [s]."""
+        """Return the longest time from the start of a fault to its loss [s]."""
         is_cable = cause not in ("injected", "corrupt")
         return DETECTED if self.segment.ring and is_cable else AFTERWARDS
 

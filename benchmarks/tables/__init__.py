@@ -1,8 +1,7 @@
-"""`python -m benchmarks table`: published tables next to our figures. Each table has a module with
-`measure(options) -> Sheet`.
+"""`python -m benchmarks table`: published tables next to our figures.
 
-`catenary.bench.enter_private_network` may run the program anew before NumPy is imported, so nothing
-is imported here before it is used.
+Each table has a module with `measure(options) -> Sheet`. Imports are inside the functions, because
+`catenary.bench.enter_private_network` may restart the program, before NumPy is imported.
 """
 
 from __future__ import annotations
@@ -16,14 +15,14 @@ if TYPE_CHECKING:
 
 class Table(NamedTuple):
     help: str  # one line
-    wires: bool  # it wants frames on wires, so a private network
+    wires: bool  # True if it needs network interfaces, and so a private network
 
 
 TABLES = {
-    "pyigh": Table("one loop, three drives, 1 kHz: Python beside C, and whether they differ", True),
+    "pyigh": Table("one loop, three drives, 1 kHz: Python compared with C", True),
     "tocabi": Table("18 + 15 axes on two networks, 4 and 8 kHz: latency, send, receive", True),
-    "cobot": Table("six tasks of a six-axis cobot, by the program of examples/cobot", False),
-    "tasks": Table("three spinning tasks: C, Python as processes and threads; the analysis", False),
+    "cobot": Table("six tasks of a six-axis cobot, with the program of examples/cobot", False),
+    "tasks": Table("three busy tasks: C, Python processes, Python threads, and analysis", False),
     "rteml": Table("intervals of cyclic frames in a capture at 5 kHz", True),
     "skew": Table("two digital outputs at both ends of the line, with and without SYNC0", False),
     "interrupt": Table("reaction of a waiting task to an event: eventfd, signal, timer", False),
@@ -31,7 +30,15 @@ TABLES = {
 
 
 def measure(name: str, options: Options) -> Sheet:
-    """ValueError: no such table; it lists those there are."""
+    """Measure a table.
+
+    Args:
+        name: Name of the table.
+        options: Options of the command line.
+
+    Raises:
+        ValueError: The table does not exist.
+    """
     check(name)
     sheet: Sheet = import_module(f"{__name__}.{name}").measure(options)
     return sheet
@@ -39,4 +46,4 @@ def measure(name: str, options: Options) -> Sheet:
 
 def check(name: str) -> None:
     if name not in TABLES:
-        raise ValueError(f"there is no table {name!r}; there are {', '.join(TABLES)}")
+        raise ValueError(f"unknown table {name!r}; known tables: {', '.join(TABLES)}")

@@ -1,8 +1,8 @@
-"""`python -m benchmarks table cobot`: six tasks of a six-axis cobot, by the program of
-`examples/cobot`, which is run and writes what it came to.
+"""`python -m benchmarks table cobot`: six tasks of a six-axis cobot.
 
-In virtual time execution is declared: the table shows the schedule. On the machine's clock
-(`--realtime`) it is measured, on real frames over a pair of interfaces.
+The table runs the program of `examples/cobot` and reads its results. In virtual time, execution
+times are declared, and the table shows the schedule. On the machine's clock (`--realtime`), they
+are measured, with real frames over a pair of interfaces.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from catenary.errors import CatenaryError
 REPOSITORY = Path(__file__).resolve().parents[2]
 PROGRAM = Path("examples", "cobot", "cobot.py")
 NEEDS = ("mujoco", "ruckig", "mcap")
-SECONDS = 3600.0  # at most; it ends by itself
+SECONDS = 3600.0  # [s] limit; the program ends by itself
 CONDITIONS = (
     "theirs: PyIgH on an Indy7, cyclic torque at 1 kHz, PREEMPT_RT, 5 min, joints 0 to 90 degrees"
 )
@@ -65,7 +65,7 @@ def moves(options: Options) -> str:
 
 
 def program(options: Options) -> Path:
-    """Return the program that was chosen, else that of this repository."""
+    """Return the chosen program, or that of this repository."""
     if options.example is not None:
         return options.example
     return REPOSITORY / PROGRAM
@@ -74,7 +74,7 @@ def program(options: Options) -> Path:
 def why_not(options: Options) -> str:
     path = program(options)
     if not path.exists():
-        return f"all of ours: there is no {path} (--example says where it is)"
+        return f"all of ours: {path} does not exist (give its path with --example)"
     missing = [name for name in NEEDS if find_spec(name) is None]
     if missing:
         return f"all of ours: {', '.join(missing)} not installed (pip install 'catenary[cobot]')"
@@ -96,9 +96,9 @@ def run(path: Path, words: Sequence[str]) -> dict[str, Any]:
         )
         file = Path(name, "cobot.json")
         if done.returncode or not file.exists():
-            last = (done.stderr.strip() or done.stdout.strip() or "it said nothing").splitlines()
+            last = (done.stderr.strip() or done.stdout.strip() or "no output").splitlines()
             raise CatenaryError(
-                f"{path} failed: {last[-1]}", hint=f"run it by itself: {sys.executable} {path}"
+                f"{path} failed: {last[-1]}", hint=f"run it separately: {sys.executable} {path}"
             )
         found: dict[str, Any] = json.loads(file.read_text())
         return found

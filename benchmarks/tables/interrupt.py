@@ -1,8 +1,8 @@
-"""`python -m benchmarks table interrupt`: how soon a waiting task runs after an event. An eventfd
-and a timer stand in for the published GPIO: what a device's driver wakes a task with.
+"""`python -m benchmarks table interrupt`: reaction time of a waiting task to an event.
 
-The event's value is the instant it was made, so the one who waits knows it. With two events before
-it runs their values would add up: such ones are left out, and counted.
+An eventfd and a timer stand in for the published GPIO interrupt, as the wake-up by a driver. The
+value of an event is its time, which the waiting process reads. If two events arrive before it runs,
+their values add up. Such events are omitted and counted.
 """
 
 from __future__ import annotations
@@ -31,12 +31,12 @@ from catenary.realtime.child import start_python
 from catenary.realtime.system.scheduling import request_scheduling
 
 SECONDS, PERIOD = 2.0, 1e-3
-PRIORITY, BELOW = 80, 10  # of who waits; who makes the events is so much lower
+PRIORITY, BELOW = 80, 10  # of the waiting thread; the source of events is lower by BELOW
 C, PYTHON, TASK = "C", "Python", "Python, sporadic task"
 EVENT, TIMER, SIGNAL = "eventfd", "timerfd", "realtime.Signal"
-PUBLISHED = "theirs waits for a GPIO; no figures of it are at hand"
+PUBLISHED = "theirs waits for a GPIO; its figures are not available"
 TFD_TIMER_ABSTIME = 1  # sys/timerfd.h
-LAST = 2**62  # the maker's last event: nobody waits for those that were added up
+LAST = 2**62  # last event of the source; ends the wait for events that were added up
 COLUMNS = ("mean", "max", "min", "sd", "p50", "p99")
 
 
@@ -62,15 +62,15 @@ def measure(options: Options) -> Sheet:
     rows = [row(who, event, each) for (who, event), each in found.items()]
     return Sheet(
         title=f"Reaction of a waiting task to an event; {PUBLISHED}",
-        conditions=f"ours: {count} events, one every {PERIOD * 1e3:g} ms; who waits has SCHED_FIFO "
-        f"{PRIORITY} where permitted, on the processor of who makes them",
+        conditions=f"ours: {count} events, one every {PERIOD * 1e3:g} ms; the waiting thread has "
+        f"SCHED_FIFO {PRIORITY} if permitted, on the processor of the event source",
         text=grid(("from event to running [us]", "", *COLUMNS, "events"), rows),
         figures={
             "published": PUBLISHED,
             "period": PERIOD,
             "ways": [
                 {
-                    "who": who,
+                    "who": who,  # words: ok
                     "event": event,
                     "events": each.events,
                     "left_out": each.left_out,
@@ -96,10 +96,12 @@ def run(who: str, event: str, count: int) -> Found:
 
 
 def of_samples(reactions_ns: npt.NDArray[np.int64]) -> Found:
-    """-1: it could not be told."""
+    """Return the figures of the reaction times; -1 marks an unknown one."""
     good = reactions_ns[reactions_ns >= 0]
     if not len(good):
-        raise CatenaryError("no event came alone: this machine is too busy to tell a reaction")
+        raise CatenaryError(
+            "no event arrived alone: this machine is too busy to measure a reaction"
+        )
     return Found(
         len(good), len(reactions_ns) - len(good), summarise(np.asarray(good * 1e-3, np.float64))
     )
@@ -123,14 +125,16 @@ def run_c(event: str, count: int, program: Path, file: Path) -> None:
 
 def run_python(event: str, count: int, file: Path) -> None:
     with start_python(["-m", __name__, event, str(count), str(file)]) as worker:
-        said = worker.read_line(60 + 10 * count * PERIOD)
-    if said != "done":
-        raise CatenaryError(f"the waiting process failed: {said or 'it said nothing'}")
+        output = worker.read_line(60 + 10 * count * PERIOD)
+    if output != "done":
+        raise CatenaryError(f"the waiting process failed: {output or 'no output'}")
 
 
 def run_task(count: int) -> Found:
-    """A task of `catenary.realtime` that sleeps until a signal is set; by the statistics of its
-    jitter, which is from the signal to its start."""
+    """Measure a task of `catenary.realtime` that sleeps until a signal is set.
+
+    The reaction time is its jitter: the time from the signal to its start.
+    """
     signal, cpu = Signal(), processors().masters
     waiting = Task(
         nothing, name="waiting", period=PERIOD / 4, priority=PRIORITY, cpu=cpu, trigger=signal
@@ -160,7 +164,7 @@ def row(who: str, event: str, found: Found) -> list[str]:
     return [who, event, *figures, str(found.events)]
 
 
-# ---- the process that waits, and the one that makes events for it
+# The waiting process, and the source of its events
 
 
 def main(arguments: Sequence[str]) -> None:
@@ -179,11 +183,11 @@ def wait_for_events(count: int) -> npt.NDArray[np.int64]:
     command = [sys.executable, "-m", __spec__.name, "make", str(count), str(event)]
     with subprocess.Popen(command, pass_fds=[event]) as maker:
         for number in range(count):
-            said = os.eventfd_read(event)
+            value = os.eventfd_read(event)
             now = time.monotonic_ns()
-            if said <= now:  # one event; the sum of two is beyond
-                reactions[number] = now - said
-            if said >= LAST:
+            if value <= now:  # one event; the sum of two is in the future
+                reactions[number] = now - value
+            if value >= LAST:
                 break
         maker.kill()
     return reactions
@@ -205,7 +209,7 @@ class Timespec(ctypes.Structure):
 
 
 def wait_for_timer(count: int) -> npt.NDArray[np.int64]:
-    """`os.timerfd_create` is Python 3.13's."""
+    """Return the reaction times to a timer [ns], by ctypes: `os.timerfd_create` needs 3.13."""
     libc = ctypes.CDLL(None, use_errno=True)
     period = round(PERIOD * 1e9)
     reactions = np.full(count, -1, np.int64)

@@ -1,5 +1,7 @@
-"""The published figures, with the conditions they were taken under. Spreads are mean, max, min, sd;
-None: not published."""
+"""The published figures and their conditions.
+
+Spreads are mean, max, min and sd; None if a value is not published.
+"""
 
 from __future__ import annotations
 
@@ -22,7 +24,7 @@ def spread_of(figures: Mapping[str, float], scale: float = 1.0) -> Spread:
     return Spread(*(figures[name] * scale for name in FIGURES))
 
 
-# ---- PyIgH, section 1: in-controller delay
+# PyIgH, section 1: in-controller delay
 
 
 class Phases(NamedTuple):
@@ -65,8 +67,7 @@ PYIGH: Mapping[str, Phases] = {
 PYIGH_C = "IgH, C++"
 PYIGH_CHI_SQUARED = {"PyIgH": 48.94, "PySOEM": 55.75}  # 29 degrees, critical 49.59 at 0.01
 
-# ---- PyIgH, section 2: six tasks of a six-axis cobot under cyclic torque control, 5 min,
-# PREEMPT_RT; spreads as mean, max, min, sd
+# PyIgH, section 2: six tasks of a six-axis cobot under cyclic torque control, 5 min, PREEMPT_RT
 
 # "stop" is its sporadic error task, "monitor" its ROS 2 node.
 COBOT: Mapping[str, TaskTimes] = {
@@ -103,7 +104,7 @@ COBOT: Mapping[str, TaskTimes] = {
 }
 COBOT_UTILISATION = 0.737  # schedulable by rate-monotonic analysis
 
-# ---- TOCABI, section 4: two networks, 33 axes
+# TOCABI, section 4: two networks, 33 axes
 
 
 class Channel(NamedTuple):
@@ -169,11 +170,11 @@ TOCABI: Mapping[tuple[int, str], Channel] = {
     ),
 }
 
-# ---- Real-time tasks in Python, section 3: three spinning tasks
+# Real-time tasks in Python, section 3: three busy tasks
 
 
 class Times(NamedTuple):
-    """[ms]"""
+    """Period and response [ms]."""
 
     period: Spread
     response: Spread
@@ -206,12 +207,12 @@ TASKS: Mapping[tuple[str, str], tuple[Times, Times, Times]] = {
     ),
 }
 
-# ---- and its EtherCAT part: two digital outputs
+# Real-time tasks in Python, EtherCAT part: two digital outputs
 
 SKEW_CONDITIONS = "theirs: Raspberry Pi 4, RT-Preempt, 3 servo drives and 2 digital outputs, 1 kHz"
 SKEW = Spread(1.45, 2.5, 0.68, 0.18)  # [us]
 
-# ---- RtEML, section 5
+# RtEML, section 5
 
 RTEML_CONDITIONS = "theirs: INtime on Windows, frames of 60 bytes, 5702 captured packets"
 RTEML_PACKETS, RTEML_INTERVAL_US = 5702, 200.0  # on average

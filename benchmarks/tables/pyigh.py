@@ -1,11 +1,15 @@
 """`python -m benchmarks table pyigh`: the in-controller delay of C, of Python and of compiled laws.
 
-Every peer runs in rounds, all in turn, as in `python -m benchmarks loop`. Two tests follow, on the
-periods. The published one takes the counts of the C program in 30 bins for the known distribution
-of Pearson's test; it holds for none of its conditions here: cycles depend on their neighbours (an
-early one makes the next period long), the expected counts are a sample themselves, and with ten
-thousands of cycles any difference at all is beyond the critical value: C against itself is, too.
-The other test compares rounds (`benchmarks.two_samples`), and says how large the difference is.
+The peers run in rounds and take turns, as in `python -m benchmarks loop`. Two tests of the periods
+follow. The published test is Pearson's, with the counts of the C program in 30 bins as the known
+distribution. Its conditions are not met:
+
+- Cycles depend on their neighbours: an early one makes the next period long.
+- The expected counts are a sample themselves.
+- With tens of thousands of cycles, any difference exceeds the critical value, even that of the C
+  program from itself.
+
+The other test compares rounds (`benchmarks.two_samples`) and measures the size of the difference.
 """
 
 from __future__ import annotations
@@ -45,7 +49,7 @@ from catenary.bench.segment import served
 from catenary.bench.statistics import Run, combine
 
 DRIVES, RATE, SECONDS = 3, 1000, 10.0
-ROUNDS = 10  # at least: of fewer than 8 pairs no test at 0.01 can reject
+ROUNDS = 10  # minimum: with fewer than 8 pairs, no test at 0.01 can reject
 C, C_RING, PYSOEM = "c", "c-ring", "pysoem"
 MARGIN_US = 5.0  # a difference that matters
 FIELDS = ("period", "receive", "process", "send", "in_controller")
@@ -82,8 +86,11 @@ def measure(options: Options) -> Sheet:
 
 
 def peers(*, busy: bool = False) -> tuple[list[str], list[str]]:
-    """Return the peers that this machine can run, and why others are left out. `busy`: with the C
-    program that busy-waits as our loops do."""
+    """Return the peers that this machine can run, and the reasons for omitted ones.
+
+    Args:
+        busy: True to include the C program with a busy-wait.
+    """
     names, left_out = list(OURS), []
     if find_spec("numba"):
         names.append(LAW)
@@ -117,22 +124,22 @@ def run(
         return interleave(published, rounds, show_progress, failed)
 
 
-# ---- the two tests
+# The two tests
 
 
 @dataclass(frozen=True, slots=True)
 class Comparison:
-    """The periods of one program beside those of another."""
+    """Comparison of the periods of two programs."""
 
     name: str
     pairs: int
     pearson: GoodnessOfFit  # as published
     rounds: PairedRounds
-    p99_deviation_us: Effect  # how much more |period - T| is
+    p99_deviation_us: Effect  # increase of the p99 of |period - T|
 
     @property
     def within(self) -> str:
-        """Whether it is at most the margin worse, by the upper end of the interval."""
+        """Verdict on the increase: "yes" if the whole interval is within the margin."""
         effect = self.p99_deviation_us
         if effect.high is None or effect.low is None:
             return "too few rounds"
@@ -142,7 +149,7 @@ class Comparison:
 
 
 def compare(found: Mapping[str, Sequence[Round]]) -> list[Comparison]:
-    """C's odd rounds beside its even ones, then each peer beside C."""
+    """Compare C's odd rounds with its even ones, then each peer with C."""
     if C not in found:
         return []
     theirs = [periods_us(each) for each in found[C]]
@@ -168,7 +175,7 @@ def comparison(name: str, ours: Sequence[Values], theirs: Sequence[Values]) -> C
 
 
 def periods_us(one: Round) -> Values:
-    """The first period of a round began in another process' time."""
+    """Return the periods of a round, without the first: it began in another process."""
     return np.asarray(one.samples[1:, PHASES.index("period")] * 1e-3)
 
 
@@ -176,7 +183,7 @@ def deviations(periods: Sequence[Values]) -> list[Values]:
     return [np.asarray(abs(each - 1e6 / RATE)) for each in periods]
 
 
-# ---- for people
+# Text output
 
 
 def as_table(runs: Sequence[Run]) -> str:
@@ -204,7 +211,7 @@ def row(name: str, phases: Phases, ratio: float | None) -> list[str]:
 
 
 def ratios(runs: Sequence[Run]) -> dict[str, float]:
-    """Means of the in-controller delay over C's."""
+    """Return the ratios of the mean in-controller delay to that of C."""
     means = {each.name: each.timing_us["in_controller"]["mean"] for each in runs}
     return {name: round(mean / means[C], 3) for name, mean in means.items() if means.get(C)}
 
@@ -212,15 +219,15 @@ def ratios(runs: Sequence[Run]) -> dict[str, float]:
 def as_tests(compared: Sequence[Comparison]) -> str:
     published = ", ".join(f"{name} {value}" for name, value in PYIGH_CHI_SQUARED.items())
     lines = [
-        f"periods beside C's. Theirs: Pearson's chi-squared {published}, critical 49.59 (29 "
+        f"periods compared with C. Theirs: Pearson's chi-squared {published}, critical 49.59 (29 "
         "degrees, alpha 0.01)."
     ]
     if compared:
         header = ("", "chi-squared (critical)", "pairs of rounds: distance, p")
         effect = f"p99 of |period - T| more [us], at most {MARGIN_US:g}"
         lines += [
-            "That test takes cycles for independent and C's counts for known: see C beside itself. "
-            "Pairs of rounds are.",
+            "This test assumes independent cycles and known counts of C, which does not hold: see "
+            "C compared with itself. Pairs of rounds are independent.",
             grid((*header, effect), [comparison_row(each) for each in compared]),
         ]
     return "\n".join(lines)

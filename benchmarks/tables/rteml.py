@@ -1,8 +1,7 @@
-"""`python -m benchmarks table rteml`: intervals of the cyclic frames on the wire at 5 kHz, in a
-capture.
+"""`python -m benchmarks table rteml`: intervals of captured cyclic frames at 5 kHz.
 
-The capture is ours: a raw socket at the segment's end of the wire, the kernel's time stamps. It is
-not at the loop's end, where frames that bypass the queueing discipline are not shown to others.
+A raw socket at the segment's end of the wire captures the frames with the kernel's time stamps. At
+the loop's end, frames that bypass the queueing discipline are not visible to other sockets.
 """
 
 from __future__ import annotations
@@ -35,15 +34,15 @@ ORDERS: tuple[Literal["threaded", "inline"], ...] = ("threaded", "inline")
 ETHERCAT = 0x88A4
 SO_TIMESTAMPNS, SO_RCVBUFFORCE = 35, 33  # asm-generic/socket.h
 SOL_PACKET, PACKET_STATISTICS = 263, 6  # linux/if_packet.h
-ROOM = 64 << 20  # [bytes] of the socket's buffer
-LONGEST = 2048  # [bytes] of a frame
-INDEX = 17  # of the first datagram; those of the cycle are below ACYCLIC
+ROOM = 64 << 20  # [bytes] size of the socket's buffer
+LONGEST = 2048  # [bytes] limit of a frame
+INDEX = 17  # offset of the first datagram's index; indices of the cycle are below ACYCLIC
 ACYCLIC = 0x80
 TIMESPEC = struct.Struct("@qq")
 
 
 class Stretch(msgspec.Struct):
-    """What the loop says: when its cycles were counted (CLOCK_REALTIME), what became of them."""
+    """Report of the loop: the time span of its counted cycles (CLOCK_REALTIME) and the counts."""
 
     start_ns: int
     end_ns: int
@@ -54,7 +53,7 @@ class Stretch(msgspec.Struct):
 
 @dataclass(frozen=True, slots=True)
 class Capture:
-    """What was seen on the wire meanwhile."""
+    """Cyclic frames on the wire in the same time span."""
 
     stamps_ns: tuple[int, ...]
     sizes: tuple[int, ...]  # [bytes], without check sequence
@@ -90,7 +89,7 @@ def measure(options: Options) -> Sheet:
 
 
 def run(order: str, rate: int, cycles: int) -> tuple[Capture, Stretch]:
-    """The loop in a process of its own; this one captures."""
+    """Run the loop in a separate process, and capture its frames in this one."""
     with served(0, inputs=1) as segment, contextlib.ExitStack() as stack:
         wire = stack.enter_context(open_capture(segment.far))
         cpu = processors().masters
@@ -101,13 +100,13 @@ def run(order: str, rate: int, cycles: int) -> tuple[Capture, Stretch]:
         return cyclic(frames, stretch, dropped(wire)), stretch
 
 
-# ---- the capture
+# The capture
 
 
 def open_capture(interface: str) -> socket.socket:
     wire = socket.socket(socket.AF_PACKET, socket.SOCK_RAW, 0)
     wire.setsockopt(socket.SOL_SOCKET, SO_TIMESTAMPNS, 1)
-    with contextlib.suppress(PermissionError):  # then what the system allows must do
+    with contextlib.suppress(PermissionError):  # then the default buffer size applies
         wire.setsockopt(socket.SOL_SOCKET, SO_RCVBUFFORCE, ROOM)
     wire.bind((interface, ETHERCAT))
     wire.setblocking(False)
@@ -118,7 +117,7 @@ Frame = tuple[int, bytes]  # CLOCK_REALTIME [ns], from the first byte
 
 
 def read_until(wire: socket.socket, worker: Child, seconds: float) -> tuple[list[Frame], str]:
-    """All frames until the worker says something, and what it said."""
+    """Return all frames until the worker prints a line, and that line."""
     output = worker.process.stdout
     assert output is not None
     frames: list[Frame] = []
@@ -130,10 +129,10 @@ def read_until(wire: socket.socket, worker: Child, seconds: float) -> tuple[list
         if wire.fileno() in ready:
             frames += drain(wire)
         if output.fileno() in ready or not ready:
-            said = worker.read_line(1.0)
-            if said is None or not said.startswith("{"):
-                raise RoundError(f"the loop failed: {said or 'it said nothing'}")
-            return frames + drain(wire), said
+            line = worker.read_line(1.0)
+            if line is None or not line.startswith("{"):
+                raise RoundError(f"the loop failed: {line or 'no output'}")
+            return frames + drain(wire), line
 
 
 def drain(wire: socket.socket) -> list[Frame]:
@@ -152,13 +151,13 @@ def drain(wire: socket.socket) -> list[Frame]:
 
 
 def dropped(wire: socket.socket) -> int:
-    """Frames for which the buffer had no room."""
+    """Return the number of frames that did not fit in the buffer."""
     statistics = wire.getsockopt(SOL_PACKET, PACKET_STATISTICS, 8)
     return int(struct.unpack("II", statistics)[1])
 
 
 def cyclic(frames: Sequence[Frame], stretch: Stretch, lacking: int) -> Capture:
-    """Those of the cycle, while it was counted."""
+    """Return the cyclic frames within the counted time span."""
     mine = [
         (stamp, len(data))
         for stamp, data in frames
@@ -169,12 +168,12 @@ def cyclic(frames: Sequence[Frame], stretch: Stretch, lacking: int) -> Capture:
     return Capture(tuple(s for s, _ in mine), tuple(size for _, size in mine), lacking)
 
 
-# ---- for people and programs
+# Output as text and as figures
 
 
 def intervals_us(capture: Capture) -> dict[str, float]:
     if len(capture.stamps_ns) < 2:
-        raise RoundError(f"only {len(capture.stamps_ns)} frames were captured")
+        raise RoundError(f"only {len(capture.stamps_ns)} frames were captured; 2 are needed")
     return summarise(np.diff(np.array(capture.stamps_ns)) * 1e-3)
 
 
@@ -196,7 +195,7 @@ def as_figures(capture: Capture, stretch: Stretch) -> dict[str, object]:
     }
 
 
-# ---- the process of the loop
+# Process of the loop
 
 
 def main(arguments: Sequence[str]) -> None:

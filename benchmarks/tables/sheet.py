@@ -1,4 +1,4 @@
-"""What is asked of a table and what it comes to, for people and for programs."""
+"""Options of a table and its results, as text and as JSON."""
 
 from __future__ import annotations
 
@@ -21,25 +21,25 @@ PACKAGES = ("catenary", "numpy", "numba", "pysoem")
 
 @dataclass(frozen=True, slots=True)
 class Options:
-    """What the command line says; None: as the table has it."""
+    """Options of the command line; None for the default of the table."""
 
     seconds: float | None = None
-    rounds: int | None = None  # of programs that take turns, at least
+    rounds: int | None = None  # smallest number of rounds in which programs take turns
     rates: tuple[int, ...] | None = None  # [Hz]
-    peers: tuple[str, ...] | None = None  # of those that the table compares
+    peers: tuple[str, ...] | None = None  # programs to compare
     ring: bool = False
     axes: tuple[int, ...] | None = None  # drives on each network
     busy_wait: float = 0.0  # [s] of our loops before each cycle start
-    example: Path | None = None  # the program of examples/cobot
-    realtime: bool = False  # on the machine's clock, where virtual time is the default
-    stretch: float | None = None  # periods so many times as long, for a slow processor
-    short: bool = False  # less of it
-    refused: str = ""  # why there is no private network
+    example: Path | None = None  # program of examples/cobot
+    realtime: bool = False  # True to use the machine's clock instead of virtual time
+    stretch: float | None = None  # factor of the periods, for a slow processor
+    short: bool = False  # True for one run of the cobot
+    refused: str = ""  # reason why there is no private network
 
 
 @dataclass(frozen=True, slots=True)
 class Sheet:
-    """One table: theirs and ours as text, all of it as figures, what was left out and why."""
+    """One table: text with their figures and ours, the figures, and the reasons for omissions."""
 
     title: str
     conditions: str  # ours
@@ -75,7 +75,7 @@ def as_json(name: str, sheet: Sheet) -> str:
 
 
 def versions() -> dict[str, str]:
-    """Of what takes part, as far as it is installed."""
+    """Return the versions of Python and of the installed packages."""
     found = {"python": sys.version.split()[0]}
     for package in PACKAGES:
         try:
@@ -86,14 +86,14 @@ def versions() -> dict[str, str]:
 
 
 def as_failures(failed: Sequence[str]) -> list[str]:
-    """Rounds that were done again, in a line: what befell them is missing in the figures."""
+    """Return a line about repeated rounds, whose failed attempts are not in the figures."""
     if not failed:
         return []
-    return [f"rounds that failed and were done again: {len(failed)} (the first: {failed[0][:110]})"]
+    return [f"rounds that failed and were repeated: {len(failed)} (the first: {failed[0][:110]})"]
 
 
 def grid(header: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    """Columns as wide as their widest; the first one to the left."""
+    """Return rows as aligned text: the first column on the left, the others on the right."""
     table = [header, *rows]
     widths = [max(len(row[k]) for row in table) for k in range(len(header))]
     return "\n".join(
@@ -106,5 +106,5 @@ def grid(header: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
 
 
 def slashed(values: Sequence[float | None], digits: int) -> str:
-    """`8.849/44.000/...`; what is not published is a dash."""
+    """Return values as "8.849/44.000/..."; a dash stands for an unpublished value."""
     return "/".join("-" if value is None else f"{value:.{digits}f}" for value in values)

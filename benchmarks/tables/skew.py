@@ -1,9 +1,11 @@
-"""`python -m benchmarks table skew`: two digital outputs at both ends of a line, switched in the
-same cycle, by the segment's own clock in place of an oscilloscope. Virtual time, the same in every
-run.
+"""`python -m benchmarks table skew`: two digital outputs at the ends of a line.
 
-Without clocks an output switches when the frame has passed, so the last one later by the line's
-delay. With distributed clocks all switch at SYNC0; what remains is how well the clocks agree.
+The outputs are switched in the same cycle. The clock of the segment replaces an oscilloscope. In
+virtual time, all runs are the same.
+
+Without clocks, an output switches when the frame has passed, so the last one switches later by the
+delay of the line. With distributed clocks, all switch at SYNC0, and the skew is the difference of
+the clocks.
 """
 
 from __future__ import annotations
@@ -22,19 +24,19 @@ from catenary.errors import CatenaryError
 from catenary.virtual import Coupler, Crystal, DigitalOutputs, Segment, Servo
 
 DRIVES, PERIOD, SECONDS = 3, 1e-3, 10.0
-PATIENCE = 1.0  # [s] of virtual time
-STAMP_JITTER, SEED = 100e-9, 1  # [s] over which a controller's time stamp scatters
+TIMEOUT = 1.0  # [s] of virtual time
+STAMP_JITTER, SEED = 100e-9, 1  # [s] jitter of a controller's time stamp
 WAYS = {
     "SYNC0, exact crystals": (True, False),
     "SYNC0": (True, True),
     "with the frame": (False, True),
 }
-FIRST = 1  # position; the other one is the last
+FIRST = 1  # position of the first output; the other one is the last device
 
 
 @dataclass(frozen=True, slots=True)
 class Found:
-    """The last output's switching less the first one's [us], and its amount."""
+    """Switching time of the last output minus that of the first [us], and its magnitude."""
 
     cycles: int
     skew_us: dict[str, float]
@@ -52,9 +54,9 @@ def measure(options: Options) -> Sheet:
     return Sheet(
         title=f"Skew of two digital outputs at both ends of the line; {SKEW_CONDITIONS}",
         conditions=f"ours: {DRIVES} drives between, 1 kHz, {seconds:g} s of virtual time; crystals "
-        f"within {PPM:g} ppm and {DRIFT_PPM:g} ppm of drift, stamps scatter over "
-        f"{STAMP_JITTER * 1e9:g} ns",
-        text=grid(("amount of the skew [us]", "mean", "max", "min", "sd"), rows),
+        f"within {PPM:g} ppm, {DRIFT_PPM:g} ppm of drift, time stamps with "
+        f"{STAMP_JITTER * 1e9:g} ns of jitter",
+        text=grid(("magnitude of the skew [us]", "mean", "max", "min", "sd"), rows),
         figures={
             "published_us": SKEW._asdict(),
             "seconds": seconds,
@@ -67,7 +69,7 @@ def measure(options: Options) -> Sheet:
 
 
 def make_line(*, real_crystals: bool) -> Segment:
-    """A coupler with the reference clock, an output, drives, an output."""
+    """Return a line: a coupler with the reference clock, an output, drives, an output."""
     random = Random(SEED)
 
     def crystal() -> Crystal:
@@ -87,7 +89,7 @@ def make_line(*, real_crystals: bool) -> Segment:
 
 
 def run(segment: Segment, seconds: float, *, dc: bool) -> Found:
-    """Both are switched in every cycle, and looked at in the next."""
+    """Switch both outputs in every cycle, and read their switching times in the next."""
     first, last = segment[FIRST], segment[len(segment) - 1]
     skews: list[int] = []
     with cat.MainDevice(segment) as main:
@@ -103,9 +105,9 @@ def run(segment: Segment, seconds: float, *, dc: bool) -> Found:
                 outputs.bits[:] = cycle.number % 2
                 if len(skews) * PERIOD >= seconds:
                     break
-                if cycle.time > 2 * seconds + PATIENCE:
+                if cycle.time > 2 * seconds + TIMEOUT:
                     raise CatenaryError(
-                        f"the outputs of {first.name} and {last.name} were taken over {len(skews)}"
+                        f"the outputs of {first.name} and {last.name} switched only {len(skews)}"
                         f" times in {cycle.time:.0f} s of virtual time"
                     )
     skew_us = np.array(skews) * 1e-3

@@ -1,11 +1,13 @@
-"""`python -m benchmarks table tasks`: three spinning tasks, 3, 5 and 10 ms every 10, 20 and 40 ms,
-in C and in Python, idle and beside stress-ng; and what the analysis says of their responses.
+"""`python -m benchmarks table tasks`: three busy tasks, 3, 5 and 10 ms every 10, 20 and 40 ms.
 
-The bound is that of the response-time analysis. A job keeps the processor busy with its release
-(timer interrupt, wake-up, switch: nobody is charged for all of that), at most as long as the first
-task, which nobody preempts, was ever late to start; and with what its thread is charged, at most
-from one start to the next, so with its end and its waiting. The analysis is for fixed priorities:
-threads under one interpreter lock are served by the lock.
+The tasks run in C and in Python, without and with stress-ng, next to the bounds of a response-time
+analysis. A job occupies the processor with two parts:
+
+- Its release: timer interrupt, wake-up and switch. They are not charged to a thread. The bound is
+  the largest start jitter of the first task, which is never preempted.
+- The processor time of its thread from one start to the next, which includes its end and waiting.
+
+The analysis assumes fixed priorities. It does not hold for threads that share the GIL.
 """
 
 from __future__ import annotations
@@ -52,13 +54,13 @@ HEADER = ("mean/max/min/sd [ms]", "", "period", "response", "bound", "within", "
 
 @dataclass(frozen=True, slots=True)
 class Found:
-    """One task of one way; figures in ms: mean, max, min, sd, p50."""
+    """Results of one task in one variant. Figures are mean, max, min, sd and p50 [ms]."""
 
     name: str
     jobs: int
-    missed: int  # ended after the period
+    missed: int  # number of jobs that ended after the period
     figures_ms: Mapping[str, Mapping[str, float]]
-    execution_ms: float  # at most, from one start to the next
+    execution_ms: float  # longest processor time from one start to the next
 
     def times(self) -> Times:
         return Times(*(spread_of(self.figures_ms[name]) for name in ("period", "response")))
@@ -77,7 +79,7 @@ def measure(options: Options) -> Sheet:
     found = run_all(loads, ways, seconds)
     return Sheet(
         title=f"Three spinning tasks; {TASKS_CONDITIONS}",
-        conditions=f"ours: on CPU {processors().masters or 0}, SCHED_FIFO where permitted, "
+        conditions=f"ours: on CPU {processors().masters or 0}, SCHED_FIFO if permitted, "
         f"{seconds:g} s of each; stress-ng {' '.join(STRESSORS[:-1])}",
         text="\n\n".join(as_table(load, found) for load in (IDLE, STRESS)),
         figures={
@@ -114,7 +116,7 @@ def run_all(
 
 @contextmanager
 def stressed() -> Iterator[None]:
-    """Beside stress-ng, with ordinary scheduling."""
+    """Run stress-ng during the block, with ordinary scheduling."""
     with start_program(["stress-ng", *STRESSORS]):
         yield
 
@@ -145,7 +147,11 @@ def run_c(seconds: float) -> list[Found]:
 
 
 def read_samples(numbers: np.ndarray) -> list[Found]:
-    """Task by task: how many jobs, and for each the figures and its processor time [ns]."""
+    """Return the results of all tasks from the output of the C program.
+
+    `numbers` holds, for each task, the number of jobs, and for each job the figures and the
+    processor time [ns].
+    """
     found = []
     width = len(FIGURES) + 1
     for name, period in zip(NAMES, PERIODS, strict=True):
@@ -189,7 +195,13 @@ def run_python(way: Literal["processes", "threads"], seconds: float) -> list[Fou
 
 
 def spin(task: Running, seconds: float, most: Value) -> None:
-    """So much processor time in every job, in Python. `most`: from one start to the next."""
+    """Spend processor time in every job.
+
+    Args:
+        task: The running task.
+        seconds: Processor time of each job [s].
+        most: Set to the longest processor time from one start to the next [s].
+    """
     before, longest = None, 0.0
     for _job in task:
         start = time.thread_time()
@@ -213,11 +225,11 @@ def of_statistics(found: Statistics, most: float) -> Found:
     return Found(found.name, found.jobs, found.misses, of_ms, round(longest, 6))
 
 
-# ---- the analysis
+# The analysis
 
 
 def bounds(executions: Sequence[float]) -> list[float | None]:
-    """The longest responses [ms], by the analysis."""
+    """Return the bounds of the responses [ms], from the analysis; None for an unbounded one."""
     verdict = analyse(
         [
             Demand(name=name, period=period, execution=execution, priority=priority)
@@ -235,7 +247,7 @@ def measured_bounds(tasks: Sequence[Found]) -> list[float | None]:
     return bounds([(each.execution_ms + release) * 1e-3 for each in tasks])
 
 
-# ---- for people
+# Text output
 
 
 def as_table(load: str, found: Mapping[tuple[str, str], Sequence[Found]]) -> str:

@@ -1,13 +1,18 @@
 """`python -m benchmarks table tocabi`: 18 + 15 axes on two networks, 4 and 8 kHz.
 
-Three ways in turn: one loop over both networks, whose Python body gives targets in every cycle; a
-loop with a law for each network in a process of its own, with a Python task of 1 kHz beside; and
-two C programs. The published loop waits in the cycle for the answer to its frame; `c` receives the
-frame of the previous cycle. Compare `receive` among ours only, and `output delay` (cycle start →
-last cyclic frame handed to the kernel) between ours and `c`.
+Three variants take turns:
 
-A rate holds for a way where nothing was lost, no instant passed without a cycle and no job of the
-task was missed. `--peers law --rates 4000,5000,6000` looks for the highest."""
+- `loop`: one loop over both networks, with targets from Python in every cycle.
+- `law`: a separate process with a loop and a law for each network, and a 1 kHz Python task.
+- `c`: two C programs.
+
+The published loop waits within the cycle for the answer to its frame, while `c` receives the frame
+of the previous cycle. Compare `receive` only among our variants. Compare `output delay` (from cycle
+start to last cyclic frame passed to the kernel) between ours and `c`.
+
+A variant holds a rate if no frame was lost, no cycle start was missed, and no job of the task was
+missed. `--peers law --rates 4000,5000,6000` searches for the highest rate.
+"""
 
 from __future__ import annotations
 
@@ -26,7 +31,7 @@ import msgspec
 import numpy as np
 
 from benchmarks.compiler import has_programs
-from benchmarks.network_law import GO, PATIENCE
+from benchmarks.network_law import GO, GO_TIMEOUT
 from benchmarks.networks import DRIVES, C, NetworkRound, run_c, run_ours
 from benchmarks.peers import modules_of
 from benchmarks.processor import processor_time
@@ -35,7 +40,7 @@ from benchmarks.tables.sheet import Options, Sheet, as_failures, grid, slashed
 from benchmarks.tasks import compute_little
 from catenary.bench.job import Body, Job
 from catenary.bench.loop import make_jobs, show_progress
-from catenary.bench.rounds import BRING_UP_SECONDS, RoundError, begin_anew
+from catenary.bench.rounds import BRING_UP_SECONDS, RoundError, run_with_retries
 from catenary.bench.segment import Served, processors, served
 from catenary.bench.statistics import summarise
 from catenary.realtime import Statistics, Task, Tasks, session
@@ -43,7 +48,7 @@ from catenary.realtime.child import Child, start_python
 
 RATES, SECONDS, ROUNDS = (4000, 8000), 10.0, 2
 NETWORKS = ("upper", "lower")
-LOOKED_AT = 0.8  # of what is measured: shares of the processor
+LOOKED_AT = 0.8  # fraction of the measurement in which processor shares are measured
 LOOP, LAW = "loop", "law"
 TASK_PERIOD, TASK_PRIORITY = 1e-3, 60  # below loops and segments
 HEADER = ("avg/max/min/sd [us]", "latency", "send", "receive", "output delay", "overflows", "lost")
@@ -52,12 +57,12 @@ OUTPUT_DELAY = "output_delay"
 
 @dataclass(frozen=True, slots=True)
 class Column:
-    """One network of one way, over all rounds."""
+    """Results of one network in one variant, over all rounds."""
 
     name: str
     cycles: int
     lost: int
-    overflows: int  # instants that passed without a cycle; C: cycles begun a period late
+    overflows: int  # missed cycle starts; for C, cycles that began a period late
     timing_us: dict[str, dict[str, float]]
 
     def channel(self) -> Channel:
@@ -97,7 +102,11 @@ def measure(options: Options) -> Sheet:
 
 
 def axes_of(options: Options) -> tuple[int, ...]:
-    """Return the number of drives on each network. ValueError unless there are two networks."""
+    """Return the number of drives on each network.
+
+    Raises:
+        ValueError: The option does not name two networks.
+    """
     axes = options.axes or DRIVES
     if len(axes) != len(NETWORKS):
         raise ValueError(f"tocabi has {len(NETWORKS)} networks, not {len(axes)}: --axes 6,6")
@@ -106,11 +115,11 @@ def axes_of(options: Options) -> tuple[int, ...]:
 
 @dataclass(slots=True)
 class WayRounds:
-    """Owns what one way came to, round by round."""
+    """Owns the results of one variant, round by round."""
 
     networks: list[list[NetworkRound]]
-    task: list[Statistics]  # of the task beside, where there is one
-    shares: list[dict[str, float]]  # of a processor, by process, where it was looked at
+    task: list[Statistics]  # of the Python task; empty without one
+    shares: list[dict[str, float]]  # processor shares by process; empty if not measured
 
 
 Way = Callable[[Sequence[Job], "Places", WayRounds], None]
@@ -118,19 +127,23 @@ Way = Callable[[Sequence[Job], "Places", WayRounds], None]
 
 @dataclass(frozen=True, slots=True)
 class Places:
-    """Where a way runs."""
+    """Segments and folder of a variant."""
 
     segments: Sequence[Served]
     folder: Path
 
 
 def ways_for(options: Options) -> tuple[dict[str, Way], list[str]]:
-    """Those asked for that this machine can; why others are left out. ValueError: no such way."""
+    """Return the requested variants that this machine can run, and the reasons for omitted ones.
+
+    Raises:
+        ValueError: A variant does not exist.
+    """
     ways: dict[str, Way] = {LOOP: one_loop, LAW: two_laws, C: two_programs}
     asked = options.peers or tuple(ways)
     for name in asked:
         if name not in ways:
-            raise ValueError(f"tocabi has no peer {name!r}; it has {', '.join(ways)}")
+            raise ValueError(f"unknown peer {name!r} of tocabi; known peers: {', '.join(ways)}")
     if options.refused:
         return {}, [f"all of ours: no private network ({options.refused})"]
     reasons = why_not(options)
@@ -139,12 +152,12 @@ def ways_for(options: Options) -> tuple[dict[str, Way], list[str]]:
 
 
 def why_not(options: Options) -> dict[str, str]:
-    """Ways that cannot be gone here."""
+    """Return the reasons why variants cannot run on this machine."""
     reasons = {}
     if find_spec("numba") is None:
         reasons[LAW] = "Numba is not installed (pip install 'catenary[law]')"
     if options.ring:
-        reasons[C] = "the C programs know one wire, not the two of a ring"
+        reasons[C] = "the C programs support one wire, not the two wires of a ring"
     elif not has_programs():
         reasons[C] = "no C compiler (sudo apt install gcc libc6-dev)"
     return reasons
@@ -158,7 +171,7 @@ def run(
     options: Options,
     failed: list[str],
 ) -> dict[str, WayRounds]:
-    """All ways in turn, round by round."""
+    """Run all variants in turn, round by round."""
     found = {name: WayRounds([], [], []) for name in ways}
     with contextlib.ExitStack() as stack:
         segments = [stack.enter_context(served(n, ring=options.ring)) for n in axes_of(options)]
@@ -174,7 +187,7 @@ def run(
         for number in range(rounds):
             for name, way in ways.items():
                 show_progress(f"{name}, {rate} Hz", number + 1, rounds)
-                begin_anew(partial(way, jobs, Places(segments, folder), found[name]), failed)
+                run_with_retries(partial(way, jobs, Places(segments, folder), found[name]), failed)
     return found
 
 
@@ -187,16 +200,16 @@ def two_programs(jobs: Sequence[Job], places: Places, found: WayRounds) -> None:
 
 
 def two_laws(jobs: Sequence[Job], places: Places, found: WayRounds) -> None:
-    """Both are measured while the task runs."""
+    """Measure both loops while the Python task runs."""
     measured = jobs[0].cycles * jobs[0].period_ns * 1e-9
     with contextlib.ExitStack() as stack:
         children = [stack.enter_context(start_law(job)) for job in jobs]
         for child in children:
-            expect(child, PATIENCE, "here")
+            expect(child, GO_TIMEOUT, "here")
         tasks = stack.enter_context(beside())
         go(children)
         for child in children:
-            expect(child, PATIENCE, "ready")
+            expect(child, GO_TIMEOUT, "ready")
         processes = {
             f"{what}, {network}": pid
             for what, pids in (
@@ -205,10 +218,10 @@ def two_laws(jobs: Sequence[Job], places: Places, found: WayRounds) -> None:
             )
             for network, pid in zip(NETWORKS, pids, strict=True)
         }
-        before = tasks["python"].statistics  # the loops' coming up is no part of it
+        before = tasks["python"].statistics  # excludes the start of the loops
         go(children)
         took = shares(processes, LOOKED_AT * measured)
-        said = [expect(child, BRING_UP_SECONDS + measured, "{") for child in children]
+        outputs = [expect(child, BRING_UP_SECONDS + measured, "{") for child in children]
         statistics = tasks["python"].statistics
     while_measured = replace(
         statistics,
@@ -217,11 +230,16 @@ def two_laws(jobs: Sequence[Job], places: Places, found: WayRounds) -> None:
     )
     found.task.append(while_measured)
     found.shares.append(took)
-    found.networks.append([msgspec.json.decode(each, type=NetworkRound) for each in said])
+    found.networks.append([msgspec.json.decode(each, type=NetworkRound) for each in outputs])
 
 
 def shares(processes: Mapping[str, int], seconds: float) -> dict[str, float]:
-    """How much of a processor each took, by its number, while these seconds passed."""
+    """Return the share of a processor that each process uses.
+
+    Args:
+        processes: Process IDs by name.
+        seconds: Duration of the measurement [s].
+    """
     before = {name: processor_time(pid) for name, pid in processes.items()}
     start = time.monotonic()
     time.sleep(seconds)
@@ -233,7 +251,7 @@ def shares(processes: Mapping[str, int], seconds: float) -> dict[str, float]:
 
 
 def start_law(job: Job) -> Child:
-    """Its threads, those of imported libraries too, inherit that GO is blocked: it waits for it."""
+    """Start the process of a loop with a law. All its threads inherit a blocked GO signal."""
     arguments = ["-m", "benchmarks.network_law", msgspec.json.encode(job).decode()]
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {GO})
     try:
@@ -263,13 +281,13 @@ def go(children: Sequence[Child]) -> None:
 
 
 def expect(child: Child, seconds: float, start: str) -> str:
-    said = child.read_line(seconds)
-    if said is None or not said.startswith(start):
-        raise RoundError(f"a loop with a law failed: {said or 'it said nothing'}")
-    return said
+    output = child.read_line(seconds)
+    if output is None or not output.startswith(start):
+        raise RoundError(f"a loop with a law failed: {output or 'no output'}")
+    return output
 
 
-# ---- for people and programs
+# Output as text and as figures
 
 
 def in_columns(found: Mapping[str, WayRounds]) -> tuple[list[Column], list[Statistics]]:
@@ -318,21 +336,21 @@ def as_table(rate: int, found: Mapping[str, WayRounds]) -> str:
     lines = [f"{rate} Hz", grid(HEADER, rows)]
     if task:
         jobs, missed = sum(each.jobs for each in task), sum(each.misses for each in task)
-        lines.append(f"the Python task of 1 kHz beside the laws: {missed} of {jobs} jobs missed")
+        lines.append(f"the 1 kHz Python task next to the laws: {missed} of {jobs} jobs missed")
     for each in (shares for way in found.values() for shares in way.shares):
         took = ", ".join(f"{name} {share:.1%}" for name, share in each.items())
-        lines.append(f"of a processor: {took}")
+        lines.append(f"processor shares: {took}")
     return "\n".join(lines)
 
 
 def as_verdicts(found: Mapping[int, Mapping[str, WayRounds]]) -> list[str]:
-    """A line for each way: the rates that hold, and those that do not."""
+    """Return a line for each variant, with the rates that it holds and those that it does not."""
     lines = []
     for name in next(iter(found.values()), {}):
         held = [rate for rate, ways in found.items() if holds(name, ways[name])]
         others = [rate for rate in found if rate not in held]
         lines.append(f"{name}: nothing lost, late or missed at {in_hertz(held)}")
-        lines[-1] += f"; not so at {in_hertz(others)}" if others else ""
+        lines[-1] += f"; not at {in_hertz(others)}" if others else ""
     return lines
 
 

@@ -1,10 +1,11 @@
-"""A six-axis cobot under torque control, by six tasks: `make cobot`.
+"""A six-axis cobot under torque control with six tasks: `make cobot`.
 
     python cobot.py                    virtual drives and a simulated arm, in virtual time
     python cobot.py --realtime         the same on the machine's clock
     python cobot.py --realtime eth0    the robot
 
-All joints go to 90 degrees and back, twice. Enter stops them; on virtual drives somebody hits it.
+All joints move to 90 degrees and back, twice. Enter stops them. On virtual drives, the program
+presses it.
 """
 
 import argparse
@@ -41,7 +42,8 @@ GAINS = control.Cascade(
 FRICTION = control.Friction(JOINTS, [7.3, 7.3, 4.4, 1.5, 1.5, 1.5], [7.3, 7.3, 3.6, 1.5, 1.5, 1.5])
 ROTORS = control.FeedForward(JOINTS, inertia=[1.46, 1.46, 0.59, 0.15, 0.15, 0.15])
 FOLLOWING_ERROR, REACH = 0.2, 2.9  # [rad]
-SILENCE, PATIENCE = 5, 3000  # cycles without news from a task, from the bus: stop, give up
+SILENCE = 5  # cycles without a sign of life from a task, after which the arm stops
+PATIENCE = 3000  # cycles without the bus, after which the program ends
 
 
 def dynamics(task, cost, state, torque, model, gravity):
@@ -63,7 +65,9 @@ def trajectory(task, cost, state, phase, rows, done, goals):
         task.spend(cost)
         if phase.read() != cat.drive.Phase.RUNNING or number == len(goals):
             motion = None
-        elif motion is None and not len(rows):  # begins as the reference moves; mostly it stands
+        elif motion is None and not len(
+            rows
+        ):  # starts from the reference, which mostly stands still
             begin = control.MotionState(*state.read()[:3])
             motion, sent = control.trajectory(begin, goals[number], LIMITS, task.period / 2), 0
         while motion and sent < len(motion) and rows.put(motion.row(sent)):
@@ -108,7 +112,7 @@ def why_stop(wanted, q, v, signs):
     joints = list(zip(wanted, q, v, strict=True))
     signs["limit"] = any(
         abs(q) > REACH and q * v > 0.01 for _, q, v in joints
-    )  # not on the way back
+    )  # not on the way back to the reference
     signs["following error"] = any(abs(wanted - q) > FOLLOWING_ERROR for wanted, q, _ in joints)
     return next((sign for sign, there in signs.items() if there), None)
 

@@ -1,6 +1,7 @@
-"""A gripper of two axes at 2 kHz: homing, compliant fingers, an object felt without a force sensor.
+"""A gripper of two axes at 2 kHz: homing, compliant fingers, and contact without a force sensor.
 
-Runs in virtual time: pip install 'catenary[law,sim]'."""
+It runs in virtual time and needs pip install 'catenary[law,sim]'.
+"""
 
 from itertools import islice
 from math import sqrt
@@ -18,7 +19,7 @@ PUSH = 0.1  # [N·m], torque of a hand
 
 seeking = control.Homing(2, velocity=-0.8, torque=0.08, travel=2.0)
 speed = control.Pid(2, 0.02, 0.5, limit=0.12)
-reference = control.LowPass(2, 250.0, PERIOD)  # on the raw goals
+reference = control.LowPass(2, 250.0, PERIOD)  # for the raw goals
 outside = control.Residual(2, gain=150.0, inertia=INERTIA)
 rubbing = control.Friction(2, VISCOUS, COULOMB)
 collision = control.Threshold(2, limit=0.03, time=1e-3)
@@ -46,7 +47,7 @@ def grip(actual, target, memory, parameters, time):
         if hit[i] == 0.0 and closing > 0.0:
             way[i] += closing * actual.dt
             if control.threshold(beyond, control.part(parameters, 4), i, push, actual.dt):
-                hit[i], way[i] = time, q - goal  # no further
+                hit[i], way[i] = time, q - goal  # stop closing
         wanted = control.low_pass(smooth, control.part(parameters, 1), i, goal + way[i])
         target.torque[i] = control.impedance(
             spring, control.part(parameters, 0), i, wanted, 0.0, 0.0, 0.0, q, v, actual.dt
@@ -86,12 +87,12 @@ with cat.MainDevice(segment) as main:
         states = [block.memory for block in (reference, outside, collision)]
         kept = control.join(np.zeros(6), *states, np.zeros(2), np.zeros(2))
         run = loop.start(grip, kept, gripping(2.0))
-        for _ in islice(loop, 4000):  # 2 s: the fingers go to their goals
+        for _ in islice(loop, 4000):  # 2 s, in which the fingers move to their goals
             pass
         for stiffness in (2.0, 4.0):
             run.parameters = gripping(stiffness)  # changed while it runs
-            print(f"stiffness [N·m/rad]: {stiffness}, seen", *seen_stiffness().round(2))
-        print("left by friction [mrad]:", *(1e3 * arm.actual.position).round(2))
+            print(f"stiffness [N·m/rad]: {stiffness}, measured", *seen_stiffness().round(2))
+        print("offset by friction [mrad]:", *(1e3 * arm.actual.position).round(2))
 
         plant.data.mocap_pos[0] = 0.0, 0.1, 0.0  # put an object between the fingers
         run.parameters = gripping(4.0, closing=1.0)

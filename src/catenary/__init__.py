@@ -9,12 +9,12 @@
             for cycle in loop:
                 arm.target.position[:] = home + 0.1 * math.sin(cycle.time)
 
-Names load when they are used. `import catenary` is fast and does not import NumPy, whose threads
-would keep a process from entering a network namespace.
+Names are imported on first use. `import catenary` is fast and does not import NumPy, whose threads
+would prevent a process from entering a network namespace.
 """
 
-# False. Importing it from `typing` takes longer than this whole module. Jedi would believe a plain
-# False and complete nothing.
+# Always False. Importing it from `typing` takes longer than this whole module. With a plain False,
+# Jedi would complete nothing.
 TYPE_CHECKING = not __name__
 
 if TYPE_CHECKING:

@@ -1,7 +1,7 @@
-"""Statistics of a time, in the order of the columns of every table."""
+"""Names of the statistics of a time, in the column order of all tables."""
 
 FIGURES = ("mean", "max", "min", "sd", "p50", "p99", "p999")
-HEADINGS = {"p999": "p99.9"}  # differs from the name
+HEADINGS = {"p999": "p99.9"}  # headings that differ from the name
 
 
 def heading(figure: str) -> str:

@@ -13,7 +13,7 @@ WARNING = (
 
 
 def is_own(executable: str, prefix: str, base_prefix: str) -> bool:
-    """Return True if the file that `setcap` would change belongs to one environment alone.
+    """Return True if the file that `setcap` would change belongs to a single environment.
 
     `python -m venv` creates a link to its own Python, unless `--copies` is given.
 
@@ -32,6 +32,6 @@ def permission_advice() -> str:
     if is_own(sys.executable, sys.prefix, sys.base_prefix):
         return f"sudo setcap {CAPABILITIES} {shlex.quote(str(real))}{WARNING}"
     return (
-        f"`python3 -m venv --copies .venv`, because {real} also runs other programs; install "
-        f"catenary there; then sudo setcap {CAPABILITIES} .venv/bin/python{WARNING}"
+        f"run `python3 -m venv --copies .venv`, because {real} also runs other programs; install "
+        f"catenary there; then run sudo setcap {CAPABILITIES} .venv/bin/python{WARNING}"
     )

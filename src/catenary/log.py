@@ -24,9 +24,9 @@ CHUNK = 4096  # rows per write
 class Log:
     """The last cycles of a loop, oldest first: `log["lateness_ns"]`, `log[-1]`, `log[-100:]`.
 
-    A structured array, shape (cycles,): `numpy.asarray(log)` returns it. `time` [s] is the clock of
-    `cycle.time`: negative before the first iteration. With `Loop(log_axes=True)` each axis has its
-    own fields, such as `shoulder.actual.position`. docs/recording.md lists all fields.
+    `numpy.asarray(log)` returns a structured array, shape (cycles,). `time` [s] is on the clock of
+    `cycle.time`, negative before the first iteration. With `Loop(log_axes=True)`, each axis has its
+    own fields, such as `shoulder.actual.position`. docs/how_to/recording.md lists all fields.
     """
 
     def __init__(self, rows: Rows) -> None:
@@ -34,7 +34,7 @@ class Log:
 
     @property
     def dtype(self) -> np.dtype[np.void]:
-        """Fields: `log.dtype.names`."""
+        """Structured type of the cycles; `log.dtype.names` lists the fields."""
         return self._rows.dtype
 
     @property
@@ -66,7 +66,7 @@ class Log:
         | npt.NDArray[np.bool_]
         | npt.NDArray[np.integer[Any]],
     ) -> npt.NDArray[Any] | np.void | Log:
-        """Return a field by its name, shape (cycles,); one cycle by its place; or a part as a Log.
+        """Return a field by its name, shape (cycles,), a cycle by its position, or a part as a Log.
 
         Raises:
             ValueError: The field does not exist.

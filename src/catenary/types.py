@@ -281,7 +281,9 @@ def sized(kind: DataType[T], size: int) -> DataType[T]:
         ValueError: The type has a fixed length already, or `size` is less than 1.
     """
     if kind.bit_length or size < 1:
-        raise ValueError(f"{kind} of {size} bytes: needs a type of any length and at least 1 byte")
+        raise ValueError(
+            f"{kind} of {size} bytes: needs a type without a fixed length, and at least 1 byte"
+        )
     return replace(kind, name=f"{kind}({size})", bit_length=8 * size)
 
 
@@ -371,7 +373,7 @@ def by_index(index: int) -> DataType[Value]:
     """Return the type with this CoE index.
 
     Raises:
-        ValueError: No base type has the index: it is a structure or a vendor's own type.
+        ValueError: No base type has the index. It belongs to a structure or a vendor-specific type.
     """
     found = _BY_INDEX.get(index)
     if found is None:

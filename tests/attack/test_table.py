@@ -1,4 +1,4 @@
-"""The table of hostile neighbours in docs/safety.md: each row names tests that exist."""
+"""Hostile neighbours of docs/explanation/safety.md: each row names tests that exist."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
-TEXT = (ROOT / "docs" / "safety.md").read_text()
+TEXT = (ROOT / "docs" / "explanation" / "safety.md").read_text()
 SECTION = TEXT.split("## Hostile neighbours")[1].split("\n## ")[0]
 ROWS = [line for line in SECTION.splitlines() if line.startswith("| ")]
 HEAD = "| neighbour |"

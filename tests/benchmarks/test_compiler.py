@@ -20,7 +20,7 @@ def test_a_missing_compiler_is_one_clear_line(tmp_path: Path, monkeypatch) -> No
     monkeypatch.setenv("PATH", str(tmp_path))
     with pytest.raises(CompilerError) as caught:
         compile_peer("c", tmp_path)
-    assert "no `cc`" in caught.value.message
+    assert "`cc` was not found" in caught.value.message
     assert "apt install gcc" in caught.value.hint
 
 

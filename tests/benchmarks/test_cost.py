@@ -14,5 +14,5 @@ def test_cost_is_found_again() -> None:
 
 
 def test_cost_of_proportional_segments_is_refused() -> None:
-    with pytest.raises(ValueError, match="do not tell"):
+    with pytest.raises(ValueError, match="cannot separate"):
         fit([Point(n, 26 * n, float(n)) for n in (3, 10, 33)])

@@ -37,7 +37,7 @@ def test_what_is_not_installed_is_told_before_the_work(monkeypatch: pytest.Monke
     monkeypatch.setattr(needed, "find_spec", lambda name: None)
     with pytest.raises(needed.PackageError, match="needs pysoem") as caught:
         peer_names(["c", "pysoem"])
-    assert "or leave pysoem out" in caught.value.hint
+    assert "or omit pysoem" in caught.value.hint
     with pytest.raises(needed.PackageError, match="needs pysoem"):
         scan.measure(drives=1, file=None)
     with pytest.raises(needed.PackageError, match="needs pysoem"):

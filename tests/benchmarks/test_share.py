@@ -25,13 +25,13 @@ def test_readers_stand_beside_a_share_without_and_that_beside_none() -> None:
     assert set(NAMES) <= set(MODULES)
 
 
-def test_aims_stand_beside_what_was_found() -> None:
+def test_limits_are_printed_with_the_measured_values() -> None:
     name = "tail: catenary-inline-readers / catenary-inline-bystanders"
     told = as_aims([Reading(3, 472, read=1.5, copy=0.25)], {name: 1.02, "x / y": 3.0})
     assert told.splitlines() == [
-        "  read 472 bytes (3 axes): 1.50 us, the copy alone 0.25 us: 1.25 beyond it, aim <= 1: "
-        "NOT REACHED",
-        f"  {name}: 1.020, aim <= 1.05: reached",
+        "  read 472 bytes (3 axes): 1.50 us, the copy alone 0.25 us: difference 1.25 us, "
+        "limit 1 us: NOT REACHED",
+        f"  {name}: 1.020, limit 1.05: reached",
     ]
 
 

@@ -58,7 +58,7 @@ def test_without_the_example_the_published_table_remains(tmp_path: Path) -> None
     text = show(cobot.measure(Options(example=tmp_path / "none.py")))
     assert "main control (theirs)" in text
     assert "225.2/339.4/133.5/19.4" in text
-    assert "none.py (--example says where it is)" in text
+    assert "none.py does not exist (give its path with --example)" in text
 
 
 def test_what_it_needs_is_named(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -56,7 +56,9 @@ def test_only_the_peers_asked_for_run_or_are_missed(monkeypatch: pytest.MonkeyPa
     monkeypatch.setattr(tocabi, "has_programs", lambda: False)
     ways, left_out = tocabi.ways_for(Options(peers=(tocabi.LAW,)))
     assert (list(ways), left_out) == ([tocabi.LAW], [])
-    with pytest.raises(ValueError, match="no peer 'rust'; it has loop, law, c"):
+    with pytest.raises(
+        ValueError, match="unknown peer 'rust' of tocabi; known peers: loop, law, c"
+    ):
         tocabi.ways_for(Options(peers=("rust",)))
 
 
@@ -67,7 +69,7 @@ def test_the_rates_that_hold_are_named() -> None:
 
     found = {4000: way(), 5000: way(), 6000: way(lost=1), 8000: way(late=1)}
     lines = tocabi.as_verdicts({rate: {tocabi.LAW: each} for rate, each in found.items()})
-    assert lines == ["law: nothing lost, late or missed at 4000, 5000 Hz; not so at 6000, 8000 Hz"]
+    assert lines == ["law: nothing lost, late or missed at 4000, 5000 Hz; not at 6000, 8000 Hz"]
 
 
 @pytest.mark.usefixtures("veth")

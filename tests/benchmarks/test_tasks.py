@@ -23,7 +23,7 @@ def test_percentiles_and_report():
     found = {way: tasks.Found(tasks.Counter({1e-6: 98, 2e-6: 1, 5e-6: 1}), 100, 1) for way in "ab"}
     one = found["a"]
     assert [one.percentile(p) for p in (0.5, 0.99, 1.0)] == [1.0, 2.0, 5.0]
-    assert "aim: 1.2" in tasks.as_text(found, 1.0)
+    assert "limit: 1.2" in tasks.as_text(found, 1.0)
     report = json.loads(json.dumps(tasks.as_json(found, 1.04)))
     assert report["ways"]["a"]["response_us"]["max"] == 5.0
     assert report["ratio"] == 1.04

@@ -152,7 +152,7 @@ def test_a_blocking_call_in_the_loops_own_thread_raises_at_once() -> None:
         lane = AcyclicQueue(main.link)
         with (
             main.attached(AcyclicRunner(lane)),
-            pytest.raises(RuntimeError, match="loop's own thread"),
+            pytest.raises(RuntimeError, match="in the loop's thread"),
         ):
             drive.sdo.read(0x1000)
         assert lane.pushed == []
@@ -206,7 +206,7 @@ def test_closing_ends_those_who_wait() -> None:
         runner.close()
         thread.join(10.0)
         assert len(failures) == 1
-        with pytest.raises(LoopError, match="has ended"):
+        with pytest.raises(LoopError, match="loop ended"):
             runner.submit(upload(drive.channel, 0x1000, 0))
 
 

@@ -37,7 +37,7 @@ def test_a_sound_segment(main: cat.MainDevice) -> None:
     main.scan()
     found = main.diagnose()
     assert not found
-    assert str(found) == "nothing found: 4 devices"
+    assert str(found) == "no faults found in 4 devices"
 
 
 def test_broken_frames_name_the_cable(segment: cat.Segment, main: cat.MainDevice) -> None:
@@ -169,5 +169,5 @@ def test_in_the_loops_own_thread_it_is_refused(segment: cat.Segment) -> None:
         )
         with cat.Loop(arm, period=1e-3) as loop:
             next(iter(loop))
-            with pytest.raises(RuntimeError, match="the loop's own thread"):
+            with pytest.raises(RuntimeError, match="in the loop's thread"):
                 main.diagnose()

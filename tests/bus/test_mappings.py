@@ -54,8 +54,8 @@ def test_a_scan_shows_what_the_device_has_and_notes_what_the_sii_says() -> None:
         assert indices(device, Direction.OUTPUT) == [0x1601]
         assert indices(device, Direction.INPUT) == [0x1A01]
         assert main.notes == (
-            f"{device}: SyncManager 2 carries PDOs 0x1601, its SII specifies 0x1600",
-            f"{device}: SyncManager 3 carries PDOs 0x1A01, its SII specifies 0x1A00",
+            f"{device}: SyncManager 2 carries PDOs 0x1601, but its SII specifies 0x1600",
+            f"{device}: SyncManager 3 carries PDOs 0x1A01, but its SII specifies 0x1A00",
         )
 
 

@@ -70,7 +70,7 @@ def test_a_list_of_pdos_that_is_never_sent_does_not_end_a_scan() -> None:
         assert subs[1].description.mapping_source == "SII"
         [note] = main.notes
         assert "device 1" in note
-        assert "its mapping cannot be read, that of its SII is used" in note
+        assert "its mapping cannot be read, so that of its SII is used" in note
 
 
 def test_a_list_of_pdos_that_is_never_sent_does_not_stop_other_devices() -> None:

@@ -70,5 +70,5 @@ def test_callers_mistakes_are_told_before_anything_is_sent(drive: SubDevice) -> 
         drive.sdo.read(0x1018, 2, complete=True)
     with pytest.raises(ValueError, match="an index has 16 bits"):
         drive.sdo.request(0x12345)
-    with pytest.raises(TypeError, match="give a type for 5"):
+    with pytest.raises(TypeError, match="5 is not bytes: give its type"):
         drive.sdo.request_write(0x2102, 0, 5)  # type: ignore[call-overload]

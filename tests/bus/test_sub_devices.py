@@ -41,13 +41,13 @@ def test_a_device_is_found_by_its_name_or_order_code() -> None:
         assert subs["CVK100"].position == 0
         with pytest.raises(SegmentError, match=r"no device has the name .* 'sholder'") as caught:
             subs["sholder"]
-        assert caught.value.hint == "names here: 'shoulder'"
+        assert caught.value.hint == "known names: 'shoulder'"
 
 
 def test_a_name_of_several_devices_is_refused_with_their_positions() -> None:
     with cat.MainDevice(Segment([Servo(), Coupler(), Servo()])) as main:
         subs = main.scan()
-        with pytest.raises(SegmentError, match=r"2 devices are 'CVS001': positions 0, 2"):
+        with pytest.raises(SegmentError, match=r"2 devices have the name 'CVS001': positions 0, 2"):
             subs["CVS001"]
 
 
@@ -64,9 +64,9 @@ def test_a_position_that_does_not_exist_names_the_number_of_devices() -> None:
     with cat.MainDevice(Segment([Coupler(), Servo()])) as main:
         subs = main.scan()
         assert subs[-1].position == 1
-        with pytest.raises(IndexError, match=r"no device 99: there are 2, 0 to 1"):
+        with pytest.raises(IndexError, match=r"no device 99: the segment has 2 devices, 0 to 1"):
             subs[99]
-    with pytest.raises(IndexError, match=r"there are 0$"):
+    with pytest.raises(IndexError, match=r"the segment has 0 devices$"):
         SubDevices()[0]
 
 

@@ -1,4 +1,4 @@
-"""The law of docs/control.md holds the arm of examples/cobot."""
+"""The law of docs/how_to/control_blocks.md holds the arm of examples/cobot."""
 
 import re
 from pathlib import Path
@@ -14,7 +14,8 @@ COBOT = ROOT / "examples" / "cobot"
 
 def test_the_first_example_holds_an_arm_at_its_goal(monkeypatch: pytest.MonkeyPatch) -> None:
     pytest.importorskip("numba", reason="laws are compiled by Numba: pip install 'catenary[law]'")
-    example = re.findall(r"```python\n(.*?)```", (ROOT / "docs/control.md").read_text(), re.S)[0]
+    page = (ROOT / "docs/how_to/control_blocks.md").read_text()
+    example = re.findall(r"```python\n(.*?)```", page, re.S)[0]
     goal = np.array([0.2, 0.5, -0.4, 0.3, 0.2, -0.1])
     monkeypatch.chdir(COBOT)
     with cat.MainDevice("virtual:segment.toml") as main:

@@ -84,6 +84,6 @@ def test_no_command_for_an_unknown_state() -> None:
 
 
 @pytest.mark.parametrize("requested_state", [-1, 4])
-def test_an_unknown_goal_is_refused(requested_state: int) -> None:
-    with pytest.raises(ValueError, match="requested_state"):
+def test_an_unknown_request_is_refused(requested_state: int) -> None:
+    with pytest.raises(ValueError, match="requested state"):
         controlword_towards(4, requested_state, 0)

@@ -1,4 +1,4 @@
-"""Fallback, return, mode changes and stops of one axis: the rows of docs/safety.md, in the core."""
+"""Fallback, return, mode changes and stops of one axis: docs/explanation/safety.md, in the core."""
 
 from dataclasses import replace
 

@@ -1,4 +1,4 @@
-"""Safety in the step: every rule of docs/safety.md, "In the core"."""
+"""Safety in the step: every rule of docs/explanation/safety.md, "In the core"."""
 
 import math
 from itertools import pairwise

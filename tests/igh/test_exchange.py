@@ -27,11 +27,11 @@ def library(doubles: dict[str, Path]) -> Library:
 @pytest.mark.parametrize(
     ("outputs", "inputs", "said"),
     [
-        ([(6, 0, 4)], [], "leave a domain of 8"),
-        ([(0, 14, 4)], [], "leave an image of 16"),
-        ([], [(0, 0, 0)], "leave a domain"),
-        ([], [(-1, 0, 2)], "leave a domain"),
-        ([], [(0, -1, 2)], "leave an image"),
+        ([(6, 0, 4)], [], "exceed a domain of 8"),
+        ([(0, 14, 4)], [], "exceed an image of 16"),
+        ([], [(0, 0, 0)], "exceed a domain"),
+        ([], [(-1, 0, 2)], "exceed a domain"),
+        ([], [(0, -1, 2)], "exceed an image"),
     ],
 )
 def test_a_copy_stays_in_its_place(
@@ -50,7 +50,7 @@ def test_time_passes_where_it_is_waited_for() -> None:
     machine = KernelTime()
     assert machine.now() <= machine.now()
     assert machine.receive() is None
-    with pytest.raises(cat.CatenaryError, match="sends no frames of others"):
+    with pytest.raises(cat.CatenaryError, match="sends only its own frames"):
         machine.send(bytes(60))
 
 

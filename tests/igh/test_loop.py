@@ -331,7 +331,7 @@ def test_two_masters_in_one_loop(doubles: dict[str, Path], tmp_path: Path) -> No
 def test_start_up_objects_are_told_to_the_master_in_their_order(
     main: cat.MainDevice, double: Double
 ) -> None:
-    """The kernel writes all of them before the mapping, and reads none back (docs/igh.md)."""
+    """The kernel writes all before the mapping, and reads none back (docs/how_to/igh.md)."""
     arm = arm_of(
         main,
         start_up=[

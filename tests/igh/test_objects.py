@@ -59,7 +59,7 @@ def test_a_refused_request_says_why(main: cat.MainDevice) -> None:
             next(loop)
         with pytest.raises(SdoAbort, match="0x06020000"):
             answer.result()
-        with pytest.raises(RuntimeError, match="inside the loop's own thread"):
+        with pytest.raises(RuntimeError, match="in the loop's thread"):
             main.subs[0].sdo.read(0x6076)
 
 
@@ -178,7 +178,7 @@ def test_a_device_that_does_not_answer_holds_nobody_else_up(doubles: dict[str, P
     double = Double(doubles["1.6.1"])
     with cat.MainDevice(Master(library=double.path)) as main:
         main.scan()
-        kernel_of(main).reservation.beside.timeout = 0.2
+        kernel_of(main).reservation.blocking_calls.timeout = 0.2
         with loop_of(main, late_limit=0, priority=None) as loop:
             double.block(0)
             stuck = main.subs[0].sdo.request_write(0x605A, 0, 6, type=UINT)
@@ -203,8 +203,8 @@ def test_a_thread_that_comes_too_late_calls_nothing(double: Double) -> None:
     reservation = Master(library=double.path).open_link()
     reservation.close()
     double.forget()
-    with pytest.raises(RuntimeError, match="not reserved any more"):
+    with pytest.raises(RuntimeError, match="no longer reserved"):
         reservation.upload(0, 0x1000, 0)
-    with pytest.raises(RuntimeError, match="not reserved any more"):
+    with pytest.raises(RuntimeError, match="no longer reserved"):
         reservation.download(0, 0x6060, 0, b"\x08")
     assert double.calls() == []

@@ -120,7 +120,7 @@ def test_cut_twice_an_island_that_is_not_required_is_named_and_comes_back(
                     break
         lost = [e for e in main.events if isinstance(e, event_types.LinkLost)]
     assert [e.between for e in lost] == [(2, 3), (4, 5)]
-    assert all("3 to 4 are an island" in e.message for e in lost)
+    assert all("devices 3 to 4 are unreachable" in e.message for e in lost)
 
 
 def test_before_a_cut_a_device_that_was_switched_off_comes_back(segment: Segment) -> None:

@@ -64,7 +64,7 @@ def test_a_master_of_the_kernel_module_has_a_number() -> None:
     source = parse("igh:1")
     assert isinstance(source, Master)
     assert source.index == 1
-    with pytest.raises(ConfigurationError, match="has a number"):
+    with pytest.raises(ConfigurationError, match="number of the IgH master is missing"):
         parse("igh:eth0")
 
 

@@ -32,7 +32,7 @@ def test_editors_complete_the_names() -> None:
 
 def test_a_target_is_a_name_or_a_segment() -> None:
     for wrong in (0, None, cat.Segment):
-        with pytest.raises(TypeError, match='a target is a name such as "eth0", or a Segment'):
+        with pytest.raises(TypeError, match='is not a target: pass a name such as "eth0"'):
             cat.MainDevice(wrong)  # type: ignore[arg-type]
 
 

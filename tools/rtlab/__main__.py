@@ -1,10 +1,11 @@
 """`make rtlab`: benchmarks on Debian's PREEMPT_RT kernel, in a machine that counts instructions.
 
     python -m tools.rtlab [TABLE ...]     from the repository's root, with the interpreter of .venv
-    python -m tools.rtlab --compare A B   how far the medians of two results, or folders, are apart
+    python -m tools.rtlab --compare A B   largest difference of medians between two runs
 
-The same software gives the same figures, whatever this machine does meanwhile. It compares software
-and shows schedules; it is no latency measurement of hardware (docs/benchmarks.md, "rtlab").
+The same software gives the same figures, independent of the load of this machine. The lab compares
+software and shows schedules. It does not measure the latency of hardware
+(docs/explanation/benchmarks.md, "rtlab").
 """
 
 from __future__ import annotations
@@ -29,7 +30,7 @@ WORK = REPOSITORY / "build" / "rtlab"
 
 
 def main(arguments: Sequence[str]) -> int:
-    signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))  # leaves through every `finally`
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))  # runs every `finally`
     try:
         asked = parse(arguments)
         if asked.compare:
@@ -61,19 +62,21 @@ def parse(arguments: Sequence[str]) -> argparse.Namespace:
     known = "\n".join(f"  {name:12}{table.help}" for name, table in tables.TABLES.items())
     parser = argparse.ArgumentParser(
         prog="python -m tools.rtlab",
-        description=f"tables:\n{known}\n  all         all but quick",
+        description=f"tables:\n{known}\n  all         all except quick",
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("tables", nargs="*", default=["all"], metavar="TABLE")
-    parser.add_argument("--out", type=Path, default=WORK / "results", help="where results are kept")
-    parser.add_argument("--options", default="", metavar="'...'", help="more for the command")
+    parser.add_argument("--out", type=Path, default=WORK / "results", help="folder of the results")
     parser.add_argument(
-        "--compare", nargs=2, type=Path, metavar=("A", "B"), help="the medians of two runs"
+        "--options", default="", metavar="'...'", help="more options of the command"
+    )
+    parser.add_argument(
+        "--compare", nargs=2, type=Path, metavar=("A", "B"), help="compare the medians of two runs"
     )
     parser.add_argument(
         "--igh", type=Path, metavar="FOLDER", help="a build of the IgH master, for its table"
     )
-    parser.add_argument("--minutes", type=float, help="the deadline of a table (its own)")
+    parser.add_argument("--minutes", type=float, help="time limit of a table (default: its own)")
     return parser.parse_args(arguments)
 
 
@@ -84,7 +87,7 @@ def cache() -> Path:
 
 def run(arguments: argparse.Namespace) -> None:
     chosen = tables.choose(arguments.tables)
-    machine.program()  # said before anything is downloaded
+    machine.program()  # fails before anything is downloaded
     for folder in (cache(), WORK, arguments.out):
         folder.mkdir(parents=True, exist_ok=True)
     system = kernel.provide(cache())
@@ -103,7 +106,7 @@ def run(arguments: argparse.Namespace) -> None:
 def built_igh(
     folder: Path | None, system: kernel.Kernel, chosen: dict[str, tables.Table]
 ) -> list[Entry]:
-    """Return what the guest gets of an IgH master. Without one its table is not run, and said."""
+    """Return the files of an IgH master for the guest, or skip its table with a message."""
     if "igh" not in chosen:
         return []
     try:
@@ -117,7 +120,11 @@ def built_igh(
 def run_table(
     name: str, table: tables.Table, system: kernel.Kernel, root: Path, minutes: float | None
 ) -> dict[str, object]:
-    """The record of one guest. LabError: it did not do it."""
+    """Run a table in a guest, and return the record.
+
+    Raises:
+        LabError: The guest failed.
+    """
     print(f"rtlab: {name}: {table.shown}", flush=True)
     command = [*program(table), *table.arguments]
     job = {

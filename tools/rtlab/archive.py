@@ -1,5 +1,8 @@
-"""A root file system as the kernel unpacks it: cpio, format "newc" (Documentation/driver-api/
-early-userspace/buffer-format.rst of the kernel). No root, no mount, no program is needed for it."""
+"""Root file system as a cpio archive, format "newc".
+
+The format is in Documentation/driver-api/early-userspace/buffer-format.rst of the kernel. Writing
+it needs no root permission, no mount and no other program.
+"""
 
 from __future__ import annotations
 
@@ -17,12 +20,12 @@ COPY_BYTES = 1 << 20
 
 @dataclass(frozen=True, slots=True)
 class Entry:
-    """One name of the archive; a regular file's bytes are read from `source` when it is written."""
+    """One entry of the archive. The content of a regular file is read from `source` on writing."""
 
     path: str  # absolute
     mode: int
-    mtime: int = 0  # [s]: Python judges its compiled files by it
-    data: bytes = b""  # of a link, or of a small file
+    mtime: int = 0  # [s]; Python checks its compiled files by it
+    data: bytes = b""  # content of a link or a small file
     source: Path | None = None
     device: tuple[int, int] = (0, 0)
 
@@ -44,14 +47,30 @@ def character_device(path: str, major: int, minor: int) -> Entry:
 
 
 def copy_of(source: Path, path: str = "") -> Entry:
-    """What `source` holds, links followed, under its own path or another. OSError: unreadable."""
+    """Return an entry for a file, under its own path or another. Links are followed.
+
+    Args:
+        source: File to copy.
+        path: Path in the archive; None for that of `source`.
+
+    Raises:
+        OSError: The file cannot be read.
+    """
     status = source.stat()
     mode = stat.S_IFREG | (0o755 if status.st_mode & 0o100 else 0o644)
     return Entry(path or str(source), mode, int(status.st_mtime), source=source.resolve())
 
 
 def write(entries: Iterable[Entry], file: BinaryIO) -> None:
-    """All entries, with the folders they lie in. OSError: the disk is full, a source unreadable."""
+    """Write all entries, with their folders.
+
+    Args:
+        entries: Entries to write.
+        file: Archive.
+
+    Raises:
+        OSError: The disk is full, or a source cannot be read.
+    """
     for number, entry in enumerate(with_folders(entries), start=1):
         size = len(entry.data) if entry.source is None else entry.source.stat().st_size
         file.write(_header(entry, size, number))
@@ -63,7 +82,7 @@ def write(entries: Iterable[Entry], file: BinaryIO) -> None:
 
 
 def with_folders(entries: Iterable[Entry]) -> Iterator[Entry]:
-    """Each path once, after the folders above it."""
+    """Yield each path once, after its parent folders."""
     known = {"/"}
     for entry in entries:
         for parent in reversed(Path(entry.path).parents):
@@ -86,7 +105,7 @@ def _header(entry: Entry, size: int, number: int) -> bytes:
 
 
 def _copy(source: Path, size: int, file: BinaryIO) -> None:
-    """Exactly `size` bytes, whatever happens to the source meanwhile."""
+    """Copy exactly `size` bytes, even if the source changes during the copy."""
     with source.open("rb") as data:
         left = size
         while left:
@@ -96,7 +115,7 @@ def _copy(source: Path, size: int, file: BinaryIO) -> None:
 
 
 def fingerprint_of(entry: Entry) -> str:
-    """What changes when the entry does, without reading a large file."""
+    """Return a text that changes with the entry, without reading a large file."""
     if entry.source is None:
         return f"{entry.path} {entry.mode} {entry.data!r} {entry.device}"
     status = os.stat(entry.source)

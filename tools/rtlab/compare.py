@@ -1,4 +1,4 @@
-"""Two runs of one table: how far their medians are apart."""
+"""Comparison of the medians of two runs of a table."""
 
 from __future__ import annotations
 
@@ -10,40 +10,48 @@ from typing import Any
 from tools.rtlab.errors import LabError
 
 MEDIAN = "p50"
-THEIRS = ("published", "date", "machine")  # what no run measures begins so
-NAMES = ("load", "way", "who", "event", "rate", "name")  # by which an entry of a list is known
+THEIRS = ("published", "date", "machine")  # prefixes of values that are not measured
+# Keys that identify an entry of a list
+NAMES = ("load", "way", "who", "event", "rate", "name")  # words: ok
 
 
 def compare(one: Path, other: Path) -> str:
-    """A line for each table that both have: results, or folders of them. LabError: there is none,
-    or they are not of one command."""
+    """Return a line for each table that two results, or folders of results, have in common.
+
+    Raises:
+        LabError: There is no common table, or the results are from different commands.
+    """
     if one.is_dir() and other.is_dir():
         names = sorted(
             {file.name for file in one.glob("rtlab-*.json") if (other / file.name).exists()}
         )
         if not names:
-            raise LabError(f"{one} and {other} have no result of one table")
+            raise LabError(f"{one} and {other} have no table in common")
         return "\n".join(compare(one / name, other / name) for name in names)
     first, second = read(one), read(other)
     if first["command"] != second["command"]:
         raise LabError(
-            f"{one} and {other} are of two commands: {first['command']}, {second['command']}"
+            f"{one} and {other} are from two commands: {first['command']}, {second['command']}"
         )
     return f"{one.stem}: {furthest(first['result'], second['result'])}"
 
 
 def read(file: Path) -> dict[str, Any]:
-    """LabError: it is no result of the lab."""
+    """Read a result file.
+
+    Raises:
+        LabError: The file is not a result of the lab.
+    """
     try:
         found: dict[str, Any] = json.loads(file.read_text())
         found["command"], found["result"]
     except (ValueError, KeyError, TypeError) as error:
-        raise LabError(f"{file} is no result of the lab ({error})") from None
+        raise LabError(f"{file} is not a result of the lab ({error})") from None
     return found
 
 
 def furthest(one: object, other: object) -> str:
-    """The largest difference of two medians of one name."""
+    """Return a text on the largest difference between medians of the same name."""
     first, second = dict(medians(one)), dict(medians(other))
     apart = {name: difference(first[name], second[name]) for name in first if name in second}
     if not apart:
@@ -56,12 +64,12 @@ def furthest(one: object, other: object) -> str:
 
 
 def difference(one: float, other: float) -> float:
-    """Of the larger amount."""
+    """Return the difference relative to the larger magnitude."""
     return abs(one - other) / max(abs(one), abs(other)) if one != other else 0.0
 
 
 def medians(value: object, path: str = "") -> Iterator[tuple[str, float]]:
-    """With where each stands."""
+    """Yield each median with its path."""
     if isinstance(value, Mapping):
         if isinstance(value.get(MEDIAN), float | int):
             yield path, value[MEDIAN]

@@ -1,7 +1,7 @@
-"""What the lab cannot do, in one line."""
+"""Error of the lab."""
 
 from __future__ import annotations
 
 
 class LabError(Exception):
-    """One line for the terminal: what is missing or failed, and what to do next."""
+    """Failure of the lab. The message is one line: the cause and the next step."""

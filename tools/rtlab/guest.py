@@ -1,6 +1,5 @@
-# The first process of the guest, and its only one that nobody asked for: makes a system of the
-# kernel, runs the commands it was handed, says what came out and turns the machine off. It stands
-# alone: nothing of this folder is in the guest but this file.
+# The first process of the guest. It sets up the system, runs its commands, reports the results and
+# turns the machine off. It imports nothing from this folder, which is not in the guest.
 import base64
 import ctypes
 import json
@@ -14,7 +13,7 @@ import tty
 from pathlib import Path
 from typing import Any
 
-MOUNTS = (  # /tmp is the root's own: the working copy may lie in it
+MOUNTS = (  # not /tmp, because it may contain the working copy
     ("proc", "/proc"),
     ("sysfs", "/sys"),
     ("devtmpfs", "/dev"),
@@ -25,25 +24,26 @@ ENVIRONMENT = {
     "HOME": "/root",
     "PATH": "/usr/local/sbin:/usr/local/bin:/usr/sbin:/usr/bin:/sbin:/bin",
     "LC_ALL": "C.UTF-8",
-    "CATENARY_PRIVATE_NETWORK": "inside",  # the whole machine is
+    "CATENARY_PRIVATE_NETWORK": "inside",  # the whole machine is private
     "CATENARY_BENCH_PROGRAMS": "/compiled",
-    "CATENARY_LIBETHERCAT": "/igh/libethercat.so.1",  # where TABLE=igh has one
+    "CATENARY_LIBETHERCAT": "/igh/libethercat.so.1",  # only for TABLE=igh
     "OPENBLAS_NUM_THREADS": "1",
-    "PYTHONHASHSEED": "0",  # one run is to be as another
+    "PYTHONHASHSEED": "0",  # all runs must be equal
     "PYTHONUNBUFFERED": "1",
 }
-RB_AUTOBOOT = 0x01234567  # QEMU runs with -no-reboot: it ends
+RB_AUTOBOOT = 0x01234567  # ends QEMU, which runs with -no-reboot
 INIT_MODULE = 175  # the system call, x86-64
 
 libc = ctypes.CDLL(None, use_errno=True)
 
 
 def main() -> None:
-    print("rtlab: the guest is up", flush=True)  # its machine is made anew where this is missing
+    print("rtlab: the guest is up", flush=True)  # the host restarts the machine if this is missing
     job = json.loads(base64.b64decode(os.environ["RTLAB_JOB"]))
     make_system()
-    # Real-time tasks may have all of the processor (-1), as on a tuned machine (docs/doctor.md).
-    runtime = job.get("real_time_us", -1)  # [us] of every second
+    # By default, real-time tasks may use the whole processor, as on a machine tuned by
+    # docs/how_to/doctor.md.
+    runtime = job.get("real_time_us", -1)  # [us] per second; -1 for no limit
     Path("/proc/sys/kernel/sched_rt_runtime_us").write_text(str(runtime))
     say(run(job))
 
@@ -64,7 +64,7 @@ def checked(status: int, what: str) -> None:
 
 
 def run(job: dict[str, Any]) -> dict[str, Any]:
-    """One benchmark; what it leaves in its file is the result."""
+    """Run one benchmark, and return the content of its file as the result."""
     file = Path("/results", job["name"])
     arguments = [str(file) if each == "FILE" else each for each in job["arguments"]]
     started = time.monotonic()
@@ -78,7 +78,7 @@ def run(job: dict[str, Any]) -> dict[str, Any]:
 
 
 def say(answer: dict[str, Any]) -> None:
-    """One line of JSON on the second serial line."""
+    """Write one line of JSON to the second serial port."""
     with open(RESULTS, "wb", buffering=0) as line:
         tty.setraw(line.fileno())
         line.write(json.dumps(answer).encode() + b"\n")

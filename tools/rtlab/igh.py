@@ -1,7 +1,8 @@
-"""Built files of the IgH EtherCAT master for the guest: found, checked, and their places there.
+"""Built files of the IgH EtherCAT master for the guest.
 
-The lab builds nothing of IgH and has nothing of it: you build it as its own INSTALL says, for the
-headers of the guest's kernel, and name the folder."""
+The lab does not contain or build IgH. Build it by its INSTALL file for the headers of the guest's
+kernel, and give the folder.
+"""
 
 from __future__ import annotations
 
@@ -21,13 +22,17 @@ TABLE = "igh_table.py"
 
 
 class NotThere(LabError):
-    """The folder has no IgH master for this kernel: the table is skipped."""
+    """Error if the folder has no IgH master for this kernel. The table is then skipped."""
 
 
 def provide(folder: Path | None, kernel: Kernel) -> list[Entry]:
-    """Return what the guest gets of a build in `folder`. NotThere says what is missing."""
+    """Return the files of a build for the guest.
+
+    Raises:
+        NotThere: A file is missing or does not fit the kernel.
+    """
     if folder is None:
-        raise NotThere("IGH=path names no build of the IgH EtherCAT master (docs/igh.md)")
+        raise NotThere("IGH=path is not a build of the IgH EtherCAT master (docs/how_to/igh.md)")
     found = [*modules(folder, kernel), library(folder)]
     program = Path(__file__).with_name(TABLE)
     return [*found, archive.text(f"{FOLDER}/{TABLE}", program.read_text())]
@@ -56,7 +61,7 @@ def library(folder: Path) -> Entry:
 
 
 def newest(folder: Path, name: str) -> Path | None:
-    """Return the file of that name below a folder that was written last."""
+    """Return the newest file of a name below a folder."""
     return max(folder.rglob(name), key=lambda file: file.stat().st_mtime, default=None)
 
 

@@ -1,6 +1,6 @@
-# The table `igh`, run inside the guest: the module of the IgH master on one end of a pair of
-# interfaces, a virtual segment on the other, and our loops over it. It stands alone, as guest.py
-# does: of this folder the guest has only these two. Ends with status 1 if anything was lost.
+# The table `igh`, run inside the guest. The module of the IgH master is at one end of a pair of
+# interfaces, and a virtual segment at the other. Our loops run over the module. Like guest.py, this
+# file imports nothing from its folder. The exit status is 1 if a frame was lost.
 from __future__ import annotations
 
 import contextlib
@@ -25,15 +25,16 @@ DRIVES = 3
 CYCLES = {1000: 4002, 4000: 12_000}  # by rate [Hz]
 WAYS = ("threaded", "inline", "law")
 CASES = (*itertools.product((None, "reference"), WAYS), ("main", "threaded"))  # clock, way
-# The drives fault (0x8700) in its bring-up: three periods, 750 us, without new outputs.
+# The bring-up of the module leaves three periods (750 us) without new outputs: the drives fault
+# (0x8700).
 LEFT_OUT = (4000, "reference", "inline")
-WARM_UP = 1.5  # [s]: after it nothing may be lost; the module logs its bring-up for up to 1 s
+WARM_UP = 1.5  # [s] after which no frame may be lost; the module logs its bring-up for up to 1 s
 AMPLITUDE = 0.1  # [rad]
 NEVER = 1e9  # [s]
 NODE = Path("/dev/EtherCAT0")
 SETTLE_SECONDS = 10.0
-CHANGES = "orking counter change"  # in lines of the log: of frames that the module missed
-LINES = 20  # of the kernel's log, where a loop failed
+CHANGES = "orking counter change"  # in the log, for frames that the module missed
+LINES = 20  # lines of the kernel's log after a failure
 
 
 @contextlib.contextmanager
@@ -73,14 +74,14 @@ def call(what: str, *arguments: int | bytes) -> None:
 
 
 class Log:
-    """Owns a place in the kernel's log."""
+    """Owns a position in the kernel's log."""
 
     def __init__(self) -> None:
         self._file = os.open("/dev/kmsg", os.O_RDONLY | os.O_NONBLOCK)
         os.lseek(self._file, 0, os.SEEK_END)
 
     def lines(self) -> Iterator[str]:
-        """Return what the master has logged since."""
+        """Return the lines that the master has logged since the last call."""
         with contextlib.suppress(BlockingIOError):
             while record := os.read(self._file, 8192):
                 text = record.decode(errors="replace").partition(";")[2].splitlines()[0]
@@ -89,7 +90,7 @@ class Log:
 
 
 def run(found: dict[str, Any], way: str, rate: int, clock: str | None) -> None:
-    """Add what one loop did to `found`, after it has warmed up."""
+    """Add the results of one loop to `found`, after its warm-up."""
     with cat.MainDevice("igh:0") as main:
         arm = cat.Drives(
             main.scan().drives,
@@ -104,7 +105,7 @@ def run(found: dict[str, Any], way: str, rate: int, clock: str | None) -> None:
             execution="inline" if way == "inline" else "threaded",
             scheduling=cat.Scheduling(
                 switch_interval=20e-6 if way == "inline" else None
-            ),  # docs/benchmarks.md
+            ),  # docs/explanation/benchmarks.md
             priority=PRIORITY,
             stop=cat.StopPolicy(lost_limit=1000, late_limit=10.0),
             laws=[sine] if way == "law" else [],
@@ -117,11 +118,11 @@ def run(found: dict[str, Any], way: str, rate: int, clock: str | None) -> None:
 
 
 def cycle(loop: cat.Loop, cycles: int, rate: int, law: bool) -> None:
-    """Exchange so many cycles. A law needs no thread meanwhile."""
+    """Exchange a number of cycles. With a law, this thread only waits."""
     if not law:
         first = next(loop).number
         while next(loop).number < first + cycles:
-            pass  # reading the counters takes longer than 250 us: an inline loop would be late
+            pass  # do not read the counters: it takes over 250 us and would delay an inline loop
         return
     last = loop.timing.counters["cycles"] + cycles
     while loop.timing.counters["cycles"] < last:
@@ -154,7 +155,7 @@ def figures_of(clocks: Any) -> dict[str, Any]:
 
 
 def rings() -> Iterator[dict[str, Any]]:
-    """A closed ring: a loop without clocks runs, one with clocks is refused."""
+    """Run a loop without clocks in a closed ring, and check that one with clocks is refused."""
     found: dict[str, Any] = {"rate": 1000, "way": "threaded", "clock": "none, closed ring"}
     with (
         served(DRIVES, ring=True) as segment,
@@ -181,7 +182,7 @@ def line(rate: int, way: str, clock: str | None) -> dict[str, Any]:
 
 @contextlib.contextmanager
 def attempt(found: dict[str, Any]) -> Iterator[None]:
-    """Add an error to `found`, and what the module said."""
+    """Add an error of the block and the log of the module to `found`."""
     log = Log()
     try:
         yield
@@ -203,7 +204,7 @@ def sound(found: dict[str, Any]) -> bool:
 
 
 def main(arguments: Sequence[str]) -> int:
-    """Run all, or those that the words before the file choose: rates, ways, `ring`."""
+    """Run all loops, or those chosen by the arguments before the file: rates, ways, `ring`."""
     *words, _json, file = arguments
     chosen = set(words) or {*map(str, CYCLES), *WAYS, "ring"}
     table = []

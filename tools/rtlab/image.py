@@ -1,6 +1,7 @@
-"""The guest's root as one file, made anew when the kernel, Python or a package changes.
+"""Root file system of the guest as one file.
 
-Kept beside the repository's builds: another working copy has another one."""
+It is rebuilt if the kernel, Python or a package changes. Each working copy has its own file.
+"""
 
 from __future__ import annotations
 
@@ -17,7 +18,18 @@ from tools.rtlab.kernel import Kernel
 
 
 def provide(kernel: Kernel, repository: Path, folder: Path, more: Sequence[Entry] = ()) -> Path:
-    """The image in `folder`. OSError: no room; CatenaryError: the C peers do not compile."""
+    """Return the image in `folder`. Build it if it is missing or outdated.
+
+    Args:
+        kernel: Kernel of the guest.
+        repository: Working copy.
+        folder: Folder of the image.
+        more: Additional entries.
+
+    Raises:
+        OSError: The disk is full.
+        CatenaryError: The C peers do not compile.
+    """
     with tempfile.TemporaryDirectory(dir=folder) as programs:
         compiled = compile_all(Path(programs))
         entries = [*root.entries(kernel, root.everything(repository), compiled), *more]
@@ -32,7 +44,7 @@ def provide(kernel: Kernel, repository: Path, folder: Path, more: Sequence[Entry
 
 
 def write(entries: Iterable[Entry], image: Path) -> None:
-    """All of it or nothing."""
+    """Write the image completely, or not at all."""
     part = image.with_suffix(".part")
     try:
         with part.open("wb") as file:

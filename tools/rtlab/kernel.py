@@ -1,4 +1,4 @@
-"""Debian's PREEMPT_RT kernel: downloaded with apt, unpacked, never installed."""
+"""Debian's PREEMPT_RT kernel, downloaded with apt and unpacked, but not installed."""
 
 from __future__ import annotations
 
@@ -28,7 +28,11 @@ class Kernel:
         return self.modules.name
 
     def with_dependencies(self, names: tuple[str, ...]) -> list[Path]:
-        """Files of these modules, each behind those it needs. LabError: there is none of a name."""
+        """Return the files of modules, each after its dependencies.
+
+        Raises:
+            LabError: A module does not exist.
+        """
         found: dict[str, Path] = {}
 
         def add(name: str) -> None:
@@ -49,20 +53,25 @@ class Kernel:
 
 
 def read_module(file: Path) -> bytes:
-    """Bookworm's modules are plain, later ones compressed."""
+    """Return the content of a module file, which is compressed after Debian 12."""
     content = file.read_bytes()
     return lzma.decompress(content) if file.suffix == ".xz" else content
 
 
 def depends(module: bytes) -> list[str]:
-    """What its `.modinfo` says it needs."""
+    """Return the dependencies of a module, from its `.modinfo`."""
     found = re.search(rb"\0depends=([^\0]*)\0", module)
     return [name for name in found[1].decode().split(",") if name] if found else []
 
 
 def provide(cache: Path) -> Kernel:
-    """The newest that apt knows, from `cache` where it lies there; without apt or a network the one
-    that does. LabError: there is none."""
+    """Return the newest kernel of apt, from `cache` if it is there.
+
+    Without apt or a network, return a kernel from `cache`.
+
+    Raises:
+        LabError: There is no kernel.
+    """
     kept = sorted(cache.glob("linux-image-*/unpacked"), key=by_version)
     try:
         name = wanted()
@@ -76,7 +85,7 @@ def provide(cache: Path) -> Kernel:
 
 
 def by_version(mark: Path) -> list[int]:
-    """6.1.0-56 is behind 6.1.0-9."""
+    """Return a sort key: 6.1.0-56 comes after 6.1.0-9."""
     return [int(number) for number in re.findall(r"\d+", mark.parent.name)]
 
 
@@ -84,19 +93,23 @@ def found_in(folder: Path) -> Kernel:
     images = sorted(folder.glob("boot/vmlinuz-*"))
     modules = [path for top in ("lib", "usr/lib") for path in folder.glob(f"{top}/modules/*")]
     if not images or not modules:
-        raise LabError(f"{folder} holds no kernel: delete it, and it is downloaded again")
+        raise LabError(f"{folder} contains no kernel: delete it to download the kernel again")
     return Kernel(images[0], modules[0], folder.name)
 
 
 def download(name: str, cache: Path) -> None:
-    """LabError: no network, no room."""
+    """Download and unpack a package into the cache.
+
+    Raises:
+        LabError: The network is not available, or the disk is full.
+    """
     package = name.partition("_")[0]
     with tempfile.TemporaryDirectory(prefix="download-", dir=cache) as scratch:
         folder = Path(scratch)
         run_apt(["apt-get", "download", package], folder)
         files = list(folder.glob("*.deb"))
         if not files:
-            raise LabError(f"`apt-get download {package}` brought no file")
+            raise LabError(f"`apt-get download {package}` produced no file")
         target = folder / name
         run(["dpkg-deb", "-x", str(files[0]), str(target)], folder)
         drop_what_is_not_used(target)
@@ -105,15 +118,15 @@ def download(name: str, cache: Path) -> None:
 
 
 def wanted() -> str:
-    """PACKAGE_VERSION of the newest; the name without a version is a dependency on it."""
+    """Return PACKAGE_VERSION of the newest kernel, on which the meta-package depends."""
     if shutil.which("apt-cache") is None or shutil.which("dpkg-deb") is None:
-        raise LabError("the lab's kernel comes from Debian's packages, and there is no apt here")
+        raise LabError("the lab's kernel is a Debian package, but apt is not installed here")
     package = first_dependency(run(["apt-cache", "depends", PACKAGE], Path.cwd()))
     return f"{package}_{candidate(run(['apt-cache', 'policy', package], Path.cwd()))}"
 
 
 def first_dependency(shown: str) -> str:
-    """Of what `apt-cache depends` prints."""
+    """Return the first dependency in the output of `apt-cache depends`."""
     for line in shown.splitlines():
         name = line.strip().removeprefix("Depends: ")
         if name.startswith("linux-image-") and name != PACKAGE:
@@ -122,10 +135,10 @@ def first_dependency(shown: str) -> str:
 
 
 def candidate(shown: str) -> str:
-    """The version in what `apt-cache policy` prints."""
+    """Return the version in the output of `apt-cache policy`."""
     found = re.search(r"Candidate: (\S+)", shown)
     if found is None or found[1] == "(none)":
-        raise LabError(f"apt knows {PACKAGE}, not what it stands for: `sudo apt-get update`")
+        raise LabError(f"apt knows {PACKAGE}, but not its version: `sudo apt-get update`")
     return found[1]
 
 
@@ -133,11 +146,15 @@ def run_apt(command: list[str], folder: Path) -> None:
     try:
         run(command, folder)
     except LabError as error:
-        raise LabError(f"{error}; if its lists are old: `sudo apt-get update`") from None
+        raise LabError(f"{error}; if the package lists are old: `sudo apt-get update`") from None
 
 
 def run(command: list[str], folder: Path) -> str:
-    """Its output. LabError: the last line it complained with."""
+    """Run a command, and return its output.
+
+    Raises:
+        LabError: The command failed. The message has the line with the cause.
+    """
     try:
         done = subprocess.run(
             command,
@@ -157,13 +174,13 @@ def run(command: list[str], folder: Path) -> str:
 
 
 def complaint(errors: str) -> str:
-    """The line that says why: apt's and dpkg's begin with E: or with the program's name."""
+    """Return the line with the cause. In apt and dpkg it begins with E: or the program's name."""
     lines = [line.strip() for line in errors.splitlines() if not line.startswith("W:")]
     return next((line for line in lines if line), "it said nothing")
 
 
 def drop_what_is_not_used(folder: Path) -> None:
-    """Of 400 MB: the kernel, and network modules."""
+    """Delete everything except the kernel and network modules. The package has 400 MB."""
     for path in list(unused(folder)):
         shutil.rmtree(path)
 

@@ -1,4 +1,4 @@
-"""The machine of the lab: QEMU with one processor whose clock counts its instructions."""
+"""The machine of the lab: QEMU with one processor, whose clock counts instructions."""
 
 from __future__ import annotations
 
@@ -25,23 +25,27 @@ from tools.rtlab.kernel import Kernel
 PROGRAM = "qemu-system-x86_64"
 SHIFT = 0  # an instruction takes 2**SHIFT ns
 MEMORY_MB = 3072
-# On a busy host one kernel in five dies in its first steps, before it says anything (QEMU 7.2).
-BOOT_SECONDS, BOOTS = 120.0, 4  # of the host's, until the guest's first word; at most so many
+# On a busy host, one kernel in five hangs at its start, before its first output (QEMU 7.2).
+BOOT_SECONDS, BOOTS = 120.0, 4  # [s] of the host until the guest's first output; attempts
 PR_SET_PDEATHSIG = 1  # linux/prctl.h
-COMMAND_LINE_SIZE = 2048  # of the kernel on x86; what is beyond is cut off
+COMMAND_LINE_SIZE = 2048  # of the kernel on x86; longer lines are truncated
 END_SECONDS = 30.0  # from a guest's last line to the end of QEMU
 KERNEL_ARGUMENTS = (
     *("console=ttyS0", "quiet", "loglevel=3", "panic=-1", "rdinit=/init"),
-    *("nokaslr", "norandmaps", "random.trust_cpu=on"),  # one run is to be as another
+    *("nokaslr", "norandmaps", "random.trust_cpu=on"),  # all runs must be equal
     *("tsc=reliable", "mitigations=off"),
 )
 
 
 def program() -> str:
-    """LabError: it is not installed."""
+    """Return the path of QEMU.
+
+    Raises:
+        LabError: QEMU is not installed.
+    """
     path = shutil.which(PROGRAM)
     if path is None:
-        raise LabError(f"there is no {PROGRAM}: `sudo apt-get install qemu-system-x86`")
+        raise LabError(f"{PROGRAM} is not installed: `sudo apt-get install qemu-system-x86`")
     return path
 
 
@@ -51,15 +55,20 @@ def version() -> str:
 
 
 def command(kernel: Kernel, root: Path, results: Path, job: Mapping[str, object]) -> list[str]:
-    """`sleep=off`: where nothing runs in the guest, its clock goes on at once to the next timer.
-    All of its memory is there before it starts: a disk would answer in the host's time. LabError:
-    the job is too long."""
+    """Return the command that starts QEMU.
+
+    With `sleep=off`, an idle guest advances its clock to the next timer at once. The root is in
+    memory from the start, because a disk would answer in the time of the host.
+
+    Raises:
+        LabError: The job is too long for the kernel's command line.
+    """
     encoded = base64.b64encode(json.dumps(job).encode()).decode()
-    said = " ".join((*KERNEL_ARGUMENTS, f"RTLAB_JOB={encoded}"))
-    if len(said) >= COMMAND_LINE_SIZE:
+    line = " ".join((*KERNEL_ARGUMENTS, f"RTLAB_JOB={encoded}"))
+    if len(line) >= COMMAND_LINE_SIZE:
         raise LabError(
-            f"the guest is told its work in {len(said)} characters, and understands"
-            f" {COMMAND_LINE_SIZE - 1}: fewer --options, or a shorter path of the working copy"
+            f"the command line of the guest has {len(line)} characters, at most"
+            f" {COMMAND_LINE_SIZE - 1}: use fewer --options, or a shorter path of the working copy"
         )
     return [
         program(),
@@ -67,7 +76,7 @@ def command(kernel: Kernel, root: Path, results: Path, job: Mapping[str, object]
         *("-accel", "tcg", "-icount", f"shift={SHIFT},sleep=off", "-rtc", "clock=vm"),
         *("-cpu", "max", "-smp", "1", "-m", str(MEMORY_MB), "-seed", "1"),
         *("-kernel", str(kernel.image), "-initrd", str(root)),
-        *("-append", said),
+        *("-append", line),
         *("-chardev", "stdio,id=console,signal=off", "-serial", "chardev:console"),
         *("-serial", f"file:{results}"),
     ]
@@ -81,13 +90,13 @@ class Guest:
         self.started = time.monotonic()
         self.limit = seconds
         self.errors = results.with_name("errors")
-        with self.errors.open("wb") as errors:  # a pipe that nobody reads would stop it when full
+        with self.errors.open("wb") as errors:  # QEMU would block on a full pipe
             self.process = subprocess.Popen(
                 arguments,
                 stdin=subprocess.DEVNULL,
                 stdout=subprocess.PIPE,
                 stderr=errors,
-                start_new_session=True,  # a Ctrl-C in the terminal is ours: we end it
+                start_new_session=True,  # not ended by Ctrl-C in the terminal, but by us
                 preexec_fn=end_with_parent(os.getpid()),
             )
 
@@ -96,16 +105,20 @@ class Guest:
         return time.monotonic() - self.started
 
     def wakes(self) -> bool:
-        """Whether it prints something, as the guest's first process does, or `lines` will judge."""
+        """Return True if the guest prints something in time, or has ended."""
         if self.limit <= BOOT_SECONDS:
             return True
         return bool(select.select([self.process.stdout], [], [], BOOT_SECONDS)[0])
 
     def lines(self) -> Iterator[str]:
-        """What it prints, until it turns itself off. LabError: the deadline."""
+        """Yield the output of the guest until it turns itself off.
+
+        Raises:
+            LabError: The time limit was exceeded.
+        """
         unread = b""
         while data := self._read():
-            *whole, unread = re.split(rb"\r\x1b\[K|\r*\n", unread + data)  # or a line written over
+            *whole, unread = re.split(rb"\r\x1b\[K|\r*\n", unread + data)  # or an overwritten line
             yield from (line.decode(errors="replace") for line in whole)
         if unread:
             yield unread.decode(errors="replace")
@@ -114,15 +127,19 @@ class Guest:
         assert self.process.stdout is not None
         left = self.limit - self.seconds
         if left <= 0 or not select.select([self.process.stdout], [], [], left)[0]:
-            raise LabError(f"not done within {self.limit / 60:.1f} minutes: --minutes gives more")
+            raise LabError(f"not done within {self.limit / 60:.1f} minutes: raise --minutes")
         return os.read(self.process.stdout.fileno(), 65536)
 
     def answer(self) -> dict[str, Any]:
-        """What the guest wrote at its end. LabError: nothing, or that it failed."""
+        """Return the answer that the guest wrote at its end.
+
+        Raises:
+            LabError: There is no answer, or the guest failed.
+        """
         try:
             self.process.communicate(timeout=END_SECONDS)
         except subprocess.TimeoutExpired:
-            raise LabError(f"QEMU did not end within {END_SECONDS:.0f} s of its guest") from None
+            raise LabError(f"QEMU did not end within {END_SECONDS:.0f} s after its guest") from None
         if self.process.returncode != 0:
             errors = self.errors.read_text(errors="replace")
             said = errors.strip().splitlines() or ["it said nothing"]
@@ -135,7 +152,11 @@ class Guest:
 
 
 def understood(said: str) -> dict[str, Any]:
-    """One line of JSON. LabError: it is none, or the command failed."""
+    """Return an answer from its line of JSON.
+
+    Raises:
+        LabError: The line is not JSON, or the command failed.
+    """
     try:
         answer: dict[str, Any] = json.loads(said)
     except ValueError:
@@ -149,7 +170,15 @@ def understood(said: str) -> dict[str, Any]:
 def started(
     kernel: Kernel, root: Path, job: Mapping[str, object], folder: Path, seconds: float
 ) -> Iterator[Guest]:
-    """A guest for as long as the block lasts, and no longer."""
+    """Run a guest during the block.
+
+    Args:
+        kernel: Kernel of the guest.
+        root: Root file system.
+        job: Job of the guest.
+        folder: Folder for the files of QEMU.
+        seconds: Time limit [s].
+    """
     with tempfile.TemporaryDirectory(prefix="run-", dir=folder) as name:
         results = Path(name, "results")
         arguments = command(kernel, root, results, job)
@@ -166,7 +195,7 @@ def started(
 
 
 def end_with_parent(parent: int) -> Callable[[], None]:
-    """Has the kernel kill the child when we end, however that is."""
+    """Return a function that makes the kernel kill the child when this process ends."""
     prctl = ctypes.CDLL(None).prctl
 
     def prepare() -> None:

@@ -1,4 +1,4 @@
-"""What is kept of a run: the result, and all that it depends on."""
+"""Record of a run: the result and all its conditions."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from tools.rtlab.tables import Table
 
 NOTE = (
     "time counts instructions: this compares software and shows schedules; "
-    "it is no latency measurement of hardware"
+    "it does not measure the latency of hardware"
 )
 
 
@@ -39,7 +39,7 @@ def make(
 
 
 def commit(repository: Path) -> str:
-    """ "" where there is no git; "+" for what is not committed."""
+    """Return the commit, with "+" for uncommitted changes; empty without git."""
     try:
         done = subprocess.run(
             ["git", "describe", "--always", "--dirty=+", "--abbrev=12"],

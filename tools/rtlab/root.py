@@ -1,6 +1,9 @@
-"""What the guest's root holds: this interpreter, the distributions a benchmark imports, Catenary as
-it stands in this folder, the libraries all of these load, and a few programs. Everything has the
-path it has here, so that what runs there is what runs here."""
+"""Files of the guest's root.
+
+They are this interpreter, the distributions that a benchmark imports, Catenary from this working
+copy, the libraries that all of these load, and a few programs. All paths are the same as on the
+host, so that the guest runs the same files.
+"""
 
 from __future__ import annotations
 
@@ -20,16 +23,20 @@ from tools.rtlab.kernel import Kernel, read_module
 
 MODULES = ("veth",)
 EXTRAS = ("law", "peers", "sim", "traj")
-PROGRAMS = ("ip", "sh")  # asked for by catenary.realtime.private_network
+PROGRAMS = ("ip", "sh")  # needed by catenary.realtime.private_network
 OPTIONAL_PROGRAMS = ("stress-ng", "cyclictest")
 UNUSED = {"test", "tests", "idlelib", "tkinter", "ensurepip", "lib2to3", "site-packages", "pip"}
 GUEST = "/init"
-COMPILED = "/compiled"  # where the guest looks for the C peers
+COMPILED = "/compiled"  # folder of the C peers in the guest
 REQUIREMENT = re.compile(r"([\w.-]+)(?:\[([\w,. -]+)\])?[^;]*(?:;(.*))?")
 
 
 def everything(repository: Path) -> list[Path]:
-    """The files of a guest that runs benchmarks. LabError: something is not installed."""
+    """Return the files of a guest that runs benchmarks.
+
+    Raises:
+        LabError: A package is not installed.
+    """
     return [
         *interpreter(),
         *(path for each in all_distributions() for path in files_of(each)),
@@ -39,7 +46,13 @@ def everything(repository: Path) -> list[Path]:
 
 
 def entries(kernel: Kernel, files: Sequence[Path], compiled: Iterable[Path] = ()) -> list[Entry]:
-    """A system round `files` and what they load; `compiled`: programs made here."""
+    """Yield the entries of a system with files and the libraries that they load.
+
+    Args:
+        kernel: Kernel of the guest.
+        files: Files with the same paths as on the host.
+        compiled: Programs that were compiled for the guest.
+    """
     return [
         *links(),
         *system(),
@@ -51,7 +64,7 @@ def entries(kernel: Kernel, files: Sequence[Path], compiled: Iterable[Path] = ()
 
 
 def system() -> Iterator[Entry]:
-    """What a system is before it has programs."""
+    """Yield the entries of a system without programs."""
     for path in ("/proc", "/sys", "/dev", "/dev/shm", "/tmp", "/run", "/root", "/results"):
         yield archive.folder(path)
     yield archive.character_device("/dev/console", 5, 1)
@@ -69,15 +82,15 @@ def modules(kernel: Kernel) -> Iterator[Entry]:
 
 
 def interpreter() -> Iterator[Path]:
-    """The interpreter and its own library, without tests."""
-    yield from Path(sys.executable).parent.glob("python*")  # scripts name it in several ways
+    """Yield the files of the interpreter and its standard library, without tests."""
+    yield from Path(sys.executable).parent.glob("python*")  # scripts use several of its names
     yield Path(sys.prefix, "pyvenv.cfg")
     yield Path(sysconfig.get_config_var("BINDIR"), f"python{sysconfig.get_python_version()}")
     yield from under(Path(sysconfig.get_path("stdlib")))
 
 
 def links() -> Iterator[Entry]:
-    """Folders that are links on a merged system; they come first, else files would make folders."""
+    """Yield folders that are links on a merged system. They must precede the files in them."""
     for path in ("/lib", "/lib64", "/bin", "/sbin"):
         if Path(path).is_symlink():
             yield archive.folder(str(Path(path).resolve()))
@@ -95,12 +108,16 @@ def under(folder: Path) -> Iterator[Path]:
 
 
 def all_distributions() -> list[Distribution]:
-    """Of benchmarks and of the cobot, which records; nothing is drawn in a guest."""
+    """Return the distributions of benchmarks and of the cobot, without plotting."""
     return [*distributions("catenary", EXTRAS), *distributions("mcap")]
 
 
 def distributions(name: str, extras: Iterable[str] = ()) -> list[Distribution]:
-    """The distribution and those it needs, as installed. LabError: one is not."""
+    """Return an installed distribution and its dependencies.
+
+    Raises:
+        LabError: A distribution is not installed.
+    """
     found: dict[str, Distribution] = {}
 
     def add(name: str, extras: frozenset[str]) -> None:
@@ -121,7 +138,7 @@ def distributions(name: str, extras: Iterable[str] = ()) -> list[Distribution]:
 def needed_by(
     requires: Iterable[str], extras: frozenset[str]
 ) -> Iterator[tuple[str, frozenset[str]]]:
-    """Names and extras of those that hold without a marker, or for one of `extras`."""
+    """Yield the names and extras of requirements that apply here, with `extras`."""
     for line in requires:
         match = REQUIREMENT.match(line)
         if match is None:
@@ -156,7 +173,7 @@ def programs() -> Iterator[Path]:
 
 
 def libraries(files: Iterable[Path]) -> list[Path]:
-    """What `ldd` finds for programs and shared libraries, the loader among them."""
+    """Return the libraries that `ldd` finds for programs and libraries, including the loader."""
     linked = sorted({str(path) for path in files if is_linked(path)})
     done = subprocess.run(["ldd", *linked], capture_output=True, text=True, check=False)
     return loaded(done.stdout)
@@ -170,6 +187,9 @@ def is_linked(path: Path) -> bool:
 
 
 def loaded(shown: str) -> list[Path]:
-    """Paths of what `ldd` prints: "libm.so.6 => /lib/libm.so.6 (0x...)", "/lib64/ld.so (0x...)"."""
+    """Return the paths in the output of `ldd`.
+
+    Its lines are "libm.so.6 => /lib/libm.so.6 (0x...)" or "/lib64/ld.so (0x...)".
+    """
     found = re.findall(r"(?:=> |^\s+)(/[^\s:]+) \(0x", shown, re.MULTILINE)
     return [Path(path) for path in sorted(set(found))]

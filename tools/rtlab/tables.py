@@ -1,4 +1,4 @@
-"""What the lab runs: one command of `python -m benchmarks` a table, each in a guest of its own."""
+"""Tables of the lab: commands of `python -m benchmarks`, each in a separate guest."""
 
 from __future__ import annotations
 
@@ -8,23 +8,23 @@ from dataclasses import dataclass
 from tools.rtlab import igh
 from tools.rtlab.errors import LabError
 
-RESULT = "FILE"  # the guest puts the path of the result in its place
+RESULT = "FILE"  # placeholder for the path of the result
 
 
 @dataclass(frozen=True, slots=True)
 class Table:
-    command: str  # of `python -m benchmarks`; it understands --json
-    minutes: float  # at most, of the host's time
+    command: str  # command of `python -m benchmarks`; it supports --json
+    minutes: float  # limit of the host's time
     help: str
-    of_all: bool = True  # whether "all" runs it
-    # What real-time tasks may have, [us] of every second; -1: all. Less lets a table end that asks
-    # for more than there is, and makes each switch 0.4 us longer.
+    of_all: bool = True  # True if "all" runs it
+    # Limit of real-time tasks, [us] per second; -1 for none. With a limit, a table that overloads
+    # the processor ends, and each context switch takes 0.4 us longer.
     real_time_us: int = -1
     program: str = ""  # of the guest, instead of the benchmarks
 
     @property
     def shown(self) -> str:
-        """The command as a person reads it."""
+        """The command as readable text."""
         return f"{self.program or 'python -m benchmarks'} {self.command}".rstrip()
 
     @property
@@ -98,7 +98,11 @@ TABLES: Mapping[str, Table] = {
 
 
 def choose(names: Sequence[str]) -> dict[str, Table]:
-    """Lists with commas as well; "all" is all that it runs. LabError: no such table."""
+    """Return the chosen tables. A name may be a list with commas, or "all".
+
+    Raises:
+        LabError: A table does not exist.
+    """
     chosen: dict[str, Table] = {}
     for name in ",".join(names).split(","):
         if name == "all":
@@ -106,5 +110,5 @@ def choose(names: Sequence[str]) -> dict[str, Table]:
         elif name in TABLES:
             chosen[name] = TABLES[name]
         else:
-            raise LabError(f"the lab has no table {name!r}: {', '.join(TABLES)}, all")
+            raise LabError(f"unknown table {name!r}; known tables: {', '.join(TABLES)}, all")
     return chosen

@@ -26,7 +26,7 @@ FRAMES_PER_STEP = 4  # acyclic frames per cycle
 
 
 class AcyclicQueue(Protocol):
-    """Python side of the acyclic queue, as `core.Engine` has it."""
+    """Interface to the acyclic queue; `core.Engine` implements it."""
 
     def acyclic_push(self, frame: bytes) -> bool: ...
     def acyclic_pop(self) -> bytes | None: ...
@@ -61,8 +61,8 @@ class _UnderWay:
 class AcyclicRunner:
     """Owns the procedures that run during one cycle. Only one thread may call `step`.
 
-    Any thread may call `submit` and `run`. `grain_ns`: a pause that ends within this time counts as
-    ended. Frames only go out with the next cycle, so short pauses pass while they wait.
+    Any thread may call `submit` and `run`. A pause that ends within `grain_ns` counts as ended,
+    because its next frame is sent only with the next cycle.
     """
 
     def __init__(
@@ -74,7 +74,7 @@ class AcyclicRunner:
         grain_ns: int = 0,
     ) -> None:
         self.counts = FrameCounts()
-        self.asked = threading.Event()  # set when a procedure was submitted
+        self.asked = threading.Event()  # set when a procedure is submitted
         self._queue = queue
         self._timeout_ns = round(frame_timeout * 1e9)
         self._attempts = attempts
@@ -93,7 +93,7 @@ class AcyclicRunner:
         self._owner = threading.get_ident()
 
     def submit(self, procedure: Procedure[T]) -> Pending[T]:
-        """Queue a procedure; it begins at the next step."""
+        """Queue a procedure. It starts at the next step."""
         pending = Pending(Task(procedure))
         with self._lock:
             if self._closed:
@@ -104,7 +104,7 @@ class AcyclicRunner:
         return pending
 
     def run(self, procedure: Procedure[T]) -> T:
-        """Run a procedure and return its result; call it in another thread than the loop's.
+        """Run a procedure and return its result. Must not be called in the loop's thread.
 
         Raises:
             RuntimeError: The caller is the loop's thread, which would deadlock.
@@ -113,9 +113,8 @@ class AcyclicRunner:
         if threading.get_ident() == self._owner:
             procedure.close()
             raise RuntimeError(
-                "a blocking call inside the loop's own thread would stop the loop: use "
-                "sub.sdo.request() and poll its `done`, or make the call in another thread or "
-                "before the loop"
+                "a blocking call in the loop's thread would stop the loop: use sub.sdo.request() "
+                "and poll its `done`, or make the call in another thread or before the loop"
             )
         pending = self.submit(procedure)
         pending.wait()
@@ -133,7 +132,7 @@ class AcyclicRunner:
 
     @property
     def next_due_ns(self) -> int:
-        """Time of the next step with work [ns, the queue's clock]; 0: now."""
+        """Time of the next step with work [ns, the queue's clock]; 0 if a step has work now."""
         if self._submitted or self._under_way or self._outbox:
             return 0
         wakes = [pending.task.wake_ns or 0 for pending in self._active]
@@ -196,10 +195,10 @@ class AcyclicRunner:
     def _begin(self, now: int) -> None:
         with self._lock:
             begun = [pending for pending in self._submitted if not pending.cancelled]
-            unwanted = [pending for pending in self._submitted if pending.cancelled]
+            cancelled = [pending for pending in self._submitted if pending.cancelled]
             self._submitted.clear()
             self._active.extend(begun)
-        for pending in unwanted:
+        for pending in cancelled:
             pending.task.cancel()
             pending.finish()
         for pending in begun:
@@ -248,5 +247,5 @@ class AcyclicRunner:
 
 def _ended() -> LoopError:
     return LoopError(
-        "the loop has ended before the device answered", hint="repeat the call outside the loop"
+        "the loop ended before the device answered", hint="repeat the call outside the loop"
     )

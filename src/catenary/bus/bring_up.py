@@ -80,18 +80,18 @@ def bring_to_safe_op(
         subs: Devices of the segment.
         plan: Plan to write.
         epoch_ns: System time minus link time.
-        ring: Ring link of the segment; None: a line.
+        ring: Ring link of the segment; None for a line.
 
     Returns:
         Measurement of the clocks; None if the plan has no clocks.
 
     Raises:
-        SegmentError: The number of devices is not that of the plan.
+        SegmentError: The number of devices differs from the plan.
         IdentityError: A device is not the planned one.
     """
     if len(subs) != len(plan.devices):
         raise SegmentError(
-            f"the plan is for {len(plan.devices)} devices, the segment has {len(subs)}",
+            f"the plan is for {len(plan.devices)} devices, but the segment has {len(subs)}",
             hint="scan and plan again",
         )
     for sub, device in zip(subs, plan.devices, strict=True):
@@ -116,9 +116,9 @@ def bring_to_safe_op(
 
 
 def _renewed(sub: SubDevice, request: DeviceRequest | None) -> Procedure[DeviceDescription]:
-    """Return the present description.
+    """Return the current description of a device.
 
-    If a device that no request names does not answer, return its description from the scan.
+    If a device without requests does not answer, return its description from the scan.
     """
     reading = within(READ_TIMEOUT, sub.station, _describe(sub, request or DeviceRequest()))
     try:

@@ -34,7 +34,7 @@ class Diagnosis:
 
     def __str__(self) -> str:
         if not self.findings:
-            return f"nothing found: {len(self.topology)} devices"
+            return f"no faults found in {len(self.topology)} devices"
         return "\n".join(map(str, self.findings))
 
     def __bool__(self) -> bool:
@@ -49,12 +49,14 @@ def diagnose(
     lost_frames: int = 0,
     ring: bool = False,
 ) -> Procedure[Diagnosis]:
-    """Read all devices in shared frames, and judge. A missing reply is not an error.
+    """Read the error counters and states of all devices in shared frames, and locate faults.
+
+    A missing reply is not an error.
 
     Args:
         subs: Devices to read.
         since: Earlier diagnosis that starts the judged time span; None: power-up.
-        lost_frames: Number of frames lost or damaged in the same time.
+        lost_frames: Number of frames lost or damaged in the same time span.
         ring: True if the segment is a ring.
     """
     stations = [sub.station for sub in subs]
@@ -71,7 +73,7 @@ def diagnose(
         *judge_silence(topology, names, silent),
         *judge(seen),
         *_wiring(topology),
-        *_complaints(names, answers),
+        *_state_errors(names, answers),
     )
     return Diagnosis(findings, counters, totals, topology, names)
 
@@ -83,7 +85,7 @@ def _wiring(topology: Topology) -> list[Finding]:
     ]
 
 
-def _complaints(names: Names, answers: Sequence[Answer]) -> list[Finding]:
+def _state_errors(names: Names, answers: Sequence[Answer]) -> list[Finding]:
     """Return a finding for each device in a state with an error."""
     found = []
     for answer in answers:

@@ -30,7 +30,7 @@ class LoopClock:
         self._zero_ns = zero_ns  # returns the link's clock time; 0: no iteration yet
 
     def stamped(self, event: Event) -> Event:
-        """Return the event with its time on the clock of `cycle.time`, once there is a zero."""
+        """Return the event with its time on the clock of `cycle.time`, if the zero is known."""
         zero = self._zero_ns()
         return replace(event, time=event.time - zero * 1e-9) if zero else event
 
@@ -41,7 +41,7 @@ class LoopClock:
 
 
 class Events:
-    """Owns the events that were not fetched yet; any thread may put and get.
+    """Owns the events that have not been fetched. Any thread may put and get.
 
         for event in main.events:                 # the pending events; never waits
             print(event)
@@ -99,7 +99,7 @@ class Events:
         return len(self._pending)
 
     def begin_loop(self, zero_ns: Callable[[], int]) -> None:
-        """Count times from the first iteration of a loop.
+        """Count event times from the first iteration of a loop.
 
         Args:
             zero_ns: Returns the cycle start of that iteration on the link's clock; 0 before it.
@@ -107,7 +107,7 @@ class Events:
         self._clock = LoopClock(zero_ns)
 
     def end_loop(self) -> None:
-        """Count times on the link's clock again. Events of the loop keep the loop's clock."""
+        """Take event times from the link's clock again. Events of the loop keep its clock."""
         if self._clock is not None:
             self._clock.freeze()
             self._clock = None
@@ -119,16 +119,16 @@ class Events:
     def listen(self, listener: Callable[[Event], None]) -> Callable[[], None]:
         """Call `listener` with every event until the returned function is called.
 
-        The call is in the thread that puts the event. Times are of the link's clock.
+        The listener runs in the thread that puts the event. Times are on the link's clock.
         """
         with self._changed:
             self._listeners = (*self._listeners, listener)
 
-        def forget() -> None:
+        def unsubscribe() -> None:
             with self._changed:
                 self._listeners = tuple(each for each in self._listeners if each is not listener)
 
-        return forget
+        return unsubscribe
 
 
 def _stamped(event: Event, clock: LoopClock | None) -> Event:
@@ -146,7 +146,7 @@ class Callbacks:
         self.in_thread = True
         self.dropped = 0  # events that were dropped because callbacks were slow
         self._callbacks: list[Callback] = []
-        self._untold: queue.Queue[Event | None] = queue.Queue(capacity)  # None: end of the thread
+        self._pending: queue.Queue[Event | None] = queue.Queue(capacity)  # None: end of the thread
         self._lock = threading.Lock()
         self._thread: threading.Thread | None = None
         self._delivering = False
@@ -167,18 +167,21 @@ class Callbacks:
                 self._thread.start()
 
     def deliver(self) -> None:
-        """Call the callbacks with the pending events, unless a thread does or a callback runs."""
+        """Call the callbacks with the pending events in virtual time; otherwise, a thread does.
+
+        No effect inside a callback.
+        """
         if not self._callbacks or self.in_thread or self._delivering:
             return
         self._delivering = True
         try:
-            while not self._untold.empty():
-                self._call(self._untold.get_nowait())
+            while not self._pending.empty():
+                self._call(self._pending.get_nowait())
         finally:
             self._delivering = False
 
     def close(self) -> None:
-        """End the thread after the pending events; wait at most CLOSE_TIMEOUT for it."""
+        """End the thread after the pending events. Wait at most CLOSE_TIMEOUT for its end."""
         self.deliver()
         with self._lock:
             thread, self._thread = self._thread, None
@@ -190,16 +193,16 @@ class Callbacks:
     def _queue(self, event: Event | None) -> None:
         while True:
             try:
-                self._untold.put_nowait(event)
+                self._pending.put_nowait(event)
                 return
             except queue.Full:
                 self.dropped += 1
                 with contextlib.suppress(queue.Empty):  # the thread was faster
-                    self._untold.get_nowait()
+                    self._pending.get_nowait()
 
     def _serve(self) -> None:
         step_behind()
-        while (event := self._untold.get()) is not None:
+        while (event := self._pending.get()) is not None:
             self._call(event)
 
     def _call(self, event: Event | None) -> None:

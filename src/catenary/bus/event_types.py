@@ -1,6 +1,6 @@
-"""Events of a segment outside of the cyclic data, as frozen values.
+"""Events of a segment, as frozen values.
 
-`time` [s] is on the clock of `cycle.time` while a loop is open: it counts from the first iteration
+While a loop is open, `time` [s] is on the clock of `cycle.time`: it counts from the first iteration
 and is negative during start-up. Without a loop, or before the first iteration, it is on the link's
 clock (`time.monotonic()` on a NIC). `sub` is the device of the event, or None for an event of the
 segment. `message` describes the event as text. The other fields are for programs:
@@ -40,7 +40,7 @@ class Event:
 
 @dataclass(frozen=True, slots=True)
 class Emergency(Event):
-    """Fault reported by a device, or its end with error code 0: ETG.1000.6 §5.6.4."""
+    """Fault reported by a device (ETG.1000.6 §5.6.4). Error code 0 reports the end of a fault."""
 
     error_code: int
     error_register: int  # object 0x1001
@@ -54,12 +54,12 @@ class Emergency(Event):
 
 @dataclass(frozen=True, slots=True)
 class DeviceLost(Event):
-    """Loss of a device: it does not answer any more."""
+    """Loss of a device: it no longer answers."""
 
 
 @dataclass(frozen=True, slots=True)
 class DeviceReturned(Event):
-    """Return of a lost device: the same one, by its identity."""
+    """Return of a lost device, with the same identity."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,7 +72,7 @@ class DeviceReplaced(Event):
 
 @dataclass(frozen=True, slots=True)
 class DeviceHeld(Event):
-    """Device that returned but is not brought to OP: by policy, or because this failed."""
+    """Device that returned but is not brought to OP: by policy, or because the attempt failed."""
 
     state: int  # AL state in which it is held
     reason: str
@@ -89,9 +89,9 @@ class StateLost(Event):
 
 @dataclass(frozen=True, slots=True)
 class LinkLost(Event):
-    """Cable that does not carry any more.
+    """Loss of a link: the cable no longer carries frames.
 
-    `between`: positions of the devices at its ends; None: the MainDevice.
+    `between` holds the positions of the devices at its ends; None stands for the MainDevice.
     """
 
     between: tuple[int | None, int | None]
@@ -99,16 +99,16 @@ class LinkLost(Event):
 
 @dataclass(frozen=True, slots=True)
 class LinkRestored(Event):
-    """Cable that carries again."""
+    """Return of a link: the cable carries frames again."""
 
     between: tuple[int | None, int | None]
 
 
 @dataclass(frozen=True, slots=True)
 class FaultFound(Event):
-    """Fault of a cable, a device or its supply, by the error counters; frames may still pass.
+    """Fault of a cable, a device or its supply, found by error counters. Frames may still pass.
 
-    `sub`: the device, or the device after the cable.
+    `sub` is the faulty device, or the device after the faulty cable.
     """
 
     finding: Finding
@@ -121,13 +121,13 @@ class DuplicateFrames(Event):
     Suspect a loop in the wiring or a second sender.
     """
 
-    count: int  # of such frames in `interval`
+    count: int  # number of such frames in `interval`
     interval: float  # [s]
 
 
 @dataclass(frozen=True, slots=True)
 class ClockUnlocked(Event):
-    """Distributed clocks that left their bound. `sub`: the device with the largest difference."""
+    """Distributed clocks that left their bound. `sub` is the device with the largest difference."""
 
     difference: float  # from the reference clock [s]
     bound: float  # [s]
@@ -135,19 +135,19 @@ class ClockUnlocked(Event):
 
 @dataclass(frozen=True, slots=True)
 class ClockLocked(Event):
-    """Distributed clocks that are within their bound; `sub` is None: all are."""
+    """Distributed clocks that are all within their bound; `sub` is None."""
 
-    difference: float  # from the reference clock [s]; of all clocks the largest
+    difference: float  # largest difference from the reference clock [s]
     bound: float  # [s]
 
 
 @dataclass(frozen=True, slots=True)
 class AxisStopped(Event):
-    """Stop of an axis by the core, without a request of the application."""
+    """Stop of an axis by the core, without a request from the application."""
 
     axis: str
     reason: StopReason
-    cycle: int  # its number
+    cycle: int  # number of the cycle
 
 
 @dataclass(frozen=True, slots=True)
@@ -160,7 +160,7 @@ class ModeRefused(Event):
 
 @dataclass(frozen=True, slots=True)
 class Marker(Event):
-    """Mark that the application set with `MainDevice.mark`, to be found among the cycles."""
+    """Mark in the sequence of cycles, set by the application with `MainDevice.mark`."""
 
 
 def emergency(time: float, sub: SubDevice, message: coe.Emergency) -> Emergency:

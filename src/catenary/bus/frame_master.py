@@ -1,4 +1,4 @@
-"""FrameMaster: brings the devices of a segment up and down by its own frames."""
+"""FrameMaster: state changes and configuration of devices by frames of our own."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ if TYPE_CHECKING:  # plan needs NumPy, a scan does not
 
 
 class FrameMaster:
-    """Owns the procedures of one MainDevice on its devices. Implements `bus.Master`."""
+    """Owns the procedures that a MainDevice runs on its devices. Implements `bus.Master`."""
 
     def __init__(self, main: MasterOwner, *, force: bool) -> None:
         self.carrier = None
@@ -82,7 +82,7 @@ class FrameMaster:
         if not running:
             return ()
         left = ", ".join(map(str, running))
-        return (f"{left}: left by another program, which was perhaps killed; now reset",)
+        return (f"{left}: left by another program, which may have been killed; now reset",)
 
     def _refuse_refreshed(self, runner: BlockingRunner, running: Sequence[Running]) -> None:
         refreshed = runner.run(find_refreshed(running))
@@ -90,14 +90,14 @@ class FrameMaster:
             raise LinkError(
                 f"another EtherCAT master is live on {self._main.link.name}: it refreshes the "
                 f"outputs of {', '.join(f'device {position}' for position in refreshed)} (0x0440)",
-                hint="a scan would reset devices that may be in motion. End that master, which "
-                "may be at the other end of the line; pass force=True (--force) to scan anyway",
+                hint="a scan would reset devices that may be in motion. Stop that master, which "
+                "may be at the other end of the line, or pass force=True (--force) to scan anyway",
             )
 
     def _addressed(
         self, runner: BlockingRunner, device_count: int
     ) -> tuple[Sequence[StationRegisters], tuple[str, ...]]:
-        """Return the registers of the addressed devices, and notes on a ring."""
+        """Address the devices. Return their registers, and a note on the cuts of a ring."""
         ring = ring_of(self._main.link)
         if ring is None:
             return runner.run(assign(range(device_count))), ()
@@ -124,20 +124,20 @@ class FrameMaster:
     def diagnose(
         self, subs: Sequence[SubDevice], *, since: Diagnosis | None, lost_frames: int
     ) -> Diagnosis:
-        """Read the error counters and states of devices and judge where a fault is."""
+        """Read the error counters and states of devices, and locate faults."""
         from catenary.bus.diagnosis import diagnose
 
         ring = ring_of(self._main.link) is not None
         return self._main.converse(diagnose(subs, since=since, lost_frames=lost_frames, ring=ring))
 
     def read_mappings(self, requests: Sequence[ProcessDataRequest], period_ns: int) -> None:
-        """Read what is mapped, and what the dictionaries say of other objects."""
+        """Read the mappings, and the dictionary entries of requested objects not mapped."""
         from catenary.bus.bring_up import describe_mappings
 
         describe_mappings(self._main.runner, self._main.subs, requests, period_ns)
 
     def read_objects(self, wanted: Mapping[int, Sequence[tuple[int, int]]]) -> dict[int, Objects]:
-        """Read objects of several devices, all devices at the same time."""
+        """Read objects of several devices at the same time."""
         positions, subs = list(wanted), self._main.subs
         found = self._main.runner.run_all([read_each(subs[k].sdo, wanted[k]) for k in positions])
         return dict(zip(positions, found, strict=True))
@@ -166,7 +166,7 @@ class FrameMaster:
             sub.state = state
 
     def _handle(self, found: ScannedDevice) -> SubDevice:
-        """Return the known handle of this place, if it is the same device; else a new one."""
+        """Return the existing handle if the device at this position is the same, or a new one."""
         subs = self._main.subs
         position = found.description.position
         known = subs[position] if position < len(subs) else None

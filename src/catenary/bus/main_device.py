@@ -55,21 +55,22 @@ class MainDevice:
     Leaving the block always brings all devices to INIT.
 
     It is the only MainDevice on its network interfaces: opening fails while another master is live,
-    unless `force=True`. A forked child cannot use it, and leaves its devices alone.
+    unless `force=True`. A forked child cannot use it and does not change its devices.
     """
 
     def __init__(self, source: LinkSource, *, force: bool = False) -> None:
-        self.subs = SubDevices()
-        self.notes: tuple[str, ...] = ()  # oddities that the last scan found
+        self.subs = SubDevices()  # devices of the last scan
+        self.notes: tuple[str, ...] = ()  # irregularities found by the last scan
         self.clock_delays_ns: tuple[int | None, ...] = ()  # to the first clock, by position
         self.clock_epoch_ns = 0  # system time of the clocks minus link time
-        self.events = events = Events()  # iterate, or get(timeout=)
+        self.events = Events()  # iterate, or get(timeout=)
         self._callbacks = callbacks = Callbacks()
+        events = self.events
         events.listen(lambda each: callbacks.report(events.stamped(each)))
         self._source = source
         self._force = force
         self._ownership: Ownership | None = None
-        self._process = 0  # identifier of the process that has opened it
+        self._process = 0  # ID of the process that opened the link
         self._link: Link | None = None
         self._blocking: BlockingRunner | None = None
         self._attached: Runner | None = None
@@ -99,7 +100,7 @@ class MainDevice:
 
     @property
     def carrier(self) -> Carrier | None:
-        """Master that exchanges the images; None: our own frames."""
+        """Master that exchanges the process images; None if the loop sends its own frames."""
         return self.master.carrier
 
     @property
@@ -108,9 +109,9 @@ class MainDevice:
         return self.runner.counts
 
     def open(self) -> Self:
-        """Open the link and return the MainDevice. Nothing is sent.
+        """Open the link and return the MainDevice. Send nothing.
 
-        Opening listens on a network interface for 0.1 s. No effect if it is open.
+        On a network interface, listen 0.1 s for another master. No effect if the link is open.
 
         Raises:
             LinkError: The link cannot be used, or another master is live on it, unless `force`.
@@ -145,7 +146,7 @@ class MainDevice:
 
     @property
     def _is_inherited(self) -> bool:
-        """True in a child that was forked while it was open."""
+        """True in a process that was forked while the link was open."""
         return self._process not in (0, os.getpid())
 
     def _not_open(self) -> RuntimeError:
@@ -160,7 +161,7 @@ class MainDevice:
     def other_masters(self) -> tuple[str, ...]:
         """Evidence of another master on the network interfaces, as text.
 
-        It was found at opening with `force`, or is found now by its packet socket.
+        It was found when the link was opened with `force`, or is found now by its packet socket.
         """
         if self._link is None or self._ownership is None:
             return ()
@@ -196,8 +197,8 @@ class MainDevice:
     def on_event(self, callback: Callback) -> None:
         """Call `callback(event)` for every event from now on, in addition to `events`.
 
-        It runs in a separate thread, which may read and write objects. In virtual time it runs in
-        the thread that advances the time, between two steps. Its exceptions are logged.
+        The callback runs in a separate thread and may read and write objects. In virtual time, it
+        runs in the thread that advances the time, between two steps. Its exceptions are logged.
         """
         self._callbacks.add(callback)
 
@@ -208,13 +209,13 @@ class MainDevice:
 
         Args:
             message: Text of the marker.
-            time: Time on the link's clock (`time.monotonic()` on a NIC) [s]. None: now.
+            time: Time on the link's clock (`time.monotonic()` on a NIC) [s]; None for now.
         """
         when = self.link.now() * 1e-9 if time is None else float(time)
         self.events.put(event_types.Marker(when, None, message))
 
     def deliver_events(self) -> None:
-        """Call the callbacks with pending events, in virtual time; otherwise a thread does."""
+        """Call the callbacks with pending events in virtual time; otherwise, a thread does."""
         self._callbacks.deliver()
 
     def scan(
@@ -230,10 +231,10 @@ class MainDevice:
         reset; `notes` names them.
 
         Args:
-            expected: By position, an identity or (vendor, product); None: any device.
-            strict: True: raise the error of a device, with those of further devices as notes;
-                `subs` has all handles nevertheless. False: store it in `SubDevice.error`, and raise
-                it when the device is used.
+            expected: By position, an identity or (vendor, product); None accepts any device.
+            strict: If True, raise the first error of a device, with further errors as notes; `subs`
+                still has all handles. If False, store each error in `SubDevice.error`, and raise it
+                when the device is used.
 
         Returns:
             All devices, by position.
@@ -261,7 +262,7 @@ class MainDevice:
         `subs` does not change, and `close` leaves these devices in their states.
 
         Args:
-            names: Also read the EEPROMs. Otherwise a device has neither name nor identity.
+            names: True to read the EEPROMs, too. Otherwise, devices have no name or identity.
         """
         found = self.master.passive_scan(names=names)
         return SubDevices([SubDevice(self, each, None) for each in found])
@@ -269,7 +270,9 @@ class MainDevice:
     def request_states(
         self, subs: Sequence[SubDevice], positions: Sequence[int], state: AlState
     ) -> dict[int, Outcome]:
-        """Bring devices of a `passive_scan` to a state and leave them there. Not while a loop runs.
+        """Bring devices of a `passive_scan` to a state and leave them there.
+
+        Do not call this while a loop runs.
 
         Args:
             subs: All devices of the passive scan.
@@ -288,15 +291,15 @@ class MainDevice:
         subs: Sequence[SubDevice] | None = None,
         lost_frames: int = 0,
     ) -> Diagnosis:
-        """Read the error counters and states of all devices, and judge where a fault is.
+        """Read the error counters and states of all devices, and locate faults.
 
-        The fault is in a cable, a device or the power supply. The call takes a few frames. While a
+        A fault is in a cable, a device or the power supply. The call takes a few frames. While a
         loop runs, call it from another thread.
 
         Args:
             since: Earlier diagnosis that starts the count; None: power-up of the devices.
             subs: Devices of a `passive_scan`; None: those of the last `scan`.
-            lost_frames: Number of frames that the caller lost or got back damaged in that time.
+            lost_frames: Number of frames that were lost or damaged in that time.
         """
         chosen = self.subs if subs is None else subs
         return self.master.diagnose(chosen, since=since, lost_frames=lost_frames)
@@ -310,10 +313,10 @@ class MainDevice:
         optional: Collection[int] = (),
         watchdog: float | None = None,
     ) -> Plan:
-        """Return the plan for these requests, from the present mapping of the devices. Print it.
+        """Return a printable plan for these requests, from the current mapping of the devices.
 
-        The devices must be in PRE-OP. Nothing is written. For further options use `read_mappings`,
-        then `catenary.plan.make_plan`.
+        The devices must be in PRE-OP. Nothing is written. For further options, call `read_mappings`
+        and then `catenary.plan.make_plan`.
 
         Args:
             requests: `Drives`, `Inputs`, `Outputs` and other process-data requests.
@@ -340,7 +343,7 @@ class MainDevice:
         )
 
     def read_mappings(self, *requests: ProcessDataRequest, period: float = 1e-3) -> None:
-        """Update the descriptions of the devices: mappings, and requested objects.
+        """Update the mappings and the requested objects in the descriptions of the devices.
 
         Args:
             *requests: Process-data requests.
@@ -396,7 +399,7 @@ class MainDevice:
                     self.deliver_events()
 
     def request(self, procedure: Procedure[T]) -> Pending[T]:
-        """Start a procedure in the acyclic queue of a loop; without a loop, run it to its end."""
+        """Start a procedure in the acyclic queue of a loop. Without a loop, run it to its end."""
         while True:
             runner = self._any_runner
             with contextlib.suppress(LinkLent):
@@ -406,19 +409,20 @@ class MainDevice:
         """Raise RuntimeError while a loop runs on this MainDevice."""
         if self._attached is not None:
             raise RuntimeError(
-                "a loop runs on this MainDevice: leave it first, or close() it (in a notebook, "
-                "before its cell is run again)"
+                "a loop runs on this MainDevice: leave its with block or close() it first (in a "
+                "notebook, before you run its cell again)"
             )
 
     @contextlib.contextmanager
     def attached(self, runner: Runner, leave: Callable[[], object] | None = None) -> Iterator[None]:
-        """While a loop runs, pass procedures to its runner and refuse scans.
+        """Within the block, pass procedures to the runner of a loop and refuse scans.
 
-        Waits for procedures of other threads, because the loop needs the link for itself.
+        Entering waits for the procedures of other threads, because the loop needs exclusive use of
+        the link.
 
         Args:
             runner: Runner of the loop.
-            leave: Ends the loop.
+            leave: Function that ends the loop.
         """
         self.require_no_loop()
         blocking = self.runner
@@ -443,7 +447,7 @@ class MainDevice:
 
     @property
     def runner(self) -> BlockingRunner:
-        """Runner of procedures without a loop. RuntimeError while a loop runs."""
+        """Runner of procedures outside a loop. Raises RuntimeError while a loop runs."""
         if self._blocking is None or self._is_inherited:
             raise self._not_open()
         self.require_no_loop()

@@ -22,7 +22,7 @@ if TYPE_CHECKING:  # plan needs NumPy, a scan does not
 
 
 class MasterOwner(DeviceOwner, Protocol):
-    """MainDevice of a master. `MainDevice` documents the properties."""
+    """Interface of a MainDevice to its master. `MainDevice` documents the properties."""
 
     @property
     def link(self) -> Link: ...
@@ -38,14 +38,15 @@ class MasterOwner(DeviceOwner, Protocol):
 
 
 class Master(Protocol):
-    """Frames of our own (`bus.FrameMaster`), or the kernel master (`igh.KernelMaster`).
+    """Interface to our own frames (`bus.FrameMaster`) or the kernel master (`igh.KernelMaster`).
 
-    `MainDevice` documents the calls. A master without a call raises ConfigurationError.
+    `MainDevice` documents the calls. A call that a master does not support raises
+    ConfigurationError.
     """
 
     @property
     def carrier(self) -> Carrier | None:
-        """Master that exchanges the process images, once configured; None: our own frames."""
+        """Configured master that exchanges the process images; None for our own frames."""
 
     def scan(self) -> tuple[Sequence[SubDevice], tuple[str, ...]]:
         """Return the handles of all devices, in PRE-OP, and notes."""
@@ -74,7 +75,7 @@ class Master(Protocol):
             epoch_ns: System time of the clocks minus link time.
 
         Returns:
-            By position, the delay after the first clock [ns]; empty if it was not measured.
+            By position, the delay after the first clock [ns]; empty if delays were not measured.
         """
 
     def leave(self, timeout: float) -> None:

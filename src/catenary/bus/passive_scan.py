@@ -26,7 +26,7 @@ def passive_scan(
 
     Args:
         runner: Runner of the procedures.
-        ring: Ring link; None: a line.
+        ring: Ring link; None for a line.
         names: True to read the EEPROMs too.
     """
     runner.flush()
@@ -45,7 +45,7 @@ def passive_scan(
 def _visit_from_both_ends(
     runner: BlockingRunner, ring: RingLink, device_count: int
 ) -> tuple[StationRegisters, ...]:
-    """Read registers as `assign_from_both_ends`: after the cut, positions count from there."""
+    """Read the registers from both ends of a ring, as `assign_from_both_ends` does."""
     near = ring.state.first_devices
     with routed(ring, "first"):
         found = runner.run(read_addresses(near))
@@ -60,7 +60,7 @@ def _visit_from_both_ends(
 
 
 def _named(registers: StationRegisters) -> Procedure[DeviceDescription]:
-    """Return the device with its EEPROM content; if that is unreadable, with a note."""
+    """Return the device with the content of its EEPROM, or with a note if it is unreadable."""
     station = Station(registers.position, registers.station_address)
     try:
         reading = within(READ_TIMEOUT, station, read_image(station))

@@ -1,4 +1,4 @@
-"""PdoTable: the process data of a device as it is mapped, to print and to iterate."""
+"""PdoTable: the mapped process data of a device, as a printable sequence."""
 
 from __future__ import annotations
 
@@ -21,16 +21,16 @@ class PdoRow:
     direction: Direction
     pdo: int
     pdo_name: str
-    index: int  # 0: a gap
+    index: int  # 0 for a gap
     subindex: int
-    name: str  # empty: neither the SII nor the dictionary has one
-    type: str  # empty: unknown
+    name: str  # empty if neither the SII nor the dictionary has one
+    type: str  # empty if unknown
     bit_length: int
     bit_offset: int
 
 
 class PdoTable(Sequence[PdoRow]):
-    """The mapped objects of a device, outputs first. `print` shows them as a table."""
+    """Mapped objects of a device, outputs first. `print` shows them as a table."""
 
     def __init__(self, device: DeviceDescription) -> None:
         self._title = f"{device}, mapping from {device.mapping_source}"

@@ -1,4 +1,4 @@
-"""Pending: the future result of a procedure, to be polled inside a loop."""
+"""Pending: the future result of a procedure, for polling inside a loop."""
 
 from __future__ import annotations
 
@@ -54,18 +54,19 @@ class Pending(Generic[T]):
         return self.task.result()
 
     def cancel(self) -> None:
-        """Discard the result. A procedure that has not begun never begins.
+        """Discard the result. A procedure that has not started does not start.
 
-        A transfer under way continues to its end, because a device must not be left within one.
+        A transfer in progress continues to its end, because a device must not be left in the
+        middle of one.
         """
         self._cancelled = not self._finished.is_set()
 
     def wait(self) -> None:
-        """Wait for the end, in another thread than the loop's."""
-        self._finished.wait()  # ended by the procedure's deadlines or by the runner's close()
+        """Wait for the end. Must not be called in the loop's thread."""
+        self._finished.wait()  # bounded by the procedure's deadlines and the runner's close()
 
     def finish(self, error: CatenaryError | None = None) -> None:
-        """Mark the procedure as ended, or end it with an error. For the runner."""
+        """Mark the procedure as ended, or end it with an error. Called by the runner."""
         if error is not None and not self.task.done:
             self.task.cancel()
             self.task.error = error

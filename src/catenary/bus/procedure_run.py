@@ -34,7 +34,7 @@ class Task(Generic[T]):
         self._advance(replies, now_ns)
 
     def cancel(self) -> None:
-        """End the procedure. Its `finally` clauses run, without the network."""
+        """End the procedure. Its `finally` clauses run without network access."""
         if not self.done:
             self.done = True
             self._procedure.close()
@@ -58,4 +58,4 @@ class Task(Generic[T]):
                 self.wake_ns = now_ns + round(step.seconds * 1e9)
             else:
                 self.requests = step
-                self.wake_ns = None if step else now_ns  # nothing to send: due at once
+                self.wake_ns = None if step else now_ns  # nothing to send: resume at once

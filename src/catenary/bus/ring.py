@@ -24,10 +24,10 @@ class HasState(Protocol):
 
 
 class Cuts(NamedTuple):
-    """Cables of a ring that do not carry, and the devices that are unreachable therefore."""
+    """Cables of a ring that carry no frames, and the devices that are unreachable as a result."""
 
     cables: tuple[Ends, ...]
-    island: tuple[int, ...]  # positions
+    island: tuple[int, ...]  # positions of the unreachable devices
 
     def __str__(self) -> str:
         if not self.cables:
@@ -36,10 +36,8 @@ class Cuts(NamedTuple):
         if not self.island:
             return f"the ring is cut between {where}"
         first, last = self.island[0], self.island[-1]
-        who = (
-            f"device {first} is an island" if first == last else f"{first} to {last} are an island"
-        )
-        return f"the ring is cut between {where}: {who}"
+        unreachable = f"device {first} is" if first == last else f"devices {first} to {last} are"
+        return f"the ring is cut between {where}: {unreachable} unreachable"
 
 
 def named(cable: Ends) -> str:
@@ -53,10 +51,10 @@ def named(cable: Ends) -> str:
 
 
 def find_cuts(state: RingState, device_count: int) -> Cuts | None:
-    """Return the cuts of a ring, by the numbers of devices that each end reaches.
+    """Return the cuts of a ring, from the number of devices that each end reaches.
 
-    If the ends reach all devices together, one cable is cut. Otherwise the devices between two
-    cuts are an island.
+    If the two ends together reach all devices, one cable is cut. Otherwise, the devices between two
+    cuts are unreachable.
 
     Args:
         state: State of the ring.
@@ -71,7 +69,7 @@ def find_cuts(state: RingState, device_count: int) -> Cuts | None:
         return None
     first, second = state.first_devices, state.second_devices
     if first + second > device_count:
-        return None  # the counts are from different moments
+        return None  # the counts were taken at different times
     upper = first - 1 if first else None
     lower = device_count - second if second else None
     if first + second == device_count:
@@ -141,21 +139,21 @@ def end_for_clocks(
             return topology.second_end
         cuts = find_cuts(state, device_count)
         raise ClockError(
-            f"clocks: {cuts or 'the ring is cut'}; devices after the cut have no common time with "
-            "those before it",
+            f"clocks: {cuts or 'the ring is cut'}; devices after the cut share no time with those "
+            "before it",
             hint="repair the cable and scan again, or omit dc=",
         )
     if topology.second_end is None or topology.contradictions:
         raise ClockError(
-            "clocks: the ring was cut during the scan, and is closed now",
-            hint="scan again, to find the port of its second end",
+            "clocks: the ring was cut during the scan, but is closed now",
+            hint="scan again to find the port at its second end",
         )
     return topology.second_end
 
 
 @contextmanager
 def routed(ring: RingLink, route: str) -> Iterator[None]:
-    """Send frames on one link only within the block: positions count from there.
+    """Within the block, send frames on one link only. Positions count from its end.
 
     Args:
         ring: Ring link.

@@ -1,8 +1,8 @@
 """Runner of procedures without a loop: all procedures at once, in shared frames.
 
-It works in rounds. All pending requests go out in as few frames as possible; when all frames are
-back or lost, the procedures continue. A lost datagram is only repeated if its procedure marked the
-request as repeatable. Every wait has a deadline on the link's clock.
+It works in rounds. All pending requests are sent in as few frames as possible. When all frames have
+returned or are lost, the procedures continue. A lost datagram is repeated only if its procedure
+marked the request as repeatable. Every wait has a deadline on the link's clock.
 """
 
 from __future__ import annotations
@@ -23,10 +23,10 @@ from catenary.wire.frame import decode_frame, is_alien
 
 T = TypeVar("T")
 
-FRAME_TIMEOUT = 0.05  # [s]; a frame takes microseconds, a busy machine's scheduler much longer
-ATTEMPTS = 4  # of a repeatable request
+FRAME_TIMEOUT = 0.05  # [s]; a frame takes microseconds, scheduling on a busy machine much longer
+ATTEMPTS = 4  # attempts of a repeatable request
 GRID_NS = 50_000  # pauses end on this grid, so that procedures share frames
-WINDOW = 16  # frames under way at once; less than the capacity of any receive ring
+WINDOW = 16  # frames in flight; less than the capacity of any receive ring
 
 
 class Runner(Protocol):
@@ -50,7 +50,7 @@ class FrameCounts:
 
 
 class LinkLent(RuntimeError):
-    """A loop has taken the link meanwhile: use the loop's runner. Nothing was sent."""
+    """Error while a loop has the link. Nothing was sent; use the loop's runner."""
 
 
 class BlockingRunner:
@@ -83,9 +83,9 @@ class BlockingRunner:
         return pending
 
     def run_all(self, procedures: Sequence[Procedure[T]]) -> list[T]:
-        """Run procedures at once, and return their results.
+        """Run procedures at the same time, and return their results.
 
-        If some fail, the others are finished first. Then the first error is raised, with the other
+        If some fail, the others run to their ends. Then the first error is raised, with the other
         errors as notes.
         """
         with self._mine():
@@ -103,7 +103,7 @@ class BlockingRunner:
         return [task.result() for task in tasks]
 
     def lend(self) -> None:
-        """Give the link to a loop: wait for running procedures, and refuse others."""
+        """Give the link to a loop. Wait for running procedures, and refuse new ones."""
         with self._lock:
             self._lent = True
 

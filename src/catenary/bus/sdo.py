@@ -24,19 +24,19 @@ Objects: TypeAlias = dict[tuple[int, int], bytes]  # by index and subindex
 
 
 class Conversations(Protocol):
-    """Interface to run procedures, as a `MainDevice` has it."""
+    """Interface to run procedures; `MainDevice` implements it."""
 
     def converse(self, procedure: Procedure[T]) -> T:
-        """Run a procedure, alone or while a loop runs."""
+        """Run a procedure to its end, with or without a running loop."""
         ...
 
     def request(self, procedure: Procedure[T]) -> Pending[T]:
-        """Start a procedure while a loop runs."""
+        """Start a procedure without waiting for its end."""
         ...
 
 
 class ObjectOwner(Protocol):
-    """The device that an object dictionary belongs to: a `SubDevice`."""
+    """Interface to the device of an object dictionary; `SubDevice` implements it."""
 
     @property
     def main(self) -> Conversations: ...
@@ -66,7 +66,7 @@ class Sdo:
 
     def __init__(self, sub: ObjectOwner) -> None:
         self._sub = sub
-        self.notes: tuple[str, ...] = ()  # gaps of the last `list`
+        self.notes: tuple[str, ...] = ()  # objects missing in the last `list`
 
     @overload
     def read(
@@ -181,7 +181,7 @@ class Sdo:
     ) -> Pending[T] | Pending[bytes]:
         """Read an object without waiting: poll `done`, then call `result()`.
 
-        Arguments as for `read`. Without a loop, the answer is there at once.
+        Arguments as for `read`. Without a loop, the answer is available at once.
         """
         asked = self._upload(index, subindex, complete, limit, timeout)
         if type is None:
@@ -205,9 +205,9 @@ class Sdo:
         type: DataType[T] | None = None,
         complete: bool = False,
     ) -> Pending[None]:
-        """Write an object without waiting: once `done`, `result()` raises the error, if any.
+        """Write an object without waiting: poll `done`, then call `result()`.
 
-        Arguments as for `write`.
+        `result()` raises the error, if any. Arguments as for `write`.
         """
         return self._sub.main.request(self._download(index, subindex, value, type, complete))
 
@@ -247,7 +247,7 @@ class Sdo:
         channel = self._channel(index, subindex, complete)
         data = value if type is None else type.encode(value)  # type: ignore[arg-type]
         if not isinstance(data, bytes):
-            raise TypeError(f"give a type for {value!r}, or bytes: type=catenary.types.UDINT")
+            raise TypeError(f"{value!r} is not bytes: give its type, as type=catenary.types.UDINT")
         return download(channel, index, subindex, data, complete_access=complete)
 
     def _channel(self, index: int = 0, subindex: int = 0, complete: bool = False) -> MailboxChannel:
@@ -259,7 +259,7 @@ class Sdo:
         if self._sub.error is not None:
             raise self._sub.error
         if channel is None or not channel.layout.coe:
-            what = "has no mailbox" if channel is None else "does not speak CoE"
+            what = "has no mailbox" if channel is None else "does not support CoE"
             raise MailboxError(
                 f"{self._sub.station} {what}: cannot access object 0x{index:04X}:{subindex:02X}",
                 hint="couplers and simple terminals have no object dictionary",

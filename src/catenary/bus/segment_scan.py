@@ -24,7 +24,7 @@ from catenary.procedure.stations import StationRegisters
 from catenary.wire.al import AlState
 
 READ_TIMEOUT = 30.0  # [s] for the registers and the SII of one device
-BRING_UP_TIMEOUT = 30.0  # [s] from there to PRE-OP, including the profile
+BRING_UP_TIMEOUT = 30.0  # [s] to bring it to PRE-OP and read its profile
 
 
 class ScannedDevice(NamedTuple):
@@ -36,14 +36,14 @@ class ScannedDevice(NamedTuple):
 
 
 def find(registers: StationRegisters) -> Procedure[ScannedDevice]:
-    """Bring one device to PRE-OP, or return its error: other devices are not affected."""
+    """Bring one device to PRE-OP, or return its error. Other devices are not affected."""
     device = unread(registers)
     station = Station(registers.position, registers.station_address)  # its name is not known yet
     try:
         device = yield from within(READ_TIMEOUT, station, identify(registers))
         station = station_of(device)
         return (yield from within(BRING_UP_TIMEOUT, station, bring_to_pre_op(device)))
-    except (DecodeError, ValueError) as error:  # a decoder does not know the device
+    except (DecodeError, ValueError) as error:  # the device sent invalid data
         return ScannedDevice(device, error=_unreadable(station, error))
     except CatenaryError as error:
         return ScannedDevice(device, error=error)
@@ -57,12 +57,12 @@ def _unreadable(station: Station, error: Exception) -> SegmentError:
 
 
 def station_of(device: DeviceDescription) -> Station:
-    """Return the device as errors name it."""
+    """Return the station of a device, with its name for error messages."""
     return Station(device.position, device.station_address, device.name)
 
 
 def bring_to_pre_op(device: DeviceDescription) -> Procedure[ScannedDevice]:
-    """Open the mailbox, request PRE-OP, read the profile, the mapping and names the SII lacks."""
+    """Open the mailbox, request PRE-OP, and read the profile, the mapping and missing names."""
     station = station_of(device)
     if device.mailbox is None:
         yield from hand_over(station)
@@ -140,5 +140,5 @@ def check_identity(device: DeviceDescription, expected: Identity) -> None:
         position=device.position,
         expected=expected,
         found=device.identity,
-        hint="check the order of the devices on the cable, or correct what is expected",
+        hint="check the order of the devices on the cable, or correct the expected identity",
     )

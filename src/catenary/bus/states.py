@@ -27,8 +27,8 @@ def request_states(
 ) -> dict[int, Outcome]:
     """Bring devices to a state; a failed device does not affect the others.
 
-    For SAFE-OP, a device gets its present mapping, as if all devices took part. OP is requested
-    without process data, which devices with outputs refuse.
+    For SAFE-OP, a device is configured with its current mapping, by a plan for all devices. OP is
+    requested without process data, which devices with outputs refuse.
 
     Args:
         runner: Runner of the procedures.
@@ -70,7 +70,7 @@ def _configure(
 def _run(
     runner: BlockingRunner, procedures: Mapping[int, Procedure[T]]
 ) -> dict[int, T | CatenaryError]:
-    """Run procedures at once; an error is a result."""
+    """Run procedures at the same time. Return an error in place of a result."""
     outcomes = runner.run_all([_attempt(each) for each in procedures.values()])
     return dict(zip(procedures, outcomes, strict=True))
 

@@ -1,4 +1,4 @@
-"""SubDevice: the handle of one device, valid across scans while its identity is the same."""
+"""SubDevice: the handle of one device. It stays valid across scans if the identity is the same."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ if TYPE_CHECKING:  # plan needs NumPy, a scan does not
 
 
 class DeviceOwner(Conversations, Protocol):
-    """The MainDevice of a device, as `SubDevice.main`. `MainDevice` documents the calls."""
+    """Interface of a MainDevice to its devices. `MainDevice` documents the calls."""
 
     @property
     def subs(self) -> Sequence[SubDevice]: ...
@@ -45,15 +45,15 @@ class SubDevice:
     ) -> None:
         self.main = main
         self.description = description
-        self.channel = channel  # None: it has no mailbox
-        self.state: AlState | None = None  # last known; None: unknown
+        self.channel = channel  # None if it has no mailbox
+        self.state: AlState | None = None  # last known state; None if unknown
         self.error: CatenaryError | None = None  # of the last scan, if it did not reach PRE-OP
         self.sync_types: dict[int, bytes] = {}  # 0x1C32:01, 0x1C33:01 before a loop with clocks
         self.sdo = Sdo(self)
 
     @property
     def position(self) -> int:
-        """Place on the cable; 0 is the first device."""
+        """Position on the segment; 0 is the first device."""
         return self.description.position
 
     @property
@@ -83,7 +83,7 @@ class SubDevice:
 
     @property
     def slots(self) -> tuple[int, ...]:
-        """Slots of its CiA 402 axes: the objects of slot k are 0x800·k above those of slot 0."""
+        """Slots of its CiA 402 axes. The objects of slot k are 0x800·k above those of slot 0."""
         return self.description.slots
 
     @property
@@ -93,7 +93,7 @@ class SubDevice:
 
     @property
     def emergencies(self) -> tuple[Emergency, ...]:
-        """Last emergencies that the device sent, oldest first."""
+        """Most recent emergencies of the device, oldest first."""
         received = self.channel.emergencies if self.channel is not None else ()
         return tuple(each.emergency for each in received)
 
@@ -109,19 +109,19 @@ class SubDevice:
         return found
 
     def request_state(self, state: AlState | str) -> DeviceState:
-        """Bring this device to a state, through the states between, and leave it there.
+        """Bring this device to a state, through all intermediate states, and leave it there.
 
-        A device that goes to SAFE-OP gets the mapping that it has. A loop configures its devices
-        itself: do not call this while one runs.
+        For SAFE-OP, the device is configured with its current mapping. Do not call this while a
+        loop runs, because the loop configures its devices itself.
 
         Args:
             state: `State.SAFE_OP`, or its name: "SAFE_OP".
 
         Returns:
-            The state that the device has then.
+            The reached state.
 
         Raises:
-            StateError: The device refuses the state; the error names its reason.
+            StateError: The device refuses the state. The error gives the reason.
             ValueError: The text is not the name of a state.
         """
         target = AlState.from_name(state) if isinstance(state, str) else AlState(state)

@@ -41,15 +41,16 @@ class SubDevices(Sequence[SubDevice]):
             known = ", ".join(f"{sub.alias} ({sub.station})" for sub in self._subs if sub.alias)
             raise SegmentError(
                 f"no device has the alias {alias}",
-                hint=f"aliases here: {known or 'none'}; catenary alias TARGET POSITION VALUE",
+                hint=f"known aliases: {known or 'none'}; to set one, run catenary alias TARGET "
+                "POSITION VALUE",
             )
         return found
 
     def group(self, alias: int) -> tuple[SubDevice, ...]:
         """Return the device with this alias and those after it, up to the next one with an alias.
 
-        That is a tool with its own devices, wherever it is plugged in. Empty if no device has the
-        alias.
+        These can be the devices of a tool, wherever it is plugged in. The tuple is empty if no
+        device has the alias.
 
         Raises:
             SegmentError: Several devices have the alias.
@@ -58,17 +59,17 @@ class SubDevices(Sequence[SubDevice]):
         head = self._with_alias(alias)
         if head is None:
             return ()
-        behind = self._subs[head.position + 1 :]
-        return (head, *takewhile(lambda sub: not sub.alias, behind))
+        following = self._subs[head.position + 1 :]
+        return (head, *takewhile(lambda sub: not sub.alias, following))
 
     def _with_alias(self, alias: int) -> SubDevice | None:
         if not 1 <= alias <= 0xFFFF:
-            raise ValueError(f"alias {alias}: from 1 to 65535; 0 means that a device has none")
+            raise ValueError(f"alias {alias} is not 1 to 65535; 0 means that a device has none")
         heads = [sub for sub in self._subs if sub.alias == alias]
         if len(heads) > 1:
             raise SegmentError(
                 f"devices {_positions(heads)} have the same alias {alias}",
-                hint="give each one its own: catenary alias TARGET POSITION VALUE",
+                hint="give each one its own alias: catenary alias TARGET POSITION VALUE",
             )
         return heads[0] if heads else None
 
@@ -80,14 +81,14 @@ class SubDevices(Sequence[SubDevice]):
             return found[0]
         if found:
             raise SegmentError(
-                f"{len(found)} devices are {name!r}: positions {_positions(found)}",
+                f"{len(found)} devices have the name {name!r}: positions {_positions(found)}",
                 hint="use the position, or give each one an alias and use subs.by_alias(...)",
             )
         known = dict.fromkeys(text for sub in self._subs for text in (sub.name, sub.order) if text)
         near = get_close_matches(name, known, n=3) or list(known)
         raise SegmentError(
             f"no device has the name or the order code {name!r}",
-            hint=f"names here: {', '.join(map(repr, near))}" if near else "no device has a name",
+            hint=f"known names: {', '.join(map(repr, near))}" if near else "no device has a name",
         )
 
     @overload
@@ -108,7 +109,8 @@ class SubDevices(Sequence[SubDevice]):
         except IndexError:
             count = len(self._subs)
             raise IndexError(
-                f"no device {key}: there are {count}" + (f", 0 to {count - 1}" if count else "")
+                f"no device {key}: the segment has {count} devices"
+                + (f", 0 to {count - 1}" if count else "")
             ) from None
 
     def __len__(self) -> int:

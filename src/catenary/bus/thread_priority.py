@@ -13,7 +13,7 @@ def step_behind() -> None:
 
     A thread inherits the scheduling of its creator. In a real-time program that is the loop's
     priority, which would delay cycle starts. The thread stays a real-time thread, because ordinary
-    programs must not preempt it while it holds the interpreter: an inline loop needs that.
+    programs must not preempt it while it holds the GIL, which an inline loop needs.
     """
     policy = os.sched_getscheduler(0) & ~os.SCHED_RESET_ON_FORK
     if policy in (os.SCHED_FIFO, os.SCHED_RR):

@@ -1,4 +1,4 @@
-"""Control blocks for laws and for plain Python, and trajectories (docs/control.md).
+"""Control blocks for laws and for plain Python, and trajectories (docs/how_to/control_blocks.md).
 
 A block has two parts. A value holds its settings (`Cascade(...)`) and provides `.parameters` and
 `.memory` as flat rows of float64. A step function computes one step of one axis from these rows

@@ -128,7 +128,7 @@ def frequency_response(
             segment does not fit at least twice.
 
     Source: H₁ = S_xy / S_xx by Welch's method with Hann windows, the mean of each segment removed;
-    coherence |S_xy|² / (S_xx S_yy). Bendat and Piersol, Random Data, ch. 6 and 9.
+    coherence `|S_xy|² / (S_xx S_yy)`. Bendat and Piersol, Random Data, ch. 6 and 9.
     """
     x, y = (np.asarray(row, dtype=np.float64) for row in (given, measured))
     if x.ndim != 1 or x.shape != y.shape:

@@ -1,6 +1,7 @@
 # cython: boundscheck=False, wraparound=False, cdivision=True
 """Safety of one axis in one cycle: requests, whether it is followed, and how it stops.
-docs/safety.md has the table of reactions and their scenarios; _setpoints.pyx computes the outputs.
+docs/explanation/safety.md has the table of reactions and their scenarios; _setpoints.pyx computes
+the outputs.
 
 Theory of operation. `guard_observe` runs after the inputs of a cycle, the other functions before its
 outputs. `requested_state` is the requested state in force, `mode` the mode of operation in force, `mode_wanted`

@@ -10,6 +10,11 @@ from catenary.core._engine cimport Engine
 
 
 cdef class Cycle:
+    """The cycle of the current actual values.
+
+    It is the same object in every iteration: copy what you want to keep.
+    """
+
     def __init__(self, Engine engine not None):
         self.engine = engine
         self.header = engine.actual_header()
@@ -19,41 +24,58 @@ cdef class Cycle:
 
     @property
     def number(self):
+        """Number of the cycle, 0 for the first of the iteration.
+
+        Skipped cycle starts leave gaps in `time` only.
+        """
         return self.header.number - self.first_number
 
     @property
     def time(self):
+        """Cycle start [s] since that of the first cycle of the iteration, on the link's clock.
+
+        A multiple of the period, unless the cycle starts follow the reference clock. Then it is the
+        elapsed time.
+        """
         return <double>(self.header.time_ns - self.first_ns) * 1e-9
 
     @property
     def ok(self):
+        """True if every required sync unit answered: the inputs are of this cycle."""
         return (self.header.flags & OK) != 0
 
     @property
     def lost(self):
+        """Number of cycles in a row, up to this one, that were not ok."""
         return self.header.lost_in_row
 
     @property
     def late(self):
+        """True if cycles were skipped, or ran without new targets, since the iteration before."""
         return (self.header.flags & (LATE | UNCOMMITTED)) != 0
 
     @property
     def limited(self):
+        """True if a set-point was limited on some axis: see `Drives.limited`."""
         return (self.header.flags & LIMITED_SOME) != 0
 
     @property
     def refused(self):
+        """True if a target was refused: NaN, infinite, or further than the step limit."""
         return (self.header.flags & REFUSED_SOME) != 0
 
     @property
     def dry(self):
+        """True if the stream of set-points was empty: an underrun."""
         return (self.header.flags & DRY) != 0
 
     @property
     def networks(self):
+        """The cycle of each network of the loop; with one network, this one."""
         return (self,)
 
     def spend(self, double seconds):
+        """Let virtual time pass as if the body took this long [s]. On a NIC, compute that long."""
         self.engine.spend(round(seconds * 1e9))
 
     def __repr__(self):

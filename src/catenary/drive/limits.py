@@ -183,7 +183,7 @@ def _given(value: float | None) -> Chosen:
 def _tightest(
     option: float | None, own: float | None, source: str, pick: Callable[[float, float], float]
 ) -> Chosen:
-    """Return the tighter of an option and a limit of the drive. An infinite option is no limit."""
+    """Return the tighter of an option and a limit of the drive. Infinity sets no limit."""
     if option is not None and not math.isfinite(option):
         option = None
     if own is None or (option is not None and pick(option, own) == option):

@@ -156,8 +156,8 @@ cdef class KernelTime:
 
     def send(self, bytes frame not None):
         raise LinkError(
-            "the IgH master sends no frames of others",
-            hint="what needs frames of its own runs on the network interface: MainDevice('eth0')",
+            "the IgH master sends only its own frames",
+            hint="to send frames yourself, use the network interface: MainDevice('eth0')",
         )
 
     def receive(self):
@@ -223,9 +223,9 @@ cdef class Exchange:
     def make_copy(self, plan, copy, image_size, uint32_t place):
         domain_offset, image_offset, size = copy
         if domain_offset < 0 or size <= 0 or domain_offset + size > plan.size:
-            raise ValueError(f"{size} bytes at {domain_offset} leave a domain of {plan.size}")
+            raise ValueError(f"{size} bytes at {domain_offset} exceed a domain of {plan.size}")
         if image_offset < 0 or image_offset + size > image_size:
-            raise ValueError(f"{size} bytes at {image_offset} leave an image of {image_size}")
+            raise ValueError(f"{size} bytes at {image_offset} exceed an image of {image_size}")
         self.c.copies[place].domain_offset = domain_offset
         self.c.copies[place].image_offset = image_offset
         self.c.copies[place].size = size

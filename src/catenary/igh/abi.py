@@ -149,7 +149,7 @@ TYPES: Final = MappingProxyType(
     }
 )
 
-# Call → types, return type first; "r": nothing before 1.6.0, then 0 or -errno.
+# Types of each call, return type first. "r": nothing before 1.6.0, then 0 or -errno.
 CALLS: Final = MappingProxyType(
     {
         "ecrt_version_magic": "u32",

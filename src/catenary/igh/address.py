@@ -23,7 +23,7 @@ class Address(NamedTuple):
 def addresses(aliases: Sequence[int]) -> list[Address]:
     """Return the addresses of all devices, by position.
 
-    An alias that several devices have is not used: the master would take the first of them.
+    A duplicate alias is not used, because the master would take the first device that has it.
     """
     found: list[Address] = []
     head: int | None = None

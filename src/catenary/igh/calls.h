@@ -22,28 +22,28 @@ typedef struct igh_calls {
     uint32_t (*monitor_process)(void *);
 } igh_calls;
 
-static inline int igh_do(const igh_calls *calls, igh_call call, void *who)
+static inline int igh_do(const igh_calls *calls, igh_call call, void *object)
 {
     if (calls->returns)
-        return call.says(who);
-    call.says_nothing(who);
+        return call.says(object);
+    call.says_nothing(object);
     return 0;
 }
 
-static inline void igh_tell(const igh_calls *calls, igh_call_time call, void *who, uint64_t time)
+static inline void igh_tell(const igh_calls *calls, igh_call_time call, void *object, uint64_t time)
 {
     if (calls->returns)
-        call.says(who, time);
+        call.says(object, time);
     else
-        call.says_nothing(who, time);
+        call.says_nothing(object, time);
 }
 
-static inline void igh_state(const igh_calls *calls, igh_call_state call, void *who, void *state)
+static inline void igh_state(const igh_calls *calls, igh_call_state call, void *object, void *state)
 {
     if (calls->returns)
-        call.says(who, state);
+        call.says(object, state);
     else
-        call.says_nothing(who, state);
+        call.says_nothing(object, state);
 }
 
 typedef struct { uint32_t counter, state, redundancy; } igh_domain_state;

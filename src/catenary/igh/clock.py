@@ -51,7 +51,7 @@ class KernelClock:
 
         Args:
             position: The position of the device.
-            register: Its register 0x092C, 4 bytes: difference to the last received reference time.
+            register: Its register 0x092C, 4 bytes: difference from the last reference time.
         """
         found = decode_difference(int.from_bytes(register, "little"))
         mean, _, worst, reads = self._differences[position]

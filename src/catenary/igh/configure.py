@@ -19,8 +19,8 @@ from catenary.plan.planner import Plan
 from catenary.plan.start_up import WATCHDOG_DIVIDER, DevicePlan, Download
 from catenary.procedure.pdo import LEFT_ALONE
 
-EMERGENCIES = 16  # kept by the master for each device
-REQUEST_SIZE = 256  # bytes of an object read by request; longer ones take a blocking call
+EMERGENCIES = 16  # that the master stores for each device
+REQUEST_SIZE = 256  # bytes of an object read by request; a longer one takes a blocking call
 REGISTER_SIZE = 64
 
 Copy = tuple[int, int, int]  # offset in the domain, in the image, bytes
@@ -132,21 +132,22 @@ def _device(
     config = library.ecrt_master_slave_config(
         master.handle, *address, identity.vendor, identity.product
     )
-    who = f"device {plan.position} ({plan.name})"
+    label = f"device {plan.position} ({plan.name})"
     if not config:
-        raise _no_handle(f"{who}: no configuration")
-    _configure_process_data(master, plan, config, who)
+        raise _no_handle(f"{label}: no configuration")
+    _configure_process_data(master, plan, config, label)
     for download in (*plan.before_mapping, *plan.start_up):
         data = ctypes.create_string_buffer(download.data, len(download.data))
-        if download.optional:  # a refused SDO in its own list makes the master give up the device
+        if download.optional:
+            # Not in the master's list: after a refused SDO, the master gives up the device.
             _download_if_there(master, plan.position, download)
             continue
         place = (download.index, download.subindex, ctypes.addressof(data), len(data))
-        what = f"{who}: start-up SDO 0x{download.index:04X}:{download.subindex:02X}"
+        what = f"{label}: start-up SDO 0x{download.index:04X}:{download.subindex:02X}"
         library.ask("ecrt_slave_config_sdo", config, *place, what=what)
-    _configure_clock(master, plan, whole.cycle.clock, config, who)
-    _register(master, plan, domains, config, who)
-    library.ask("ecrt_slave_config_emerg_size", config, EMERGENCIES, what=f"{who}: emergencies")
+    _configure_clock(master, plan, whole.cycle.clock, config, label)
+    _register(master, plan, domains, config, label)
+    library.ask("ecrt_slave_config_emerg_size", config, EMERGENCIES, what=f"{label}: emergencies")
     sdo = 0
     if coe:
         sdo = library.ecrt_slave_config_create_sdo_request(config, 0x1000, 0, REQUEST_SIZE)
@@ -156,7 +157,7 @@ def _device(
 
 
 def _download_if_there(master: Reservation, position: int, download: Download) -> None:
-    """Write an object. Ignore the abort codes of an absent or read-only object."""
+    """Write an object. Ignore the abort codes for absent and read-only objects."""
     try:
         master.download(position, download.index, download.subindex, download.data)
     except SdoAbort as abort:
@@ -164,14 +165,14 @@ def _download_if_there(master: Reservation, position: int, download: Download) -
             raise
 
 
-def _configure_process_data(master: Reservation, plan: DevicePlan, config: int, who: str) -> None:
+def _configure_process_data(master: Reservation, plan: DevicePlan, config: int, label: str) -> None:
     """Configure PDOs and watchdogs. The master writes only values that differ from the device's."""
     mode = abi.WATCHDOG_ENABLE if plan.watchdog_ns else abi.WATCHDOG_DISABLE
     if plan.watchdog_ns:
         master.library.ask(
             "ecrt_slave_config_watchdog",
             *(config, WATCHDOG_DIVIDER, plan.watchdog_count),
-            what=f"{who}: watchdog",
+            what=f"{label}: watchdog",
         )
     syncs = []
     for direction in Direction:
@@ -189,7 +190,7 @@ def _configure_process_data(master: Reservation, plan: DevicePlan, config: int, 
     if syncs:
         records = (abi.SyncInfo * len(syncs))(*syncs)
         at = ctypes.addressof(records)
-        what = f"{who}: its PDOs"
+        what = f"{label}: its PDOs"
         master.library.ask("ecrt_slave_config_pdos", config, len(syncs), at, what=what)
 
 
@@ -201,21 +202,21 @@ def _pdo_info(pdo: Pdo) -> abi.PdoInfo:
 
 
 def _configure_clock(
-    master: Reservation, plan: DevicePlan, clock: ClockPlan | None, config: int, who: str
+    master: Reservation, plan: DevicePlan, clock: ClockPlan | None, config: int, label: str
 ) -> None:
-    """Configure SYNC0. Its shift from the application time lets the frames pass first."""
+    """Configure SYNC0. Its shift from the application time gives the frames time to pass first."""
     if plan.sync is None or clock is None:
         return
     shift_ns = plan.sync.shift_ns + clock.wire_ns + clock.allowance_ns
     sync = (plan.sync.assign_activate, plan.sync.cycle_ns, shift_ns % plan.sync.cycle_ns)
-    what = f"{who}: distributed clocks"
+    what = f"{label}: distributed clocks"
     master.library.ask("ecrt_slave_config_dc", config, *sync, plan.sync.sync1_ns, 0, what=what)
 
 
 def _register(
-    master: Reservation, plan: DevicePlan, domains: Sequence[Domain], config: int, who: str
+    master: Reservation, plan: DevicePlan, domains: Sequence[Domain], config: int, label: str
 ) -> None:
-    """Map each SyncManager into the domain of its sync unit, and record the offsets of the copy."""
+    """Map each SyncManager into the domain of its sync unit, and record what to copy."""
     place = plan.layout
     for direction in Direction:
         output = direction is Direction.OUTPUT
@@ -227,7 +228,7 @@ def _register(
             first = next(rank for rank, pdo in enumerate(assignment.pdos) if pdo.entries)
             bit = ctypes.c_uint32()
             at = (assignment.sync_manager, first, 0, domain.domain, ctypes.byref(bit))
-            what = f"{who}: SyncManager {assignment.sync_manager} into a domain"
+            what = f"{label}: SyncManager {assignment.sync_manager} into a domain"
             call = "ecrt_slave_config_reg_pdo_entry_pos"
             found = master.library.ask(call, config, *at, what=what)
             copies = domain.outputs if output else domain.inputs
@@ -236,4 +237,4 @@ def _register(
 
 
 def _no_handle(what: str) -> MemoryError:
-    return MemoryError(f"{what}: the kernel has no memory for it; see dmesg | tail")
+    return MemoryError(f"{what}: the kernel is out of memory; see dmesg | tail")

@@ -1,7 +1,7 @@
 """Device descriptions from the data of the kernel master, in the form that our own scan returns.
 
-libethercat does not report everything: entries have no names and no types, and SyncManagers have
-no addresses. The master chooses the missing values.
+libethercat does not report everything: entries have no names or types, and SyncManagers have no
+addresses. The master chooses the missing values.
 """
 
 from __future__ import annotations
@@ -104,10 +104,10 @@ def read_if_there(
         subindex: Subindex of the object.
 
     Returns:
-        The data; empty if the device refuses the upload; None if it has no CoE.
+        The data, empty if the device refuses the upload; None if it does not support CoE.
 
     Raises:
-        MailboxError: The device did not answer any attempt.
+        MailboxError: The device did not answer in any attempt.
     """
     for attempt in range(ATTEMPTS):
         try:

@@ -66,8 +66,8 @@ static int igh_emit(void *self)
 }
 
 /* Receive the frames that have arrived. The monitor datagram uses the main interface only. If that
- * interface is lost, the domains of a ring return by the backup interface: then, as without a
- * monitor datagram, the cycle counts as back at once. */
+ * interface is lost, the domains of a ring return on the backup interface. The cycle then counts as
+ * received at once, as it does without a monitor datagram. */
 static void igh_receive(igh_exchange *x)
 {
     if (igh_do(&x->calls, x->calls.receive, x->master) < 0)

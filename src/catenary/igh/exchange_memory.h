@@ -44,11 +44,11 @@ typedef struct igh_exchange {
     uint8_t judged;                   /* misses of this emit have been counted */
     uint8_t waits;                    /* collect waits for answers: threaded execution */
     uint8_t marked;                   /* the monitor datagram was sent last in this emit */
-    uint8_t received;                    /* the monitor datagram is back, so all others are, too */
+    uint8_t received;                 /* the monitor datagram is back, so all others are, too */
     uint8_t back;                     /* received, or sent without a usable monitor datagram */
     uint8_t attended;                 /* the clocks have been processed after this emit */
     uint32_t monitored;               /* content of the monitor datagram: OR of all 0x092C [ns] */
-    uint32_t deaf;                    /* consecutive complete cycles without it */
+    uint32_t deaf;                    /* consecutive complete cycles without the monitor datagram */
     int64_t sent, patience;           /* time of sending; measured round trip [ns] */
 
     int clock;                        /* IGH_NO_CLOCK ... */

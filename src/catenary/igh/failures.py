@@ -19,19 +19,19 @@ class NoMailboxError(MailboxError):
 
 
 def sdo_error(
-    who: str, position: int, index: int, subindex: int, result: int, code: int
+    name: str, position: int, index: int, subindex: int, result: int, code: int
 ) -> CatenaryError:
     """Return the error for a failed SDO transfer.
 
     Args:
-        who: Name of the device in the message.
+        name: Name of the device in the message.
         position: Position of the device.
         index: Index of the object.
         subindex: Subindex of the object.
         result: The result of the call: -errno.
-        code: The abort code of the device; 0 if it sent none.
+        code: The abort code from the device; 0 if there is none.
     """
-    what = f"{who}: SDO 0x{index:04X}:{subindex:02X}"
+    what = f"{name}: SDO 0x{index:04X}:{subindex:02X}"
     if code:
         known = abort_code(code)
         return SdoAbort(
@@ -45,7 +45,7 @@ def sdo_error(
     if -result == errno.EPROTONOSUPPORT:
         return NoMailboxError(f"{what}: the device has no objects", hint="it does not support CoE")
     if -result in (errno.EOVERFLOW, errno.ENOBUFS):
-        return MailboxError(f"{what} is longer than expected", hint="give a larger limit=")
+        return MailboxError(f"{what} is longer than the limit", hint="pass a larger limit=")
     return MailboxError(
         f"{what}: no answer ({os.strerror(-result)})",
         hint="a device without CoE has no objects; otherwise see the kernel log: dmesg | tail",
@@ -66,7 +66,7 @@ def refused(index: int, number: int, library: Library) -> LinkError:
             return LinkError(
                 f"master {index}: the kernel module ec_master is not loaded, {node} does not exist",
                 hint="sudo systemctl start ethercat; if that fails, the module was not built "
-                "for this kernel: docs/igh.md",
+                "for this kernel: docs/how_to/igh.md",
             )
         return LinkError(
             f"master {index}: the module ec_master is loaded, but {node} does not exist",

@@ -120,8 +120,8 @@ static void igh_judge_clocks(igh_exchange *x)
 }
 
 /* Return the correction before any device is in OP. It is fast, because the clocks start at an
- * arbitrary phase and SYNC0 starts by it. It is slow enough for a delay of two cycles and a median
- * of five. */
+ * arbitrary phase, which determines the start of SYNC0. It is slow enough for a delay of two cycles
+ * and a median of five. */
 static int64_t igh_sought(const igh_exchange *x)
 {
     double limit = (double)x->period / IGH_SEEK_SHARE;

@@ -64,10 +64,10 @@ class KernelAccess:
         """Refuse a blocking call while the master is activated and no cycles run.
 
         An activated master sends its requests in the frames of the application. Without cycles,
-        the call would wait for ever.
+        the call would wait forever.
 
         Raises:
-            ConfigurationError: The call would wait for ever.
+            ConfigurationError: The call would wait forever.
         """
         if self.active is not None and not self.cycling:
             raise ConfigurationError(
@@ -79,7 +79,7 @@ class KernelAccess:
         """Check that the handles are still valid.
 
         Raises:
-            LoopError: The loop has ended, and the handles with it.
+            LoopError: The loop has ended, and its handles are invalid.
         """
         if self.configuration_of(device.position) is not device:
             raise LoopError("the loop ended before the device answered", hint="repeat the request")

@@ -1,4 +1,4 @@
-"""Beside: threads for calls that block in the kernel until a device answers.
+"""Threads for calls that block in the kernel until a device answers.
 
 Calls such as `ecrt_master_sdo_upload` block in the kernel, where no signal interrupts them. While
 a loop runs, each device has its own thread for these calls. Other devices and the service of the
@@ -16,7 +16,7 @@ from catenary.procedure.exchange import Procedure, after
 
 T = TypeVar("T")
 
-LOOK = 0.001  # [s] between two checks of a thread
+POLL_INTERVAL = 0.001  # [s] between two checks of a thread
 BLOCKED_TIMEOUT = 30.0  # [s]; while cycles run, the kernel's own timeout for a device is shorter
 END_TIMEOUT = 2.0  # [s] for pending calls when the master is released
 
@@ -48,7 +48,7 @@ class Call(Generic[T]):
         return self._results[0]
 
 
-class Beside:
+class BlockingCalls:
     """Owns the pending calls, at most one for each device."""
 
     def __init__(self, timeout: float = BLOCKED_TIMEOUT) -> None:
@@ -56,7 +56,7 @@ class Beside:
         self._under_way: dict[int, Call[object]] = {}
 
     def run(self, position: int, what: str, call: Callable[[], T]) -> Procedure[T]:
-        """Run `call` in a thread, and wait for it in a conversation.
+        """Run `call` in a thread, and wait for its result without blocking.
 
         Args:
             position: The position of the device.
@@ -69,16 +69,16 @@ class Beside:
         Raises:
             MailboxError: The kernel did not answer within `timeout`. The thread keeps waiting.
         """
-        left = round(self.timeout / LOOK)
+        left = round(self.timeout / POLL_INTERVAL)
         while (before := self._under_way.get(position)) is not None and not before.done:
-            yield after(LOOK)
+            yield after(POLL_INTERVAL)
             left -= 1
             if left < 0:
                 raise self._late(position, what, f"the kernel is still busy with {before.what}")
         mine = Call(call, what)
         self._under_way[position] = mine  # type: ignore[assignment]  # its result is not read
         while not mine.done:
-            yield after(LOOK)
+            yield after(POLL_INTERVAL)
             left -= 1
             if left < 0:
                 raise self._late(position, what, "the kernel has not returned")
@@ -93,5 +93,5 @@ class Beside:
     def _late(self, position: int, what: str, why: str) -> CatenaryError:
         return MailboxError(
             f"device {position}: {what}: no answer within {self.timeout:g} s: {why}",
-            hint="it answers only while cycles run; dmesg | tail shows what it waits for",
+            hint="it answers only while cycles run; dmesg | tail may show the reason",
         )

@@ -28,11 +28,12 @@ from catenary.wire.coe import Emergency
 from catenary.wire.register import AL_STATUS_CODE, SYSTEM_TIME_DIFFERENCE
 
 OP_TIMEOUT = 20.0  # [s]: the master configures one device after the other
-LOOK = 0.005  # [s] between two checks
-CODE_TIMEOUT, CODE_LOOK = 0.5, 0.010  # [s]: timeout and interval of reading an AL status code
+POLL_INTERVAL = 0.005  # [s] between two checks
+CODE_TIMEOUT = 0.5  # [s] to read an AL status code
+CODE_POLL_INTERVAL = 0.010  # [s]
 INVALID_SYNC = 0x0030  # AL status code
 SYNC_TYPE = 0x1C32, 1  # object and subindex
-LINKS = 2  # the main one and the backup
+LINKS = 2  # main and backup interface
 _EMERGENCY = struct.Struct("<HB5s")
 
 
@@ -75,14 +76,14 @@ class KernelCarrier:
         return state
 
     def bring_to_op(self, positions: Sequence[int]) -> Procedure[None]:
-        """Wait until the master has brought the devices to OP. Cycles must run meanwhile.
+        """Wait until the master has brought the devices to OP. Cycles must run during the wait.
 
         Raises:
             StateError: A device did not reach OP.
             IdentityError: Another device is at the position.
         """
         waiting = list(positions)
-        for _ in range(round(OP_TIMEOUT / LOOK)):
+        for _ in range(round(OP_TIMEOUT / POLL_INTERVAL)):
             waiting = [p for p in waiting if not self.state(p).operational]
             if not waiting:
                 return
@@ -90,7 +91,7 @@ class KernelCarrier:
             if refusing:
                 waiting = refusing
                 break
-            yield after(LOOK)
+            yield after(POLL_INTERVAL)
         raise (yield from self._not_in_op(waiting))
 
     def _refuses(self, position: int) -> bool:
@@ -122,7 +123,7 @@ class KernelCarrier:
                 == 0
             ):
                 self._on_emergency(device.position, target.raw)
-        self._look_at_links()
+        self._poll_links()
         yield from self._read_difference()
 
     def _read_difference(self) -> Procedure[None]:
@@ -132,7 +133,7 @@ class KernelCarrier:
         if position is None or self._clock is None or not self.state(position).operational:
             return
         register = SYSTEM_TIME_DIFFERENCE
-        with contextlib.suppress(RegisterError):  # no answer: it is read again in its next turn
+        with contextlib.suppress(RegisterError):  # no answer: the next turn reads it again
             self._clock.note(
                 position, (yield from self._sub(position).read_register(register.address, 4))
             )
@@ -143,7 +144,7 @@ class KernelCarrier:
         return sub
 
     def _on_emergency(self, position: int, message: bytes) -> None:
-        """Publish an emergency (8 bytes) that the master has stored for a device."""
+        """Put an event for an emergency (8 bytes) that the master has stored."""
         sub = self._kernel.subs[position]
         received = Emergency(*_EMERGENCY.unpack(message))
         if isinstance(sub, SubDevice):
@@ -151,7 +152,7 @@ class KernelCarrier:
         now = self._kernel.main.link.now() * 1e-9
         self._kernel.main.events.put(emergency(now, sub, received))
 
-    def _look_at_links(self) -> None:
+    def _poll_links(self) -> None:
         handle = self._kernel.reservation.handle
         for number in range(self._link_count):
             state = abi.MasterState()
@@ -172,7 +173,7 @@ class KernelCarrier:
             self._kernel.main.events.put(kind(now, None, message, (None, end)))
 
     def _status_code(self, position: int) -> Procedure[int]:
-        """Return the AL status code of a device in error; 0: unknown.
+        """Return the AL status code of a device in error; 0 if it is unknown.
 
         The code is in the kernel's log. If this process cannot read the log, read the register of
         the device. The master refuses requests until it has acknowledged the error, and the
@@ -181,7 +182,7 @@ class KernelCarrier:
         try:
             place = self._kernel.place_of(position)
         except SegmentError:
-            return 0  # it was unplugged meanwhile
+            return 0  # the device was unplugged
         code = self._kernel_log.status_code(self._kernel.reservation.index, place)
         if code:
             return code
@@ -192,7 +193,7 @@ class KernelCarrier:
                 data = yield from sub.read_register(AL_STATUS_CODE.address, AL_STATUS_CODE.size)
                 return AL_STATUS_CODE.unpack(data)
             except CatenaryError:
-                yield after(CODE_LOOK)
+                yield after(CODE_POLL_INTERVAL)
         return 0
 
     def _not_in_op(self, waiting: Sequence[int]) -> Procedure[CatenaryError]:
@@ -248,15 +249,15 @@ class KernelCarrier:
         """Return the cause of 0x0030: the SYNC unit and 0x1C32:01 contradict each other."""
         sync = self.configuration.devices[sub.position].sync
         kind = yield from self._sync_type(sub)
-        said = "its 0x1C32:01 could not be read" if kind is None else f"its 0x1C32:01 is {kind}"
+        value = "its 0x1C32:01 could not be read" if kind is None else f"its 0x1C32:01 is {kind}"
         if sync is not None:
             return (
                 f"this loop starts SYNC0 every {sync.cycle_ns / 1e3:g} us with AssignActivate "
-                f"0x{sync.assign_activate:04X}, and {said}: compare AssignActivate and cycle with "
+                f"0x{sync.assign_activate:04X}, and {value}: compare AssignActivate and cycle with "
                 "Dc/OpMode in its ESI file"
             )
         return (
-            f"{said}, and this loop does not start SYNC0. A program that was killed may have left "
+            f"{value}, and this loop does not start SYNC0. A program that was killed may have left "
             "2 or 3 there (SYNC0 or SYNC1). Switch the device off and on, or run ethercat download "
             f"-p {sub.position} -t uint16 0x1C32 1 0 (free run; 1: SyncManager events), and the "
             "same with 0x1C33; or use dc=True"
@@ -268,7 +269,7 @@ class KernelCarrier:
             return None
         asked, deadline = sub.sdo.request(*SYNC_TYPE), self._deadline()
         while not asked.done and self._kernel.main.link.now() < deadline:
-            yield after(CODE_LOOK)
+            yield after(CODE_POLL_INTERVAL)
         if not asked.done:
             return None
         try:

@@ -67,7 +67,7 @@ class KernelMaster:
         found = [describe(self.reservation, position) for position in range(count)]
         if not found:
             raise NoDeviceError(
-                f"{self.reservation.name}: the master finds no device",
+                f"{self.reservation.name}: the master found no device",
                 hint="check cable and power; ethercat slaves lists the devices it finds",
             )
         subs = [self._handle(description) for description in found]
@@ -124,7 +124,7 @@ class KernelMaster:
         """
         if self.carrier is not None:
             raise ConfigurationError(
-                f"{self.reservation.name} is activated already: its configuration cannot change",
+                f"{self.reservation.name} is already activated: its configuration cannot change",
                 hint="leave the running loop, or call main.leave()",
             )
         infos = [self.reservation.slave(sub.position) for sub in self.main.subs]
@@ -176,7 +176,7 @@ class KernelMaster:
         carrier.end()
         what = f"deactivating master {self.reservation.index}"
         self.reservation.ask("ecrt_master_deactivate", what=what)
-        self.reservation.beside.end()
+        self.reservation.blocking_calls.end()
         if any(sub.sync_types for sub in self.main.subs):
             self.reservation.wait_preop(RESTORE_PATIENCE)
         else:
@@ -211,7 +211,7 @@ class KernelMaster:
         """Deactivate the master. Its release leaves the devices in PRE-OP."""
         try:
             self.leave(timeout)
-        except CatenaryError as problem:  # the master must be released nevertheless
+        except CatenaryError as problem:  # the master must be released in any case
             warnings.warn(str(problem), RuntimeWarning, stacklevel=4)
 
     @property
@@ -222,7 +222,7 @@ class KernelMaster:
             RuntimeError: No loop is open.
         """
         if self._kernel.active is None:
-            raise RuntimeError("the master is not activated: with Loop(...) as loop:")
+            raise RuntimeError("the master is not activated: open a loop first")
         return self._kernel.active
 
     # Services that libethercat does not offer
@@ -247,7 +247,7 @@ class KernelMaster:
         self._cannot("request a state of single devices", f"ethercat states {state}")
 
     def _cannot(self, what: str, command: str) -> NoReturn:
-        raise ConfigurationError(f"libethercat cannot {what}", hint=f"its tool does: {command}")
+        raise ConfigurationError(f"libethercat cannot {what}", hint=f"use IgH's tool: {command}")
 
     def _handle(self, description: DeviceDescription) -> SubDevice:
         position = description.position

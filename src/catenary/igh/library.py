@@ -10,7 +10,7 @@ from pathlib import Path
 from catenary.errors import CatenaryError, LinkError
 from catenary.igh import abi
 
-VARIABLE = "CATENARY_LIBETHERCAT"  # path of another library
+VARIABLE = "CATENARY_LIBETHERCAT"  # environment variable with the path of the library
 PLACES = (
     "libethercat.so.1",
     "/usr/local/lib/libethercat.so.1",
@@ -18,7 +18,7 @@ PLACES = (
     "/usr/local/etherlab/lib/libethercat.so.1",
 )
 INSTALL = (
-    "install IgH's EtherCAT master (docs/igh.md), or set the library's path: "
+    "install IgH's EtherCAT master (docs/how_to/igh.md), or set the library's path: "
     f"{VARIABLE}=/opt/etherlab/lib/libethercat.so.1"
 )
 
@@ -26,15 +26,15 @@ INSTALL = (
 class Library:
     """Owns one loaded libethercat. Each call is an attribute: `library.ecrt_master_send(master)`.
 
-    `returns` is True from 1.6.0 on: calls that returned nothing before return 0 or -errno. If it is
-    False, the return values of these calls are never read.
+    `returns` is True from 1.6.0 on. Before, some calls return nothing instead of 0 or -errno, and
+    their return values are never read.
     """
 
     def __init__(self, path: str | os.PathLike[str] | None = None) -> None:
         """Load the library.
 
         Args:
-            path: Path of the library; None: `CATENARY_LIBETHERCAT` or the usual places.
+            path: Path of the library; None for `CATENARY_LIBETHERCAT` or the usual places.
 
         Raises:
             LinkError: No library was found, or its version is not supported.
@@ -108,8 +108,8 @@ class Library:
             known = " and ".join(f"{each >> 8}.{each & 0xFF}" for each in abi.MAGICS)
             raise LinkError(
                 f"{self.path} is libethercat {magic >> 8}.{magic & 0xFF} (version magic "
-                f"0x{magic:04X}); supported are {known}, from 1.5.2 on",
-                hint="its structures may differ: install a supported release",
+                f"0x{magic:04X}), which is not supported; use {known}, from 1.5.2 on",
+                hint="its structures may differ; install a supported release",
             )
         if missing:
             raise LinkError(

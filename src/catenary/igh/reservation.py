@@ -10,7 +10,7 @@ from catenary.errors import CatenaryError, LinkError, SegmentError
 from catenary.igh import abi
 from catenary.igh._ecrt import KernelTime
 from catenary.igh.failures import refused, sdo_error
-from catenary.igh.kernel_calls import Beside
+from catenary.igh.kernel_calls import BlockingCalls
 from catenary.igh.library import Library
 from catenary.link import forget_in_child
 from catenary.model.device import Identity
@@ -19,9 +19,9 @@ from catenary.wire.al import AlState
 SCAN_TIMEOUT = 30.0  # [s]: some devices answer their first SDO after seconds
 EMPTY_TIMEOUT = 3.0  # [s]: a link that has just come up finds its devices within a second
 PREOP_TIMEOUT = 15.0  # [s] without a change, from INIT; the master itself waits 10
-LEAVE_OP_TIMEOUT = 2.0  # [s] without a change, from the last user's OP back
-SETTLE_TIMEOUT = 60.0  # [s] for all devices: the master takes one after the other
-LOOK = 0.010  # [s] between two checks
+LEAVE_OP_TIMEOUT = 2.0  # [s] without a change, if the devices were in OP
+SETTLE_TIMEOUT = 60.0  # [s] for all devices: the master handles one after the other
+POLL_INTERVAL = 0.010  # [s] between two checks
 UPLOAD_LIMIT = 1 << 16  # largest object [bytes]
 
 
@@ -36,7 +36,7 @@ class Reservation:
         self.index = index
         self.time = time
         self.handle = 0
-        self.beside = Beside()
+        self.blocking_calls = BlockingCalls()
         self.reserve()
         forget_in_child(self)
 
@@ -81,11 +81,11 @@ class Reservation:
         """Release the master. It then brings its devices to PRE-OP."""
         handle, self.handle = self.handle, 0
         if handle:
-            self.beside.end()
+            self.blocking_calls.end()
             self.library.ecrt_release_master(handle)
 
     def forget(self) -> None:
-        """Close the copies of device file and process data in a forked child.
+        """Close the copies of the device file and the process data in a forked child.
 
         The kernel releases the master when all copies are closed, so the parent keeps it.
         """
@@ -108,7 +108,7 @@ class Reservation:
         libethercat does not check handles, and a thread may make its call after `close`.
         """
         if not (handle := self.handle):
-            raise RuntimeError("the master is not reserved any more")
+            raise RuntimeError("the master is no longer reserved")
         return handle
 
     # Devices of the master
@@ -130,9 +130,9 @@ class Reservation:
             if waited >= SCAN_TIMEOUT:
                 raise SegmentError(
                     f"master {self.index} is still scanning after {SCAN_TIMEOUT:g} s",
-                    hint="ethercat slaves shows its progress, dmesg what it waits for",
+                    hint="ethercat slaves shows the progress; dmesg may show the reason",
                 )
-            self.wait_until(self.now() + round(LOOK * 1e9), False)
+            self.wait_until(self.now() + round(POLL_INTERVAL * 1e9), False)
         if not info.link_up:
             raise LinkError(
                 f"master {self.index}: its network interface has no link",
@@ -158,11 +158,11 @@ class Reservation:
         return (info.vendor_id, info.product_code) == identity[:2]
 
     def wait_preop(self, patience: float = LEAVE_OP_TIMEOUT) -> None:
-        """Wait until the master has brought its devices to PRE-OP, or no state changes any more.
+        """Wait until the master has brought its devices to PRE-OP, or states stop changing.
 
         Devices in INIT do not answer SDOs. After another application has released the master, its
         devices are still changing to PRE-OP. A device with Ethernet over EtherCAT may stay in OP,
-        where it answers, too. Devices that are lost meanwhile do not count.
+        where it answers, too. Devices that are lost during the wait do not count.
 
         Args:
             patience: Longest time without a state change if no device is in INIT [s].
@@ -179,7 +179,7 @@ class Reservation:
             limit = PREOP_TIMEOUT if AlState.INIT in states else patience
             if self.now() - changed >= limit * 1e9:
                 return
-            self.wait_until(self.now() + round(LOOK * 1e9), False)
+            self.wait_until(self.now() + round(POLL_INTERVAL * 1e9), False)
 
     def _present(self) -> int:
         """Return the present number of devices, even during a scan."""
@@ -209,7 +209,7 @@ class Reservation:
         self.ask(call, position, index, rank, place, ctypes.byref(info), what=what)
         return info
 
-    # Objects; both calls block, without the GIL
+    # Objects. Both calls block, with the GIL released.
 
     def upload(self, position: int, index: int, subindex: int, limit: int = UPLOAD_LIMIT) -> bytes:
         """Read an object.

@@ -26,7 +26,7 @@ from catenary.wire.sdo_information import ObjectDescription
 T = TypeVar("T")
 V = TypeVar("V")
 
-LOOK = 0.001  # [s] between two checks of a request
+POLL_INTERVAL = 0.001  # [s] between two checks of a request
 REQUEST_TIMEOUT = 5.0  # [s]
 EMERGENCIES_KEPT = 32
 
@@ -41,11 +41,11 @@ class SubDevice(bus.SubDevice):
         self.sdo: Sdo = Sdo(self)
         self.kernel = kernel
         self._emergencies: deque[Emergency] = deque(maxlen=EMERGENCIES_KEPT)
-        self._asking = False  # True while the register request is in use
+        self._register_busy = False  # True while the register request is in use
 
     @property
     def emergencies(self) -> tuple[Emergency, ...]:
-        """The last emergencies of the device, oldest first."""
+        """Most recent emergencies of the device, oldest first."""
         return tuple(self._emergencies)
 
     def add_emergency(self, emergency: Emergency) -> None:
@@ -61,7 +61,7 @@ class SubDevice(bus.SubDevice):
         return DeviceState(self.state, bool(info.error_flag), 0, word)
 
     def read_register(self, address: int, size: int) -> Procedure[bytes]:
-        """Read registers while a loop runs. Pass the conversation to `main.request(...)`.
+        """Read registers while a loop runs. Pass the procedure to `main.request(...)`.
 
         Args:
             address: Address of the first byte, 16 bits.
@@ -81,10 +81,10 @@ class SubDevice(bus.SubDevice):
             yield from self._answered(device, f"register 0x{address:04X}")
             return ctypes.string_at(library.ecrt_reg_request_data(request), size)
         finally:
-            self._asking = False
+            self._register_busy = False
 
     def write_register(self, address: int, data: bytes) -> Procedure[None]:
-        """Write registers while a loop runs. Pass the conversation to `main.request(...)`.
+        """Write registers while a loop runs. Pass the procedure to `main.request(...)`.
 
         Args:
             address: Address of the first byte, 16 bits.
@@ -104,7 +104,7 @@ class SubDevice(bus.SubDevice):
             library.ecrt_reg_request_write(request, address, len(data))
             yield from self._answered(device, f"register 0x{address:04X}")
         finally:
-            self._asking = False
+            self._register_busy = False
 
     def _checked(self, address: int, size: int) -> DeviceConfiguration:
         if not 0 <= address <= 0xFFFF or not 1 <= size <= REGISTER_SIZE:
@@ -116,26 +116,26 @@ class SubDevice(bus.SubDevice):
         if device is None or not device.register_request:
             raise ConfigurationError(
                 f"{self.station}: register access needs an activated master",
-                hint="access registers while a loop runs, or use ethercat reg_read "
+                hint="access registers while a loop runs, or run ethercat reg_read "
                 f"-p {self.position} 0x{address:04X} {size}",
             )
         return device
 
     def _exclusively(self) -> Procedure[None]:
-        while self._asking:
-            yield after(LOOK)
-        self._asking = True
+        while self._register_busy:
+            yield after(POLL_INTERVAL)
+        self._register_busy = True
 
     def _answered(self, device: DeviceConfiguration, what: str) -> Procedure[None]:
         state = self.kernel.reservation.library.ecrt_reg_request_state
-        for _ in range(round(REQUEST_TIMEOUT / LOOK)):
+        for _ in range(round(REQUEST_TIMEOUT / POLL_INTERVAL)):
             self.kernel.same_configuration(device)
             found = state(device.register_request)
             if found == abi.REQUEST_SUCCESS:
                 return
             if found == abi.REQUEST_ERROR:
                 break
-            yield after(LOOK)
+            yield after(POLL_INTERVAL)
         raise RegisterError(
             f"{self.station}: {what} was not answered",
             hint="the master refuses requests to a device while it is in an error state",
@@ -166,14 +166,14 @@ class Sdo(bus.Sdo):
     def _cannot(self, what: str, command: str) -> NoReturn:
         raise ConfigurationError(
             f"{self._device.station}: libethercat cannot {what} the objects of a device",
-            hint=f"run ethercat {command} -p {self._device.position}; objects can be read and "
-            "written here",
+            hint=f"run ethercat {command} -p {self._device.position}; `read` and `write` are "
+            "available here",
         )
 
     def _upload(
         self, index: int, subindex: int, complete: bool, limit: int, timeout: float
     ) -> Procedure[bytes]:
-        """Read an object. The deadlines are those of libethercat, not `timeout`."""
+        """Read an object. The deadlines of libethercat apply, not `timeout`."""
         self._check(index, subindex, complete)
         if complete:
             raise ConfigurationError(
@@ -188,13 +188,13 @@ class Sdo(bus.Sdo):
         if device is None or not device.sdo_request or not kernel.cycling:
             return (yield from self._uploaded_blocking(index, subindex, limit))
         while self._busy:
-            yield after(LOOK)
+            yield after(POLL_INTERVAL)
         self._busy = True
         try:
             data = yield from self._requested(device, index, subindex, limit)
         finally:
             self._busy = False
-        if data is None:  # too long or refused: the blocking call reads it or raises the reason
+        if data is None:  # too long or refused: the blocking call reads it or raises the error
             data = yield from self._uploaded_blocking(index, subindex, limit)
         return data
 
@@ -208,12 +208,12 @@ class Sdo(bus.Sdo):
         return (yield from self._blocking(f"SDO 0x{index:04X}:{subindex:02X}", call))
 
     def _blocking(self, what: str, call: Callable[[], V]) -> Procedure[V]:
-        """Make a call that waits in the kernel; in a thread while a loop runs in real time."""
+        """Make a call that waits in the kernel. Use a thread while a loop runs in real time."""
         kernel, position = self._device.kernel, self._device.position
         kernel.refuse_blocking(position)
         if not kernel.cycling or kernel.reservation.time.is_virtual:
             return call()
-        return (yield from kernel.reservation.beside.run(position, what, call))
+        return (yield from kernel.reservation.blocking_calls.run(position, what, call))
 
     def _requested(
         self, device: DeviceConfiguration, index: int, subindex: int, limit: int
@@ -224,7 +224,7 @@ class Sdo(bus.Sdo):
         library.ecrt_sdo_request_index(request, index, subindex)
         library.ecrt_sdo_request_timeout(request, round(REQUEST_TIMEOUT * 1000))
         library.ecrt_sdo_request_read(request)
-        yield after(LOOK)
+        yield after(POLL_INTERVAL)
         if (yield from self._idle(device)) == abi.REQUEST_SUCCESS:
             size = library.ecrt_sdo_request_data_size(request)
             if size <= min(limit, REQUEST_SIZE):
@@ -239,12 +239,12 @@ class Sdo(bus.Sdo):
         """
         kernel = self._device.kernel
         state = kernel.reservation.library.ecrt_sdo_request_state
-        for _ in range(round(2 * REQUEST_TIMEOUT / LOOK)):
+        for _ in range(round(2 * REQUEST_TIMEOUT / POLL_INTERVAL)):
             kernel.same_configuration(device)
             found = int(state(device.sdo_request))
             if found != abi.REQUEST_BUSY:
                 return found
-            yield after(LOOK)
+            yield after(POLL_INTERVAL)
         raise MailboxError(
             f"{self._device.station}: no answer within {2 * REQUEST_TIMEOUT:g} s: the master has "
             "not served the request",
@@ -257,7 +257,7 @@ class Sdo(bus.Sdo):
         self._check(index, subindex, complete)
         data = value if type is None else type.encode(value)  # type: ignore[arg-type]
         if not isinstance(data, bytes):
-            raise TypeError(f"{value!r} needs a type, such as type=catenary.types.UDINT, or bytes")
+            raise TypeError(f"{value!r} is not bytes: give its type, as type=catenary.types.UDINT")
         if complete and subindex:
             raise ConfigurationError(
                 f"{self._device.station}: libethercat starts complete access at subindex 0 only",

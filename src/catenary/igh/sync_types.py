@@ -72,4 +72,4 @@ def _by_hand(position: int, types: Mapping[int, bytes]) -> str:
         f"ethercat download -p {position} -t uint16 0x{index:04X} 1 {value}"
         for index, value in values.items()
     )
-    return f"a loop without clocks will not start; switch the device off and on, or: {commands}"
+    return f"a loop without clocks will not start; switch the device off and on, or run {commands}"

@@ -1,4 +1,4 @@
-"""Plausibility of the delays that a kernel master has measured.
+"""Plausibility check of the delays that a kernel master has measured.
 
 IgH measures them once, in its scan, from the times at which a frame passed each port in both
 directions (`ec_master_calc_dc` in its master/master.c). In a closed ring, the frame does not return
@@ -15,9 +15,8 @@ from catenary.igh.abi import SlaveInfo
 
 DELAY_MAX_NS = 100_000  # from one clock to the next: a hundred devices without clocks between them
 OPEN_RING = (
-    "unplug the cable of the backup interface, `sudo ethercat rescan`, start the loop, plug it in "
-    "again; "
-    "or let Catenary send the frames itself: MainDevice('eth0', 'eth1')"
+    "unplug the cable of the backup interface, run `sudo ethercat rescan`, start the loop, and "
+    "plug the cable in again; or let Catenary send the frames itself: MainDevice('eth0', 'eth1')"
 )
 
 

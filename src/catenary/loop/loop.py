@@ -55,9 +55,10 @@ class Loop:
             for cycle in loop:
                 ...
 
-    Requests on several MainDevices run as several networks in one schedule (docs/networks.md). Such
-    a loop is threaded, with a thread for each network. `cycle.networks[i]` and `loop.networks[i]`
-    belong to one network; the properties of the loop itself are those of the first.
+    Requests on several MainDevices run as several networks in one schedule
+    (docs/how_to/networks.md). Such a loop is threaded, with a thread for each network.
+    `cycle.networks[i]` and `loop.networks[i]` belong to one network; the properties of the loop
+    itself are those of the first.
 
     Args:
         requests: `Drives`, `Inputs`, `Outputs` and other process-data requests.
@@ -77,7 +78,7 @@ class Loop:
         stop: Limits that stop axes or end the loop.
         scheduling: Waiting for time and frames.
         clocks: Synchronisation of the distributed clocks.
-        log_axes: True to log the values of every axis too (docs/recording.md).
+        log_axes: True to log the values of every axis too (docs/how_to/recording.md).
 
     Raises:
         ValueError: An option is impossible, or a request names devices of several MainDevices.

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
 
 class Machine:
-    """Owner of the MainDevice, the drives and the process data of a machine (docs/machine.md).
+    """Owner of the MainDevice, drives and I/O of a machine file (docs/reference/machine_file.md).
 
         with cat.Machine("machine.toml") as machine:
             arm = machine.drives["arm"]
@@ -156,7 +156,7 @@ class Machine:
             raise self._file.error(
                 (),
                 "no drives and no process data",
-                hint="add a [drives.NAME] table: docs/machine.md",
+                hint="add a [drives.NAME] table: docs/reference/machine_file.md",
             )
         reference = self._file.tables.clocks.reference
         options = loop_options(self._file, None if reference is UNSET else self.subs[reference])

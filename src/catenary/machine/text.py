@@ -19,7 +19,8 @@ ENCODER = (0x608F, 1), (0x608F, 2)  # encoder counts, motor turns
 _HEAD = """\
 # Written by `catenary init`. To compare this file with the segment, run `catenary check FILE`.
 # A number is in SI units (rad, s, N·m). Text has a unit: "170 deg", "500 us", "90 rpm".
-# Complete the lines marked {mark} and remove the "#" before them. docs/machine.md lists all keys.
+# Complete the lines marked {mark} and remove the "#" before them.
+# All keys: docs/reference/machine_file.md
 format = "{format}"
 name = "machine"
 target = {target}                      # cat.Machine(..., target="virtual:FILE.toml") overrides it

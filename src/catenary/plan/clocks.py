@@ -34,8 +34,8 @@ HOP_NS = 1000  # through a device and its cable: 0.3 µs by E-bus, up to 1 µs b
 # wake-up. Inline and with a law: also for the calculation, which precedes the frames.
 ALLOWANCE: dict[ExecutionMode, float] = {"threaded": 0.2, "inline": 0.5}
 
-# Phase controller (docs/clocks.md): a critically damped loop with this time constant. It begins
-# faster and slows down. Its change of the period is limited.
+# Phase controller (docs/how_to/clocks.md): a critically damped loop with this time constant. It
+# begins faster and slows down. Its change of the period is limited.
 TIME_CONSTANT = 0.1  # [s]
 CYCLES_MIN = 16  # least cycles of a time constant: the response takes one or two cycles
 RATE_LIMIT = 1e-3  # of the period: the interpolation of a servo is not affected

@@ -169,7 +169,8 @@ class AxisPlan:
     torque_demand: Number | None = None  # 0x6074
     velocity_offset: Number | None = None  # 0x60B1, where the application writes it as a column
     limits: AxisLimits = AxisLimits()
-    # Shape of fallback and return, never of the application's set-points (docs/safety.md)
+    # Shape of fallback and return, never of the application's set-points:
+    # docs/explanation/safety.md
     acceleration: float = 25.0  # [rad/s²] on return to the set-points
     deceleration: float = 25.0  # [rad/s²] to standstill, and before a position limit in CSV
     linear: bool = False  # m, m/s and N instead
@@ -181,7 +182,7 @@ class AxisPlan:
 
 @dataclass(frozen=True, slots=True)
 class ClockPlan:
-    """Synchronisation of the cycle and the distributed clocks (plan/clocks.py, docs/clocks.md).
+    """Synchronisation of the cycle and the distributed clocks (docs/how_to/clocks.md).
 
     `follow`: "reference": the cycle starts follow the reference clock; "main": the reference clock
     follows the link's clock.

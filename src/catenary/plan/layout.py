@@ -1,8 +1,8 @@
 """Places of the process data: images, logical addresses, FMMUs, sync units. ETG.1000.4 §6.6.
 
 - A unit is the content of one datagram (LRW; or LRD and LWR if a device has no LRW). A device is
-  never split over units or datagrams (docs/deviations.md): after the loss of one of two frames, its
-  data would be of different cycles.
+  never split over units or datagrams (docs/reference/deviations.md): after the loss of one of two
+  frames, its data would be of different cycles.
 - An optional device is a separate unit, so its loss does not affect others. Devices with the same
   divider share units; the units of a divider take turns, so that a cycle carries as little as
   possible.

@@ -1,4 +1,4 @@
-"""Reasons for which the core stops an axis, with the text that users read (docs/safety.md)."""
+"""Reasons for which the core stops an axis, with their text (docs/explanation/safety.md)."""
 
 from __future__ import annotations
 

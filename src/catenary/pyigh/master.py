@@ -58,7 +58,7 @@ class Steps(Protocol):
 
 
 class MasterBase:
-    """Owns a master whose cycle a program runs call by call.
+    """Owns a master for a program that runs a cycle call by call.
 
     Use it as a context manager, or call `close`.
 
@@ -112,7 +112,7 @@ class MasterBase:
         self._before_operation()
         if not 0 <= slave.position < len(self.main.subs):
             raise ConfigurationError(
-                f"there is no slave {slave.position}: the master has {len(self.main.subs)}",
+                f"there is no slave {slave.position}: the master has {len(self.main.subs)} slaves",
                 hint="correct the position, or scan again",
             )
         slave.adopt(self.main.subs[slave.position].description)
@@ -126,7 +126,9 @@ class MasterBase:
         """
         self._before_operation()
         if not self.slaves:
-            raise ConfigurationError("no slaves", hint="call ecat_init_slave(...) first")
+            raise ConfigurationError(
+                "no slave has been added", hint="call ecat_init_slave(...) first"
+            )
         self._planned = True
 
     def ecat_activate_master(self) -> None:
@@ -137,7 +139,7 @@ class MasterBase:
         """
         self._before_operation()
         if not self._planned:
-            raise RuntimeError("call ecat_activate_domain() first")
+            raise RuntimeError("the domain is not active: call ecat_activate_domain() first")
         master = self.main.master
         if isinstance(master, igh.KernelMaster):
             self._steps = KernelSteps(self.main, master, self._request, self.slaves, self.period)
@@ -197,6 +199,6 @@ class MasterBase:
     def _before_operation(self) -> None:
         if self._steps is not None:
             raise ConfigurationError(
-                "the master is active: nothing can be configured any more",
-                hint="close it, then create a new one",
+                "the master is active and can no longer be configured",
+                hint="close it and create a new one",
             )

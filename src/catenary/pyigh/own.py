@@ -1,4 +1,4 @@
-"""The steps of a cycle over Catenary's own MainDevice, by an inline loop."""
+"""The steps of a cycle over Catenary's own MainDevice, in an inline loop."""
 
 from __future__ import annotations
 
@@ -26,10 +26,10 @@ class ArrayCell(NamedTuple):
 
 
 class OwnSteps:
-    """Owns the loop.
+    """Owns the inline loop of a program.
 
-    `receive` sends the outputs, waits for the cycle start and reads the inputs: the cycle of the
-    loop starts where the cycle of the program ends.
+    `receive` sends the outputs, waits for the cycle start and reads the inputs. A cycle of the loop
+    therefore starts where a cycle of the program ends.
     """
 
     def __init__(self, request: ProcessDataRequest, slaves: list[SlaveBase], period: float) -> None:

@@ -76,8 +76,8 @@ class SlaveBase:
             ConfigurationError: Vendor or product differ from the expected ones.
         """
         found = description.identity
-        for wanted, there in ((self.vendor, found.vendor), (self.product, found.product)):
-            if wanted is not None and wanted != there:
+        for expected, actual in ((self.vendor, found.vendor), (self.product, found.product)):
+            if expected is not None and expected != actual:
                 raise ConfigurationError(
                     f"{description}: vendor and product {found.vendor:#x}, {found.product:#x} are "
                     f"not the expected {self.vendor}, {self.product}",
@@ -89,7 +89,7 @@ class SlaveBase:
         self._cells = cells
 
     def read(self, index: int, subindex: int = 0) -> int:
-        """Return a mapped object as of the last `ecat_domain_process`.
+        """Return the value of a mapped object at the last `ecat_domain_process`.
 
         Args:
             index: Index of the object.
@@ -192,7 +192,7 @@ class SlaveServo(SlaveBase):
             DriveError: The axis is in fault, or in its fault reaction.
         """
         if self.state in (AxisState.FAULT, AxisState.FAULT_REACTION_ACTIVE):
-            raise DriveError(f"slave {self.position}: in fault", hint="read its object 0x603F")
+            raise DriveError(f"slave {self.position} is in fault", hint="read its object 0x603F")
 
     def set_position(self, counts: int) -> None:
         self.write(Object.TARGET_POSITION, counts)
@@ -215,7 +215,7 @@ class SlaveServo(SlaveBase):
         return self.read(Object.TORQUE_ACTUAL)
 
     def set_mode(self, mode: int) -> None:
-        """Set the mode of operation (0x6060): 8 CSP, 9 CSV, 10 CST. `enable` then writes it."""
+        """Set the mode of operation (0x6060): 8 CSP, 9 CSV, 10 CST. `enable` keeps writing it."""
         self._mode = Mode(mode)
         self.write(Object.MODE_OF_OPERATION, mode)
 
@@ -267,7 +267,7 @@ class SlaveIO(SlaveBase):
 
     def adopt(self, description: DeviceDescription) -> None:
         super().adopt(description)
-        # Objects are identified by index and subindex: one mapped twice is a single channel.
+        # Index and subindex identify an object. An object that is mapped twice is one channel.
         objects: dict[tuple[Direction, int, int], RawObject] = {}
         for direction in Direction:
             for entry in mapped_entries(description.assignments(direction)):
@@ -301,7 +301,8 @@ class SlaveIO(SlaveBase):
         if not 0 <= channel < len(mine):
             kind = "digital" if digital else "analogue"
             raise ValueError(
-                f"{kind} channel {channel} does not exist: slave {self.position} has {len(mine)}"
+                f"{kind} channel {channel} does not exist: slave {self.position} has {len(mine)} "
+                "such channels"
             )
         return mine[channel]
 

@@ -1,4 +1,4 @@
-"""The public MainDevice: takes the name of a segment, or a link source."""
+"""The public MainDevice, which accepts the name of a segment or a link source."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ class MainDevice(bus.MainDevice):
     """MainDevice of one segment: `MainDevice("eth0")`, `MainDevice("virtual")`.
 
     Further forms: `MainDevice(Segment([...]))`; `MainDevice("eth0", "eth1")` for a ring between
-    two ports; `MainDevice("igh:0")` for the IgH kernel master (docs/igh.md).
+    two ports; `MainDevice("igh:0")` for the IgH kernel master (docs/how_to/igh.md).
 
         with cat.MainDevice("eth0") as main:
             for sub in main.scan():
@@ -22,8 +22,8 @@ class MainDevice(bus.MainDevice):
     Args:
         target: Name of a segment, or a link source.
         second: Second port of a ring.
-        force: Open an interface even if another master is live on it (docs/networks.md). It has no
-            effect on the kernel master.
+        force: Open an interface even if another master is live on it (docs/how_to/networks.md).
+            It has no effect on the kernel master.
     """
 
     def __init__(
@@ -47,5 +47,5 @@ def source_of(target: str | LinkSource) -> LinkSource:
     if isinstance(target, str):
         return parse(target)
     if isinstance(target, type) or not hasattr(target, "open_link"):
-        raise TypeError(f'a target is a name such as "eth0", or a Segment; not {target!r}')
+        raise TypeError(f'{target!r} is not a target: pass a name such as "eth0", or a Segment')
     return target

@@ -21,7 +21,9 @@ IGH = "igh"
 
 
 def parse(target: str) -> LinkSource:
-    """Return the link source of a name; nothing is opened. Each call makes a new virtual segment.
+    """Return the link source of a name, without opening it.
+
+    Each call creates a new virtual segment.
 
     Raises:
         ConfigurationError: The name is invalid.
@@ -37,7 +39,7 @@ def parse(target: str) -> LinkSource:
     if not kind or colon or any(letter.isspace() or letter == "/" for letter in kind):
         raise ConfigurationError(
             f"invalid target {target!r}",
-            hint="give a network interface (eth0), two (eth0,eth1), virtual, virtual:FILE.toml, "
+            hint="use a network interface (eth0), two (eth0,eth1), virtual, virtual:FILE.toml, "
             "virtual-realtime, igh:0, or a machine file (machine.toml)",
         )
     return Interface(kind)
@@ -48,7 +50,7 @@ def _kernel_master(target: str, rest: str) -> LinkSource:
 
     if not rest.isdecimal():
         raise ConfigurationError(
-            f"{target!r}: a master of the IgH kernel module has a number", hint="give igh:0"
+            f"invalid target {target!r}: the number of the IgH master is missing", hint="use igh:0"
         )
     return Master(int(rest))
 
@@ -57,13 +59,13 @@ def _ring(target: str) -> LinkSource:
     names = target.split(",")
     if len(names) != 2 or names[0].strip() == names[1].strip():
         raise ConfigurationError(
-            f"{target!r} is not a ring", hint="give two different network interfaces: eth0,eth1"
+            f"{target!r} is not a ring", hint="use two different network interfaces: eth0,eth1"
         )
     first, second = (parse(name) for name in names)
     if not isinstance(first, Interface) or not isinstance(second, Interface):
         raise ConfigurationError(
-            f"{target!r}: a ring is made of two network interfaces",
-            hint="a virtual ring is made in Python: MainDevice(segment.first, segment.second)",
+            f"{target!r}: a ring needs two network interfaces",
+            hint="create a virtual ring in Python: MainDevice(segment.first, segment.second)",
         )
     return Ring(first, second)
 
@@ -84,7 +86,7 @@ def named_target(target: str) -> str:
 
 
 def _virtual(path: str, *, realtime: bool) -> LinkSource:
-    from catenary.virtual import demo_segment, read_segment  # a NIC needs none of it
+    from catenary.virtual import demo_segment, read_segment  # not needed for a NIC
 
     clock: Literal["virtual", "monotonic"] = "monotonic" if realtime else "virtual"
     segment = read_segment(path, clock=clock) if path else demo_segment(clock=clock)
@@ -92,7 +94,7 @@ def _virtual(path: str, *, realtime: bool) -> LinkSource:
 
 
 def segment_of(source: LinkSource) -> Segment | None:
-    """Return the virtual segment that a source leads into; None if it is not virtual."""
+    """Return the virtual segment that a source opens; None if it is not virtual."""
     from catenary.virtual.segment import Segment, SegmentEnd
 
     end = source.first if isinstance(source, Ring) else source

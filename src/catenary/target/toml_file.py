@@ -1,4 +1,4 @@
-"""Reading of TOML files, with errors that name file and line."""
+"""Reading of TOML files, with errors that name the file and the line."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from pathlib import Path
 
 from catenary.errors import MachineFileError
 
-VIRTUAL = ("virtual", "virtual-realtime")  # targets with the file of a segment
+VIRTUAL = ("virtual", "virtual-realtime")  # targets that may name the file of a segment
 _PLACE = re.compile(r"\s*\(at (?:line (\d+), column (\d+)|end of document)\)")
 
 
@@ -23,7 +23,7 @@ class TomlFile:
 
 
 def read_toml(path: str | Path) -> TomlFile:
-    """Read a file.
+    """Read a TOML file.
 
     Raises:
         MachineFileError: It cannot be opened, is not UTF-8, or is not TOML.
@@ -32,7 +32,7 @@ def read_toml(path: str | Path) -> TomlFile:
     try:
         text = where.read_bytes().decode("utf-8-sig")
     except OSError as error:
-        hint = "write one: catenary init TARGET -o machine.toml"
+        hint = "create a file: catenary init TARGET -o machine.toml"
         raise _unreadable(where, error.strerror or str(error), hint=hint) from error
     except UnicodeDecodeError as error:
         line = error.object.count(b"\n", 0, error.start) + 1
@@ -45,13 +45,13 @@ def read_toml(path: str | Path) -> TomlFile:
         message, line = _parts(str(error), text)
         raise _unreadable(where, f"not TOML: {message}", line, hint=_hint(text, line)) from error
     except RecursionError as error:
-        raise _unreadable(where, "not TOML that can be read: nested too deeply") from error
+        raise _unreadable(where, "the TOML is nested too deeply") from error
 
 
 def target_of(file: TomlFile) -> str:
     """Return the `target` that a machine file names.
 
-    A virtual segment's file counts from the folder of the machine file.
+    The path of a virtual segment's file is relative to the folder of the machine file.
 
     Raises:
         MachineFileError: The file has no target, or an invalid one.
@@ -86,7 +86,7 @@ def _unreadable(
 
 
 def _parts(message: str, text: str) -> tuple[str, int]:
-    """Return the message of `tomllib` without the place, and the line."""
+    """Return the message of `tomllib` without the position, and the line."""
     found = _PLACE.search(message)
     line = int(found[1]) if found is not None and found[1] else text.count("\n") + 1
     return _PLACE.sub("", message), line

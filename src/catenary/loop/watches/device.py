@@ -2,8 +2,8 @@
 
 The watch is one endless procedure in the acyclic queue. While the cycle finds all devices in OP, it
 only reads a flag of the core. Otherwise it queries all devices, reports changes as events, and
-brings optional devices back to OP. The failure of a required device ends the loop (docs/safety.md);
-the watch only reports it.
+brings optional devices back to OP. The failure of a required device ends the loop; the watch only
+reports it (docs/explanation/safety.md).
 """
 
 from __future__ import annotations
