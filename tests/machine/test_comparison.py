@@ -60,19 +60,19 @@ def test_two_devices_that_are_swapped() -> None:
     assert 'identity of "2-C"; check' in found[1].cause
 
 
-def test_one_device_more_on_the_cable() -> None:
+def test_one_more_device_on_the_cable() -> None:
     found = compare([at(0, A), at(1, B), at(2, C)], subs(A, D, B, C))
     assert verdicts(found) == ["same", "different", "different", "unknown"]
     assert found[1].cause.startswith("the cable has 1 more device before it")
 
 
-def test_one_device_fewer_on_the_cable() -> None:
+def test_one_fewer_device_on_the_cable() -> None:
     found = compare([at(0, A), at(1, B), at(2, C), at(3, D)], subs(A, C, D))
     assert verdicts(found) == ["same", "different", "different", "missing"]
     assert found[1].cause.startswith("the cable has 1 fewer device before it")
 
 
-def test_a_device_of_a_kind_that_nobody_expects() -> None:
+def test_a_device_of_an_unexpected_kind() -> None:
     found = compare([at(0, A), at(1, B)], subs(A, D))
     assert "check the order of the devices" in found[1].cause
 

@@ -1,4 +1,4 @@
-"""Hand-written files with the mistakes that users make: each error names file, line and key."""
+"""Files with common mistakes: each error names file, line and key."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from tests.machine.files import SMALL, write_small
 
 
 def line_of(text: str, part: str) -> int:
-    """Return the line of a text on which a part stands."""
+    """Return the line number of a part of a text."""
     return text[: text.index(part)].count("\n") + 1
 
 
-# what the user wrote: old text, new text, key and message of the error. It names the new text's
-# line, unless there is a fifth part: a text on that line.
+# Edits of a valid file: old text, new text, key and message of the error. The error names the line
+# of the new text, or that of the fifth text if there is one.
 MISTAKES: dict[str, tuple[str, ...]] = {
     "unknown key at the top": (
         'target = "',
@@ -438,7 +438,7 @@ def test_there_are_at_least_30_mistakes() -> None:
     assert len(MISTAKES) >= 30
 
 
-def test_a_file_that_is_not_there_is_named(tmp_path: Path) -> None:
+def test_a_missing_file_is_named(tmp_path: Path) -> None:
     with pytest.raises(MachineFileError, match=r"nothing\.toml: No such file") as caught:
         read_machine(tmp_path / "nothing.toml")
     assert "catenary init" in caught.value.hint
@@ -456,7 +456,7 @@ def test_text_that_is_not_utf_8_names_the_line(tmp_path: Path) -> None:
         read_machine(path)
 
 
-def test_a_mark_at_the_beginning_is_skipped(tmp_path: Path) -> None:
+def test_a_byte_order_mark_is_skipped(tmp_path: Path) -> None:
     """Windows editors write a byte order mark."""
     path = tmp_path / "machine.toml"
     path.write_bytes(b'\xef\xbb\xbfformat = "catenary-machine/1"\r\n')
@@ -473,7 +473,7 @@ def test_an_empty_file_misses_its_format(tmp_path: Path) -> None:
 def test_deep_nesting_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "machine.toml"
     path.write_text("format = " + "[" * 100_000)
-    with pytest.raises(MachineFileError, match="not TOML"):
+    with pytest.raises(MachineFileError, match="nested too deeply"):
         read_machine(path)
 
 
@@ -485,7 +485,7 @@ def test_deep_nesting_is_refused(tmp_path: Path) -> None:
         ("virtual:nothing.toml", r"nothing\.toml: No such file"),
     ],
 )
-def test_a_target_that_cannot_be_has_its_line(target: str, message: str, tmp_path: Path) -> None:
+def test_an_invalid_target_has_its_line(target: str, message: str, tmp_path: Path) -> None:
     path = write_small(tmp_path, SMALL.replace("virtual:line.toml", target))
     with pytest.raises(MachineFileError, match=rf"machine\.toml:2: target: .*{message}"):
         Machine(path)
