@@ -105,19 +105,19 @@ def sources() -> dict[str, str]:
     return {str(path.relative_to(ROOT / "src")): path.read_text() for path in files}
 
 
-def test_every_package_has_its_layer():
+def test_every_package_has_a_layer():
     packages = {path.parent.name for path in (ROOT / "src/catenary").glob("*/__init__.py")}
     modules = {path.stem for path in (ROOT / "src/catenary").glob("*.py")} - {"__init__"}
     assert packages | modules <= set(LAYERS.level)
 
 
-def test_no_file_imports_against_the_layers():
+def test_no_file_violates_the_layers():
     files = sources()
     assert {Path(path).suffix for path in files} >= {".py", ".pyi", ".pyx", ".pxd"}
     assert [line for path, text in files.items() for line in objections(path, text, LAYERS)] == []
 
 
-def test_the_core_imports_nothing_of_catenary():
+def test_the_core_does_not_import_catenary():
     foreign = [
         (path, imported)
         for path, text in sources().items()
@@ -128,7 +128,7 @@ def test_the_core_imports_nothing_of_catenary():
     assert foreign == []
 
 
-def test_native_headers_include_one_another_and_the_system_alone():
+def test_native_headers_include_only_each_other_and_the_system():
     headers = {path.name: path.read_text() for path in (ROOT / "src/catenary/native").glob("*.h")}
     included = {
         name for text in headers.values() for name in re.findall(r'#include "([^"]+)"', text)
@@ -154,7 +154,7 @@ def test_native_headers_include_one_another_and_the_system_alone():
         ("catenary/drive/_x.pyx", 'cdef extern from "../core/engine.h":'),
     ],
 )
-def test_objects_to(path, text):
+def test_a_forbidden_import_is_found(path, text):
     assert objections(path, text, LAYERS)
 
 
@@ -170,5 +170,5 @@ def test_objects_to(path, text):
         ("catenary/__init__.py", "from catenary.loop import Loop"),
     ],
 )
-def test_allows(path, text):
+def test_an_allowed_import_is_accepted(path, text):
     assert objections(path, text, LAYERS) == []

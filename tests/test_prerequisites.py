@@ -30,7 +30,7 @@ def missing(path: str, python: str, *kind: str) -> str:
     return done.stdout
 
 
-def test_nothing_is_said_where_all_is_there():
+def test_no_output_if_all_packages_are_installed():
     assert missing("/usr/sbin:/usr/bin:/sbin:/bin", sys.executable) == ""
 
 
@@ -49,7 +49,7 @@ def test_a_missing_python_is_three_packages(bare_path):
     assert "apt-get install python3 python3-venv python3-dev gcc" in line
 
 
-def test_an_old_python_is_named_with_the_way_out(bare_path):
+def test_an_old_python_is_named_with_the_solution(bare_path):
     old = bare_path / "python3"
     old.write_text('#!/bin/sh\n[ "$1" = -V ] && echo "Python 3.9.2" && exit\nexit 1\n')
     old.chmod(0o755)

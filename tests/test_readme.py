@@ -17,7 +17,7 @@ def test_the_example_is_the_one_in_the_repository() -> None:
 
 
 @pytest.mark.parametrize("link", sorted(set(re.findall(r"\]\(([^)#]+)\)", README))))
-def test_what_the_readme_points_at_exists(link: str) -> None:
+def test_the_links_of_the_readme_exist(link: str) -> None:
     assert link.startswith("https://") or (ROOT / link).exists()
 
 

@@ -29,8 +29,8 @@ def test_limits_are_printed_with_the_measured_values() -> None:
     name = "tail: catenary-inline-readers / catenary-inline-bystanders"
     told = as_aims([Reading(3, 472, read=1.5, copy=0.25)], {name: 1.02, "x / y": 3.0})
     assert told.splitlines() == [
-        "  read 472 bytes (3 axes): 1.50 us, the copy alone 0.25 us: difference 1.25 us, limit 1 us: "
-        "NOT REACHED",
+        "  read 472 bytes (3 axes): 1.50 us, the copy alone 0.25 us: difference 1.25 us, "
+        "limit 1 us: NOT REACHED",
         f"  {name}: 1.020, limit 1.05: reached",
     ]
 

@@ -13,7 +13,7 @@ from catenary.virtual import Coupler, Segment, Servo
 
 
 @pytest.mark.parametrize("ask", [cat.MainDevice.scan, cat.MainDevice.passive_scan])
-def test_two_ports_that_are_swapped_are_told(ask: Callable[[cat.MainDevice], object]) -> None:
+def test_swapped_ports_are_an_error(ask: Callable[[cat.MainDevice], object]) -> None:
     """Frames then pass all devices unprocessed from the first port, and positions mean nobody."""
     segment = Segment([Coupler(), Servo()], ring=True)
     with (

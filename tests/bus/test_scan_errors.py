@@ -25,7 +25,7 @@ def segment() -> cat.Segment:
     return segment
 
 
-def test_strict_it_is_raised_and_the_others_are_there(segment: cat.Segment) -> None:
+def test_a_strict_scan_raises_the_error_and_keeps_all_handles(segment: cat.Segment) -> None:
     with cat.MainDevice(segment) as main:
         with pytest.raises(StateError, match="device 1") as caught:
             main.scan()
@@ -39,7 +39,7 @@ def test_strict_it_is_raised_and_the_others_are_there(segment: cat.Segment) -> N
         assert [device.state for device in segment][2:] == [2, 2]
 
 
-def test_else_it_is_raised_when_the_device_is_used(segment: cat.Segment) -> None:
+def test_without_strict_the_error_is_raised_when_the_device_is_used(segment: cat.Segment) -> None:
     with cat.MainDevice(segment) as main:
         subs = main.scan(strict=False)
         assert isinstance(subs[1].error, StateError)
@@ -53,7 +53,7 @@ def test_else_it_is_raised_when_the_device_is_used(segment: cat.Segment) -> None
             pass
 
 
-def test_mended_and_scanned_again_it_is_whole(segment: cat.Segment) -> None:
+def test_a_repaired_device_works_after_a_new_scan(segment: cat.Segment) -> None:
     with cat.MainDevice(segment) as main:
         before = main.scan(strict=False)[2]
         segment[1].refuse_state(AlState.PRE_OP, None)
@@ -63,7 +63,7 @@ def test_mended_and_scanned_again_it_is_whole(segment: cat.Segment) -> None:
         assert [sub.state for sub in subs] == [AlState.PRE_OP] * 4
 
 
-def test_further_ones_are_notes(segment: cat.Segment) -> None:
+def test_further_errors_are_notes(segment: cat.Segment) -> None:
     segment[2].refuse_state(AlState.PRE_OP, REFUSED)
     with cat.MainDevice(segment) as main:
         with pytest.raises(CatenaryError, match="device 1") as caught:
@@ -82,7 +82,7 @@ def slow_segment() -> cat.Segment:
     return segment
 
 
-def test_a_slow_eeprom_does_not_hold_a_scan(slow_segment: cat.Segment) -> None:
+def test_a_slow_eeprom_does_not_block_a_scan(slow_segment: cat.Segment) -> None:
     segment = slow_segment
     with cat.MainDevice(segment) as main:
         subs = main.scan(strict=False)
@@ -92,7 +92,7 @@ def test_a_slow_eeprom_does_not_hold_a_scan(slow_segment: cat.Segment) -> None:
         assert subs[2].sdo.read(0x1018, 4)
 
 
-def test_a_slow_eeprom_does_not_hold_a_look(slow_segment: cat.Segment) -> None:
+def test_a_slow_eeprom_does_not_block_a_passive_scan(slow_segment: cat.Segment) -> None:
     with cat.MainDevice(slow_segment) as main:
         found = main.passive_scan()
         assert slow_segment.now_ns < 40e9
@@ -100,7 +100,7 @@ def test_a_slow_eeprom_does_not_hold_a_look(slow_segment: cat.Segment) -> None:
         assert found[2].identity.serial == 2
 
 
-def test_an_object_that_drips_does_not_hold_a_scan() -> None:
+def test_an_endless_object_does_not_block_a_scan() -> None:
     """0x1000 is announced with 4000 bytes; one of them comes in each segment, after 50 ms."""
     device = cat.virtual.Servo(mailbox_delay=0.05)
     segment = cat.Segment([cat.virtual.Coupler(), device, cat.virtual.Servo(serial=2)])

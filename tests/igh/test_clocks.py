@@ -20,7 +20,7 @@ def times_of(calls: list[str], name: str) -> list[int]:
     return [int(call.split()[1]) for call in calls if call.startswith(f"{name} ")]
 
 
-def test_sync0_fires_behind_the_frames(main: cat.MainDevice, double: Double) -> None:
+def test_sync0_fires_after_the_frames(main: cat.MainDevice, double: Double) -> None:
     with clocked_loop(main, margin=100e-6):
         pass
     [first, second] = [call for call in double.calls() if call.startswith("dc ")]
@@ -95,7 +95,7 @@ def reference(main: cat.MainDevice, double: Double) -> Reference:
 
 
 @pytest.mark.parametrize("periods", [-1, 4, -1000])
-def test_whole_periods_are_no_phase_error(
+def test_whole_periods_are_not_a_phase_error(
     main: cat.MainDevice, double: Double, reference: Reference, periods: int
 ) -> None:
     """The master leaves a clock alone that is less than 1 ms off, and sets others to 4 ms (seen on
@@ -113,7 +113,7 @@ def test_whole_periods_are_no_phase_error(
 
 
 @pytest.mark.parametrize("share", [0.4, -0.3])
-def test_the_phase_is_sought_before_operation(
+def test_the_phase_is_corrected_before_op(
     main: cat.MainDevice, double: Double, reference: Reference, share: float
 ) -> None:
     """The clocks keep the phase of an earlier loop: it is found while devices climb, not by slewing
@@ -133,7 +133,7 @@ def test_the_phase_is_sought_before_operation(
     assert reference.figures["offset_ns"] == pytest.approx(share * PERIOD_NS, abs=2000)
 
 
-def test_late_frames_are_no_jumps(
+def test_late_frames_do_not_count_as_jumps(
     main: cat.MainDevice, double: Double, reference: Reference
 ) -> None:
     """A frame that the segment, or this thread, delays says nothing about clocks."""
@@ -150,7 +150,7 @@ def test_late_frames_are_no_jumps(
         assert not [e for e in main.events if isinstance(e, cat.events.ClockUnlocked)]
 
 
-def test_a_clock_that_jumps_in_operation_is_followed_slowly(
+def test_a_jump_in_op_is_followed_slowly(
     main: cat.MainDevice, double: Double, reference: Reference
 ) -> None:
     """By 0.1 % of the period in a cycle, and no drift is learnt from it."""
@@ -175,7 +175,7 @@ def test_a_reference_clock_can_be_chosen(main: cat.MainDevice, double: Double) -
 
 
 @pytest.mark.parametrize("clock", ["main", "reference"])
-def test_the_watch_of_the_clocks(main: cat.MainDevice, double: Double, clock: str) -> None:
+def test_the_figures_of_the_clocks(main: cat.MainDevice, double: Double, clock: str) -> None:
     """Phase and the largest difference of every cycle, single differences one after the other."""
     double.spread(300)
     double.register(1, 0x092C, 0x00FA)
@@ -196,7 +196,7 @@ def test_the_watch_of_the_clocks(main: cat.MainDevice, double: Double, clock: st
         assert any(isinstance(event, cat.events.ClockUnlocked) for event in main.events)
 
 
-def test_clocks_that_do_not_come_together_are_told(main: cat.MainDevice, double: Double) -> None:
+def test_clocks_that_do_not_synchronise_are_an_error(main: cat.MainDevice, double: Double) -> None:
     double.spread(50_000)
     with (
         clocked_loop(main) as loop,
@@ -205,7 +205,7 @@ def test_clocks_that_do_not_come_together_are_told(main: cat.MainDevice, double:
         loop.wait_locked(within=1e-6, timeout=0.2)
 
 
-def test_a_silent_reference_is_asked_seldom(main: cat.MainDevice, double: Double) -> None:
+def test_a_silent_reference_is_read_rarely(main: cat.MainDevice, double: Double) -> None:
     """libethercat writes a line on stderr for each question without an answer."""
     with clocked_loop(main) as loop:
         double.fail(b"reference_clock_time", -6)
@@ -217,7 +217,7 @@ def test_a_silent_reference_is_asked_seldom(main: cat.MainDevice, double: Double
         assert double.calls().count("reference_clock_time") <= 18
 
 
-def test_clocks_are_kept_while_a_device_is_away_that_need_not_be_there(
+def test_clocks_stay_synchronised_without_an_optional_device(
     main: cat.MainDevice, double: Double
 ) -> None:
     """Its domain stays incomplete: that is no reason to let the instants of the others drift."""
@@ -234,7 +234,7 @@ def test_clocks_are_kept_while_a_device_is_away_that_need_not_be_there(
         assert not loop.clocks.locked
 
 
-def test_without_clocks_there_is_nothing_to_watch(main: cat.MainDevice) -> None:
+def test_waiting_without_clocks_is_refused(main: cat.MainDevice) -> None:
     with (
         cat.Loop(cat.Drives(main.subs.drives, counts_per_turn=1000, velocity_limit=100.0)) as loop,
         pytest.raises(RuntimeError, match="no distributed clocks"),

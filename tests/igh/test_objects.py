@@ -34,7 +34,7 @@ def test_objects_before_a_loop(main: cat.MainDevice, double: Double) -> None:
     assert (caught.value.position, caught.value.code) == (1, 0x06020000)
 
 
-def test_objects_in_operation_go_by_request_objects(main: cat.MainDevice, double: Double) -> None:
+def test_request_objects_read_objects_in_op(main: cat.MainDevice, double: Double) -> None:
     sub = main.subs[0]
     with loop_of(main) as loop:
         next(loop)
@@ -51,7 +51,7 @@ def test_objects_in_operation_go_by_request_objects(main: cat.MainDevice, double
     assert double.value(0, 0x605A, 0) == 6
 
 
-def test_a_refused_request_says_why(main: cat.MainDevice) -> None:
+def test_a_refused_request_has_the_reason(main: cat.MainDevice) -> None:
     with loop_of(main) as loop:
         next(loop)
         answer = main.subs[0].sdo.request(0x2000)
@@ -63,7 +63,7 @@ def test_a_refused_request_says_why(main: cat.MainDevice) -> None:
             main.subs[0].sdo.read(0x6076)
 
 
-def test_registers_in_operation(main: cat.MainDevice, double: Double) -> None:
+def test_registers_in_op(main: cat.MainDevice, double: Double) -> None:
     sub = main.subs[1]
     assert isinstance(sub, SubDevice)
     double.register(1, 0x0990, 0x1234)
@@ -91,7 +91,7 @@ def test_emergencies_are_events(main: cat.MainDevice, double: Double) -> None:
     assert main.subs[1].emergencies[0].data == b"\1\2\3\4\5"
 
 
-def test_what_the_library_cannot_do_says_so(main: cat.MainDevice) -> None:
+def test_unsupported_calls_are_errors_with_a_hint(main: cat.MainDevice) -> None:
     sub = main.subs[0]
     for ask, command in (
         (sub.sdo.list, "ethercat sdos -p 0"),
@@ -119,7 +119,7 @@ def test_a_device_without_objects(main: cat.MainDevice, double: Double) -> None:
         sub.sdo.read(0x1018)
 
 
-def test_another_thread_asks_while_the_loop_runs(doubles: dict[str, Path]) -> None:
+def test_another_thread_reads_objects_while_the_loop_runs(doubles: dict[str, Path]) -> None:
     """In real time a call that blocks waits in its own thread."""
     double = Double(doubles["1.6.1"])
     found: list[int] = []
@@ -136,7 +136,7 @@ def test_another_thread_asks_while_the_loop_runs(doubles: dict[str, Path]) -> No
     assert found == [1000]
 
 
-def test_an_activated_master_without_cycles_is_not_asked(
+def test_calls_on_an_activated_master_without_cycles_are_refused(
     main: cat.MainDevice, double: Double
 ) -> None:
     """The real one would wait in the kernel for ever, and the process with it."""
@@ -152,7 +152,7 @@ def test_an_activated_master_without_cycles_is_not_asked(
     assert double.calls() == []
 
 
-def test_a_request_that_nobody_serves_has_an_end(main: cat.MainDevice, double: Double) -> None:
+def test_a_request_that_is_not_served_has_a_deadline(main: cat.MainDevice, double: Double) -> None:
     """A device that is not there: its request stays busy in the kernel."""
     one, two = (
         cat.Drives([drive], counts_per_turn=1000, velocity_limit=100.0, required=required)
@@ -173,7 +173,7 @@ def test_a_request_that_nobody_serves_has_an_end(main: cat.MainDevice, double: D
         assert again.result() == 1000
 
 
-def test_a_device_that_does_not_answer_holds_nobody_else_up(doubles: dict[str, Path]) -> None:
+def test_a_silent_device_does_not_delay_others(doubles: dict[str, Path]) -> None:
     """Calls that block wait in a thread of their device's own, and not for ever."""
     double = Double(doubles["1.6.1"])
     with cat.MainDevice(Master(library=double.path)) as main:
@@ -198,7 +198,7 @@ def test_a_device_that_does_not_answer_holds_nobody_else_up(doubles: dict[str, P
     assert double.reserved() == 0
 
 
-def test_a_thread_that_comes_too_late_calls_nothing(double: Double) -> None:
+def test_a_late_thread_makes_no_call(double: Double) -> None:
     """libethercat does not look at the handle it is given: none of a master that was given back."""
     reservation = Master(library=double.path).open_link()
     reservation.close()

@@ -68,7 +68,7 @@ def test_devices_are_found(main: cat.MainDevice) -> None:
 
 
 @pytest.mark.parametrize("run", ["threaded", "inline"])
-def test_a_loop_reaches_op_and_leaves_nothing(subject: Subject, run: str) -> None:
+def test_a_loop_reaches_op_and_can_be_repeated(subject: Subject, run: str) -> None:
     for _ in range(2):  # the second time shows that nothing was left of the first
         with subject.open() as main:
             main.scan()
@@ -144,7 +144,7 @@ def test_registers_in_operation(subject: Subject, main: cat.MainDevice) -> None:
 
 
 @pytest.mark.parametrize("clock", ["main", "reference"])
-def test_clocks_are_watched(subject: Subject, main: cat.MainDevice, clock: str) -> None:
+def test_the_figures_of_the_clocks(subject: Subject, main: cat.MainDevice, clock: str) -> None:
     """Every follower tells its difference, the reference its time; how close is the machine's."""
     clocked = [sub for sub in drives(main) if sub.description.clock_bits]
     if not clocked:
@@ -174,7 +174,7 @@ def test_drives_follow(subject: Subject, main: cat.MainDevice, run: str) -> None
         np.testing.assert_allclose(arm.actual.position, home + 0.1, atol=0.02)
 
 
-def test_another_thread_asks_while_the_loop_runs(subject: Subject) -> None:
+def test_another_thread_reads_objects_while_the_loop_runs(subject: Subject) -> None:
     with subject.open() as main:
         main.scan()
         sub = talker(main)
@@ -190,7 +190,7 @@ def test_another_thread_asks_while_the_loop_runs(subject: Subject) -> None:
         assert found == [sub.identity.vendor]
 
 
-def test_the_published_interface(subject: Subject) -> None:
+def test_the_interface_of_pyigh(subject: Subject) -> None:
     with MasterBase(subject.make(), period=subject.period) as master:
         slave = SlaveIO(next(sub.position for sub in master.main.subs if sub.description.inputs))
         master.ecat_init_slave(slave)
@@ -213,7 +213,7 @@ def test_the_published_interface(subject: Subject) -> None:
 
 
 @pytest.mark.skipif(REAL is not None, reason="this is what it starts")
-def test_the_switch_is_no_dead_code(doubles: dict[str, Path]) -> None:
+def test_the_switch_for_the_real_master_works(doubles: dict[str, Path]) -> None:
     """CATENARY_IGH=0 takes whatever library is found: here the double, as if it were installed."""
     environment = {
         **os.environ,

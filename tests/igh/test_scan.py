@@ -10,7 +10,7 @@ from catenary.igh import Master
 from tests.igh.double import Double
 
 
-def test_devices_that_are_on_their_way_are_waited_for(double: Double) -> None:
+def test_a_scan_waits_for_devices_on_the_way_to_pre_op(double: Double) -> None:
     """In INIT nobody answers an SDO: they would pass for devices without objects."""
     double.boot(12)
     with cat.MainDevice(Master(library=double.path, virtual_time=True)) as main:
@@ -19,7 +19,7 @@ def test_devices_that_are_on_their_way_are_waited_for(double: Double) -> None:
         assert all(sub.is_drive for sub in subs)
 
 
-def test_a_device_that_the_master_keeps_in_op_holds_nobody_up(double: Double) -> None:
+def test_a_device_that_stays_in_op_does_not_block_a_scan(double: Double) -> None:
     """As those with Ethernet over EtherCAT."""
     double.state(1, 8, 0)
     with cat.MainDevice(Master(library=double.path, virtual_time=True)) as main:
@@ -28,7 +28,7 @@ def test_a_device_that_the_master_keeps_in_op_holds_nobody_up(double: Double) ->
         assert (main.link.now() - begun) * 1e-9 < 3.0
 
 
-def test_an_answer_that_was_lost_is_asked_for_again(double: Double) -> None:
+def test_an_upload_with_a_lost_answer_is_repeated(double: Double) -> None:
     """Else a drive whose answer a frame has lost would pass for a device without objects (seen on a
     real master)."""
     double.silent(2)
@@ -39,7 +39,7 @@ def test_an_answer_that_was_lost_is_asked_for_again(double: Double) -> None:
             main.scan()
 
 
-def test_a_terminal_without_mailbox_is_not_asked_for_objects(double: Double) -> None:
+def test_no_objects_are_read_from_a_terminal_without_a_mailbox(double: Double) -> None:
     """libethercat and the kernel would complain of it, on stderr and in the log."""
     double.plain(1)
     with cat.MainDevice(Master(library=double.path, virtual_time=True)) as main:
@@ -49,7 +49,7 @@ def test_a_terminal_without_mailbox_is_not_asked_for_objects(double: Double) -> 
     assert not any(call.startswith("sdo_upload 1 ") for call in double.calls())
 
 
-def test_clocks_are_where_receive_times_were_latched(double: Double) -> None:
+def test_devices_with_latched_receive_times_have_clocks(double: Double) -> None:
     double.clockless(0)
     with cat.MainDevice(Master(library=double.path, virtual_time=True)) as main:
         first, second = main.scan()

@@ -13,7 +13,7 @@ from tests.igh.double import Double
 from tests.igh.loops import clocked_loop
 
 
-def test_devices_keep_time_as_before_when_a_loop_with_clocks_ends(
+def test_the_types_are_restored_after_a_loop_with_clocks(
     main: cat.MainDevice, double: Double
 ) -> None:
     """Else the next program, without clocks, would find them waiting for SYNC0 (seen on a real
@@ -44,7 +44,7 @@ def test_a_device_may_take_seconds_to_reach_pre_op(main: cat.MainDevice, double:
     assert [double.value(p, 0x1C32, 1) for p in (0, 1)] == [1, 1]
 
 
-def test_a_type_that_cannot_be_restored_is_told(main: cat.MainDevice, double: Double) -> None:
+def test_a_type_that_cannot_be_restored_is_an_error(main: cat.MainDevice, double: Double) -> None:
     def run() -> None:
         with clocked_loop(main):
             double.refuse(0x06090030)
@@ -55,7 +55,7 @@ def test_a_type_that_cannot_be_restored_is_told(main: cat.MainDevice, double: Do
     assert any("device 1" in note for note in caught.value.__notes__)
 
 
-def test_a_device_that_stays_up_is_told(main: cat.MainDevice, double: Double) -> None:
+def test_a_device_that_stays_in_op_is_an_error(main: cat.MainDevice, double: Double) -> None:
     def run() -> None:
         with clocked_loop(main):
             double.linger(1_000_000)
@@ -70,14 +70,16 @@ def test_a_device_that_stays_up_is_told(main: cat.MainDevice, double: Double) ->
         assert double.value(0, 0x1C32, 1) == 1  # made up for
 
 
-def test_a_configuration_that_fails_leaves_no_type(main: cat.MainDevice, double: Double) -> None:
+def test_the_types_are_restored_after_a_failed_configuration(
+    main: cat.MainDevice, double: Double
+) -> None:
     double.fail(b"activate", -5)
     with pytest.raises(cat.CatenaryError, match="activat"), clocked_loop(main):
         pass
     assert [double.value(p, 0x1C32, 1) for p in (0, 1)] == [1, 1]
 
 
-def test_the_kernels_log_tells_a_code_that_the_device_has_forgotten(
+def test_a_cleared_code_is_read_from_the_kernel_log(
     main: cat.MainDevice, double: Double, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The master acknowledges an error, and the device clears its AL status code."""
@@ -98,9 +100,7 @@ def test_the_kernels_log_tells_a_code_that_the_device_has_forgotten(
     assert caught.value.position == 1
 
 
-def test_the_error_of_a_type_that_was_left_behind_says_so(
-    main: cat.MainDevice, double: Double
-) -> None:
+def test_the_error_names_a_leftover_type(main: cat.MainDevice, double: Double) -> None:
     """A program that was killed wrote 2 into 0x1C32:01: AL status code 0x0030."""
     double.set(0, 0x1C32, 1, 2)
     double.register(0, 0x0134, 0x0030)

@@ -10,9 +10,7 @@ from tests.igh.loops import clocked_loop
 
 
 @pytest.mark.parametrize("delay", [2_147_000_000, 5_000_000])
-def test_delays_that_cannot_be_are_refused(
-    main: cat.MainDevice, double: Double, delay: int
-) -> None:
+def test_implausible_delays_are_refused(main: cat.MainDevice, double: Double, delay: int) -> None:
     """A closed ring makes them: the clocks would agree with each other on a wrong time."""
     double.measured(delay)
     with pytest.raises(cat.errors.ConfigurationError, match="us from device 0"), clocked_loop(main):

@@ -103,7 +103,7 @@ def test_topology_and_delays(slaves: list[Slave]) -> None:
     assert delays[0] == 0 < delays[-1] < 100_000
 
 
-def test_sii_is_read_the_same_by_position(master: KernelMaster, slaves: list[Slave]) -> None:
+def test_the_sii_can_be_read_by_position(master: KernelMaster, slaves: list[Slave]) -> None:
     # fsm_sii.c with EC_FSM_SII_USE_INCREMENT_ADDRESS
     master.ask_one(2, -SERVO, 0x0502, struct.pack("<BBH", 0x80, 0x01, 0x08))
     master.run(3)
@@ -131,7 +131,7 @@ def test_operation(master: KernelMaster, slaves: list[Slave], segment: Segment) 
     assert master.broadcast() == (6, OP)
 
 
-def test_outputs_and_inputs_pass(
+def test_outputs_and_inputs_are_exchanged(
     master: KernelMaster, slaves: list[Slave], segment: Segment
 ) -> None:
     domain = operate(master, slaves)
@@ -167,7 +167,7 @@ def test_counters_of_domains(
     assert domain.counter == domain.expected == expected
 
 
-def test_two_domains_with_logical_addresses_of_their_own(
+def test_two_domains_with_separate_logical_addresses(
     master: KernelMaster, slaves: list[Slave]
 ) -> None:
     first, second = Domain(0), Domain(64)
@@ -234,7 +234,7 @@ def test_sdo_downloads(master: KernelMaster, slaves: list[Slave], size: int) -> 
     assert master.upload(slaves[SERVO], 0x2101, 0) == data
 
 
-def test_a_download_that_is_refused(master: KernelMaster, slaves: list[Slave]) -> None:
+def test_a_refused_download(master: KernelMaster, slaves: list[Slave]) -> None:
     with pytest.raises(Abort) as caught:
         master.download(slaves[SERVO], 0x1018, 1, bytes(4))
     assert caught.value.code == 0x06010002
@@ -272,7 +272,7 @@ def test_a_refused_state_is_acknowledged(
     assert domain.counter == domain.expected
 
 
-def test_a_device_that_has_no_outputs_falls_and_is_acknowledged(
+def test_a_device_without_outputs_leaves_op_and_is_acknowledged(
     master: KernelMaster, slaves: list[Slave]
 ) -> None:
     """The application stops: watchdogs expire, the master acknowledges and configures again."""
@@ -294,7 +294,7 @@ def test_a_device_that_has_no_outputs_falls_and_is_acknowledged(
 
 
 @pytest.mark.parametrize("state", [PRE_OP, INIT])
-def test_going_down(
+def test_states_on_the_way_down(
     master: KernelMaster, slaves: list[Slave], segment: Segment, state: int
 ) -> None:
     operate(master, slaves)
@@ -306,7 +306,7 @@ def test_going_down(
 
 
 @pytest.mark.parametrize("gap", range(9))
-def test_a_stop_is_quick_whatever_fails_meanwhile(
+def test_a_stop_is_quick_despite_errors(
     master: KernelMaster, slaves: list[Slave], segment: Segment, gap: int
 ) -> None:
     """The application stops with clocks on. Drives miss their outputs before, while and after INIT
@@ -321,7 +321,7 @@ def test_a_stop_is_quick_whatever_fails_meanwhile(
     assert [device.state for device in segment] == [INIT] * 6
 
 
-def test_another_master_finds_the_segment_in_op(segment: Segment) -> None:
+def test_a_second_master_finds_the_segment_in_op(segment: Segment) -> None:
     first = KernelMaster(segment)
     operate(first, first.scan())
     first.post(first.slaves[SERVO], struct.pack("<HBHB4x", 0x2000, 0x40, 0x1008, 0))
@@ -339,7 +339,7 @@ def test_another_master_finds_the_segment_in_op(segment: Segment) -> None:
     second.close()
 
 
-def test_registers_are_asked_by_the_application(master: KernelMaster, slaves: list[Slave]) -> None:
+def test_the_application_reads_registers(master: KernelMaster, slaves: list[Slave]) -> None:
     # fsm_slave.c, ec_fsm_slave_action_process_reg
     servo = slaves[SERVO]
     assert len(master.ask_one(FPRD, servo.station, 0x0300, 20)) == 20

@@ -182,7 +182,7 @@ def test_a_servo_goes_through_its_states_to_a_position(master: Any) -> None:
     cycle_until(master, arrived)
 
 
-def test_a_pause_of_the_segment_leaves_no_old_answers(veth: tuple[str, str], line: Path) -> None:
+def test_a_stalled_segment_leaves_no_old_answers(veth: tuple[str, str], line: Path) -> None:
     """SOEM finds answers by index modulo 16, in a socket that it does not empty."""
     ours, theirs = veth
     with serving(theirs, line, max_age=0.002) as server, opened(6, ours) as master:
@@ -228,7 +228,7 @@ def without_lrw(veth: tuple[str, str], tmp_path: Path) -> Iterator[Any]:
 
 
 @again(devices=4)
-def test_servos_with_three_siis_reach_op_and_are_all_counted(without_lrw: Any) -> None:
+def test_servos_with_three_siis_reach_op_with_the_right_counter(without_lrw: Any) -> None:
     master = without_lrw
     to_operational(master)
     assert master.expected_wkc == 9
@@ -246,7 +246,7 @@ def ring(line: Path, veth: tuple[str, str]) -> Iterator[tuple[str, str, Child]]:
             yield veth[0], other[0], server
 
 
-def test_a_ring_over_both_interfaces_survives_a_cut(ring: tuple[str, str, Child]) -> None:
+def test_a_ring_with_two_interfaces_survives_a_cut(ring: tuple[str, str, Child]) -> None:
     """Cable redundancy of SOEM: a cut in the middle of cyclic operation, and joined again."""
     first, second, server = ring
     with opened(6, first, second) as master:

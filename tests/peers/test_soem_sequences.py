@@ -41,7 +41,7 @@ def test_devices_of_one_kind_share_an_sii() -> None:
     assert not two.blocks_lrw
 
 
-def test_variants_with_another_sii_have_another_identity() -> None:
+def test_variants_with_different_siis_have_different_identities() -> None:
     """With one revision for both, the second servo would get the mailbox of the first: 0x0016."""
     soem = operate(Segment([Servo(), Servo(mailbox_bytes=256), AnalogInputs(mailbox_bytes=64)]))
     assert len({record.identity for record in soem.records}) == 3
@@ -121,14 +121,14 @@ def after_a_pause(max_age_ns: int) -> tuple[Segment, Iterator[int | None]]:
     return segment, lags()
 
 
-def test_answers_to_frames_that_waited_would_lag_for_ever() -> None:
+def test_without_an_age_limit_old_answers_lag_forever() -> None:
     segment, lags = after_a_pause(NEVER_NS)
     assert {lag for lag in itertools.islice(lags, 200)} <= {MAX_BUF, 2 * MAX_BUF, None}
     lags.close()  # type: ignore[attr-defined]
     assert segment.frames.expired == 0
 
 
-def test_frames_that_waited_are_lost_and_no_answer_lags() -> None:
+def test_old_frames_are_discarded_and_no_answer_lags() -> None:
     segment, lags = after_a_pause(2_000_000)
     deadline = time.monotonic() + SECONDS
     seen: list[int | None] = []
