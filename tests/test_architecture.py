@@ -1,4 +1,4 @@
-"""docs/explanation/architecture.md names what there is, and all of it."""
+"""docs/explanation/architecture.md names all packages, and only existing files."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Rights go to a Python of one environment, never to that of the whole machine."""
+"""Capabilities are given to the Python of one environment, never to that of the machine."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from catenary import interpreter
 
 @pytest.fixture
 def system(tmp_path: Path) -> Path:
-    """The folder of a machine's Python."""
+    """Return the folder of a machine's Python."""
     place = tmp_path / "usr" / "bin" / "python3"
     place.parent.mkdir(parents=True)
     place.touch()

@@ -1,4 +1,4 @@
-"""What a newcomer reads where something is missing: one line that names the packages."""
+"""Missing packages are named in one line."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ TOOL = Path(__file__).resolve().parent.parent / "tools/missing_prerequisites"
 
 @pytest.fixture
 def bare_path(tmp_path):
-    """A PATH with nothing on it but what the tool itself runs."""
+    """Return a PATH with only the programs that the tool itself runs."""
     for command in ("id", "sh"):
         found = shutil.which(command)
         assert found

@@ -1,4 +1,4 @@
-"""The README shows what is really there."""
+"""The README refers to existing files, and shows the tested example."""
 
 from __future__ import annotations
 

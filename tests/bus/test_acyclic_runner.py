@@ -1,4 +1,4 @@
-"""Procedures beside a cycle: a lane of a few frames, one step a millisecond."""
+"""Procedures while a cycle runs: an acyclic queue of a few frames, one step per millisecond."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ PERIOD_NS = 1_000_000
 
 
 class AcyclicQueue:
-    """Owns a lane over a virtual link: what is pushed goes out with the next cycle."""
+    """Owns an acyclic queue on a virtual link. Pushed frames are sent with the next cycle."""
 
     def __init__(self, link: Link, *, slots: int = 64) -> None:
         self.link = link
@@ -156,7 +156,7 @@ def test_a_blocking_call_in_the_loops_thread_raises_at_once() -> None:
         ):
             drive.sdo.read(0x1000)
         assert lane.pushed == []
-        assert drive.sdo.read(0x1000)  # detached again
+        assert drive.sdo.read(0x1000)  # the loop has ended
 
 
 def test_a_scan_is_refused_while_a_loop_runs() -> None:
@@ -180,7 +180,7 @@ def test_another_thread_reads_while_the_loop_runs() -> None:
                 target=lambda: found.append(drive.sdo.read(0x1018, 1, type=UDINT))
             )
             thread.start()
-            while thread.is_alive():  # each step is a cycle of virtual time; no clock is asked
+            while thread.is_alive():  # each step is a cycle of virtual time
                 runner.step()
                 lane.cycle()
                 thread.join(0.001)
@@ -230,8 +230,7 @@ def _state(station: int) -> Procedure[int]:
 
 
 def test_a_starting_loop_waits_for_running_procedures() -> None:
-    """One thread at a time has the link: a conversation of another thread is finished first, one
-    that comes too late for that goes into the lane."""
+    """Only one thread uses the link. A running procedure finishes first; a later one is queued."""
     with MainDevice(demo_segment()) as main:
         drive = main.scan()[2]
         lane = AcyclicQueue(main.link)
@@ -251,7 +250,7 @@ def test_a_starting_loop_waits_for_running_procedures() -> None:
         assert talking.wait(60.0)
         late: list[int] = []
         second = threading.Thread(target=lambda: late.append(drive.sdo.read(0x1018, 1, type=UDINT)))
-        second.start()  # waits for the first, on the blocking runner; or comes later
+        second.start()  # waits for the first one on the blocking runner, or starts later
         threading.Timer(0.02, go_on.set).start()
         with main.attached(runner):
             order.append("attached")

@@ -1,4 +1,4 @@
-"""`main.diagnose()`: alone and while a loop runs."""
+"""`main.diagnose()` with and without a running loop."""
 
 from __future__ import annotations
 
@@ -68,7 +68,7 @@ def test_silence_names_the_cable(segment: cat.Segment, main: cat.MainDevice) -> 
 
 
 def after(segment: cat.Segment, main: cat.MainDevice, *injected: faults.Fault) -> Diagnosis:
-    """What is found after half a second of traffic with faults."""
+    """Return the diagnosis after half a second of traffic with faults."""
     subs = main.passive_scan()
     before = main.diagnose(subs=subs)
     for fault in injected:
@@ -110,7 +110,7 @@ def test_a_device_that_was_switched_off_and_on(segment: cat.Segment, main: cat.M
 def test_a_device_that_returned_by_itself_had_no_power(
     segment: cat.Segment, main: cat.MainDevice
 ) -> None:
-    """With its address given again its counters can be read, and show that they began anew."""
+    """After it gets its address again, its counters can be read, and show a restart."""
     subs = main.passive_scan()
     before = main.diagnose(subs=subs)
     segment.inject(faults.power_cycle(2, for_=0.1))

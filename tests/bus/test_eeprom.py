@@ -1,4 +1,4 @@
-"""Whole EEPROMs read and written, and writes that break off."""
+"""Reading and writing of whole EEPROMs, and interrupted writes."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The queue of events, and callbacks beside it."""
+"""The queue of events, and callbacks."""
 
 from __future__ import annotations
 
@@ -76,7 +76,7 @@ def test_in_a_loop_times_count_from_its_first_iteration() -> None:
     early = events.get()
     assert before is not None
     assert early is not None
-    assert (before.time, early.time) == (7.0, 8.0)  # there is no zero yet
+    assert (before.time, early.time) == (7.0, 8.0)  # the zero is not known yet
     zero_ns = 10_000_000_000
     events.put(DeviceLost(10.5, None, "in the loop"))
     events.end_loop()

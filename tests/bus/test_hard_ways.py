@@ -1,4 +1,4 @@
-"""Devices that are slow, odd or answered for twice: they come up, or the error names them."""
+"""Slow, unusual or duplicate answers: the device reaches PRE-OP, or the error names it."""
 
 from __future__ import annotations
 
@@ -104,7 +104,7 @@ def categories(image: bytes) -> Iterator[tuple[int, bytes]]:
 
 
 def changed(monkeypatch: pytest.MonkeyPatch, change: Callable[[bytes], bytes]) -> cat.Segment:
-    """A segment whose servo has another SII image."""
+    """Return a segment whose servo has another SII image."""
     make = virtual_device.make_sii_image
 
     def made(description: object, *quirks: object) -> bytes:
@@ -119,7 +119,7 @@ def changed(monkeypatch: pytest.MonkeyPatch, change: Callable[[bytes], bytes]) -
 def test_an_sii_without_one_of_its_categories(
     monkeypatch: pytest.MonkeyPatch, missing: int
 ) -> None:
-    """It comes to PRE-OP and answers; without SyncManagers it cannot exchange process data."""
+    """It reaches PRE-OP and answers. Without SyncManagers, it cannot exchange process data."""
 
     def without(image: bytes) -> bytes:
         rest = b"".join(part for kind, part in categories(image) if kind != missing)
@@ -132,7 +132,7 @@ def test_an_sii_without_one_of_its_categories(
         assert servo.name
         assert servo.sdo.read(0x1018, 1, type=UDINT) == servo.identity.vendor
         arm = cat.Drives([servo], counts_per_turn=2**20, velocity_limit=100.0)
-        if missing == SYNC_MANAGER:  # there is no place to put process data
+        if missing == SYNC_MANAGER:  # process data cannot be mapped
             with pytest.raises(MappingError, match=r"device 1.*SyncManager"), cat.Loop(arm):
                 pass
             return
@@ -141,7 +141,7 @@ def test_an_sii_without_one_of_its_categories(
 
 
 def test_an_sii_with_coe_but_without_a_mailbox(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The header's standard mailbox of no size."""
+    """The header has a standard mailbox of size 0."""
 
     def without_mailbox(image: bytes) -> bytes:
         return image[:48] + b"\0" * 8 + image[56:]

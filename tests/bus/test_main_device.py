@@ -34,7 +34,7 @@ from tests.plan.devices import Asking, asks
 
 
 def test_the_device_gets_its_eeprom_before_pre_op() -> None:
-    """Some refuse PRE-OP without it; who looks into it afterwards gives it back."""
+    """Some devices refuse PRE-OP without it. A later access of the master returns it."""
     segment = demo_segment()
     with MainDevice(segment) as main:
         for _ in range(2):
@@ -321,7 +321,7 @@ FEATURES, NO_LRW = 0x0008, 0x0200
 
 @pytest.mark.parametrize("by_sii", [True, False])
 def test_one_indication_is_enough_to_avoid_lrw(by_sii: bool) -> None:
-    """The SII's general category, or the controller's features."""
+    """The indication is in the SII's general category, or in the features of the controller."""
     segment = Segment([Servo(lrw=not by_sii), Servo()])
     features = int.from_bytes(segment.core.peek(0, FEATURES, 2), "little")
     shown = features & ~NO_LRW if by_sii else features | NO_LRW
@@ -337,7 +337,7 @@ def test_one_indication_is_enough_to_avoid_lrw(by_sii: bool) -> None:
 
 
 def test_a_hundred_devices_in_few_frames() -> None:
-    """PySOEM's config_init takes about 100 frames a device (`python -m benchmarks scan`)."""
+    """PySOEM's config_init takes about 100 frames per device (`python -m benchmarks scan`)."""
     segment = Segment([Coupler(), *(Servo() for _ in range(99))])
     with MainDevice(segment) as main:
         assert len(main.scan()) == 100

@@ -1,4 +1,4 @@
-"""Mappings of devices with quirks: read, kept, chosen, written, refused and brought back."""
+"""Mappings of devices with quirks: read, kept, chosen, written, refused and restored."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ DEMAND = ObjectReference(0x6062, 0, 32)  # in no PDO of the servo
 
 @contextmanager
 def scanned(**quirks: object) -> Iterator[MainDevice]:
-    """A coupler and a servo with quirks of its mapping, in PRE-OP."""
+    """Yield a coupler and a servo with quirks of its mapping, in PRE-OP."""
     servo = Servo(mapping_quirks=MappingQuirks(**quirks))  # type: ignore[arg-type]
     with MainDevice(Segment([Coupler(), servo])) as main:
         main.scan()
@@ -84,7 +84,7 @@ def test_a_pdo_flagged_as_fixed_is_refused_in_the_plan() -> None:
 
 
 def test_access_rights_are_read_from_the_dictionary() -> None:
-    """PDOs that are flagged in the SII are not needed: the access rights are read."""
+    """The SII need not flag fixed PDOs, because the access rights are read."""
     wanted = asking(FOLLOWING_ERROR, POSITION, DEMAND, ObjectReference(0x5FFF, 0, 8))
     refused = pytest.raises(MappingError, match="its dictionary says that 0x1C13 is read-only")
     with scanned(fixed_lists="declared") as main, refused:
@@ -145,7 +145,7 @@ def test_a_mapping_of_the_application_is_tried_against_the_sii() -> None:
 
 
 def test_pdos_that_exclude_each_other_are_replaced() -> None:
-    """Adding 0x1A00 to 0x1A01 would be refused with 0x08000021."""
+    """The device refuses 0x1A00 in addition to 0x1A01 with 0x08000021."""
     with scanned(power_up=(0x1601, 0x1A01), exclusive=True, fixed_pdos="declared") as main:
         torque = ObjectReference(0x6077, 0, 16)
         plan = main.plan(asking(STATUS, POSITION, torque))

@@ -1,4 +1,4 @@
-"""Devices that do not answer while their mappings are read: a scan and a plan go on, and end."""
+"""Devices that do not answer while their mappings are read. A scan and a plan still end."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def answer_uploads(servo: Servo, answer: Callable[[bytes], list[bytes] | None]) 
 
 
 def silence(servo: Servo, *indices: int) -> None:
-    """Uploads of these objects are never answered."""
+    """Return a filter that never answers uploads of these objects."""
 
     def answer(payload: bytes) -> list[bytes] | None:
         return [] if struct.unpack_from("<H", payload, 3)[0] in indices else None
@@ -48,7 +48,7 @@ def silence(servo: Servo, *indices: int) -> None:
 
 
 def drip_lists(payload: bytes) -> list[bytes] | None:
-    """0x1C12 is announced with 4000 bytes; one of them comes in each segment."""
+    """Announce 4000 bytes for 0x1C12, and send one byte per segment."""
     if payload[2] >> 5 == UPLOAD and payload[3:5] != b"\x12\x1c":
         return None
     if payload[2] >> 5 == SEGMENT:
@@ -136,7 +136,7 @@ def test_a_slow_mailbox_does_not_block_the_reading_of_settings() -> None:
 
 @pytest.mark.parametrize("length", [None, 0, 6])
 def test_pdos_without_a_description_do_not_end_a_plan(length: int | None) -> None:
-    """Descriptions of entries are missing, or end too early."""
+    """Descriptions of entries are missing or truncated."""
     odd = Servo()
     with MainDevice(make_segment(odd)) as main:
         main.scan()

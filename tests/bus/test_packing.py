@@ -1,4 +1,4 @@
-"""Requests and the frames they share."""
+"""Requests that share frames."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Devices looked at and brought to states outside a loop."""
+"""Passive scans and state requests outside a loop."""
 
 from __future__ import annotations
 

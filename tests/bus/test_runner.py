@@ -1,4 +1,4 @@
-"""The blocking runner on a bad cable: lost, late, doubled, spoiled and alien frames."""
+"""The blocking runner on a bad cable: lost, late, duplicate, corrupt and alien frames."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def test_loss_of_every_seventh_frame() -> None:
 @given(st.sets(st.integers(0, 400), max_size=30))
 def test_loss_of_any_frames(lost: set[int]) -> None:
     link = meddled(small_segment(), lambda k, frame: [] if k in lost else [frame])
-    # An error only where several in a row were lost.
+    # An error is allowed only after several consecutive losses.
     with contextlib.suppress(CatenaryError), MainDevice(link) as main:
         assert bring_up_and_ask(main) == "Elbow"
 
@@ -64,7 +64,7 @@ def test_a_flood_of_alien_frames_does_not_extend_a_deadline() -> None:
 
 
 class Halting(Echo):
-    """The program is halted for longer than any deadline whenever it looks at the clock."""
+    """Link of a program that is halted beyond any deadline at each reading of the clock."""
 
     def now(self) -> int:
         self._now += 200_000_000

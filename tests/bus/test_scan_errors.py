@@ -1,4 +1,4 @@
-"""A device that cannot be brought to PRE-OP: named, told when it is used, no harm to the others."""
+"""A device that cannot be brought to PRE-OP is named, and does not affect the others."""
 
 import struct
 
@@ -43,7 +43,7 @@ def test_without_strict_the_error_is_raised_when_the_device_is_used(segment: cat
     with cat.MainDevice(segment) as main:
         subs = main.scan(strict=False)
         assert isinstance(subs[1].error, StateError)
-        assert subs[1].identity == subs[2].identity  # what could be read is known
+        assert subs[1].identity == subs[2].identity  # the readable part is known
         assert subs[2].error is None
         assert subs[2].sdo.read(0x1018, 1)
         with pytest.raises(StateError, match="device 1"):
@@ -76,7 +76,7 @@ SLOW_READ, WRITE = 400_000_000, 3_000_000  # [ns] of the EEPROM
 
 @pytest.fixture
 def slow_segment() -> cat.Segment:
-    """The EEPROM of device 1 would take minutes."""
+    """Yield a segment in which reading the EEPROM of device 1 takes minutes."""
     segment = cat.Segment([cat.virtual.Coupler(), cat.virtual.Servo(), cat.virtual.Servo(serial=2)])
     segment.core.time_sii(1, SLOW_READ, WRITE, False)
     return segment
@@ -101,7 +101,7 @@ def test_a_slow_eeprom_does_not_block_a_passive_scan(slow_segment: cat.Segment) 
 
 
 def test_an_endless_object_does_not_block_a_scan() -> None:
-    """0x1000 is announced with 4000 bytes; one of them comes in each segment, after 50 ms."""
+    """The device announces 4000 bytes for 0x1000, and sends one byte per segment, after 50 ms."""
     device = cat.virtual.Servo(mailbox_delay=0.05)
     segment = cat.Segment([cat.virtual.Coupler(), device, cat.virtual.Servo(serial=2)])
     announced = struct.pack("<HBHBI", 0x3000, 0x41, 0x1000, 0, 4000)

@@ -1,4 +1,4 @@
-"""The object dictionary of a device, where no loop runs."""
+"""The object dictionary of a device, without a loop."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Threads beside the loop."""
+"""Scheduling of threads while a loop runs."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from catenary.bus.thread_priority import BEHIND, step_behind
 
 
 def scheduling_of_a_thread_started_with(policy: int, priority: int) -> tuple[int, int]:
-    """Policy and priority after `step_behind`."""
+    """Return policy and priority after `step_behind`."""
     found: list[tuple[int, int]] = []
 
     def inner() -> None:

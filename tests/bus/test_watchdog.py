@@ -1,4 +1,4 @@
-"""Devices with watchdogs of all kinds come up: what their SII says does not decide."""
+"""Watchdogs of devices follow the plan, for any content of the SII."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ TORQUE = ObjectReference(0x6071, 0, 16)
 
 
 def registers(segment: cat.Segment, position: int) -> tuple[int, int]:
-    """(control byte of SyncManager 2, 0x0420) of a virtual device."""
+    """Return the control byte of SyncManager 2 and 0x0420 of a virtual device."""
     core: Any = segment[position].core
     return core.peek(position, 0x0814, 1)[0], int.from_bytes(
         core.peek(position, 0x0420, 2), "little"

@@ -41,7 +41,7 @@ releases = pytest.mark.parametrize("tag", TABLE)
 
 
 def place(structure: type[ctypes.Structure], member: str) -> int:
-    """Offset of a member, `ports[1].desc` included; `x:bit`, `x:bits`: of a bit field."""
+    """Return the offset of a member (`ports[1].desc`) or of a bit field (`x:bit`, `x:bits`)."""
     if ":" in member:
         name, what = member.split(":")
         field = getattr(structure, name)
@@ -121,7 +121,7 @@ def test_the_double_has_the_same_interface(tag: str, tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("tag", DEFINES)
 def test_return_values_of_old_libraries_are_not_read(doubles: dict[str, Path], tag: str) -> None:
-    """The void functions of the old doubles leave -EIO where a result would be."""
+    """The void functions of the old doubles leave -EIO in place of a result."""
     Double(doubles[tag])
     library = Library(doubles[tag])
     assert library.returns is (tag not in OLD)

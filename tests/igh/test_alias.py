@@ -1,4 +1,4 @@
-"""Devices named by the alias of one they are plugged in behind."""
+"""Devices addressed by the alias of a preceding device."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from tests.igh.double import Double
 
 @pytest.fixture
 def main(double: Double) -> Iterator[cat.MainDevice]:
-    """Three drives, the second with alias 7."""
+    """Yield three drives, the second with alias 7."""
     double.reset(3)
     with cat.MainDevice(Master(library=double.path, virtual_time=True)) as main:
         main.scan()
@@ -47,7 +47,7 @@ def test_a_group_is_the_same_as_on_our_own_master(main: cat.MainDevice) -> None:
 
 
 def test_a_moved_device_is_found_by_its_alias(main: cat.MainDevice, double: Double) -> None:
-    """The two drives of the tool and the one in front of it change their places."""
+    """The two drives of the tool and the drive before them exchange places."""
     double.set(1, 0x6076, 0, 5000)
     tool = cat.Drives([main.subs.group(7)[0]], counts_per_turn=1000, velocity_limit=100.0)
     with cat.Loop(tool, stop=cat.StopPolicy(raise_faults=False)) as loop:

@@ -1,4 +1,4 @@
-"""What is in the way of a kernel master: the cause, the command that mends it, nothing left."""
+"""Errors of a kernel master: the cause, a command as remedy, and no leftovers."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from tests.igh.double import Double
 
 @pytest.fixture
 def node(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A device file that is there, of a module that is loaded."""
+    """Provide a device file and a loaded module."""
     path = tmp_path / "EtherCAT0"
     path.touch()
     sysfs = tmp_path / "ec_master"
@@ -167,7 +167,7 @@ def test_nothing_is_left_reserved(double: Double, error: type[BaseException]) ->
 
 
 def test_a_device_lost_before_the_loop_is_named(double: Double) -> None:
-    """Its place is empty: the master has found fewer devices since."""
+    """Its position is empty: the master has found fewer devices since the scan."""
     with cat.MainDevice(Master(library=double.path, virtual_time=True)) as main:
         main.scan()
         arm = cat.Drives(main.subs.drives, counts_per_turn=1000, velocity_limit=100.0)

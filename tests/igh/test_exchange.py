@@ -1,4 +1,4 @@
-"""The image table: what leaves a domain or an image is refused, nothing is called after its end."""
+"""The image table: copies are checked, and no call follows its end."""
 
 from __future__ import annotations
 
@@ -95,16 +95,18 @@ def test_no_call_follows_the_end(doubles: dict[str, Path]) -> None:
 
 
 def test_no_domain_is_processed_before_its_frame_is_back(doubles: dict[str, Path]) -> None:
-    """The kernel logs one that is as "working counter changes". Naps learn when answers come, and
-    forget it slowly: a look that is too early must cost nothing. (Frames take 400 us; a machine
-    that stalls only makes looks later.)"""
+    """The kernel logs "working counter changes" for a domain that is processed too early.
+
+    The wait adapts to the round trip, and an early check must cost nothing. Frames take 400 us. A
+    stalled machine only delays checks.
+    """
     double = Double(doubles["1.6.1"])
     double.delay(400)
     with cat.MainDevice(Master(library=double.path)) as main:
         main.scan()
         arm = cat.Drives(main.subs.drives, counts_per_turn=1000, velocity_limit=100.0)
         with cat.Loop(arm, period=4e-3, stop=cat.StopPolicy(late_limit=0), priority=None) as loop:
-            double.early()  # bring-up: nothing is known of the answers before the first cycle
+            double.early()  # bring-up: the round trip is unknown before the first cycle
             for _ in range(60):
                 assert next(loop).ok
             assert double.early() == 0
@@ -126,8 +128,10 @@ def test_the_monitor_datagram_is_sent_last_in_threaded_execution(doubles: dict[s
 
 
 def test_a_ring_without_its_main_interface_causes_no_wait(doubles: dict[str, Path]) -> None:
-    """The monitor datagram goes by the main interface alone. The domains come by the other one, and
-    are not kept until the deadline."""
+    """The monitor datagram uses only the main interface.
+
+    The domains return on the other one, and are not delayed until the deadline.
+    """
     double = Double(doubles["1.6.1"])
     with cat.MainDevice(Master(library=double.path, virtual_time=True)) as main:
         main.scan()
@@ -143,7 +147,7 @@ def test_a_ring_without_its_main_interface_causes_no_wait(doubles: dict[str, Pat
 
 
 def test_slow_answers_of_optional_devices_are_received(doubles: dict[str, Path]) -> None:
-    """Nobody is waited for long who was away before; but who is only slow must be received."""
+    """A lost device causes only a short wait, but slow answers must be received."""
     double = Double(doubles["1.6.1"])
     double.delay(20_000)
     with cat.MainDevice(Master(library=double.path)) as main:

@@ -1,4 +1,4 @@
-"""AL status codes out of the kernel's log."""
+"""AL status codes from the kernel's log."""
 
 from __future__ import annotations
 

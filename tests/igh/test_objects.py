@@ -120,7 +120,7 @@ def test_a_device_without_objects(main: cat.MainDevice, double: Double) -> None:
 
 
 def test_another_thread_reads_objects_while_the_loop_runs(doubles: dict[str, Path]) -> None:
-    """In real time a call that blocks waits in its own thread."""
+    """In real time, a blocking call waits in a separate thread."""
     double = Double(doubles["1.6.1"])
     found: list[int] = []
     with cat.MainDevice(Master(library=double.path)) as main:
@@ -139,7 +139,7 @@ def test_another_thread_reads_objects_while_the_loop_runs(doubles: dict[str, Pat
 def test_calls_on_an_activated_master_without_cycles_are_refused(
     main: cat.MainDevice, double: Double
 ) -> None:
-    """The real one would wait in the kernel for ever, and the process with it."""
+    """A call to the real master would block in the kernel forever."""
     plan = main.plan(cat.Drives(main.subs.drives, counts_per_turn=1000, velocity_limit=100.0))
     main.configure(plan)
     double.forget()
@@ -153,7 +153,7 @@ def test_calls_on_an_activated_master_without_cycles_are_refused(
 
 
 def test_a_request_that_is_not_served_has_a_deadline(main: cat.MainDevice, double: Double) -> None:
-    """A device that is not there: its request stays busy in the kernel."""
+    """The request of a missing device stays busy in the kernel."""
     one, two = (
         cat.Drives([drive], counts_per_turn=1000, velocity_limit=100.0, required=required)
         for drive, required in zip(main.subs.drives, (True, False), strict=True)
@@ -174,7 +174,7 @@ def test_a_request_that_is_not_served_has_a_deadline(main: cat.MainDevice, doubl
 
 
 def test_a_silent_device_does_not_delay_others(doubles: dict[str, Path]) -> None:
-    """Calls that block wait in a thread of their device's own, and not for ever."""
+    """Blocking calls wait in a thread of their device, with a deadline."""
     double = Double(doubles["1.6.1"])
     with cat.MainDevice(Master(library=double.path)) as main:
         main.scan()
@@ -199,7 +199,7 @@ def test_a_silent_device_does_not_delay_others(doubles: dict[str, Path]) -> None
 
 
 def test_a_late_thread_makes_no_call(double: Double) -> None:
-    """libethercat does not look at the handle it is given: none of a master that was given back."""
+    """libethercat does not check handles, so those of a released master are not used."""
     reservation = Master(library=double.path).open_link()
     reservation.close()
     double.forget()

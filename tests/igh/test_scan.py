@@ -1,4 +1,4 @@
-"""What a scan asks, and what it takes from what the master knows."""
+"""Scans with the data of the kernel master."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from tests.igh.double import Double
 
 
 def test_a_scan_waits_for_devices_on_the_way_to_pre_op(double: Double) -> None:
-    """In INIT nobody answers an SDO: they would pass for devices without objects."""
+    """In INIT, devices do not answer SDOs, and would look like devices without objects."""
     double.boot(12)
     with cat.MainDevice(Master(library=double.path, virtual_time=True)) as main:
         subs = main.scan()
@@ -20,7 +20,7 @@ def test_a_scan_waits_for_devices_on_the_way_to_pre_op(double: Double) -> None:
 
 
 def test_a_device_that_stays_in_op_does_not_block_a_scan(double: Double) -> None:
-    """As those with Ethernet over EtherCAT."""
+    """Devices with Ethernet over EtherCAT do so."""
     double.state(1, 8, 0)
     with cat.MainDevice(Master(library=double.path, virtual_time=True)) as main:
         begun = main.link.now()
@@ -29,8 +29,10 @@ def test_a_device_that_stays_in_op_does_not_block_a_scan(double: Double) -> None
 
 
 def test_an_upload_with_a_lost_answer_is_repeated(double: Double) -> None:
-    """Else a drive whose answer a frame has lost would pass for a device without objects (seen on a
-    real master)."""
+    """Otherwise, a drive whose answer was lost would look like a device without objects.
+
+    This was observed on a real master.
+    """
     double.silent(2)
     with cat.MainDevice(Master(library=double.path, virtual_time=True)) as main:
         assert all(sub.is_drive for sub in main.scan())
@@ -40,7 +42,7 @@ def test_an_upload_with_a_lost_answer_is_repeated(double: Double) -> None:
 
 
 def test_no_objects_are_read_from_a_terminal_without_a_mailbox(double: Double) -> None:
-    """libethercat and the kernel would complain of it, on stderr and in the log."""
+    """libethercat and the kernel would report an error, on stderr and in the log."""
     double.plain(1)
     with cat.MainDevice(Master(library=double.path, virtual_time=True)) as main:
         drive, terminal = main.scan()

@@ -16,8 +16,10 @@ from tests.igh.loops import clocked_loop
 def test_the_types_are_restored_after_a_loop_with_clocks(
     main: cat.MainDevice, double: Double
 ) -> None:
-    """Else the next program, without clocks, would find them waiting for SYNC0 (seen on a real
-    master: AL status 0x0030)."""
+    """Otherwise, the devices would wait for SYNC0 in the next program without clocks.
+
+    This was observed on a real master, with AL status 0x0030.
+    """
     with clocked_loop(main):
         assert double.value(0, 0x1C32, 1) == 2
     assert double.value(0, 0x1C32, 1) == 1
@@ -28,7 +30,7 @@ def test_the_types_are_restored_after_a_loop_with_clocks(
 def test_types_are_restored_once_devices_are_in_pre_op(
     main: cat.MainDevice, double: Double
 ) -> None:
-    """The master leads them down after it was deactivated; in OP they refuse 0x1C32."""
+    """The master brings them down after its deactivation. In OP, they refuse 0x1C32."""
     double.linger(20)
     with clocked_loop(main):
         assert double.value(1, 0x1C32, 1) == 2
@@ -38,7 +40,7 @@ def test_types_are_restored_once_devices_are_in_pre_op(
 
 def test_a_device_may_take_seconds_to_reach_pre_op(main: cat.MainDevice, double: Double) -> None:
     """The master repeats a lost INIT request after 5 s (seen on a real master)."""
-    double.linger(500)  # a look takes 10 ms
+    double.linger(500)  # a check takes 10 ms
     with clocked_loop(main):
         pass
     assert [double.value(p, 0x1C32, 1) for p in (0, 1)] == [1, 1]
@@ -62,12 +64,12 @@ def test_a_device_that_stays_in_op_is_an_error(main: cat.MainDevice, double: Dou
 
     with pytest.raises(cat.errors.StateError, match=r"device 0 is not in PRE-OP but in OP.*0x1C32"):
         run()
-    assert all(str(sub.state) == "OP" for sub in main.subs)  # as read, not as it should be
+    assert all(str(sub.state) == "OP" for sub in main.subs)  # as read from the device
     double.linger(0)
     double.state(0, 2, 0)
     double.state(1, 2, 0)
     with cat.Loop(cat.Drives(main.subs.drives, counts_per_turn=1000, velocity_limit=100.0)):
-        assert double.value(0, 0x1C32, 1) == 1  # made up for
+        assert double.value(0, 0x1C32, 1) == 1  # restored later
 
 
 def test_the_types_are_restored_after_a_failed_configuration(

@@ -1,5 +1,7 @@
-"""The kernel master IgH, played word for word (`kernel_master.py`), judges the virtual segment: by
-what it sends in scan, configuration and operation, and by what it would log as an error."""
+"""A simulated IgH kernel master (`kernel_master.py`) tests the virtual segment.
+
+Its frames are those of scan, configuration and operation. Errors that it would log are failures.
+"""
 
 from __future__ import annotations
 
@@ -64,7 +66,7 @@ def slaves(master: KernelMaster) -> list[Slave]:
 
 
 def operate(master: KernelMaster, slaves: list[Slave], **options: int) -> Domain:
-    """One domain over all, everything configured to OP while it runs."""
+    """Configure all devices to OP with one running domain."""
     domain = Domain(0)
     for slave in slaves:
         domain.add(slave)
@@ -88,11 +90,11 @@ def test_scan(master: KernelMaster, slaves: list[Slave]) -> None:
     assert list(servo.pdos) == [2, 3]
     assert [len(v) for pdos in servo.pdos.values() for v in pdos.values()] == [5, 5]
     assert (servo.size(2), servo.size(3)) == (13, 13)
-    assert slaves[COUPLER].state == INIT  # no CoE: left alone until it is configured
+    assert slaves[COUPLER].state == INIT  # no CoE: unchanged until it is configured
 
 
 def test_topology_and_delays(slaves: list[Slave]) -> None:
-    # DL status: link of port 0 and 1, loop closed behind the last (slave.c, ec_slave_set_dl_status)
+    # DL status: link of port 0 and 1, loop closed after the last (slave.c, ec_slave_set_dl_status)
     for slave in slaves:
         last = slave is slaves[-1]
         assert bool(slave.dl_status & 1 << 4)
@@ -197,7 +199,7 @@ def test_clocks(master: KernelMaster, slaves: list[Slave]) -> None:
 def test_clocks_that_ran_before_their_offset_was_set(
     master: KernelMaster, slaves: list[Slave]
 ) -> None:
-    """The application is quicker than the state machine: wrong times first, then the offset."""
+    """The application is faster than the state machine: the offset follows after wrong times."""
     master.clock = slaves[COUPLER]
     master.run(200)
     operate(master, slaves, sync0=1_000_000)
@@ -275,7 +277,7 @@ def test_a_refused_state_is_acknowledged(
 def test_a_device_without_outputs_leaves_op_and_is_acknowledged(
     master: KernelMaster, slaves: list[Slave]
 ) -> None:
-    """The application stops: watchdogs expire, the master acknowledges and configures again."""
+    """The application stops, watchdogs expire, and the master configures the device again."""
     operate(master, slaves)
     domains, master.domains = master.domains, []
     master.run(300)
@@ -309,8 +311,10 @@ def test_states_on_the_way_down(
 def test_a_stop_is_quick_despite_errors(
     master: KernelMaster, slaves: list[Slave], segment: Segment, gap: int
 ) -> None:
-    """The application stops with clocks on. Drives miss their outputs before, while and after INIT
-    is requested. A lost request is a wait of 5 s (fsm_change.c, ec_fsm_change_timeout_ms)."""
+    """The application stops with clocks. Drives miss outputs before and after INIT requests.
+
+    A lost request costs 5 s (fsm_change.c, ec_fsm_change_timeout_ms).
+    """
     operate(master, slaves, sync0=1_000_000)
     master.domains = []
     master.run(gap)
@@ -325,11 +329,11 @@ def test_a_second_master_finds_the_segment_in_op(segment: Segment) -> None:
     first = KernelMaster(segment)
     operate(first, first.scan())
     first.post(first.slaves[SERVO], struct.pack("<HBHB4x", 0x2000, 0x40, 0x1008, 0))
-    first.run(5)  # its answer lies in the mailbox, nobody fetches it
+    first.run(5)  # its answer stays in the mailbox
     first.close()
     second = KernelMaster(segment)
     slaves = second.scan()
-    # nobody fed the outputs while it scanned, so watchdogs have expired, as they must
+    # the scan sends no outputs, so the watchdogs must have expired
     assert [slave.state for slave in slaves] == [OP, OP, SAFE_OP | 0x10, SAFE_OP | 0x10, OP, OP]
     for slave in slaves[SERVO : SERVO_2 + 1]:
         assert second.acknowledge(slave) == 0x001B

@@ -1,4 +1,4 @@
-"""Programs written for PyIgH: over libethercat's double and over our own MainDevice."""
+"""Programs for PyIgH, on a double of libethercat and on our own MainDevice."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def master(library: Path, request: pytest.FixtureRequest) -> MasterBase:
 
 
 def cycle(master: MasterBase, *servos: SlaveServo, goal: int | None = None) -> bool:
-    """One cycle as published; whether all servos are enabled."""
+    """Run one cycle as published. Return True if all servos are enabled."""
     master.wait()
     master.ecat_master_receive()
     assert isinstance(master.ecat_domain_process(), bool)
@@ -173,7 +173,7 @@ def test_the_example_is_short_and_runs() -> None:
     out = run("pyigh_loop.py")
     assert out.startswith("3 servos")
     assert "al_states=8" in out
-    assert "us a cycle" in out
+    assert "us per cycle" in out
 
 
 def test_the_same_program_on_the_kernel_master(

@@ -1,4 +1,4 @@
-"""`import catenary as cat`: the names, and what they cost."""
+"""`import catenary as cat`: the names, and the modules that they import."""
 
 from __future__ import annotations
 
