@@ -25,8 +25,11 @@ extensions = [
     "sphinx_copybutton",
     "api_reference",  # these are in _extensions
     "command_line",
+    "docstrings",
     "drawings",
+    "name_links",
     "repository_links",
+    "short_types",
 ]
 exclude_patterns = ["README.md"]
 default_role = "code"

@@ -70,7 +70,7 @@ def measure(options: Options) -> Sheet:
             "period": PERIOD,
             "ways": [
                 {
-                    "who": who,
+                    "who": who,  # words: ok
                     "event": event,
                     "events": each.events,
                     "left_out": each.left_out,

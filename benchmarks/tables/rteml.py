@@ -129,10 +129,10 @@ def read_until(wire: socket.socket, worker: Child, seconds: float) -> tuple[list
         if wire.fileno() in ready:
             frames += drain(wire)
         if output.fileno() in ready or not ready:
-            output = worker.read_line(1.0)
-            if output is None or not output.startswith("{"):
-                raise RoundError(f"the loop failed: {output or 'no output'}")
-            return frames + drain(wire), output
+            line = worker.read_line(1.0)
+            if line is None or not line.startswith("{"):
+                raise RoundError(f"the loop failed: {line or 'no output'}")
+            return frames + drain(wire), line
 
 
 def drain(wire: socket.socket) -> list[Frame]:

@@ -40,7 +40,7 @@ from benchmarks.tables.sheet import Options, Sheet, as_failures, grid, slashed
 from benchmarks.tasks import compute_little
 from catenary.bench.job import Body, Job
 from catenary.bench.loop import make_jobs, show_progress
-from catenary.bench.rounds import BRING_UP_SECONDS, RoundError, begin_anew
+from catenary.bench.rounds import BRING_UP_SECONDS, RoundError, run_with_retries
 from catenary.bench.segment import Served, processors, served
 from catenary.bench.statistics import summarise
 from catenary.realtime import Statistics, Task, Tasks, session
@@ -187,7 +187,7 @@ def run(
         for number in range(rounds):
             for name, way in ways.items():
                 show_progress(f"{name}, {rate} Hz", number + 1, rounds)
-                begin_anew(partial(way, jobs, Places(segments, folder), found[name]), failed)
+                run_with_retries(partial(way, jobs, Places(segments, folder), found[name]), failed)
     return found
 
 

@@ -1,4 +1,4 @@
-"""API reference: the directive `api`, and readable docstrings, signatures and links for autodoc.
+"""API reference: the directive `api`, and links from types to their public names.
 
     :::{api} catenary.drive
     Move
@@ -11,13 +11,12 @@ name has to be on exactly one page; the build warns otherwise, and warnings are 
 
 from __future__ import annotations
 
-import ast
 import inspect
 import re
+import sys
+import types
 from enum import Enum
-from functools import cache
 from importlib import import_module
-from pathlib import Path
 from typing import Any, ClassVar
 
 from docutils import nodes
@@ -27,7 +26,6 @@ from sphinx.addnodes import pending_xref
 from sphinx.application import Sphinx
 from sphinx.environment import BuildEnvironment
 from sphinx.ext.autodoc import Options
-from sphinx.ext.napoleon import GoogleDocstring
 from sphinx.pycode import ModuleAnalyzer
 from sphinx.util import logging
 from sphinx.util.docutils import SphinxDirective
@@ -35,12 +33,12 @@ from sphinx.util.docutils import SphinxDirective
 from catenary.types import DataType
 
 LOGGER = logging.getLogger(__name__)
-SOURCE = Path(__file__).resolve().parents[2] / "src"
-# classes whose members are known: they are not repeated in what derives from them
-KNOWN = "object, int, str, tuple, Enum, IntEnum, IntFlag, Struct, Exception, BaseException, Generic"
-PAGE = re.compile(r"\bdocs((?:/\w+)+)\.md")
+# the members of these classes are not repeated in classes that derive from them
+KNOWN = (
+    "object, int, str, tuple, Enum, IntEnum, Struct, BaseException, Generic, Sequence, Mapping, "
+    "Device, DataType"
+)
 SECTION = re.compile(r"^(Args|Attributes):$", re.MULTILINE)
-COMMENT = re.compile(r"^( {4}\w+: [^#\n]*[^#\s])  # (?!noqa|type:|fmt:)", re.MULTILINE)
 
 
 class Api(SphinxDirective):
@@ -66,10 +64,17 @@ class Api(SphinxDirective):
 
     def entry(self, module: str, name: str) -> list[str]:
         """Return the lines of reStructuredText that document a name."""
-        found = getattr(import_module(EVENTS if module == "catenary.events" else module), name)
+        home = import_module(EVENTS if module == "catenary.events" else module)
+        found = getattr(home, name, None)
+        if found is None:
+            raise self.error(f"{module} has no name {name!r}")
         full = f"{module}.{name}"
+        self.note_files(found)
         if isinstance(found, DataType):
             return [f".. py:data:: {full}", "", f"   {describe_type(found)}"]
+        if isinstance(found, types.UnionType):
+            names = ", ".join(f"`{each.__name__}`" for each in found.__args__)
+            return [f".. py:data:: {full}", "", f"   Any of {names}."]
         if not isinstance(found, type):
             return [f".. auto{'function' if callable(found) else 'data'}:: {full}"]
         if found.__name__ != name:
@@ -81,10 +86,17 @@ class Api(SphinxDirective):
         if "exclude" in self.options:
             lines += [f"   :exclude-members: {', '.join(self.options['exclude'].split())}"]
         if exception or module == "catenary.events":
-            lines += ["   :show-inheritance:"]
+            lines += ["   :show-inheritance:"] * (found.__base__ is not object)
         elif "no-inherited" not in self.options:
             lines += [f"   :inherited-members: {KNOWN}"]
         return lines
+
+    def note_files(self, found: object) -> None:
+        """Build the page again after a change of this file, or of the module of a name."""
+        for name in (__name__, getattr(found, "__module__", None)):
+            path = getattr(sys.modules.get(name or ""), "__file__", None)
+            if path is not None:
+                self.env.note_dependency(path)
 
     def alias(self, full: str, found: type) -> list[str]:
         """Document a class under the name of the function that users call."""
@@ -103,78 +115,6 @@ def describe_type(data: DataType[Any]) -> str:
     length = f"{data.bit_length} bits" if data.bit_length else "any number of bytes"
     others = f"; also called {', '.join(data.aliases)}" if data.aliases else ""
     return f"Index 0x{data.index:04X}, {length}{others}."
-
-
-def mark_examples(lines: list[str]) -> list[str]:
-    """Return the lines with a directive before each indented block after a paragraph."""
-    result: list[str] = []
-    in_block = False
-    for number, line in enumerate(lines):
-        indent = len(line) - len(line.lstrip())
-        before = lines[number - 1] if number else ""
-        if not in_block and line.strip() and indent >= 4 and not before.strip():
-            previous = next((each for each in reversed(lines[:number]) if each.strip()), "")
-            is_item = re.match(r"\s*(-|\d+\.|\w+:)(\s|$)", previous)
-            if not is_item and indent - (len(previous) - len(previous.lstrip())) >= 4:
-                in_block = True
-                result += [" " * (indent - 4) + ".. code-block:: python", ""]
-        elif line.strip() and indent < 4:
-            in_block = False
-        result.append(line)
-    return result
-
-
-def improve_docstring(
-    app: Sphinx, what: str, name: str, obj: object, options: Options, lines: list[str]
-) -> None:
-    """Mark examples as code, link pages, add types of stubs. Runs before napoleon."""
-    lines[:] = [PAGE.sub(r":doc:`\1`", line) for line in mark_examples(lines)]
-    stub = stub_function(obj) if what in ("attribute", "property") else None
-    if stub is not None and stub.returns is not None:
-        lines += ["", f":type: {ast.unparse(stub.returns)}"]
-
-
-@cache
-def stub_of(module: str) -> dict[str, ast.FunctionDef]:
-    """Return the functions of a compiled module's stub, by qualified name."""
-    path = SOURCE / f"{module.replace('.', '/')}.pyi"
-    if not path.exists():
-        return {}
-    found = {}
-    for node in ast.parse(path.read_text()).body:
-        inner = node.body if isinstance(node, ast.ClassDef) else [node]
-        prefix = f"{node.name}." if isinstance(node, ast.ClassDef) else ""
-        found |= {prefix + each.name: each for each in inner if isinstance(each, ast.FunctionDef)}
-    return found
-
-
-def stub_function(obj: Any) -> ast.FunctionDef | None:
-    """Return the stub of a compiled function or property; None if it is not compiled."""
-    owner = getattr(obj, "__objclass__", obj)
-    stub = stub_of(getattr(owner, "__module__", None) or "")
-    return stub.get(getattr(obj, "__qualname__", ""))
-
-
-def read_stub_signature(
-    app: Sphinx, what: str, name: str, obj: Any, options: Options, signature: str, returns: str
-) -> tuple[str, str | None] | None:
-    """Return the signature that the stub of a compiled function has."""
-    function = stub_function(obj) if what in ("function", "method") else None
-    if function is None:
-        return None
-    arguments = ast.unparse(function.args).removeprefix("self").removeprefix(", ")
-    return f"({arguments})", ast.unparse(function.returns) if function.returns else None
-
-
-def read_comments(init: Any) -> Any:
-    """Return a constructor of ModuleAnalyzer for which comments of fields are documentation."""
-
-    def wrapper(self: ModuleAnalyzer, source: str, modname: str, srcname: str) -> None:
-        if modname.startswith("catenary"):
-            source = COMMENT.sub(r"\1  #: ", source)
-        init(self, source, modname, srcname)
-
-    return wrapper
 
 
 def resolve(
@@ -210,18 +150,8 @@ def check_public_names(app: Sphinx, env: BuildEnvironment) -> None:
         LOGGER.warning("%s is public, but no page documents it: add it to an {api} block", name)
 
 
-def read_attribute(self: GoogleDocstring) -> list[str]:
-    """Return the docstring of an attribute or property as it is: "a: b" is not "type: text"."""
-    lines: list[str] = self._consume_to_end()
-    return lines
-
-
 def setup(app: Sphinx) -> dict[str, bool]:
-    GoogleDocstring._parse_attribute_docstring = read_attribute  # type: ignore[method-assign]
-    ModuleAnalyzer.__init__ = read_comments(ModuleAnalyzer.__init__)  # type: ignore[method-assign]
     app.add_directive("api", Api)
-    app.connect("autodoc-process-docstring", improve_docstring, priority=400)
-    app.connect("autodoc-process-signature", read_stub_signature)
     app.connect("missing-reference", resolve)
     app.connect("env-check-consistency", check_public_names)
     return {"parallel_read_safe": True, "parallel_write_safe": True}

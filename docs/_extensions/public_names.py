@@ -11,6 +11,24 @@ MODULES = ("control", "drive", "realtime", "record", "share", "virtual")
 PLAIN = ("errors", "events", "types", "virtual.faults")  # no `__all__`: what they define
 INTERNAL = {"catenary.events.emergency", "catenary.virtual.faults.number_of_state"}
 
+# Types of what public methods return; programs do not import them.
+RETURNED = {
+    "catenary.bus": ("SubDevices", "Sdo", "Pending", "ListType"),
+    "catenary.bus.diagnosis": ("Diagnosis",),
+    "catenary.bus.event_queue": ("Events",),
+    "catenary.drive.values": ("AxisValues",),
+    "catenary.link.interfaces": ("NetworkInterface",),
+    "catenary.log": ("Log",),
+    "catenary.loop": ("Law", "LawRun", "Network", "Stream"),
+    "catenary.loop.timing": ("Timing",),
+    "catenary.model.device": ("Identity",),
+    "catenary.model.finding": ("Finding",),
+    "catenary.plan.stop_reason": ("StopReason",),
+    "catenary.procedure.al_state": ("DeviceState",),
+    "catenary.wire.al": ("AlState",),
+    "catenary.wire.cia402": ("AxisState",),
+}
+
 
 def public_names() -> set[str]:
     """Return the full names, such as `catenary.MainDevice` and `catenary.drive.Move`."""
@@ -18,7 +36,8 @@ def public_names() -> set[str]:
     add(found, "catenary")
     for name in (*MODULES, *PLAIN):
         add(found, f"catenary.{name}")
-    return set(found.values()) - INTERNAL
+    returned = {f"{module}.{name}" for module, names in RETURNED.items() for name in names}
+    return (set(found.values()) - INTERNAL) | returned
 
 
 def add(found: dict[int, str], name: str) -> None:

@@ -1,4 +1,4 @@
-"""`catenary bench latency`: the verdict is the doctor's; how late is not for a test."""
+"""`catenary bench latency`: output, file and errors, without limits on the latency."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import pytest
 from catenary.cli.main import main
 
 
-def test_it_prints_and_writes_the_verdict(
+def test_the_verdict_is_printed_and_written(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     file = tmp_path / "latency.json"
@@ -24,6 +24,6 @@ def test_it_prints_and_writes_the_verdict(
     assert printed == capsys.readouterr().out + f"wrote {file}\n"
 
 
-def test_a_cpu_that_does_not_exist_is_one_line(capsys: pytest.CaptureFixture[str]) -> None:
+def test_an_unknown_cpu_is_an_error_of_one_line(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["bench", "latency", "--seconds", "0.1", "--cpu", "9999"]) == 1
     assert "CPU 9999 does not exist" in capsys.readouterr().err

@@ -12,11 +12,11 @@ from catenary.bench.statistics import combine
 from tests.bench.test_statistics import make_round
 
 
-def test_a_law_runs_where_it_can_be_compiled() -> None:
+def test_a_law_runs_if_numba_is_installed() -> None:
     assert own_names() == list(MODULES)[: 3 if find_spec("numba") else 2]
 
 
-def test_a_busy_wait_must_be_possible() -> None:
+def test_a_busy_wait_is_less_than_the_period() -> None:
     check_busy_wait(50e-6, 1000)
     for seconds in (1e-3, -1e-6):
         with pytest.raises(ValueError, match="less than the period"):
@@ -34,7 +34,7 @@ def test_the_file_has_the_setting_and_all_runs(tmp_path, capsys) -> None:
     assert [run["name"] for run in figures["runs"]] == list(MODULES)
 
 
-def test_a_ratio_that_is_missing_is_a_dash() -> None:
+def test_a_missing_ratio_is_a_dash() -> None:
     runs = [combine("c", [make_round(500, 4000, 5500)])]
     text = as_text(runs, {"tail: a / b": 1.5, "process: c / d": 2.0})
     assert text.splitlines()[-2].split() == ["a", "/", "b", "1.50", "-"]

@@ -1,4 +1,4 @@
-"""Rounds that fail: done again a number of times, and told."""
+"""Failed rounds are repeated and reported, up to a limit."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import pytest
 
 from catenary.bench import rounds
 from catenary.bench.job import Body, Job
-from catenary.bench.rounds import MOST_FAILED, RoundError, begin_anew, interleave
+from catenary.bench.rounds import MOST_FAILED, RoundError, interleave, run_with_retries
 from tests.bench.test_statistics import make_round
 
 
@@ -24,22 +24,22 @@ def once(good: Iterator[bool]) -> str:
     return "done"
 
 
-def test_a_round_is_done_again_and_that_is_told() -> None:
+def test_a_failed_round_is_repeated_and_reported() -> None:
     failed: list[str] = []
     good = outcomes(2)
-    assert begin_anew(lambda: once(good), failed) == "done"
+    assert run_with_retries(lambda: once(good), failed) == "done"
     assert failed == ["the machine stopped"] * 2
 
 
-def test_not_for_ever() -> None:
+def test_the_number_of_repetitions_is_limited() -> None:
     failed: list[str] = []
     good = outcomes(1000)
     with pytest.raises(RoundError, match="the machine stopped"):
-        begin_anew(lambda: once(good), failed)
+        run_with_retries(lambda: once(good), failed)
     assert len(failed) == MOST_FAILED
 
 
-def test_each_round_begins_with_another_peer(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_each_round_starts_with_another_peer(monkeypatch: pytest.MonkeyPatch) -> None:
     ran: list[str] = []
 
     def run_round(job: Job, _folder: object) -> object:

@@ -1,4 +1,4 @@
-"""`catenary bench report`: a saved result is printed as when it was measured."""
+"""`catenary bench report`: a saved result is printed like a new one."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from catenary.cli.main import main
 from tests.bench.test_statistics import make_round
 
 
-def test_a_loop_is_printed_again_with_the_verdict(
+def test_a_saved_loop_is_printed_with_the_verdict(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     file = tmp_path / "loop.json"
@@ -26,7 +26,7 @@ def test_a_loop_is_printed_again_with_the_verdict(
 
 
 @pytest.mark.parametrize("text", ["", "[]", "{}", '{"runs": [{}], "machine": "", "ratios": {}}'])
-def test_another_file_is_refused_in_one_line(
+def test_another_file_is_an_error_of_one_line(
     text: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     file = tmp_path / "other.json"

@@ -21,13 +21,13 @@ LATENESS = 50_000
 def make_round(
     receive: int, process: int, send: int, lost: int = 0, cpu_ns: float = 20_000.0
 ) -> Round:
-    """A hundred equal cycles of an inline loop."""
+    """Return a round of a hundred equal cycles of an inline loop."""
     delay = LATENESS + receive + process + send
     row = (1_000_000, LATENESS, receive, process, send, 2_000, delay, 990_000)
     return Round(np.tile(np.array(row, np.int64), (100, 1)), lost, cpu_ns, "SCHED_FIFO 80")
 
 
-def test_rounds_of_a_peer_are_one_run() -> None:
+def test_combine_the_rounds_of_a_peer() -> None:
     run = combine("c", [make_round(5000, 300, 5000, 1), make_round(7000, 300, 5000, 2)])
     assert (run.cycles, run.lost, run.cpu_us_per_cycle) == (200, 3, 20.0)
     assert run.timing_us["receive"]["mean"] == 6.0
@@ -67,7 +67,7 @@ def test_the_first_period_of_a_round_is_not_counted() -> None:
     assert combine("c", [first, first]).timing_us["period"]["max"] == 1000.0
 
 
-def test_job_and_round_survive_a_file(tmp_path) -> None:
+def test_write_and_read_a_job_and_a_round(tmp_path) -> None:
     job = Job("c", "peer", "cat0a", (2, 3), Body.PD, 1_000_000, 200, 1000, None, 80, 2.0**20, 1.0)
     write_job(job, tmp_path / "job.json")
     assert read_job(tmp_path / "job.json") == job

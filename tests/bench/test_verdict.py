@@ -11,9 +11,7 @@ from tests.bench.test_statistics import LATENESS, make_round
     ("delay_us", "lost", "status"),
     [(100, 0, "PASS"), (101, 0, "WARN"), (60, 1, "WARN"), (500, 0, "WARN"), (501, 0, "FAIL")],
 )
-def test_the_worst_output_delay_and_lost_cycles_are_judged(
-    delay_us: int, lost: int, status: str
-) -> None:
+def test_verdict_by_output_delay_and_lost_cycles(delay_us: int, lost: int, status: str) -> None:
     run = combine("catenary-inline", [make_round(0, delay_us * 1000 - LATENESS, 0, lost)])
     assert verdict.status_of(run, 1000.0) == status
     share = f"{delay_us / 10:.1f}% of the period; {lost} of 100 cycles lost"

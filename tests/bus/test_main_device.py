@@ -188,7 +188,7 @@ def test_a_device_that_never_reaches_a_state() -> None:
         main.scan()
         segment[4].delay_state(AlState.SAFE_OP, None)
         start = main.link.now()
-        with pytest.raises(StateError, match=r"device 4 .*did not reach within 10 s SAFE-OP"):
+        with pytest.raises(StateError, match=r"device 4 .*did not reach SAFE-OP within 10 s"):
             main.configure(main.plan())
         assert main.link.now() - start < 15e9
 
@@ -360,7 +360,7 @@ def test_the_length_of_a_requested_object_is_checked() -> None:
     with MainDevice(demo_segment()) as main:
         main.scan()
         asked = Asking({2: DeviceRequest(inputs=(ObjectReference(0x60F4, 0, 16),))})
-        with pytest.raises(MappingError, match="has 32 bits, 16 were asked for"):
+        with pytest.raises(MappingError, match="has 32 bits, 16 were requested"):
             main.plan(asked)
 
 

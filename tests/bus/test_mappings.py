@@ -54,8 +54,8 @@ def test_a_scan_shows_the_mapping_of_the_device_and_notes_that_of_the_sii() -> N
         assert indices(device, Direction.OUTPUT) == [0x1601]
         assert indices(device, Direction.INPUT) == [0x1A01]
         assert main.notes == (
-            f"{device}: SyncManager 2 carries PDOs 0x1601, its SII specifies 0x1600",
-            f"{device}: SyncManager 3 carries PDOs 0x1A01, its SII specifies 0x1A00",
+            f"{device}: SyncManager 2 carries PDOs 0x1601, but its SII specifies 0x1600",
+            f"{device}: SyncManager 3 carries PDOs 0x1A01, but its SII specifies 0x1A00",
         )
 
 

@@ -70,7 +70,7 @@ def test_a_missing_list_of_pdos_does_not_end_a_scan() -> None:
         assert subs[1].description.mapping_source == "SII"
         [note] = main.notes
         assert "device 1" in note
-        assert "its mapping cannot be read, that of its SII is used" in note
+        assert "its mapping cannot be read, so that of its SII is used" in note
 
 
 def test_a_missing_list_of_pdos_does_not_affect_other_devices() -> None:

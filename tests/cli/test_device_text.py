@@ -1,4 +1,4 @@
-"""Text of devices is data: no command prints its control characters."""
+"""Text from devices is data: no command prints its control characters."""
 
 from __future__ import annotations
 
@@ -77,7 +77,7 @@ def test_no_command_prints_control_characters(
     assert "internal error" not in err
 
 
-def test_an_error_of_the_scan_is_escaped_too(
+def test_an_error_of_the_scan_is_escaped(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     status, out, err = call(f"scan {made(tmp_path, SEGMENT % 65535)}", capsys)
@@ -87,14 +87,12 @@ def test_an_error_of_the_scan_is_escaped_too(
     assert all(line.isprintable() for line in (out + err).split("\n"))
 
 
-def test_a_string_is_shown_with_its_escapes(
-    target: str, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_string_is_printed_with_escapes(target: str, capsys: pytest.CaptureFixture[str]) -> None:
     _, out, _ = call(f"sdo read {target} 0 0x1008 --type STRING", capsys)
     assert out == "\\x1b[2J\\r\\n\\x07\\x9barm\n"
 
 
-def test_a_list_that_was_cut_short_is_printed_with_a_note(
+def test_a_truncated_list_is_printed_with_a_note(
     target: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     status, out, err = call(f"sdo list {target} 0 --json", capsys)
@@ -112,7 +110,7 @@ def test_a_list_that_was_cut_short_is_printed_with_a_note(
         'object_list = "promised"',
     ],
 )
-def test_sdo_list_prints_what_the_device_describes(
+def test_sdo_list_prints_the_descriptions_of_the_device(
     quirks: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     target = made(tmp_path, servo(f"mailbox_quirks = {{ {quirks} }}"))
@@ -135,7 +133,7 @@ def test_an_object_without_a_description_has_a_row_and_a_note(
     assert (row["subindex"], row["problem"]) == (None, "not described")
 
 
-def test_another_devices_error_does_not_keep_one_from_being_read(
+def test_an_error_of_another_device_does_not_prevent_a_read(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     target = made(tmp_path, servo("sii_quirks = { mailbox_size = 8 }"), servo("serial = 2"))
@@ -146,7 +144,7 @@ def test_another_devices_error_does_not_keep_one_from_being_read(
     assert "device 0" in err
 
 
-def test_what_is_escaped() -> None:
+def test_escaped_characters() -> None:
     assert escaped(EVIL) == r"\x1b[2J\r\n\x9b31m\u202e"
     assert escaped("Größe 5 µm, 20 °C") == "Größe 5 µm, 20 °C"
     assert table([("a", EVIL)]) == "a  " + escaped(EVIL)

@@ -1,4 +1,4 @@
-"""`diag` and `graph` on a virtual segment that lives through several commands."""
+"""`diag` and `graph` on a virtual segment that several commands share."""
 
 from __future__ import annotations
 
@@ -26,13 +26,13 @@ def call(line: str, capsys: pytest.CaptureFixture[str]) -> tuple[int, str, str]:
     return status, printed.out, printed.err
 
 
-def test_nothing_found(segment: cat.Segment, capsys: pytest.CaptureFixture[str]) -> None:
+def test_no_fault_found(segment: cat.Segment, capsys: pytest.CaptureFixture[str]) -> None:
     status, out, err = call("diag eth9", capsys)
     assert (status, err) == (0, "")
-    assert out.startswith("nothing found: 3 devices have counted no error since")
+    assert out.startswith("no fault found: 3 devices counted no error since")
 
 
-def test_a_cable_is_named(segment: cat.Segment, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_faulty_cable_is_named(segment: cat.Segment, capsys: pytest.CaptureFixture[str]) -> None:
     segment.core.poke(2, 0x0300, b"\x09\x02")
     status, out, _ = call("diag eth9", capsys)
     assert status == 1
@@ -48,7 +48,7 @@ def test_a_cable_is_named(segment: cat.Segment, capsys: pytest.CaptureFixture[st
     ]
 
 
-def test_watching_tells_old_errors_from_new_ones(
+def test_seconds_reports_only_new_errors(
     segment: cat.Segment, capsys: pytest.CaptureFixture[str]
 ) -> None:
     segment.core.poke(2, 0x0300, b"\x09\x02")
@@ -57,13 +57,15 @@ def test_watching_tells_old_errors_from_new_ones(
     assert "counted no error within 0.2 s (" in out
 
 
-def test_clearing_begins_anew(segment: cat.Segment, capsys: pytest.CaptureFixture[str]) -> None:
+def test_clear_resets_the_counters(
+    segment: cat.Segment, capsys: pytest.CaptureFixture[str]
+) -> None:
     segment.core.poke(2, 0x0300, b"\x09\x02")
     assert call("diag eth9 --clear", capsys)[0] == 1
     assert call("diag eth9", capsys)[0] == 0
 
 
-def test_diag_for_programs(segment: cat.Segment, capsys: pytest.CaptureFixture[str]) -> None:
+def test_diag_as_json(segment: cat.Segment, capsys: pytest.CaptureFixture[str]) -> None:
     segment.core.poke(2, 0x0300, b"\x09\x02")
     status, out, _ = call("diag eth9 --json", capsys)
     found = json.loads(out)
@@ -77,7 +79,7 @@ def test_diag_for_programs(segment: cat.Segment, capsys: pytest.CaptureFixture[s
     }
 
 
-def test_diag_leaves_the_states_as_they_are(
+def test_diag_does_not_change_states(
     segment: cat.Segment, capsys: pytest.CaptureFixture[str]
 ) -> None:
     call("state eth9 SAFEOP", capsys)
@@ -86,7 +88,7 @@ def test_diag_leaves_the_states_as_they_are(
     assert [segment.core.peek(n, 0x0130, 1)[0] for n in range(3)] == [4, 4, 4]
 
 
-def test_graph_draws_a_line(segment: cat.Segment, capsys: pytest.CaptureFixture[str]) -> None:
+def test_graph_of_a_line(segment: cat.Segment, capsys: pytest.CaptureFixture[str]) -> None:
     status, out, _ = call("graph eth9", capsys)
     lines = out.splitlines()
     assert status == 0
@@ -103,7 +105,7 @@ def test_graph_for_graphviz(segment: cat.Segment, capsys: pytest.CaptureFixture[
     assert out.rstrip().endswith("}")
 
 
-def test_graph_says_what_is_no_tree(
+def test_graph_reports_contradicting_ports(
     segment: cat.Segment, capsys: pytest.CaptureFixture[str]
 ) -> None:
     status = segment.core.peek(2, 0x0110, 2)
@@ -122,9 +124,7 @@ def test_graph_says_what_is_no_tree(
         ("graph virtual:nosuchfile.toml", "nosuchfile.toml"),
     ],
 )
-def test_mistakes_name_the_thing(
-    line: str, message: str, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_errors_name_the_cause(line: str, message: str, capsys: pytest.CaptureFixture[str]) -> None:
     status, out, err = call(line, capsys)
     assert (status, out) == (1, "")
     assert message in err
@@ -132,9 +132,7 @@ def test_mistakes_name_the_thing(
 
 
 @pytest.mark.parametrize("words", ["diag", "diag eth9 --seconds soon", "diag eth9 --seconds 0"])
-def test_a_wrong_command_line_says_where_the_help_is(
-    words: str, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_usage_error_names_the_help(words: str, capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit) as stop:
         main(words.split())
     assert stop.value.code == 2

@@ -1,4 +1,4 @@
-"""Every command line in the documents is one that the parser takes."""
+"""The parser accepts every command line in the documents."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import re
 import shlex
 from collections.abc import Iterator
 from pathlib import Path
+from textwrap import indent
 
 import pytest
 
@@ -14,18 +15,21 @@ from catenary.cli import main as catenary
 
 ROOT = Path(__file__).resolve().parent.parent.parent
 DOCUMENTS = (ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md")))
+FENCE = re.compile(r"^```(?:bash|console|sh)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 CALL = re.compile(
-    r"(?:^ {4}|`)(?:sudo )?(?:\.venv/bin/)?(catenary|python -m benchmarks) ([^`\n]+)", re.MULTILINE
+    r"(?:^ {4}(?:\$ )?|`)(?:sudo )?(?:\.venv/bin/)?(catenary|python -m benchmarks) ([^`\n]+)",
+    re.MULTILINE,
 )
 PARSERS = {"catenary": catenary.make_parser, "python -m benchmarks": benchmarks.make_parser}
 PLACEHOLDER = re.compile(r"[\[|]|\b(COMMAND|TARGET|POSITION|FILE|NAME|N|S)\b")
-BEHIND = re.compile(r"\s{2,}| \\?\| | && |\s#|&$")  # a comment, or what a shell does with it
+BEHIND = re.compile(r"\s{2,}| \\?\| | && |\s#|&$")  # a comment, or shell syntax after the command
 
 
 def calls() -> Iterator[tuple[str, str]]:
-    """Whole ones: neither a command's name alone nor one with something to put in."""
+    """Return complete command lines, without bare command names and placeholders."""
     for document in DOCUMENTS:
-        for program, found in CALL.findall(document.read_text()):
+        text = FENCE.sub(lambda block: indent(block[1], " " * 4), document.read_text())
+        for program, found in CALL.findall(text):
             call = BEHIND.split(found)[0].strip()
             given = [word for word in call.split() if not word.isalpha()]
             if given and not PLACEHOLDER.search(call):
@@ -33,6 +37,8 @@ def calls() -> Iterator[tuple[str, str]]:
 
 
 @pytest.mark.parametrize(("program", "call"), sorted(set(calls())))
-def test_it_parses(program: str, call: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(ROOT)  # where results go is looked at
+def test_the_parser_accepts_the_command(
+    program: str, call: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(ROOT)  # the parser checks the folders of result files
     PARSERS[program]().parse_args(shlex.split(call))

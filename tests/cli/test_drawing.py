@@ -1,4 +1,4 @@
-"""Drawings of segments: text, and Graphviz where it is installed."""
+"""Drawings of segments as text, and with Graphviz if it is installed."""
 
 from __future__ import annotations
 
@@ -26,11 +26,11 @@ def drawing(errors: dict[int, ErrorCounters] | None = None) -> Drawing:
     return Drawing("eth0", topology, nodes)
 
 
-def test_a_line_stays_a_column() -> None:
+def test_a_line_is_drawn_as_a_column() -> None:
     assert indents(make_topology(line(4))) == ("", "", "", "")
 
 
-def test_branches_are_indented_and_the_last_way_on_is_not() -> None:
+def test_branches_are_indented_except_the_last_one() -> None:
     assert indents(make_topology(TREE)) == ("", "", "├─", "│ ", "├─", "│ ├─", "│ ", "", "")
 
 
@@ -43,13 +43,13 @@ def test_text_has_a_line_for_each_device_with_its_cable() -> None:
     assert "4 port 3    500 ns" in lines[5]
 
 
-def test_text_shows_what_contradicts_itself() -> None:
+def test_text_shows_contradictions() -> None:
     nodes = (Node("a", 0, "INIT", None, None), Node("b", 0, "INIT", None, None))
     text = as_text(Drawing("eth0", make_topology([LINE, LINE]), nodes))
     assert text.splitlines()[-1].startswith("! device 1 port 1 is open, but no device answers")
 
 
-def test_errors_in_a_few_words() -> None:
+def test_error_text() -> None:
     errors = counted(p0=PortErrors(14, 3), p1=PortErrors(lost_links=1), processing_unit=14, pdi=2)
     assert error_text(errors) == "port 0: 14 broken, 3 symbol; port 1: 1 lost link; PDI 2"
     assert error_text(ErrorCounters()) == error_text(None) == ""
@@ -64,7 +64,7 @@ def test_dot_has_a_node_for_each_device_and_an_edge_for_each_cable() -> None:
 
 
 @pytest.mark.skipif(shutil.which("dot") is None, reason="Graphviz is not installed")
-def test_graphviz_reads_it() -> None:
+def test_graphviz_accepts_the_graph() -> None:
     done = subprocess.run(
         ["dot", "-Tplain"], input=as_dot(drawing()), capture_output=True, text=True, timeout=60
     )

@@ -1,4 +1,4 @@
-"""The command line on a kernel master: what works, and what says whose work it is."""
+"""The command line on a kernel master: supported commands, and errors of the others."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def test_scan_and_sdo(capsys: pytest.CaptureFixture[str]) -> None:
         ("sdo list igh:0 0", "ethercat sdos -p 0"),
     ],
 )
-def test_what_the_library_cannot(
+def test_unsupported_commands(
     capsys: pytest.CaptureFixture[str], command: str, instead: str
 ) -> None:
     assert main(command.split()) == 1

@@ -18,7 +18,7 @@ def call(capsys: pytest.CaptureFixture[str], *words: str | Path) -> tuple[int, s
     return status, printed.out, printed.err
 
 
-def test_init_writes_a_file_that_check_finds_equal(
+def test_check_accepts_a_file_written_by_init(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     line = tmp_path / "line.toml"
@@ -36,9 +36,7 @@ def test_init_writes_a_file_that_check_finds_equal(
     ]
 
 
-def test_check_takes_a_file_of_any_suffix(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_check_accepts_any_suffix(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = write_small(tmp_path).rename(tmp_path / "cell.cfg")
     assert call(capsys, "check", path)[0] == 0
 
@@ -63,13 +61,13 @@ def test_init_does_not_overwrite(tmp_path: Path, capsys: pytest.CaptureFixture[s
     path.write_text("mine")
     status, _, err = call(capsys, "init", "virtual", "-o", path)
     assert status == 2
-    assert "exists already" in err
+    assert "already exists" in err
     assert path.read_text() == "mine"
     assert call(capsys, "init", "virtual", "-o", path, "--force")[0] == 0
     assert "catenary-machine/1" in path.read_text()
 
 
-def test_init_wants_a_target(capsys: pytest.CaptureFixture[str]) -> None:
+def test_init_needs_a_target(capsys: pytest.CaptureFixture[str]) -> None:
     status, _, err = call(capsys, "init")
     assert status == 2
     assert "TARGET is missing" in err
@@ -97,13 +95,13 @@ def test_check_compares_without_changing_a_device(
     assert rows["Catenary"].startswith("unknown")
 
 
-def test_check_takes_another_target(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_check_with_another_target(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     status, out, _ = call(capsys, "check", write_small(tmp_path), "virtual")
     assert status == 1
     assert "different  gauge" in out
 
 
-def test_check_for_programs(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_check_as_json(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     status, out, _ = call(capsys, "check", write_small(tmp_path), "--json")
     assert status == 0
     rows = json.loads(out)
@@ -126,7 +124,7 @@ def test_check_for_programs(tmp_path: Path, capsys: pytest.CaptureFixture[str]) 
         (SMALL.replace("virtual:line.toml", "virtual:nothing.toml"), "nothing.toml: No such file"),
     ],
 )
-def test_what_cannot_be_read_has_a_status_of_its_own(
+def test_exit_status_of_unreadable_files(
     text: str, message: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     status, out, err = call(capsys, "check", write_small(tmp_path, text))
@@ -168,7 +166,7 @@ def test_a_machine_file_without_a_target_is_refused(
     assert 'write target = "eth0"' in err
 
 
-def test_a_graph_begins_with_the_target_of_the_file(
+def test_a_graph_starts_at_the_target_of_the_file(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     path = write_small(tmp_path)

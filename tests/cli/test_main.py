@@ -1,4 +1,4 @@
-"""Exit statuses, one-line errors, help: everything around the commands."""
+"""Exit statuses, one-line errors and help of all commands."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def failing_scan(monkeypatch: pytest.MonkeyPatch, request: pytest.FixtureRequest
     monkeypatch.setattr(scan, "run", fail)
 
 
-def test_the_commands_of_the_manual_are_there() -> None:
+def test_the_documented_commands_exist() -> None:
     assert {
         "catenary scan",
         "catenary sdo read",
@@ -78,7 +78,7 @@ def test_every_help_has_an_example_that_parses(name: str) -> None:
         "bench loop --json nowhere/loop.json",
     ],
 )
-def test_a_wrong_command_line_is_one_line_a_hint_and_status_2(
+def test_a_usage_error_is_one_line_with_a_hint_and_status_2(
     line: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     with pytest.raises(SystemExit) as caught:
@@ -93,7 +93,7 @@ def test_a_wrong_command_line_is_one_line_a_hint_and_status_2(
     ("line", "command"),
     [("demo eth0", "demo"), ("sdo read virtual 2 0x1018 --sub 1", "sdo read")],
 )
-def test_what_is_too_much_is_told_by_its_command(
+def test_surplus_arguments_are_reported_by_their_command(
     line: str, command: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     with pytest.raises(SystemExit):
@@ -102,24 +102,26 @@ def test_what_is_too_much_is_told_by_its_command(
 
 
 @pytest.mark.parametrize("name", ALL)
-def test_a_help_fills_the_terminal(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A terminal breaks long lines within words."""
+def test_help_is_wrapped_to_the_terminal(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Longer lines would be broken within words."""
     monkeypatch.setenv("COLUMNS", "80")
     text = dict(parsers(make_parser()))[name].format_help()
-    assert max(map(len, text.partition("options:")[0].splitlines())) <= 84  # tables of their own
+    assert (
+        max(map(len, text.partition("options:")[0].splitlines())) <= 84
+    )  # the epilog of `catenary` has tables
 
 
 @pytest.mark.parametrize(
     ("error", "hint"),
-    [(FileExistsError, "a folder is needed"), (PermissionError, "another user")],
+    [(FileExistsError, "a folder is needed"), (PermissionError, "owner and permissions")],
 )
-def test_a_file_in_the_way_has_a_hint(error: type[OSError], hint: str) -> None:
+def test_file_errors_have_a_hint(error: type[OSError], hint: str) -> None:
     message, found = describe(error(1, "no", "place"))
     assert message == "place: no"
     assert hint in found
 
 
-def test_a_clone_that_was_pulled_is_to_be_built() -> None:
+def test_outdated_compiled_modules_have_a_hint() -> None:
     error = ImportError("cannot import name 'X' from 'catenary.core._cycle'")
     error.name = "catenary.core._cycle"
     message, hint = describe(error)
@@ -132,7 +134,7 @@ def test_a_clone_that_was_pulled_is_to_be_built() -> None:
     "failing_scan", [LinkError("no such interface", hint="there are: lo")], indirect=True
 )
 @pytest.mark.usefixtures("failing_scan")
-def test_an_error_is_a_line_and_a_hint(capsys: pytest.CaptureFixture[str]) -> None:
+def test_an_error_is_one_line_and_a_hint(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["scan", "eth0"]) == 1
     assert capsys.readouterr().err == "catenary: no such interface\n  hint: there are: lo\n"
 
@@ -147,14 +149,14 @@ def test_debug_shows_the_traceback(line: str) -> None:
 
 @pytest.mark.parametrize("failing_scan", [KeyError("oh")], indirect=True)
 @pytest.mark.usefixtures("failing_scan")
-def test_a_bug_is_called_one(capsys: pytest.CaptureFixture[str]) -> None:
+def test_an_unexpected_exception_is_an_internal_error(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["scan", "eth0"]) == 1
     assert "internal error: KeyError: 'oh'" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("failing_scan", [KeyboardInterrupt()], indirect=True)
 @pytest.mark.usefixtures("failing_scan")
-def test_ctrl_c_is_quiet_and_130(
+def test_ctrl_c_exits_silently_with_130(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(sys, "argv", ["catenary", "scan", "eth0"])
@@ -169,7 +171,7 @@ def test_version(capsys: pytest.CaptureFixture[str]) -> None:
     assert capsys.readouterr().out.startswith("catenary ")
 
 
-def test_a_reader_that_goes_away_is_no_error_message() -> None:
+def test_a_closed_pipe_prints_no_error() -> None:
     reading, writing = os.pipe()
     os.close(reading)
     command = [sys.executable, "-m", "catenary.cli", "--version"]
@@ -178,7 +180,7 @@ def test_a_reader_that_goes_away_is_no_error_message() -> None:
     assert (done.returncode, done.stderr) == (141, b"")
 
 
-def test_start_up_imports_nothing_heavy() -> None:
+def test_startup_imports_no_large_modules() -> None:
     code = (
         "import sys; from catenary.cli.main import make_parser; make_parser();"
         "print(*{'numpy', 'msgspec', 'catenary.core', 'subprocess'} & set(sys.modules))"

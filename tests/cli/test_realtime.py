@@ -1,4 +1,4 @@
-"""`catenary realtime analyse`: the verdict for people and programs; errors that name the field."""
+"""`catenary realtime analyse`: the verdict as text and JSON, and errors that name the field."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ def test_json(file, capsys):
     assert [task["response_ms"] for task in verdict["tasks"]] == [3.0, 8.0, 29.0]
 
 
-def test_a_deadline_that_can_be_missed_is_exit_status_1(file, capsys):
+def test_exit_status_1_if_a_deadline_can_be_missed(file, capsys):
     text = EXAMPLE.replace("period = 0.040", "period = 0.040\ndeadline = 0.025")
     assert main(["realtime", "analyse", file(text)]) == 1
     out = capsys.readouterr().out
@@ -75,11 +75,11 @@ def test_a_deadline_that_can_be_missed_is_exit_status_1(file, capsys):
         ("[[task]", "tasks.toml: "),
     ],
 )
-def test_what_is_wrong_is_named(file, capsys, text, words):
+def test_errors_name_the_field(file, capsys, text, words):
     assert main(["realtime", "analyse", file(text)]) == 1
     assert words in capsys.readouterr().err
 
 
-def test_a_file_that_is_not_there(capsys):
+def test_a_missing_file(capsys):
     assert main(["realtime", "analyse", "/nowhere/tasks.toml"]) == 1
     assert "/nowhere/tasks.toml: No such file" in capsys.readouterr().err

@@ -1,5 +1,7 @@
-"""`record` and `plot` as a user types them. Ends by signals, a killed recorder and a full disk:
-tests/record/test_recorder.py and scenarios 76 to 78."""
+"""Commands `record` and `plot`.
+
+tests/record/test_recorder.py and scenarios 76 to 78 cover signals, killed recorders and full disks.
+"""
 
 from __future__ import annotations
 
@@ -42,7 +44,7 @@ def call(line: str, capsys: pytest.CaptureFixture[str]) -> tuple[int, str, str]:
     return status, printed.out, printed.err
 
 
-def test_record_says_what_it_does(
+def test_record_prints_its_progress(
     name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     path = tmp_path / "x.mcap"
@@ -52,13 +54,13 @@ def test_record_says_what_it_does(
     cycles = len(record.read(path))
     assert (status, err) == (0, "")
     assert out.splitlines() == [
-        f"recording {name} (3 axes at 1000 Hz) to {path}; Ctrl-C ends",
+        f"recording {name} (3 axes at 1000 Hz) to {path}; press Ctrl-C to stop",
         f"{path}: {cycles} cycles, none lost; stopped",
     ]
     assert cycles > 100
 
 
-def test_record_for_programs(name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_record_as_json(name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     with shared_loop(name) as shared:
         shared.run(100)
         status, out, _ = call(f"record {name} {tmp_path}/x.mcap --seconds 0.01 --json", capsys)
@@ -68,18 +70,18 @@ def test_record_for_programs(name: str, tmp_path: Path, capsys: pytest.CaptureFi
     assert said == {"file": f"{tmp_path}/x.mcap", "lost": 0, "ended": "stopped"}
 
 
-def test_the_user_whose_share_it_is(
+def test_uid_selects_the_owner_of_the_share(
     name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     with shared_loop(name) as shared:
         shared.run(10)
         line = f"record {name} {tmp_path / 'x.mcap'} --seconds 0.01 --uid"
-        status, _, err = call(f"{line} 64001", capsys)  # an id that no user has
+        status, _, err = call(f"{line} 64001", capsys)  # an unused user id
         assert (status, f"there is no share '{name}'" in err) == (1, True)
         assert call(f"{line} {os.geteuid()}", capsys)[0] == 0
 
 
-def test_an_existing_file_is_replaced_only_when_asked(
+def test_an_existing_file_is_replaced_only_with_force(
     name: str, recording: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     before = recording.read_bytes()
@@ -93,23 +95,21 @@ def test_an_existing_file_is_replaced_only_when_asked(
     assert record.read(recording).name == name
 
 
-def test_no_such_share(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_missing_share(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     status, _, err = call(f"record nobody-here {tmp_path}/x.mcap", capsys)
     assert status == 1
     assert "there is no share 'nobody-here'" in err
     assert not list(tmp_path.iterdir())
 
 
-def test_a_folder_that_is_not_there(
-    name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_missing_folder(name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     with shared_loop(name):
         status, _, err = call(f"record {name} {tmp_path}/no/x.mcap", capsys)
     assert (status, err) == (1, f"catenary: {tmp_path}/no/x.mcap: No such file or directory\n")
 
 
 @pytest.mark.parametrize("line", ["record {file}", "record arm {file} --repair"])
-def test_a_share_is_named_or_a_file_repaired(
+def test_a_share_and_repair_exclude_each_other(
     recording: Path, capsys: pytest.CaptureFixture[str], line: str
 ) -> None:
     before = recording.read_bytes()
@@ -129,7 +129,7 @@ def test_repair(recording: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert said["seconds"] == pytest.approx(1.199)
 
 
-def test_plot_beside_the_recording(recording: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_plot_next_to_the_recording(recording: Path, capsys: pytest.CaptureFixture[str]) -> None:
     status, out, err = call(f"plot {recording}", capsys)
     picture = recording.with_suffix(".png")
     assert (status, err) == (0, "")
@@ -145,24 +145,24 @@ def test_plot_a_part_of_one_axis(recording: Path, capsys: pytest.CaptureFixture[
     assert "tracking error [°]" in page.read_text()
 
 
-def test_plot_says_what_is_wrong(recording: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_plot_errors(recording: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert call(f"plot {recording} -o x.jpeg", capsys)[0] == 2
     assert call(f"plot {recording}.old", capsys)[2] == (
         f"catenary: {recording}.old: No such file or directory\n"
     )
     status, _, err = call(f"plot {recording} --axis elbow", capsys)
     assert status == 1
-    assert err == "catenary: cell-1 has no axis 'elbow'\n  hint: it has joint0, joint1\n"
+    assert err == "catenary: cell-1 has no axis 'elbow'\n  hint: its axes are joint0, joint1\n"
     status, _, err = call(f"plot {recording} --start 99", capsys)
     assert status == 2
-    assert err.startswith(f"catenary: {recording} has no cycles in that time")
+    assert err.startswith(f"catenary: {recording} has no cycles in this time range")
     assert not recording.with_suffix(".png").exists()
     recording.write_text("text")
     status, _, err = call(f"plot {recording}", capsys)
     assert (status, "is not an MCAP file" in err) == (1, True)
 
 
-def test_without_matplotlib_the_extra_is_named(
+def test_a_missing_matplotlib_names_the_extra(
     recording: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setitem(sys.modules, "matplotlib", None)

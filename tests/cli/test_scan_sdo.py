@@ -1,4 +1,4 @@
-"""`scan` and `sdo` on a virtual segment: what people and programs read, and what goes wrong."""
+"""`scan` and `sdo` on a virtual segment: text, JSON and errors."""
 
 from __future__ import annotations
 
@@ -28,14 +28,14 @@ def test_scan_lists_every_device(capsys: pytest.CaptureFixture[str]) -> None:
     assert {line.split()[-1] for line in lines} == {"PRE-OP"}
 
 
-def test_scan_notes_what_is_odd(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_scan_prints_notes(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = tmp_path / "twins.toml"
     path.write_text('[[device]]\nkind = "servo"\nalias = 7\n' * 2)
     status, _, err = call(f"scan virtual:{path}", capsys)
     assert (status, err) == (0, f"note: devices (0, 1) have the same alias 7\n{NOTE}")
 
 
-def test_scan_for_programs(capsys: pytest.CaptureFixture[str]) -> None:
+def test_scan_as_json(capsys: pytest.CaptureFixture[str]) -> None:
     _, out, _ = call("scan virtual --json", capsys)
     devices = json.loads(out)
     assert [device["position"] for device in devices] == list(range(6))
@@ -43,7 +43,9 @@ def test_scan_for_programs(capsys: pytest.CaptureFixture[str]) -> None:
     assert [device["serial"] for device in devices[2:5]] == [1, 2, 3]
 
 
-def test_sdo_read_without_a_type_shows_bytes_and_number(capsys: pytest.CaptureFixture[str]) -> None:
+def test_sdo_read_without_a_type_prints_bytes_and_a_number(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
     _, out, _ = call("sdo read virtual 2 0x1018:1", capsys)
     assert out == "59 4e 54 43  (0x43544E59, 1129598553)\n"
 
@@ -53,7 +55,7 @@ def test_sdo_read_with_a_type(capsys: pytest.CaptureFixture[str]) -> None:
     assert out == "Catenary virtual servo 2\n"
 
 
-def test_sdo_read_for_programs(capsys: pytest.CaptureFixture[str]) -> None:
+def test_sdo_read_as_json(capsys: pytest.CaptureFixture[str]) -> None:
     _, out, _ = call("sdo read virtual 2 0x1018:1 --type UDINT --json", capsys)
     assert json.loads(out) == {
         "position": 2,
@@ -69,7 +71,7 @@ def test_sdo_write(capsys: pytest.CaptureFixture[str]) -> None:
     assert call("sdo write virtual 2 0x6065 0x1388 --type UDINT", capsys) == (0, "", NOTE)
 
 
-def test_sdo_list_names_every_entry(capsys: pytest.CaptureFixture[str]) -> None:
+def test_sdo_list_prints_every_entry(capsys: pytest.CaptureFixture[str]) -> None:
     _, out, _ = call("sdo list virtual 2", capsys)
     lines = [line.split(maxsplit=3) for line in out.splitlines()]
     assert ["0x1018:01", "UDINT", "r", "Vendor ID"] in lines
@@ -78,7 +80,7 @@ def test_sdo_list_names_every_entry(capsys: pytest.CaptureFixture[str]) -> None:
     assert ["0x1C12:01", "UINT", "rwP", "Subindex 001"] in lines
 
 
-def test_sdo_list_with_values_for_programs(capsys: pytest.CaptureFixture[str]) -> None:
+def test_sdo_list_with_values_as_json(capsys: pytest.CaptureFixture[str]) -> None:
     _, out, _ = call("sdo list virtual 2 --values --json", capsys)
     rows = {(row["index"], row["subindex"]): row for row in json.loads(out)}
     assert rows[0x1018, 1] == {
@@ -113,7 +115,7 @@ def test_sdo_list_with_values_for_programs(capsys: pytest.CaptureFixture[str]) -
         ("scan virtual:nosuchfile.toml", 1, "nosuchfile.toml"),
     ],
 )
-def test_mistakes_name_the_thing(
+def test_errors_name_the_cause(
     line: str, status: int, message: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     found, out, err = call(line, capsys)
@@ -125,7 +127,7 @@ def test_mistakes_name_the_thing(
     assert "internal error" not in err
 
 
-def test_virtual_time_is_named_where_the_clock_is_the_segments(
+def test_virtual_time_prints_a_note(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     assert call("scan virtual", capsys)[2] == NOTE

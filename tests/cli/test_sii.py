@@ -1,4 +1,4 @@
-"""`sii read` and `sii write` on one virtual segment that lives through several commands."""
+"""`sii read` and `sii write` on a virtual segment that several commands share."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ def spoil(segment: cat.Segment, position: int, *words: tuple[int, int]) -> None:
         opened.converse(write_words(station, [Change(*each) for each in words]))
 
 
-def test_what_is_read_is_what_is_there(
+def test_read_returns_the_content(
     segment: cat.Segment, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     path = tmp_path / "servo.bin"
@@ -56,7 +56,7 @@ def test_what_is_read_is_what_is_there(
     assert path.read_bytes() == segment.core.sii_image(1)
 
 
-def test_text_says_what_it_means(segment: cat.Segment, capsys: pytest.CaptureFixture[str]) -> None:
+def test_text_explains_the_fields(segment: cat.Segment, capsys: pytest.CaptureFixture[str]) -> None:
     status, out, _ = call("sii read eth9 2 --text", capsys)
     lines = out.splitlines()
     assert status == 0
@@ -69,7 +69,7 @@ def test_text_says_what_it_means(segment: cat.Segment, capsys: pytest.CaptureFix
     assert "RxPDO 0x1600   0x6040:00 16 bits UINT 'Controlword'" in lines
 
 
-def test_the_dump_leaves_out_lines_that_repeat() -> None:
+def test_the_dump_omits_repeated_lines() -> None:
     assert dump(b"EtherCAT" * 2 + bytes(64)) == [
         "000000  45 74 68 65 72 43 41 54 45 74 68 65 72 43 41 54  EtherCATEtherCAT",
         "000010  00 00 00 00 00 00 00 00 00 00 00 00 00 00 00 00  ................",
@@ -78,7 +78,7 @@ def test_the_dump_leaves_out_lines_that_repeat() -> None:
     ]
 
 
-def test_a_write_shows_what_differs_writes_it_and_reads_it_back(
+def test_write_shows_the_differences_and_verifies(
     segment: cat.Segment, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     path = tmp_path / "wrist.bin"
@@ -90,12 +90,12 @@ def test_a_write_shows_what_differs_writes_it_and_reads_it_back(
     assert segment.core.sii_image(1) != path.read_bytes()
     status, out, _ = call(f"sii write eth9 1 {path}", capsys)
     assert status == 0
-    assert out.endswith("words written and read back; switch the device off and on\n")
+    assert out.endswith("words written and verified; power-cycle the device to use them\n")
     assert segment.core.sii_image(1) == path.read_bytes()
     assert call(f"sii write eth9 1 {path}", capsys)[1].endswith("already has this content\n")
 
 
-def test_a_broken_checksum_is_named_and_can_be_repaired(
+def test_a_wrong_checksum_is_reported_and_can_be_repaired(
     segment: cat.Segment, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     path = tmp_path / "servo.bin"
@@ -109,17 +109,17 @@ def test_a_broken_checksum_is_named_and_can_be_repaired(
     assert call("sii read eth9 1 --text", capsys)[0] == 0
 
 
-def test_categories_without_an_end_are_bounded_and_named(
+def test_categories_without_an_end_are_reported(
     segment: cat.Segment, capsys: pytest.CaptureFixture[str]
 ) -> None:
     spoil(segment, 1, *((word, 0) for word in range(8)), *((w, 0) for w in range(0x40, 0xC0)))
     status, out, err = call("sii read eth9 1", capsys)
     assert status == 1
     assert out.splitlines()[-1] == "001000"
-    assert "no end mark: 4096 bytes are used" in err
+    assert "no end mark, 4096 bytes are used" in err
 
 
-def test_another_products_image_needs_insisting(
+def test_an_image_for_another_product_needs_force(
     segment: cat.Segment, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     path = tmp_path / "coupler.bin"
@@ -133,12 +133,12 @@ def test_another_products_image_needs_insisting(
     assert segment.core.sii_image(1) == path.read_bytes()
 
 
-def test_a_wrong_checksum_is_refused_whoever_insists(
+def test_a_wrong_checksum_is_refused_even_with_force(
     segment: cat.Segment, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     path = tmp_path / "edited.bin"
     image = bytearray(segment.core.sii_image(1))
-    image[8] = 5  # the alias, by hand
+    image[8] = 5  # the alias
     path.write_bytes(image)
     status, _, err = call(f"sii write eth9 1 {path} --force", capsys)
     assert status == 1
@@ -154,14 +154,14 @@ def test_an_image_larger_than_the_eeprom_is_refused(
     path.write_bytes(image)
     status, _, err = call(f"sii write eth9 1 {path}", capsys)
     assert status == 1
-    assert "the image has 4096 bytes, its EEPROM 2048" in err
+    assert "the image has 4096 bytes, but its EEPROM has only 2048" in err
     status, _, err = call(f"sii write eth9 1 {path} --force", capsys)
     assert status == 1
-    assert "SII word 0x0400 cannot be written to 0x5555: the EEPROM does not acknowledge" in err
+    assert "SII word 0x0400 cannot be set to 0x5555: the EEPROM does not acknowledge" in err
     assert "mixture of old and new" in err
 
 
-def test_a_file_is_shown_with_every_field(
+def test_show_prints_every_field(
     segment: cat.Segment, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     path = tmp_path / "oversampled.bin"
@@ -186,7 +186,7 @@ def test_a_file_is_shown_with_every_field(
 
 
 def oversampled_image() -> bytes:
-    """The clocks of Beckhoff's EL3702 (ESI, OpMode DcSync4), flags and types of every kind."""
+    """Image with the clocks of Beckhoff's EL3702 (ESI, OpMode DcSync4) and all kinds of fields."""
     strings = encode_strings(["DcSync4", "Samples", "Value"])
     entries = (
         PdoEntry(0x6000, 1, 16, data_type=0x03, name=3, flags=2),
@@ -215,20 +215,18 @@ def oversampled_image() -> bytes:
     ).encode()
 
 
-def test_a_file_that_is_not_an_image_is_named(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_show_reports_an_invalid_image(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = tmp_path / "drive.hex"
     path.write_text(":020000040000FA\n")
     status, out, err = call(f"sii show {path}", capsys)
     assert status == 1
-    assert "cannot be read as an image" in out
+    assert "invalid image" in out
     assert "the header alone needs" in err
     assert "convert Intel hex" in err
 
 
 def test_every_byte_that_differs_is_shown() -> None:
-    """A flag, a factor, filling behind a string: nothing differs without a line."""
+    """Every difference has a line: a flag, a factor, or padding after a string."""
     image = oversampled_image()
     for place in range(len(image)):
         for bit in (1, 0x80):
@@ -259,7 +257,7 @@ def test_every_byte_that_differs_is_shown() -> None:
         ),
     ],
 )
-def test_the_field_that_differs_is_named(place: str, lines: list[str]) -> None:
+def test_differences_name_the_field(place: str, lines: list[str]) -> None:
     image = oversampled_image()
     other = bytearray(image)
     if place == "flags":
@@ -270,7 +268,7 @@ def test_the_field_that_differs_is_named(place: str, lines: list[str]) -> None:
     assert differences(image, bytes(other)) == lines
 
 
-def test_real_images_are_shown_whole(shared_data: Path) -> None:
+def test_real_images_are_shown_completely(shared_data: Path) -> None:
     for path in sorted((shared_data / "sii").glob("*.bin")):
         lines = as_text(path.read_bytes())
         assert len(lines) > 10 or "empty" in path.name
@@ -285,7 +283,7 @@ def test_real_images_are_shown_whole(shared_data: Path) -> None:
         ("sii show /nowhere.bin", 1, "/nowhere.bin: No such file"),
     ],
 )
-def test_mistakes_name_the_thing(
+def test_errors_name_the_cause(
     line: str, status: int, message: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     found, out, err = call(line, capsys)

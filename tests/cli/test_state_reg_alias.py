@@ -1,4 +1,4 @@
-"""`state`, `reg` and `alias` on a virtual segment: what people and programs read, and mistakes."""
+"""`state`, `reg` and `alias` on a virtual segment: text, JSON and errors."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ def call(line: str, capsys: pytest.CaptureFixture[str]) -> tuple[int, str, str]:
     return status, printed.out, printed.err
 
 
-def test_state_shows_every_device_where_it_is(capsys: pytest.CaptureFixture[str]) -> None:
+def test_state_shows_every_device(capsys: pytest.CaptureFixture[str]) -> None:
     status, out, _ = call("state virtual", capsys)
     heading, *lines = out.splitlines()
     assert status == 0
@@ -26,20 +26,20 @@ def test_state_shows_every_device_where_it_is(capsys: pytest.CaptureFixture[str]
 
 
 @pytest.mark.parametrize("word", ["PREOP", "pre-op", "PRE_OP"])
-def test_state_asks_for_one(word: str, capsys: pytest.CaptureFixture[str]) -> None:
+def test_state_requests_a_state(word: str, capsys: pytest.CaptureFixture[str]) -> None:
     status, out, _ = call(f"state virtual {word} --position 2", capsys)
     assert (status, out.splitlines()[1].split()[-1]) == (0, "PRE-OP")
 
 
-def test_state_tells_who_refuses(capsys: pytest.CaptureFixture[str]) -> None:
+def test_state_names_the_devices_that_refuse(capsys: pytest.CaptureFixture[str]) -> None:
     status, out, err = call("state virtual OP", capsys)
     assert status == 1
     assert "SAFE-OP + ERROR  0x0019: No valid outputs" in out
     assert "device 3 (Catenary virtual servo 2) refused OP" in err
-    assert "is the loop running?" in err
+    assert "check that the loop runs" in err
 
 
-def test_state_for_programs(capsys: pytest.CaptureFixture[str]) -> None:
+def test_state_as_json(capsys: pytest.CaptureFixture[str]) -> None:
     status, out, _ = call("state virtual OP --json", capsys)
     devices = json.loads(out)
     assert status == 1
@@ -61,7 +61,7 @@ def test_reg_read_of_many_bytes_is_a_dump(capsys: pytest.CaptureFixture[str]) ->
     assert out.splitlines() == ["  0000 " + " 00" * 16, "  0010 " + " 00" * 4]
 
 
-def test_reg_for_programs(capsys: pytest.CaptureFixture[str]) -> None:
+def test_reg_as_json(capsys: pytest.CaptureFixture[str]) -> None:
     _, out, _ = call("reg read virtual 2 watchdog-divider --json", capsys)
     assert json.loads(out) == {
         "position": 2,
@@ -82,17 +82,17 @@ def test_reg_write_takes_numbers_and_bytes(value: str, capsys: pytest.CaptureFix
     assert (status, json.loads(out)["data"]) == (0, "e803")
 
 
-def test_alias_now_and_after_the_next_power_up(capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_current_alias_and_the_next_one(capsys: pytest.CaptureFixture[str]) -> None:
     name = "device 2 (Catenary virtual servo 1)"
     assert call("alias virtual 2", capsys) == (0, f"{name}: no alias\n", f"note: {VIRTUAL_TIME}\n")
     assert call("alias virtual 2 17", capsys)[1] == (
-        f"{name}: no alias, after its next power-up alias 17\n"
+        f"{name}: no alias; alias 17 after the next power-up\n"
     )
     _, out, _ = call("alias virtual 2 17 --json", capsys)
     assert json.loads(out)["eeprom"] == 17
 
 
-def test_an_alias_that_another_device_has_is_refused(
+def test_an_alias_of_another_device_is_refused(
     tmp_path: object, capsys: pytest.CaptureFixture[str]
 ) -> None:
     path = f"{tmp_path}/two.toml"
@@ -104,7 +104,7 @@ def test_an_alias_that_another_device_has_is_refused(
     assert call(f"alias virtual:{path} 1 7 --force", capsys)[0] == 0
 
 
-def test_an_alias_that_another_device_will_have_is_refused_too(
+def test_a_future_alias_of_another_device_is_refused(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     segment = cat.Segment([cat.virtual.Servo(), cat.virtual.Servo()])
@@ -139,7 +139,7 @@ def test_an_alias_that_another_device_will_have_is_refused_too(
         ("alias virtual 6 1", 2, "the segment has 6"),
     ],
 )
-def test_mistakes_name_the_thing(
+def test_errors_name_the_cause(
     line: str, status: int, message: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     found, out, err = call(line, capsys)
@@ -160,7 +160,7 @@ def test_mistakes_name_the_thing(
         ("alias virtual 2 abc", "'abc' is not a number"),
     ],
 )
-def test_a_wrong_command_line_says_where_the_help_is(
+def test_a_usage_error_names_the_help(
     line: str, message: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     with pytest.raises(SystemExit) as stop:

@@ -18,21 +18,23 @@ ETHERCAT = 0x88A4
 SECONDS = 30.0
 
 
-def test_lost_frames_are_reported_in_the_end(veth: tuple[str, str]) -> None:
-    """Any frame is too old for an age of 0."""
+def test_dropped_frames_are_reported_at_the_end(veth: tuple[str, str]) -> None:
+    """With a maximum age of 0, every frame is too old."""
     ours, theirs = veth
     command = ["-m", "catenary.cli", "virtual", "serve", theirs, "--max-age", "0"]
     with start_python(command) as server, socket.socket(socket.AF_PACKET, socket.SOCK_RAW) as wire:
         assert server.read_line(SECONDS), "the virtual segment did not start"
         wire.bind((ours, ETHERCAT))
         wire.send(encode_frame([Datagram(EcatCommand.BRD, 0, b"\0")]))
-        time.sleep(0.1)  # real time, over a real wire: the frame has arrived
+        time.sleep(0.1)  # real time on a veth pair, until the frame has arrived
         server.process.send_signal(signal.SIGTERM)
-        said = server.read_line(SECONDS)
-    assert said == "1 frames waited longer than 0 ms and were lost; --priority 80 makes this rarer"
+        line = server.read_line(SECONDS)
+    assert line == (
+        "1 frames waited longer than 0 ms and were dropped; --priority 80 makes this less frequent"
+    )
 
 
-def test_a_priority_that_is_refused_is_an_error(
+def test_a_refused_priority_is_an_error(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     refused = scheduling.Scheduling("SCHED_OTHER", 0, False, (0,), ("SCHED_FIFO 80 refused",))

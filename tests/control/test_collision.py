@@ -1,4 +1,4 @@
-"""Residuals against the momentum observer as published, and what they are worth."""
+"""Residuals: comparison with the published momentum observer, and accuracy."""
 
 from pathlib import Path
 
@@ -13,7 +13,7 @@ DT = 1e-3
 JOINTS = ["turn", "shoulder", "elbow"]
 
 
-def test_one_axis_follows_the_outside_at_first_order() -> None:
+def test_the_residual_follows_the_external_torque_at_first_order() -> None:
     block = control.Residual(1, 50.0, 0.02)
     memory, v, seen = block.memory, 0.0, []
     for k in range(400):
@@ -25,13 +25,13 @@ def test_one_axis_follows_the_outside_at_first_order() -> None:
     assert seen[100:] == pytest.approx(0.7 * (1 - np.exp(-50 * after)), abs=0.02)
 
 
-def test_a_threshold_needs_its_time_and_either_sign() -> None:
+def test_a_threshold_needs_its_time_and_ignores_the_sign() -> None:
     block = control.Threshold(2, 1.0, [0.0, 0.003])
     memory = block.memory
     assert not control.threshold(memory, block.parameters, 0, 1.0, DT)
     assert control.threshold(memory, block.parameters, 0, -1.1, DT)
-    said = [control.threshold(memory, block.parameters, 1, 2.0, DT) for _ in range(5)]
-    assert said == [False, False, False, True, True]
+    exceeded = [control.threshold(memory, block.parameters, 1, 2.0, DT) for _ in range(5)]
+    assert exceeded == [False, False, False, True, True]
     assert not control.threshold(memory, block.parameters, 1, 0.5, DT)
     assert not control.threshold(memory, block.parameters, 1, 2.0, DT)
 
@@ -44,7 +44,7 @@ def path(tmp_path: Path) -> Path:
 
 
 def published(model, data, states, torques, gain: float) -> np.ndarray:
-    """r = K (p - ∫ (τ + Cᵀ q̇ - g + r) dt) with Cᵀ q̇ - g = Ṁ q̇ - bias, literally."""
+    """Evaluate r = K (p - ∫ (τ + Cᵀ q̇ - g + r) dt) with Cᵀ q̇ - g = Ṁ q̇ - bias, as published."""
     n, sums, r, rows, before = 3, np.zeros(3), np.zeros(3), [], None
     for (q, v), torque in zip(states, torques, strict=True):
         data.qpos[:n], data.qvel[:n] = q, v
@@ -66,8 +66,8 @@ def published(model, data, states, torques, gain: float) -> np.ndarray:
     return np.array(rows)
 
 
-def test_with_a_model_it_is_the_published_observer(path: Path) -> None:
-    """An arm that falls and is pushed at the elbow from 0.3 s on, stepped by MuJoCo."""
+def test_the_residual_with_a_model_equals_the_published_observer(path: Path) -> None:
+    """MuJoCo simulates a falling arm; from 0.3 s on, a torque acts on the elbow."""
     model = mujoco.MjModel.from_xml_path(str(path))
     model.opt.timestep = DT
     model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_LIMIT

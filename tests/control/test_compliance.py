@@ -1,4 +1,4 @@
-"""Impedance, natural admittance, feed-forward, friction: on an axis with friction of its own."""
+"""Impedance, natural admittance, feed-forward and friction, on a simulated axis with friction."""
 
 import math
 from collections.abc import Callable
@@ -20,7 +20,7 @@ def driven(
     coulomb: float = COULOMB,
     q: float = 0.0,
 ) -> np.ndarray:
-    """(k, 3): position, velocity, torque of an axis with dry and viscous friction."""
+    """Return position, velocity and torque (k, 3) of an axis with dry and viscous friction."""
     v, track = 0.0, []
     for k in range(round(seconds / DT)):
         torque = step(q, v, external(k * DT))
@@ -40,28 +40,28 @@ def spring(**options: float) -> Callable[[float, float, float], float]:
 
 
 @pytest.mark.parametrize("push", [0.5, 1.0, -2.0])
-def test_it_yields_as_the_spring_says(push: float) -> None:
-    """Without friction, force over displacement is the stiffness, statically."""
+def test_the_axis_yields_with_the_stiffness_of_the_spring(push: float) -> None:
+    """Without friction, the ratio of static torque to displacement is the stiffness."""
     end = driven(spring(), 3.0, lambda t: push, coulomb=0.0)[-1]
     assert push / end[0] == pytest.approx(5.0, rel=1e-3)
 
 
-def test_the_observer_takes_dry_friction_away() -> None:
-    """Let go at 0.015 rad, the spring's 0.075 N·m are less than the friction's 0.1."""
+def test_the_observer_compensates_dry_friction() -> None:
+    """At 0.015 rad, the spring torque of 0.075 N·m is below the dry friction of 0.1 N·m."""
     assert driven(spring(), 2.0, q=0.015)[-1, 0] == pytest.approx(0.015)
     freed = driven(spring(bandwidth=100.0, compensation=COULOMB), 2.0, q=0.015)
     assert abs(freed[-1, 0]) < 0.005
 
 
-def test_compensation_is_bounded_so_that_the_outside_is_still_felt() -> None:
-    """A push of 2 N·m: stiffness times displacement is what friction and compensation leave."""
+def test_the_axis_still_yields_with_limited_compensation() -> None:
+    """The spring torque balances a push of 2 N·m, minus friction and compensation."""
     pushed = driven(spring(bandwidth=100.0, compensation=COULOMB), 3.0, lambda t: 2.0)
     assert 5.0 * pushed[-1, 0] == pytest.approx(2.0 - COULOMB, abs=COULOMB + 1e-6)
     rigid = driven(spring(bandwidth=100.0), 3.0, lambda t: 2.0)
-    assert abs(rigid[-1, 0]) < 0.02  # all that is unknown is taken away: as the docstring warns
+    assert abs(rigid[-1, 0]) < 0.02  # without a limit the observer also compensates the push
 
 
-def test_with_a_sensor_all_friction_goes_and_the_spring_stays() -> None:
+def test_with_a_sensor_the_observer_compensates_all_friction() -> None:
     block = control.Impedance(1, 5.0, 0.4, INERTIA, VISCOUS, bandwidth=100.0)
     memory, parameters = block.memory, block.parameters
     end = driven(
@@ -74,14 +74,16 @@ def test_with_a_sensor_all_friction_goes_and_the_spring_stays() -> None:
 
 
 def test_the_observer_is_the_low_passed_disturbance() -> None:
-    """A known disturbance on the nominal plant comes out through w/(s + w)."""
+    """The estimate of a known disturbance is the disturbance filtered by w / (s + w)."""
     block = control.Impedance(1, 0.0, 0.0, INERTIA, VISCOUS, bandwidth=50.0)
     memory, parameters, v, seen = block.memory, block.parameters, 0.0, []
     share = 1 - math.exp(-VISCOUS * DT / INERTIA)
     for _ in range(400):
         torque = control.impedance(memory, parameters, 0, 0, 0, 0, 0, 0, v, DT)
         seen.append(torque)
-        v += share * ((torque - 0.2) / VISCOUS - v)  # exactly, torque held for the period
+        v += share * (
+            (torque - 0.2) / VISCOUS - v
+        )  # exact for a torque that is constant during the period
     time = DT * np.arange(400)
     assert seen == pytest.approx(0.2 * (1 - np.exp(-50.0 * time)), abs=0.006)
 
@@ -93,7 +95,7 @@ def test_impedance_limits_its_torque() -> None:
 
 
 def test_an_observer_needs_the_inertia() -> None:
-    with pytest.raises(ValueError, match=r"inertia of axis 1: 0\.0, the observer needs"):
+    with pytest.raises(ValueError, match=r"inertia of axis 1 is 0; the observer .* needs"):
         control.Impedance(2, 1.0, 1.0, [0.1, 0.0], bandwidth=10.0)
 
 
@@ -111,7 +113,7 @@ def admitted(gain: float, coulomb: float) -> np.ndarray:
 
 
 def test_natural_admittance_moves_as_if_there_were_no_friction() -> None:
-    """Against the model's own differential equation; without the loop friction rules."""
+    """The axis follows the differential equation of the model; without the loop it does not."""
     q = v = 0.0
     model = []
     for k in range(8000):
@@ -129,7 +131,7 @@ def test_feed_forward_is_inertia_and_damping() -> None:
     assert control.feed_forward(block.parameters, 1, 2.0, 5.0) == pytest.approx(7.0)
 
 
-def test_friction_is_viscous_and_coulomb_smoothly() -> None:
+def test_friction_is_viscous_plus_smoothed_coulomb() -> None:
     block = control.Friction(1, 0.5, 2.0, 0.01)
     assert control.friction(block.parameters, 0, 1.0) == pytest.approx(2.5)
     assert control.friction(block.parameters, 0, -1.0) == pytest.approx(-2.5)

@@ -30,7 +30,7 @@ def test_the_first_example_holds_an_arm_at_its_goal(monkeypatch: pytest.MonkeyPa
         with cat.Loop(arm, period=1e-3) as loop:
 
             class Started:
-                """The example runs it to its end; here it is watched."""
+                """Stand-in for the loop: start the law instead of running it to its end."""
 
                 run = staticmethod(loop.start)
 
@@ -40,4 +40,4 @@ def test_the_first_example_holds_an_arm_at_its_goal(monkeypatch: pytest.MonkeyPa
                     break
             assert arm.actual.position == pytest.approx(goal, abs=2e-3)
             assert abs(arm.actual.velocity).max() < 0.01
-            assert abs(arm.actual.torque[1]) > 20.0  # it carries
+            assert abs(arm.actual.torque[1]) > 20.0  # holds against gravity

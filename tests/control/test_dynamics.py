@@ -1,4 +1,4 @@
-"""Gravity and inverse dynamics: against a pendulum's formula and MuJoCo's own Python."""
+"""Gravity and inverse dynamics, compared with a pendulum formula and MuJoCo's Python functions."""
 
 import math
 import pickle
@@ -43,7 +43,7 @@ def test_a_pendulums_inverse_dynamics(pendulum: control.Dynamics) -> None:
 
 
 def oracle(path: Path, order: list[str], q, v, a) -> np.ndarray:
-    """MuJoCo's own: M q̈ + bias, from functions that ours does not call."""
+    """Compute M q̈ + bias with MuJoCo functions that catenary does not use."""
     model = mujoco.MjModel.from_xml_path(str(path))
     data = mujoco.MjData(model)
     degrees = [model.joint(name).dofadr[0] for name in order]
@@ -66,14 +66,14 @@ def test_joints_in_the_axes_order(three: Path, order: list[str]) -> None:
     assert dynamics.joints == tuple(order)
     rng = np.random.default_rng(1)
     for _ in range(20):
-        q, v, a = rng.uniform(-3, 3, (3, 3))  # beyond the shoulder's range too
+        q, v, a = rng.uniform(-3, 3, (3, 3))  # also beyond the range of the shoulder
         expected = oracle(three, order, q, v, a)
         assert dynamics.inverse(q, v, a) == pytest.approx(expected, abs=1e-9)
         still = np.zeros(3)
         assert dynamics.gravity(q) == pytest.approx(oracle(three, order, q, still, still))
 
 
-def test_gravity_does_not_remember_a_motion(three: Path) -> None:
+def test_gravity_does_not_depend_on_an_earlier_call(three: Path) -> None:
     dynamics = control.Dynamics(three, joints=JOINTS)
     q = [0.1, 0.2, 0.3]
     before = dynamics.gravity(q)
@@ -84,8 +84,11 @@ def test_gravity_does_not_remember_a_motion(three: Path) -> None:
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ({"joints": ["turn", "wrist"]}, r"no joint 'wrist'\n.*it has turn, shoulder, elbow, ball"),
-        ({"joints": ["turn", "turn"]}, "joint 'turn' is named twice"),
+        (
+            {"joints": ["turn", "wrist"]},
+            r"no joint 'wrist'\n.*the joints turn, shoulder, elbow, ball",
+        ),
+        ({"joints": ["turn", "turn"]}, "joint 'turn' is given twice"),
         ({}, "joint 'ball' is neither hinge nor slide"),
         ({"joints": JOINTS, "axes": 6}, r"3 joints \(turn, shoulder, elbow\) for 6 axes"),
         ({"joints": []}, "no joints"),
@@ -101,12 +104,12 @@ def test_motor_inertia_through_the_gear_is_added(tmp_path: Path) -> None:
     path.write_text(PENDULUM)
     with_motor = control.Dynamics(path, armature=1.5)
     assert with_motor.inverse([0], [0], [2.0])[0] == pytest.approx((2 * 0.25 + 0.06 + 1.5) * 2)
-    with pytest.raises(ValueError, match="armature: one value, or one for each of 1 axes"):
+    with pytest.raises(ValueError, match=r"armature has shape \(2,\); give one value, or one for"):
         control.Dynamics(path, armature=[1.0, 2.0])
 
 
 def test_a_urdf_without_its_meshes(tmp_path: Path) -> None:
-    """Two links that hang: at q the shoulder carries both, the elbow its own."""
+    """Two hanging links: the shoulder carries both, the elbow carries the lower one."""
     path = tmp_path / "two.urdf"
     path.write_text(URDF)
     dynamics = control.Dynamics(path, joints=["elbow", "shoulder"], axes=2)
@@ -118,16 +121,16 @@ def test_a_urdf_without_its_meshes(tmp_path: Path) -> None:
 
 @pytest.mark.shared_data
 def test_indy7_by_its_path(shared_data: Path) -> None:
-    """Its masses, from its own file, are what the shoulder carries when the arm lies level."""
+    """The shoulder carries the masses of the file when the arm is horizontal."""
     path = shared_data / "robots/indy7/derived_indy7_flat.urdf"
     dynamics = control.Dynamics(path, axes=6)
     assert len(dynamics.joints) == 6
     assert dynamics.gravity(np.zeros(6)) == pytest.approx(np.zeros(6), abs=8.0)  # upright
     level = dynamics.gravity([0, np.pi / 2, 0, 0, 0, 0])
-    assert 50.0 < abs(level[1]) < 431.97  # [N·m], its largest torque
+    assert 50.0 < abs(level[1]) < 431.97  # [N·m], the largest torque of the joint
 
 
-def test_a_file_that_is_not_there_or_no_model(tmp_path: Path) -> None:
+def test_a_missing_or_invalid_file(tmp_path: Path) -> None:
     with pytest.raises(ConfigurationError, match=r"nowhere\.xml"):
         control.Dynamics(tmp_path / "nowhere.xml")
     for text in ("<html/>", "<robot", "<mujoco><worldbody><body/></mujoco>"):
@@ -142,11 +145,13 @@ def test_without_mujoco_the_extra_is_named(monkeypatch: pytest.MonkeyPatch, thre
         control.Dynamics(three)
 
 
-def test_vectors_of_another_length_and_another_memory(three: Path) -> None:
+def test_vectors_of_wrong_length_and_the_wrong_memory(three: Path) -> None:
     dynamics = control.Dynamics(three, joints=JOINTS)
-    with pytest.raises(ValueError, match="position: one number for each of turn, shoulder, elbow"):
+    with pytest.raises(
+        ValueError, match=r"position has shape .* 3 joints \(turn, shoulder, elbow\)"
+    ):
         dynamics.gravity([0.0, 0.0])
-    with pytest.raises(ValueError, match="another number of joints"):
+    with pytest.raises(ValueError, match="the number of joints of the model differs"):
         control.gravity(dynamics.memory, np.zeros(2), np.zeros(2))
     with pytest.raises(ValueError, match="not the memory of a Dynamics"):
         control.gravity(np.zeros(40), np.zeros(3), np.zeros(3))
@@ -155,10 +160,10 @@ def test_vectors_of_another_length_and_another_memory(three: Path) -> None:
 def test_each_law_has_a_workspace_of_its_own(three: Path) -> None:
     dynamics = control.Dynamics(three, joints=JOINTS)
     first, second = dynamics.memory, dynamics.memory
-    assert first[3] != second[3]  # the mjData's address
+    assert first[3] != second[3]  # address of the mjData
     q, torque = np.array([0.1, 0.2, 0.3]), np.empty(3)
     del dynamics
-    control.gravity(first, q, torque)  # lives longer than the object
+    control.gravity(first, q, torque)  # the memory outlives the object
     assert torque == pytest.approx(oracle(three, JOINTS, q, np.zeros(3), np.zeros(3)))
 
 

@@ -1,4 +1,4 @@
-"""examples/gripper: what it promises, said by the example and seen in the model."""
+"""examples/gripper: the printed results agree with the model."""
 
 import re
 import shutil
@@ -12,8 +12,8 @@ FOLDER = Path(__file__).resolve().parents[2] / "examples" / "gripper"
 
 
 @pytest.fixture(scope="module")
-def said() -> dict[str, list[float]]:
-    """The numbers behind each line's first word, colon or figure."""
+def printed() -> dict[str, list[float]]:
+    """Return the numbers of the printed lines, by the first word of the line."""
     return run(FOLDER / "gripper.py")
 
 
@@ -34,22 +34,24 @@ def run(program: Path) -> dict[str, list[float]]:
     return found
 
 
-def test_homing_finds_the_joints_ranges_and_where_the_fingers_meet(said) -> None:
-    assert said["open"] == pytest.approx([-0.8, -0.8], abs=0.01)
-    assert said["closed"] == pytest.approx([0.6, 0.6], abs=0.01)
+def test_homing_finds_the_joints_ranges_and_where_the_fingers_meet(printed) -> None:
+    assert printed["open"] == pytest.approx([-0.8, -0.8], abs=0.01)
+    assert printed["closed"] == pytest.approx([0.6, 0.6], abs=0.01)
     # tips of 8 mm meet where 100 mm · sin(angle) = 40 mm - 8 mm
-    assert said["meeting"] == pytest.approx([0.326, 0.326], abs=0.01)
+    assert printed["meeting"] == pytest.approx([0.326, 0.326], abs=0.01)
 
 
-def test_the_stiffness_seen_from_outside_is_the_one_asked_for(said) -> None:
-    first, second = said["stiffness"][:3], said["stiffness"][3:]
+def test_the_measured_stiffness_is_the_configured_one(printed) -> None:
+    first, second = printed["stiffness"][:3], printed["stiffness"][3:]
     assert first == pytest.approx([2.0, 2.0, 2.0], rel=0.03)
     assert second == pytest.approx([4.0, 4.0, 4.0], rel=0.03)
 
 
-def test_the_observer_takes_the_friction_away(said, tmp_path: Path) -> None:
-    """Without it a finger that was pushed stays as far from its goal as dry friction holds the
-    spring: at most 0.01 N·m / 4 N·m/rad."""
+def test_the_observer_compensates_the_friction(printed, tmp_path: Path) -> None:
+    """Without the observer, a pushed finger does not return to its goal.
+
+    Dry friction holds the spring at up to 0.01 N·m / 4 N·m/rad.
+    """
     text = (FOLDER / "gripper.py").read_text()
     bandwidth = "VISCOUS, 100.0, COULOMB"
     assert bandwidth in text
@@ -58,11 +60,11 @@ def test_the_observer_takes_the_friction_away(said, tmp_path: Path) -> None:
     shutil.copy(FOLDER / "gripper.xml", tmp_path)
     without = run(program)["left"]
     assert all(1.0 < abs(x) <= 2.5 for x in without)
-    assert all(abs(x) < 0.2 for x in said["left"])
+    assert all(abs(x) < 0.2 for x in printed["left"])
 
 
-def test_the_object_is_felt_soon_and_where_it_is(said) -> None:
-    after, *places = said["felt"]
+def test_the_object_is_detected_soon_and_at_its_place(printed) -> None:
+    after, *places = printed["felt"]
     assert 0.5 <= after <= 10.0  # [ms]
     assert places == pytest.approx([0.17, 0.17], abs=0.02)  # 100 mm · sin = 40 - 15 - 8 mm
 

@@ -1,4 +1,4 @@
-"""Homing of two fingers between hard stops, and of one that has none."""
+"""Homing of two fingers with hard stops, without them, and with an obstacle."""
 
 import numpy as np
 import pytest
@@ -10,14 +10,14 @@ OPEN, SHUT, INERTIA = (-0.8, 0.9), (0.5, -0.4), 0.01
 
 
 class Fingers:
-    """Two axes between stops; they meet where their closing ways add up to `gap`."""
+    """Two simulated axes between stops; they meet where their positions differ by 0.2 rad."""
 
     def __init__(self, *, stops: bool = True) -> None:
         self.q, self.v = np.array([-0.1, 0.2]), np.zeros(2)
         self.stops = stops
 
     def outside(self, i: int) -> float:
-        """The stiff stop's torque, and the other finger's."""
+        """Return the torque of the stop and of the other finger."""
         low, high = sorted((OPEN[i], SHUT[i]))
         over = max(self.q[i] - high, 0) + min(self.q[i] - low, 0)
         met = max(0.0, self.q[0] - self.q[1] - 0.2)
@@ -36,8 +36,8 @@ def home(fingers: Fingers, seconds: float = 20.0) -> tuple[np.ndarray, int]:
     memory, kept, torque = block.memory, loop.memory, np.zeros(2)
     for k in range(round(seconds / DT)):
         for i in range(2):
-            wanted = control.homing(memory, block.parameters, i, fingers.q[i], torque[i], DT)
-            torque[i] = control.pid(kept, loop.parameters, i, wanted, fingers.v[i], 0.0, DT)
+            velocity = control.homing(memory, block.parameters, i, fingers.q[i], torque[i], DT)
+            torque[i] = control.pid(kept, loop.parameters, i, velocity, fingers.v[i], 0.0, DT)
         fingers.step(torque)
         if control.homed(memory):
             return memory, k
@@ -56,24 +56,24 @@ def test_the_three_phases_find_all_stops() -> None:
     assert not found.failed.any()
 
 
-def test_without_stops_both_stand_and_say_so() -> None:
+def test_without_stops_homing_fails_and_both_axes_stop() -> None:
     fingers = Fingers(stops=False)
     memory, steps = home(fingers)
     assert steps > 0
     found = control.stops(memory)
     assert found.failed.any()
     assert np.isnan(found.open).all()
-    asked = [
+    velocities = [
         control.homing(
             memory, control.Homing(2, -0.5, 0.3, 2.0).parameters, i, fingers.q[i], 0.0, DT
         )
         for i in range(2)
     ]
-    assert asked == [0.0, 0.0]
+    assert velocities == [0.0, 0.0]
 
 
 class Obstructed(Fingers):
-    """Something falls between finger 0 and its open stop once it has closed."""
+    """Fingers with an obstacle between finger 0 and its open stop, after it has closed."""
 
     closed = False
 
@@ -83,7 +83,7 @@ class Obstructed(Fingers):
         return super().outside(i) - 2000 * wall - 1.0 * self.v[i] * (wall != 0)
 
 
-def test_an_axis_that_is_stopped_on_its_return_has_failed() -> None:
+def test_an_axis_that_is_blocked_on_its_return_has_failed() -> None:
     fingers = Obstructed()
     memory, steps = home(fingers)
     assert steps > 0
@@ -94,11 +94,11 @@ def test_an_axis_that_is_stopped_on_its_return_has_failed() -> None:
     assert np.isnan(found.meeting).all()
 
 
-def test_before_anything_is_found_all_is_nan() -> None:
+def test_all_results_are_nan_before_homing() -> None:
     found = control.stops(control.Homing(2, 0.5, 0.3, 2.0).memory)
     assert np.isnan([found.open, found.closed, found.meeting]).all()
 
 
-def test_an_axis_without_a_way_to_open() -> None:
-    with pytest.raises(ValueError, match="velocity of axis 1: 0"):
+def test_a_velocity_of_zero_is_refused() -> None:
+    with pytest.raises(ValueError, match="velocity of axis 1 is 0"):
         control.Homing(2, [0.5, 0.0], 0.3, 2.0)

@@ -1,4 +1,4 @@
-"""Blocks inside compiled laws: the same numbers as in Python, no allocation, errors told."""
+"""Blocks in compiled laws: same results as in Python, no allocation, errors are reported."""
 
 import subprocess
 import sys
@@ -28,7 +28,7 @@ def opened(
     with cat.MainDevice(cat.Segment([servo])) as main:
         arm = cat.Drives(main.scan().drives, mode=mode, counts_per_turn=2**20, velocity_limit=100.0)
         with cat.Loop(arm, period=1e-3, **grouped(more)) as loop, warnings.catch_warnings():
-            warnings.simplefilter("error")  # a law that allocates is warned of
+            warnings.simplefilter("error")  # a law that allocates causes a warning
             yield arm, loop
 
 
@@ -52,7 +52,7 @@ def hold(actual, target, memory, time, parameters):
     return time > 1.0
 
 
-def test_a_cascade_in_a_law_is_the_one_in_python() -> None:
+def test_a_cascade_gives_the_same_result_in_a_law_and_in_python() -> None:
     block = control.Cascade(control.Pid(3, 20.0, limit=5.0), control.Pid(3, 1.0, 5.0, limit=10.0))
     goal = [0.5, -0.5, 1.0]
     ends = []
@@ -62,7 +62,7 @@ def test_a_cascade_in_a_law_is_the_one_in_python() -> None:
             memory = loop.run(hold, memory, block.parameters, compiled=compiled)
             assert arm.actual.position == pytest.approx(goal, abs=2e-3)
             ends.append(memory)
-    assert ends[0] == pytest.approx(ends[1], abs=0.02)  # a cycle apart
+    assert ends[0] == pytest.approx(ends[1], abs=0.02)  # they differ by one cycle
 
 
 @cat.law
@@ -80,7 +80,7 @@ def weightless(actual, target, memory, time):
     return time > 0.05
 
 
-def test_dynamics_in_a_law_are_those_in_python(tmp_path: Path) -> None:
+def test_dynamics_give_the_same_result_in_a_law_and_in_python(tmp_path: Path) -> None:
     path = tmp_path / "three.xml"
     path.write_text(THREE)
     dynamics = control.Dynamics(path, joints=JOINTS)
@@ -97,7 +97,7 @@ def test_dynamics_in_a_law_are_those_in_python(tmp_path: Path) -> None:
 
 @cat.law
 def everything(memory, parameters):
-    """All blocks on signals of their own, so that it does not matter when it begins."""
+    """Run all blocks on generated signals, so that the start time does not matter."""
     count, kept = control.part(memory, 0), control.part(memory, 1)
     count[0] += 1.0
     time, dt = count[0] * 1e-3, 1e-3
@@ -121,7 +121,7 @@ def everything(memory, parameters):
     return count[0] > 500.0
 
 
-def test_every_block_is_the_same_compiled_and_allocates_nothing() -> None:
+def test_every_compiled_block_gives_the_same_result_and_allocates_nothing() -> None:
     blocks = [
         control.LowPass(2, [50.0, 80.0], 1e-3),
         control.Pid(2, 2.0, 3.0, 0.01, limit=5.0, rate=900.0, derivative_time=0.01),
@@ -148,7 +148,7 @@ def test_every_block_is_the_same_compiled_and_allocates_nothing() -> None:
 
 @cat.law
 def observed(memory, parameters):
-    """The model's residual, on signals of its own."""
+    """Run the residual with a model on generated signals."""
     count, q, v = control.part(memory, 0), control.part(memory, 3), control.part(memory, 4)
     count[0] += 1.0
     for i in range(3):
@@ -160,7 +160,7 @@ def observed(memory, parameters):
     return count[0] > 100.0
 
 
-def test_the_models_residual_is_the_same_compiled(tmp_path: Path) -> None:
+def test_the_compiled_residual_with_a_model_gives_the_same_result(tmp_path: Path) -> None:
     path = tmp_path / "three.xml"
     path.write_text(THREE)
     dynamics, block, still = (
@@ -179,7 +179,7 @@ def test_the_models_residual_is_the_same_compiled(tmp_path: Path) -> None:
 
 
 def test_trial_steps_leave_nothing_in_the_model(tmp_path: Path) -> None:
-    """A law is tried on copies of its memory before it starts, but in the same workspace."""
+    """Trial steps run on copies of the law's memory, but in the same MuJoCo workspace."""
     path = tmp_path / "three.xml"
     path.write_text(THREE)
     dynamics = control.Dynamics(path, joints=JOINTS)
@@ -204,7 +204,7 @@ print(control.cascade(block.memory, block.parameters, 0, 1.0, 0.0, 0.5, 0.0, 0.0
     assert float(done.stdout) == 6.5
 
 
-def test_the_wrong_parameters_stop_the_drives_and_are_told() -> None:
+def test_wrong_parameters_stop_the_drives_with_an_error() -> None:
     with opened() as (_, loop):
         pid = control.Pid(3, 1.0)
         memory = control.join(np.zeros(30), np.zeros(3))
@@ -218,7 +218,7 @@ def test_more_axes_than_the_model_has_joints(tmp_path: Path) -> None:
     dynamics = control.Dynamics(path, joints=JOINTS)
     with opened(axes=4) as (_, loop):
         memory = control.join(dynamics.memory, np.zeros(4), np.zeros(4), np.zeros(4))
-        with pytest.raises(LawError, match="another number of joints"):
+        with pytest.raises(LawError, match="the number of joints of the model differs"):
             loop.run(weightless, memory)
 
 

@@ -1,4 +1,4 @@
-"""Rows of several blocks in one."""
+"""Rows that combine several blocks, and the checks of options."""
 
 import math
 
@@ -8,7 +8,7 @@ import pytest
 from catenary import control
 
 
-def test_parts_are_found_again_as_views() -> None:
+def test_parts_are_views_of_the_joined_row() -> None:
     row = control.join([1.0, 2.0], [], np.array([[3.0, 4.0], [5.0, 6.0]]))
     assert control.part(row, 0).tolist() == [1.0, 2.0]
     assert control.part(row, 1).tolist() == []
@@ -18,12 +18,12 @@ def test_parts_are_found_again_as_views() -> None:
 
 
 @pytest.mark.parametrize("k", [-1, 2])
-def test_a_part_that_is_not_there(k: int) -> None:
-    with pytest.raises(IndexError, match="no such part"):
+def test_a_missing_part_is_refused(k: int) -> None:
+    with pytest.raises(IndexError, match="no part of this number"):
         control.part(control.join([1.0], [2.0]), k)
 
 
-def test_an_axis_begins_anew_and_leaves_the_others() -> None:
+def test_restart_resets_one_axis_only() -> None:
     memory = np.arange(1.0, 7.0)
     control.restart(memory, 1, 3)
     assert memory.tolist() == [1.0, 2.0, 0.0, 0.0, 5.0, 6.0]
@@ -32,13 +32,13 @@ def test_an_axis_begins_anew_and_leaves_the_others() -> None:
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ({"proportional": [1.0, 2.0]}, "proportional: one value, or one for each of 3 axes"),
-        ({"proportional": [1.0, float("nan"), 1.0]}, "proportional of axis 1: nan"),
-        ({"proportional": 1.0, "limit": 0.0}, "limit of axis 0: 0.0, must be above 0.0"),
-        ({"proportional": 1.0, "integral": [1, 1, -1]}, "integral of axis 2: -1.0"),
+        ({"proportional": [1.0, 2.0]}, "give one value, or one for each of 3 axes"),
+        ({"proportional": [1.0, float("nan"), 1.0]}, "proportional of axis 1 is nan"),
+        ({"proportional": 1.0, "limit": 0.0}, "limit of axis 0 is 0.0; it must be above 0.0"),
+        ({"proportional": 1.0, "integral": [1, 1, -1]}, "integral of axis 2 is -1.0"),
     ],
 )
-def test_a_wrong_number_is_refused_where_it_is_written(options: dict, message: str) -> None:
+def test_an_invalid_option_is_refused_by_the_constructor(options: dict, message: str) -> None:
     with pytest.raises(ValueError, match=message):
         control.Pid(3, **options)
 
@@ -60,8 +60,8 @@ def test_a_step_of_all_axes_at_once() -> None:
 
 
 @pytest.mark.parametrize("inputs", [(), (0.1, 0.2), (np.zeros(2), np.zeros(3))])
-def test_inputs_that_say_no_number_of_axes(inputs: tuple[float, ...]) -> None:
-    with pytest.raises(ValueError, match=r"every: at least one|broadcast"):
+def test_inputs_without_a_number_of_axes_are_refused(inputs: tuple[float, ...]) -> None:
+    with pytest.raises(ValueError, match=r"every: give at least one|broadcast"):
         control.every(control.friction, (control.Friction(2, 1.0, 0.0).parameters,), *inputs)
 
 
@@ -83,7 +83,7 @@ STEPS = {
 
 
 @pytest.mark.parametrize("name", STEPS)
-def test_what_is_no_number_never_becomes_a_limit(name: str) -> None:
+def test_nan_inputs_give_nan_not_a_limit(name: str) -> None:
     block, step, inputs = STEPS[name]
     for wrong in range(inputs):
         memory = block.memory

@@ -1,4 +1,4 @@
-"""PID and cascade: against the textbook's closed forms, at their limits, and out of them."""
+"""PID and cascade: comparison with closed-form solutions, and behaviour at the limits."""
 
 import math
 
@@ -12,7 +12,7 @@ DT = 1e-3
 
 
 def response(block: control.Pid, errors: np.ndarray, measured: float = 0.0) -> np.ndarray:
-    """The output of axis 0 for each error."""
+    """Return the output of axis 0 for each error."""
     memory, parameters = block.memory, block.parameters
     return np.array([control.pid(memory, parameters, 0, e, measured, 0.0, DT) for e in errors])
 
@@ -36,7 +36,7 @@ def test_the_filtered_derivative_is_the_first_order_filters() -> None:
 
 
 def test_the_integral_does_not_wind_up() -> None:
-    """After ten seconds at the limit the output leaves it at once when the error turns."""
+    """After ten seconds at the limit, the output leaves it when the error changes its sign."""
     block = control.Pid(1, 1.0, 2.0, limit=1.0)
     errors = np.concatenate([np.full(10_000, 3.0), np.full(2000, -0.5)])
     out = response(block, errors)
@@ -44,7 +44,7 @@ def test_the_integral_does_not_wind_up() -> None:
     assert out[9_999] == 1.0
     assert out[10_000 + 50] < 0.5
     without = np.clip(np.cumsum(2.0 * errors * DT) + errors, -1, 1)
-    assert without[10_000 + 1999] == 1.0  # what winding up would have done
+    assert without[10_000 + 1999] == 1.0  # with wind-up
 
 
 def test_neither_limit_nor_rate_is_exceeded() -> None:
@@ -56,7 +56,7 @@ def test_neither_limit_nor_rate_is_exceeded() -> None:
     assert abs(np.diff(out)).max() == pytest.approx(40.0 * DT)
 
 
-def test_it_begins_at_its_feed_forward() -> None:
+def test_the_output_starts_at_the_feed_forward() -> None:
     block = control.Pid(1, 0.0, limit=100.0, rate=10.0)
     memory = block.memory
     assert control.pid(memory, block.parameters, 0, 0.0, 0.0, 50.0, DT) == 50.0
@@ -73,7 +73,7 @@ def test_parameters_of_another_block_are_refused() -> None:
 
 
 def moved(block: control.Cascade, inertia: float, load: float, seconds: float) -> np.ndarray:
-    """(k, 3): position, velocity and torque of an inertia that is to go from 0 to 1 rad."""
+    """Return position, velocity and torque (k, 3) of an inertia that moves from 0 to 1 rad."""
     memory, parameters = block.memory, block.parameters
     q = v = 0.0
     track = []
@@ -85,7 +85,7 @@ def moved(block: control.Cascade, inertia: float, load: float, seconds: float) -
     return np.array(track)
 
 
-def test_a_cascade_arrives_against_a_load_and_keeps_its_limits() -> None:
+def test_a_cascade_reaches_its_goal_under_load_within_its_limits() -> None:
     block = control.Cascade(
         control.Pid(1, 10.0, limit=2.0, rate=25.0),
         control.Pid(1, 40.0, 400.0, limit=30.0, rate=3000.0),
@@ -98,8 +98,8 @@ def test_a_cascade_arrives_against_a_load_and_keeps_its_limits() -> None:
     assert track[:, 0].max() < 1.02
 
 
-def test_a_cascade_is_the_linear_system_of_the_textbook() -> None:
-    """P over PI on an inertia, far from all limits: scipy's step response."""
+def test_a_cascade_has_the_step_response_of_the_linear_system() -> None:
+    """P over PI on an inertia, far from all limits, against the step response of scipy."""
     kp, kv, ki, inertia = 8.0, 20.0, 100.0, 0.5
     track = moved(
         control.Cascade(control.Pid(1, kp), control.Pid(1, kv, ki)), inertia, 0.0, seconds=2.0
@@ -110,7 +110,7 @@ def test_a_cascade_is_the_linear_system_of_the_textbook() -> None:
     assert math.isclose(time[-1], 2.0)
 
 
-def test_axes_are_apart() -> None:
+def test_axes_are_independent() -> None:
     block = control.Cascade(control.Pid(3, [1, 2, 3]), control.Pid(3, 1.0, 1.0))
     memory = block.memory
     torque = [control.cascade(memory, block.parameters, 2, 1.0, 0, 0, 0, 0, DT) for _ in range(9)]

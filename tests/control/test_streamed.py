@@ -1,4 +1,4 @@
-"""A trajectory through the loop's ring, from a slower task: no commanded row is beyond a limit."""
+"""Trajectory streamed by a slower task: no commanded row exceeds a limit."""
 
 import numpy as np
 import pytest
@@ -10,7 +10,7 @@ PERIOD = 1e-3
 LIMITS = control.MotionLimits(velocity=[2.0, 1.0], acceleration=[8.0, 5.0], jerk=80.0)
 
 
-def test_what_is_commanded_keeps_every_limit_and_arrives() -> None:
+def test_a_streamed_trajectory_keeps_all_limits_and_arrives() -> None:
     with cat.MainDevice(cat.Segment([cat.virtual.Servo(), cat.virtual.Servo()])) as main:
         arm = cat.Drives(
             main.scan().drives, mode="csp", counts_per_turn=2**20, velocity_limit=100.0
@@ -21,7 +21,7 @@ def test_what_is_commanded_keeps_every_limit_and_arrives() -> None:
             motion = control.trajectory(home, goal, LIMITS, PERIOD)
             stream, sent, rows, worst = loop.stream(capacity=40), 0, [home], 0.0
             for cycle in loop:
-                if cycle.number % 10 == 0:  # the slower task: what finds room
+                if cycle.number % 10 == 0:  # the slower task: write as many rows as fit
                     part = motion.position[sent:], motion.velocity[sent:]
                     sent += stream.write(part[0], velocity=part[1]) if len(part[0]) else 0
                 rows.append(arm.target.position.copy())
@@ -29,7 +29,7 @@ def test_what_is_commanded_keeps_every_limit_and_arrives() -> None:
                 if sent == len(motion) and cycle.dry:
                     break
     commanded = np.array(rows)
-    assert commanded[-1] == pytest.approx(goal, abs=1e-8)  # one cycle was continued
+    assert commanded[-1] == pytest.approx(goal, abs=1e-8)  # one cycle was extrapolated
     begun = np.flatnonzero((commanded != home).any(axis=1))[0]
     ended = begun + len(motion)
     assert commanded[begun:ended] == pytest.approx(motion.position)  # no row lost or held
@@ -39,4 +39,4 @@ def test_what_is_commanded_keeps_every_limit_and_arrives() -> None:
         derivatives, (LIMITS.velocity, LIMITS.acceleration, LIMITS.jerk), strict=True
     ):
         assert (abs(found) <= np.array(limit) * (1 + 1e-6)).all()
-    assert worst < 0.02  # followed: two cycles at 2 rad/s, and the drives' own error
+    assert worst < 0.02  # delay of two cycles at 2 rad/s, plus the following error of the drives

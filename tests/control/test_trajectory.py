@@ -1,4 +1,4 @@
-"""Trajectories: every sample within every limit, by finite differences; what cannot be is named."""
+"""Trajectories: finite differences of all samples stay within the limits; invalid input fails."""
 
 import sys
 
@@ -14,7 +14,7 @@ HOME = np.zeros(3)
 
 
 def assert_within(motion: control.Trajectory, start: control.MotionState) -> None:
-    """By differences of the samples, not by what the maker says of its derivatives."""
+    """Check the differences of the samples, not the derivatives that ruckig reports."""
     n = motion.position.shape[1]
     q = np.vstack([start.position, motion.position])
     v = np.vstack([start.velocity, motion.velocity])
@@ -24,7 +24,7 @@ def assert_within(motion: control.Trajectory, start: control.MotionState) -> Non
     assert (abs(np.diff(q, axis=0)) / PERIOD <= np.array(LIMITS.velocity) + 1e-6).all()
     assert (abs(np.diff(v, axis=0)) / PERIOD <= np.array(LIMITS.acceleration) + 1e-6).all()
     assert (abs(np.diff(a, axis=0)) / PERIOD <= LIMITS.jerk + 1e-6).all()
-    # and the three belong together: trapezoids of one are the next, up to a jerk's share
+    # position, velocity and acceleration are consistent: the trapezoidal rule holds up to the jerk
     steps = PERIOD * (v[1:] + v[:-1]) / 2
     assert np.diff(q, axis=0) == pytest.approx(steps, abs=LIMITS.jerk * PERIOD**3)
     steps = PERIOD * (a[1:] + a[:-1]) / 2
@@ -56,16 +56,16 @@ def test_from_a_moving_start(seed: int) -> None:
     assert_within(motion, start)
 
 
-def test_all_axes_arrive_together_and_the_slowest_at_its_limit() -> None:
+def test_all_axes_arrive_together_and_the_slowest_reaches_its_limit() -> None:
     motion = control.trajectory(HOME, [0.5, 2.0, 0.1], LIMITS, PERIOD)
     moving = abs(np.diff(motion.position, axis=0)) > 1e-12
     assert moving[-5:-1].all()
     assert motion.velocity[:, 1].max() == pytest.approx(1.0, abs=1e-6)
-    # v / a + a / j + q / v is the textbook's time for one axis with all phases
+    # duration of a motion of one axis with all seven phases: q / v + v / a + a / j
     assert motion.duration == pytest.approx(2.0 / 1.0 + 1.0 / 5.0 + 5.0 / 60.0, abs=1e-6)
 
 
-def test_waypoints_are_a_chain_at_rest_in_each() -> None:
+def test_a_motion_through_waypoints_rests_at_each() -> None:
     way = [[0.3, 0.0, -0.3], [0.3, 0.5, 0.3], [0.0, 0.0, 0.0]]
     motion = control.trajectory(HOME, way, LIMITS, PERIOD)
     assert_within(motion, at_rest(HOME))
@@ -80,7 +80,7 @@ def test_waypoints_are_a_chain_at_rest_in_each() -> None:
     assert motion.duration == pytest.approx(sum(single))
 
 
-def test_a_row_at_a_time_is_what_the_arrays_hold() -> None:
+def test_single_rows_equal_the_arrays() -> None:
     goals = [[1.0, -0.5], [0.2, 0.3]]
     limits = control.MotionLimits(1.0, 5.0, 50.0)
     motion = control.trajectory([0.0, 0.0], goals, limits, 0.01)
@@ -91,7 +91,7 @@ def test_a_row_at_a_time_is_what_the_arrays_hold() -> None:
         motion.row(3000)
 
 
-def test_where_it_stands_already_it_is_one_row() -> None:
+def test_a_motion_to_the_start_has_one_row() -> None:
     motion = control.trajectory(HOME, HOME, LIMITS, PERIOD)
     assert motion.position.tolist() == [[0.0, 0.0, 0.0]]
     assert motion.duration == 0.0
@@ -110,36 +110,46 @@ def bounded(low: float, high: float) -> control.MotionLimits:
 @pytest.mark.parametrize(
     ("start", "goal", "limits", "message"),
     [
-        (HOME, [0, 2, 0], bounded(-1, 1), "goal of axis 1: 2 beyond its position_max 1"),
-        (HOME, [0, 0, -2], bounded(-1, 1), "goal of axis 2: -2 beyond its position_min -1"),
-        ([0, 3, 0], HOME, bounded(-1, 1), "start of axis 1: 3 beyond its position_max"),
-        (HOME, [0, np.nan, 0], LIMITS, "goal of axis 1: nan"),
-        ([np.inf, 0, 0], HOME, LIMITS, "start: position of axis 0: inf"),
-        (HOME, [0, 0], LIMITS, "goal: 3 numbers"),
-        (control.MotionState(HOME, [0, 1.2, 0]), HOME, LIMITS, "start: velocity of axis 1: 1.2"),
+        (HOME, [0, 2, 0], bounded(-1, 1), "goal of axis 1 is 2; it is beyond position_max 1"),
+        (HOME, [0, 0, -2], bounded(-1, 1), "goal of axis 2 is -2; it is beyond position_min -1"),
+        ([0, 3, 0], HOME, bounded(-1, 1), "start of axis 1 is 3; it is beyond position_max"),
+        (HOME, [0, np.nan, 0], LIMITS, "goal of axis 1 is nan"),
+        ([np.inf, 0, 0], HOME, LIMITS, "start position of axis 0 is inf"),
+        (HOME, [0, 0], LIMITS, "give 3 numbers"),
+        (control.MotionState(HOME, [0, 1.2, 0]), HOME, LIMITS, "start velocity of axis 1 is 1.2"),
         (
             control.MotionState(HOME, [0, 0.9, 0], [0, 5.0, 0]),
             HOME,
             LIMITS,
-            "start: velocity once its acceleration has ended of axis 1: 1.1",
+            "velocity after the start acceleration has decreased to zero of axis 1 is 1.1",
         ),
         (
             control.MotionState(HOME, HOME, [0, 0, 10.0]),
             HOME,
             LIMITS,
-            "start: acceleration of axis 2: 10 beyond its limit 9",
+            "start acceleration of axis 2 is 10; it is beyond the limit 9",
         ),
         (
             control.MotionState([0.95, 0, 0], [0.9, 0, 0]),
             HOME,
             bounded(-1, 1),
-            "the way there: its highest position of axis 0: 1.* beyond its position_max 1",
+            "highest position of the motion of axis 0 is 1.*; it is beyond position_max 1",
         ),
-        (HOME, HOME, control.MotionLimits(1.0, 0.0, 1.0), "acceleration of axis 0: 0.0, must be"),
-        (HOME, HOME, control.MotionLimits(1.0, 1.0, np.inf), "jerk of axis 0: inf must be finite"),
-        (HOME, HOME, bounded(1, 1), "position_min of axis 0: 1 is not below position_max"),
+        (
+            HOME,
+            HOME,
+            control.MotionLimits(1.0, 0.0, 1.0),
+            "acceleration of axis 0 is 0.0; it must be",
+        ),
+        (
+            HOME,
+            HOME,
+            control.MotionLimits(1.0, 1.0, np.inf),
+            "jerk of axis 0 is inf; it must be finite",
+        ),
+        (HOME, HOME, bounded(1, 1), "position_min of axis 0 is 1; it must be below position_max"),
     ],
 )
-def test_what_cannot_be_names_axis_and_limit(start, goal, limits, message: str) -> None:
+def test_an_impossible_motion_names_axis_and_limit(start, goal, limits, message: str) -> None:
     with pytest.raises(ValueError, match=message):
         control.trajectory(start, goal, limits, PERIOD)

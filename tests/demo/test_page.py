@@ -34,7 +34,7 @@ def result() -> Result:
 
 
 class Balance(HTMLParser):
-    """Every tag that is opened is closed in its turn."""
+    """Parser that checks that all tags are closed in the right order."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -52,7 +52,7 @@ class Balance(HTMLParser):
             assert self.open.pop() == tag
 
 
-def test_json_has_the_published_form(result: Result) -> None:
+def test_json_has_the_documented_keys(result: Result) -> None:
     read = json.loads(as_json(result))
     assert list(read) == [
         "devices",
@@ -83,7 +83,7 @@ def test_json_has_the_published_form(result: Result) -> None:
     assert read["timing_us"]["period"]["max"] == 9.0
 
 
-def test_the_error_is_against_what_had_reached_the_drive() -> None:
+def test_the_error_refers_to_the_set_point_at_the_drive() -> None:
     time = np.array([0.0, 1e-3, 2e-3, 6e-3, 7e-3])  # the program missed three cycles
     reference = np.array([[0.0], [1.0], [2.0], [3.0], [4.0]])
     error = Motion(time, reference, np.zeros_like(reference)).error(2e-3)
@@ -91,7 +91,7 @@ def test_the_error_is_against_what_had_reached_the_drive() -> None:
     assert error[2:, 0].tolist() == [0.0, -2.0, -2.0]
 
 
-def test_page_is_well_formed_and_needs_nothing_from_elsewhere(result: Result) -> None:
+def test_the_page_is_well_formed_and_self_contained(result: Result) -> None:
     page = as_html(result)
     balance = Balance()
     balance.feed(page)
@@ -102,15 +102,15 @@ def test_page_is_well_formed_and_needs_nothing_from_elsewhere(result: Result) ->
     assert page.count("<svg") == 2 + len(PHASES)
 
 
-def test_one_outlier_does_not_flatten_a_histogram() -> None:
+def test_an_outlier_does_not_compress_a_histogram() -> None:
     buckets = [(float(n), n + 1.0, 500) for n in range(10)] + [(900.0, 901.0, 1)]
     low, high = drawn_range(buckets)
     assert low == 0.0
     assert 10.0 < high < 12.0
 
 
-def test_a_run_without_motion_still_makes_a_page(result: Result) -> None:
+def test_a_page_of_a_run_without_motion(result: Result) -> None:
     empty = Motion(np.empty(0), np.empty((0, 3)), np.empty((0, 3)))
     short = Result(**{name: getattr(result, name) for name in result.__slots__} | {"motion": empty})
-    assert "Too short a run" in as_html(short)
+    assert "The run was too short" in as_html(short)
     assert json.loads(as_json(short))["tracking_error_rad"] == {"rms": 0.0, "max": 0.0}

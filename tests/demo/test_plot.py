@@ -14,7 +14,7 @@ def test_rebin_keeps_every_count_of_narrow_buckets() -> None:
     assert bars[3][2] == sum(range(31, 41))
 
 
-def test_rebin_spreads_a_wide_bucket() -> None:
+def test_rebin_distributes_a_wide_bucket() -> None:
     assert [count for *_, count in rebin([(0.0, 4.0, 8)], 0.0, 4.0, 4)] == [2, 2, 2, 2]
 
 
@@ -23,7 +23,7 @@ def test_nice_step(span: float, step: float) -> None:
     assert nice_step(span) == pytest.approx(step)
 
 
-def test_axis_stays_inside_its_frame() -> None:
+def test_an_axis_clamps_to_its_frame() -> None:
     axis = Axis(0.0, 10.0, 100.0, 200.0)
     assert [axis.pixel(value) for value in (-5.0, 0.0, 5.0, 10.0, 99.0)] == [
         100,
@@ -43,7 +43,7 @@ def test_a_single_late_cycle_is_drawn() -> None:
     assert min(heights) > 3.0  # pixels
 
 
-def test_a_line_that_does_not_move_is_drawn() -> None:
+def test_a_constant_line_is_drawn() -> None:
     flat = Line("flat", "a", [0.0, 1.0, 2.0], [1.0, 1.0, 1.0])
     drawn = ElementTree.fromstring(line_plot([flat], x_unit="s", y_unit="rad", title="t"))
     assert [len(line.get("points", "").split()) for line in drawn.iter("polyline")] == [3]

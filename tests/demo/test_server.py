@@ -1,4 +1,4 @@
-"""Segments that are served to a demo or a benchmark."""
+"""Server process of a demo or a benchmark."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ from catenary.virtual.server import MAX_AGE
 
 
 @pytest.mark.parametrize(("policy", "max_age"), [("SCHED_FIFO", MAX_AGE), ("SCHED_OTHER", None)])
-def test_late_frames_are_lost_only_in_real_time(
+def test_late_frames_are_dropped_only_in_real_time(
     monkeypatch: pytest.MonkeyPatch, policy: str, max_age: float | None
 ) -> None:
-    """A machine that refuses the priority is late itself: its frames are answered."""
+    """If the machine refuses the priority, the segment answers late frames."""
     asked: dict[str, object] = {}
     served: dict[str, object] = {}
 

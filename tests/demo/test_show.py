@@ -1,4 +1,4 @@
-"""The demo from end to end, short and in this process."""
+"""A short run of the whole demo in this process."""
 
 from __future__ import annotations
 
@@ -39,11 +39,11 @@ def test_page(folder: Path) -> None:
     assert page.count("<polyline") == 3 * 3  # references, positions, errors
 
 
-def test_what_is_printed(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_output(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     main(["demo", "--in-process", "--seconds", "0.05", "--out", str(tmp_path)])
     printed = capsys.readouterr().out
-    assert "no real frames here (asked for)" in printed
-    assert "\r" not in printed  # no progress bar: this is no terminal
+    assert "no real frames (--in-process)" in printed
+    assert "\r" not in printed  # no progress bar without a terminal
     assert "in_controller" in printed
     assert " late, " in printed
     assert "against the set-point that had reached the drive" in printed

@@ -1,4 +1,4 @@
-"""Enter, hit while a program runs."""
+"""Detection of Enter while a program runs."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import threading
 from catenary.demo.terminal import on_enter
 
 
-def test_enter_at_a_terminal_is_heard_and_leaving_does_not_wait() -> None:
+def test_enter_calls_the_action_and_leaving_does_not_block() -> None:
     person, program = pty.openpty()
     received = threading.Semaphore(0)
     with on_enter(received.release, source=program) as listening:
@@ -23,7 +23,7 @@ def test_enter_at_a_terminal_is_heard_and_leaving_does_not_wait() -> None:
     os.close(program)
 
 
-def test_letters_are_no_key_and_a_terminal_that_hangs_up_ends_it() -> None:
+def test_letters_are_ignored_and_a_hangup_ends_the_thread() -> None:
     person, program = os.pipe(), threading.Event()
     with on_enter(program.set, source=person[0]) as listening:
         assert listening
@@ -35,5 +35,5 @@ def test_letters_are_no_key_and_a_terminal_that_hangs_up_ends_it() -> None:
 
 def test_without_a_terminal_nothing_is_read() -> None:
     received = threading.Event()
-    with on_enter(received.set) as listening:  # pytest's standard input is none
+    with on_enter(received.set) as listening:  # the standard input of pytest is not a terminal
         assert not listening

@@ -1,4 +1,4 @@
-"""Machines made of files: a well set up one, a laptop, a container, a guest of a hypervisor."""
+"""Simulated machines made of files: a controller, a laptop, a container and a virtual machine."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ Files = Mapping[str, str]
 
 
 def make(root: Path, files: Files, **facts: object) -> Machine:
-    """A path that ends in / is an empty folder."""
+    """Create a machine from files. A path that ends in / is an empty folder."""
     for name, text in files.items():
         path = root / name.lstrip("/")
         if name.endswith("/"):
@@ -172,7 +172,7 @@ def laptop(root: Path, **changed: str) -> Machine:
 
 
 def container(root: Path) -> Machine:
-    """Of Docker, as it comes, but with --cpus 1.5, on a machine that is set up well."""
+    """Return a default Docker container with --cpus 1.5 on a well-configured machine."""
     files = {name: text for name, text in CONTROLLER.items() if "enp" not in name}
     return make(
         root,

@@ -1,4 +1,4 @@
-"""Changes are noted before they are made, and taken back."""
+"""Changes are saved before they are made, and can be undone."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from tests.doctor import machines
 
 
 class Ground:
-    """Owns values; those in `refused` cannot be written."""
+    """Simulated machine; targets in `refused` cannot be written."""
 
     def __init__(self, refused: str = "", **values: str) -> None:
         self.values = values
@@ -48,7 +48,7 @@ def state(tmp_path):
     return HostState(tmp_path / "state" / "doctor.json", "boot 1")
 
 
-def test_applied_and_undone(state):
+def test_apply_and_undo(state):
     ground = Ground(a="1", b="2")
     assert list(apply([Change("a", "8"), Change("b", "9")], ground, state)) == [
         "done: a = 8 (was 1)",
@@ -60,7 +60,7 @@ def test_applied_and_undone(state):
     assert state.load() == []
 
 
-def test_twice_applied_goes_back_to_what_was_there_first(state):
+def test_undo_after_two_runs_restores_the_first_values(state):
     ground = Ground(a="1")
     list(apply([Change("a", "8")], ground, state))
     assert list(apply([Change("a", "8")], ground, state)) == ["already set: a = 8"]
@@ -69,7 +69,7 @@ def test_twice_applied_goes_back_to_what_was_there_first(state):
     assert ground.values == {"a": "1"}
 
 
-def test_what_is_refused_is_said_and_not_noted(state):
+def test_a_refused_change_is_reported_and_not_saved(state):
     ground = Ground(refused="a", a="1", b="2")
     lines = list(apply([Change("a", "8"), Change("gone", "8"), Change("b", "9")], ground, state))
     assert lines == [
@@ -80,15 +80,15 @@ def test_what_is_refused_is_said_and_not_noted(state):
     assert [made.target for made in state.load()] == ["b"]
 
 
-def test_what_somebody_else_changed_since_is_left(state):
+def test_a_value_changed_again_is_not_undone(state):
     ground = Ground(a="1")
     list(apply([Change("a", "8")], ground, state))
     ground.values["a"] = "5"
-    assert list(undo(ground, state)) == ["not undone, because it was changed since: a"]
+    assert list(undo(ground, state)) == ["not undone, because its value was changed again: a"]
     assert ground.values == {"a": "5"}
 
 
-def test_what_cannot_be_undone_now_stays_noted(state):
+def test_a_refused_undo_stays_in_the_state_file(state):
     ground = Ground(a="1")
     list(apply([Change("a", "8")], ground, state))
     ground.refused = "a"
@@ -97,8 +97,8 @@ def test_what_cannot_be_undone_now_stays_noted(state):
     assert list(undo(ground, state)) == ["undone: a = 1"]
 
 
-def test_it_is_noted_before_it_is_made(state):
-    """Killed between the two, it can still be undone."""
+def test_a_change_is_saved_before_it_is_made(state):
+    """The change can be undone even if the program is killed between the two."""
 
     class Killed(Ground):
         def write(self, target: str, value: str) -> None:
@@ -116,25 +116,25 @@ def test_after_a_reboot_there_is_nothing_to_undo(state):
     assert HostState(state.path, "boot 2").load() == []
 
 
-def test_where_nothing_can_be_noted_nothing_is_changed(state, monkeypatch):
+def test_nothing_is_changed_if_it_cannot_be_saved(state, monkeypatch):
     def full(_):
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
     monkeypatch.setattr(os, "fsync", full)
     ground = Ground(a="1")
-    with pytest.raises(StateError, match=r"No space left on device.*so nothing is changed"):
+    with pytest.raises(StateError, match=r"No space left on device.*no setting is changed"):
         list(apply([Change("a", "8")], ground, state))
     assert ground.values == {"a": "1"}
 
 
-def test_a_damaged_note_is_an_error_and_not_silence(state):
+def test_a_damaged_state_file_is_an_error(state):
     state.path.parent.mkdir()
     state.path.write_text('{"boot": "boot 1", "made": [{"target": 1}]}')
     with pytest.raises(StateError, match="cannot be read"):
         state.load()
 
 
-def test_files_of_a_machine(tmp_path, state):
+def test_apply_and_undo_on_files(tmp_path, state):
     pages = tmp_path / HUGE_PAGES.lstrip("/")
     pages.parent.mkdir(parents=True)
     pages.write_text("[always] madvise never\n")
@@ -172,8 +172,8 @@ def test_every_change_of_the_checks_can_be_made_and_undone(tmp_path, state):
         "",
     ],
 )
-def test_nothing_outside_of_the_list_is_written(tmp_path, state, target):
-    """A state file with any content."""
+def test_unknown_targets_are_refused(tmp_path, state, target):
+    """Only known targets are written, whatever the state file contains."""
     (tmp_path / "etc").mkdir()
     (tmp_path / "etc" / "passwd").write_text("root")
     for parts in ("etc", "proc/sys/kernel", "sys/kernel/mm/transparent_hugepage/enabled"):
@@ -185,7 +185,7 @@ def test_nothing_outside_of_the_list_is_written(tmp_path, state, target):
     assert {(tmp_path / "etc" / "passwd").read_text(), core.read_text()} == {"root"}
 
 
-def test_undo_says_what_it_does_not_write_and_keeps_it_noted(tmp_path, state):
+def test_undo_reports_and_keeps_unknown_targets(tmp_path, state):
     (tmp_path / "etc").mkdir()
     (tmp_path / "etc" / "passwd").write_text("after")
     state.save([Made("/etc/passwd", "before", "after")])
@@ -214,12 +214,12 @@ def test_a_state_file_of_another_user_is_refused(state):
 def test_a_state_file_that_others_can_write_is_refused(state, mode):
     state.save([Made(HUGE_PAGES, "always", "madvise")])
     state.path.chmod(mode)
-    with pytest.raises(StateError, match="its content is not written to this machine"):
+    with pytest.raises(StateError, match="its content is not trusted"):
         state.load()
 
 
 def test_a_link_is_not_followed(state, tmp_path):
-    """Neither in reading nor in writing: as root it would overwrite any file."""
+    """If root followed a link, it would overwrite any file."""
     victim = tmp_path / "victim"
     victim.write_text("mine")
     state.path.parent.mkdir()
@@ -233,13 +233,13 @@ def test_a_link_is_not_followed(state, tmp_path):
     assert state.load() == []
 
 
-def test_the_state_of_root_is_not_where_a_group_can_write(monkeypatch):
+def test_the_state_file_of_root_is_not_in_a_group_folder(monkeypatch):
     monkeypatch.delenv("XDG_STATE_HOME", raising=False)
     monkeypatch.setattr(os, "geteuid", lambda: 0)
     assert str(open_state().path) == "/run/catenary-doctor.json"
 
 
-def test_a_folder_comes_and_goes(tmp_path, state):
+def test_a_folder_is_created_and_removed(tmp_path, state):
     me = f"{pwd.getpwuid(os.geteuid()).pw_name}:{grp.getgrgid(os.getegid()).gr_name}"
     ground, target = MachineGround(tmp_path), "folder:/run/catenary"
     (tmp_path / "run").mkdir()
@@ -258,14 +258,14 @@ def test_a_folder_comes_and_goes(tmp_path, state):
 
 
 @pytest.mark.parametrize("value", ["", "777", "x root:root", "755 nobody-at-all:root", "755 root"])
-def test_a_folders_state_that_cannot_be(tmp_path, value):
+def test_invalid_folder_states(tmp_path, value):
     (tmp_path / "run").mkdir()
-    with pytest.raises(OSError, match=r"is not a folder's state|no such user"):
+    with pytest.raises(OSError, match=r"invalid folder state|no such user"):
         MachineGround(tmp_path).write("folder:/run/catenary", value)
 
 
 @pytest.mark.parametrize(
     ("text", "word"), [("always [madvise] never", "madvise"), ("performance", "performance")]
 )
-def test_the_chosen_one_of_several(text, word):
+def test_the_selected_value_of_several(text, word):
     assert chosen(text) == word

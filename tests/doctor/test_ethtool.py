@@ -1,4 +1,4 @@
-"""The driver's answers: as bytes, and from drivers that are here."""
+"""Answers of drivers: given bytes, and the drivers of this machine."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def test_link(speed, duplex, expected):
     assert decode_link(struct.pack("=IIB", 0x4C, speed, duplex).ljust(48, b"\0")) == expected
 
 
-def test_a_veth_pair_answers(veth):
+def test_read_the_card_of_a_veth_pair(veth):
     card = read_card(veth[0])
     assert (card.driver, card.link, card.up, card.hardware_type) == (
         "veth",
@@ -54,7 +54,7 @@ def test_a_veth_pair_answers(veth):
     assert card.refusals["coalescing"] == "Operation not supported"
 
 
-def test_what_a_driver_cannot_do_is_an_oserror(veth):
+def test_an_unsupported_request_raises_oserror(veth):
     with pytest.raises(OSError, match="Operation not supported"):
         read_setting(veth[0], "eee")
     with pytest.raises(OSError, match="Operation not supported"):
@@ -63,7 +63,7 @@ def test_what_a_driver_cannot_do_is_an_oserror(veth):
 
 @pytest.fixture
 def tap(veth):
-    """A driver that knows coalescing, of one kind only: drivers/net/tun.c."""
+    """Interface whose driver supports only one coalescing setting, drivers/net/tun.c."""
     made = subprocess.run(
         ["ip", "tuntap", "add", "dev", "catenary0", "mode", "tap"], capture_output=True, text=True
     )
@@ -73,7 +73,7 @@ def tap(veth):
     subprocess.run(["ip", "tuntap", "del", "dev", "catenary0", "mode", "tap"], check=True)
 
 
-def test_a_setting_is_written_and_what_the_driver_lacks_is_refused(tap):
+def test_write_a_setting_and_refuse_an_unsupported_one(tap):
     assert read_setting(tap, "rx-usecs") == 0
     write_setting(tap, "rx-usecs", 0)
     with pytest.raises(OSError, match=r"not supported|Invalid"):

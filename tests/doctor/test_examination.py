@@ -1,4 +1,4 @@
-"""The verdicts over four machines: as a whole, each in the order shown."""
+"""All verdicts on four simulated machines."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ def test_the_verdicts(tmp_path, column):
         assert check.advice or check.status in ("PASS", "SKIP"), check
 
 
-def test_a_machine_of_which_nothing_is_known_gets_no_praise(tmp_path):
+def test_an_unknown_machine_passes_few_checks(tmp_path):
     checks = examine(machines.make(tmp_path, {}, clock=None)).checks
     statuses = {check.id: check.status for check in checks}
     assert statuses["limit-rtprio"] == "SKIP"
@@ -67,7 +67,7 @@ def test_a_machine_of_which_nothing_is_known_gets_no_praise(tmp_path):
     assert "this kernel has no /proc/self/limits" in {check.found for check in checks}
 
 
-def test_a_laptop_can_have_changed_what_can_be_undone(tmp_path):
+def test_reversible_changes_of_a_laptop(tmp_path):
     targets = [change.target for change in examine(machines.laptop(tmp_path)).changes]
     assert targets == [
         *(f"{machines.CPU}/cpu{n}/cpufreq/scaling_governor" for n in range(4)),
@@ -80,19 +80,19 @@ def test_a_laptop_can_have_changed_what_can_be_undone(tmp_path):
     assert examine(machines.controller(tmp_path / "controller")).changes == ()
 
 
-def test_the_port_that_carries_the_network_is_left_alone():
-    change = machines.Machine  # any value: only whose it is matters
+def test_no_changes_of_a_port_with_the_default_route():
+    change = machines.Machine  # any value; only the check that it belongs to matters
     coalescing = warned("nic-coalescing", "", "", (change,))
     in_use = failed("nic-use", "", "")
     assert Examination((("", (coalescing,)),)).changes == (change,)
     assert Examination((("", (coalescing, in_use)),)).changes == ()
 
 
-def test_without_a_card_those_there_are_named(tmp_path):
+def test_without_a_card_the_report_lists_the_cards(tmp_path):
     machine = machines.make(tmp_path, machines.LAPTOP)
     [check] = [check for check in examine(machine).checks if check.id == "nic"]
     assert check.status == "SKIP"
-    assert "there is enp0s31f6, wlp3s0" in check.found
+    assert "this machine has enp0s31f6, wlp3s0" in check.found
 
 
 def test_a_card_that_does_not_exist():
@@ -106,7 +106,7 @@ def test_a_cpu_that_does_not_exist():
         this_machine(None, cpu=5000)
 
 
-def test_this_machine_is_judged_whatever_it_is():
+def test_examine_this_machine():
     checks = examine(this_machine("lo")).checks
     statuses = {check.id: check.status for check in checks}
     assert statuses["nic-driver"] == "FAIL"  # lo is not an Ethernet card

@@ -1,4 +1,4 @@
-"""How late wake-ups are: judged on made figures; measured here, without asserting how long."""
+"""Wake-up latency: verdicts on given figures, and a measurement without limits."""
 
 from __future__ import annotations
 
@@ -26,32 +26,32 @@ def latency(worst: float, period: float = 1e-3) -> Latency:
         (101e-6, 1e-3, "WARN"),
         (499e-6, 1e-3, "WARN"),
         (501e-6, 1e-3, "FAIL"),
-        (99e-6, 125e-6, "FAIL"),  # good for 1 kHz, not for 8
+        (99e-6, 125e-6, "FAIL"),  # good at 1 kHz, bad at 8 kHz
     ],
 )
-def test_the_worst_is_judged_by_the_period(tmp_path, worst, period, status):
+def test_the_verdict_depends_on_the_period(tmp_path, worst, period, status):
     assert judge(latency(worst, period), make(tmp_path, {})).status == status
 
 
-def test_a_guest_is_told_to_measure_elsewhere(tmp_path):
+def test_the_advice_for_a_virtual_machine(tmp_path):
     check = judge(latency(0.5), make(tmp_path, GUEST))
-    assert check.advice.startswith("a virtual machine is late")
+    assert check.advice.startswith("the host can delay a virtual machine")
 
 
-def test_without_priority_that_is_to_be_had_first(tmp_path):
+def test_the_advice_without_real_time_priority(tmp_path):
     refused = replace(latency(0.5), scheduling="SCHED_OTHER, SCHED_FIFO 80 refused")
     check = judge(refused, make(tmp_path, GUEST))
-    assert check.advice.startswith("first the permissions (limit-rtprio")
+    assert check.advice.startswith("fix the permissions first (limit-rtprio")
 
 
-def test_nothing_measured_is_no_verdict(tmp_path):
+def test_no_measurement_is_skipped(tmp_path):
     machine = make(tmp_path, {})
     assert judge(None, machine).status == "SKIP"
     none = replace(latency(0.0), lateness=Figure(0, 0, 0, 0, 0, 0, 0, 0))
     assert judge(none, machine).status == "SKIP"
 
 
-def test_it_measures_here():
+def test_measure_on_this_machine():
     cpu = max(os.sched_getaffinity(0))
     measured = measure(0.2, period=1e-3, priority=80, cpu=cpu)
     figure = measured.lateness
@@ -61,8 +61,8 @@ def test_it_measures_here():
     assert f"CPU {cpu}" in measured.scheduling
 
 
-def test_a_cpu_outside_of_our_set_is_had_by_asking(tmp_path):
-    """As with isolcpus: nobody has that CPU unasked."""
+def test_a_cpu_outside_of_the_default_set_is_obtainable(tmp_path):
+    """With isolcpus, such a CPU is not in the default set."""
     ours = os.sched_getaffinity(0)
     if len(ours) < 2:
         pytest.skip("one CPU")

@@ -1,4 +1,4 @@
-"""Machine: files below a root, and what is read from them."""
+"""Machine: properties read from files below a root folder."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from tests.doctor.machines import LAPTOP, make
         ("5", {5}),
         ("", set()),
         (None, set()),
-        ("(null)", set()),  # nohz_full of a kernel that was started without
+        ("(null)", set()),  # nohz_full of a kernel that was started without this option
         ("0-1,4-5\n", {0, 1, 4, 5}),
     ],
 )
@@ -26,11 +26,11 @@ def test_lists_of_cpus(text, cpus):
     assert cpu_list(as_list(cpus)) == cpus
 
 
-def test_lists_are_as_short_as_the_kernels():
+def test_lists_of_cpus_are_as_short_as_the_kernels():
     assert as_list({8, 0, 2, 1, 10}) == "0-2,8,10"
 
 
-def test_a_file_that_is_not_there_is_told_from_one_that_may_not_be_read(tmp_path):
+def test_the_reason_why_a_file_has_no_text(tmp_path):
     machine = make(tmp_path, {"/sys/here": "7"})
     (tmp_path / "sys/folder").mkdir()
     assert machine.number("/sys/here") == 7
@@ -39,23 +39,23 @@ def test_a_file_that_is_not_there_is_told_from_one_that_may_not_be_read(tmp_path
     assert machine.lack("/sys/folder") == "/sys/folder: Is a directory"
 
 
-def test_permission_to_look_is_named(tmp_path, monkeypatch):
+def test_a_file_without_read_permission(tmp_path, monkeypatch):
     machine = make(tmp_path, {"/sys/secret": "7"})
 
     def refuse(path):
         raise PermissionError(13, "Permission denied", str(path))
 
     monkeypatch.setattr("pathlib.Path.read_bytes", refuse)  # root may read everything
-    assert machine.lack("/sys/secret") == "/sys/secret may not be read by this user"
+    assert machine.lack("/sys/secret") == "this user may not read /sys/secret"
 
 
-def test_the_kernels_configuration_is_found_packed_too(tmp_path):
+def test_a_compressed_kernel_configuration(tmp_path):
     machine = make(tmp_path, {"/proc/sys/kernel/osrelease": "6.1.0"})
     (tmp_path / "proc/config.gz").write_bytes(gzip.compress(b"CONFIG_HZ=250\n# CONFIG_X is not\n"))
     assert machine.configuration == {"CONFIG_HZ": "250"}
 
 
-def test_a_damaged_configuration_is_none(tmp_path):
+def test_a_damaged_configuration_is_empty(tmp_path):
     machine = make(tmp_path, {"/proc/sys/kernel/osrelease": "6.1.0", "/proc/config.gz": "rubbish"})
     assert machine.configuration == {}
 
@@ -90,8 +90,8 @@ def test_kinds_of_containers(tmp_path, files, kind):
     ("files", "kind"),
     [
         ({"/sys/hypervisor/type": "xen"}, "xen"),
-        ({"/proc/device-tree/hypervisor/": ""}, "a hypervisor (device tree)"),
-        ({"/proc/cpuinfo": "flags\t: fpu hypervisor"}, "a hypervisor (/proc/cpuinfo)"),
+        ({"/proc/device-tree/hypervisor/": ""}, "unknown hypervisor, device tree"),
+        ({"/proc/cpuinfo": "flags\t: fpu hypervisor"}, "unknown hypervisor, /proc/cpuinfo"),
         ({"/proc/cpuinfo": "model name : hypervisor lover"}, ""),
     ],
 )

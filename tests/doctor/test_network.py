@@ -1,4 +1,4 @@
-"""The network card's checks."""
+"""Checks of the network card."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def test_speed(tmp_path, speed, full, status):
     assert link(controller(tmp_path), replace(I210, link=Link(speed, full))).status == status
 
 
-def test_down_and_without_a_cable_are_two_things(tmp_path):
+def test_advice_for_a_port_that_is_down_or_has_no_cable(tmp_path):
     machine = controller(tmp_path)
     assert link(machine, replace(I210, up=False)).advice == "sudo ip link set enp2s0 up"
     assert "cable" in link(machine, replace(I210, running=False)).advice
@@ -47,9 +47,9 @@ def test_down_and_without_a_cable_are_two_things(tmp_path):
     ("change", "files", "status", "words"),
     [
         ({}, {}, "PASS", "i210"),
-        ({"driver": "r8169"}, {}, "WARN", "late answers"),
+        ({"driver": "r8169"}, {}, "WARN", "late frames"),
         ({"driver": "ax88179_178a", "bus": "usb-0000:00:14.0-2"}, {}, "WARN", "on USB"),
-        ({"driver": "unheard_of"}, {}, "WARN", "not known to this list"),
+        ({"driver": "unheard_of"}, {}, "WARN", "not in the list"),
         ({"driver": "iwlwifi"}, {f"{PLACE}/phy80211/": ""}, "FAIL", "wireless"),
         ({"hardware_type": 772}, {}, "FAIL", "not an Ethernet card"),
         ({"driver": "veth"}, {}, "WARN", "software"),
@@ -60,12 +60,12 @@ def test_drivers(tmp_path, change, files, status, words):
     assert (check.status, words in check.found) == (status, True)
 
 
-def test_a_card_that_sys_does_not_show_is_no_virtual_one(tmp_path):
-    """In another network namespace than the one /sys was mounted in."""
+def test_a_card_missing_in_sys_is_not_virtual(tmp_path):
+    """/sys was mounted in another network namespace."""
     assert driver(make(tmp_path, {}), I210).status == "PASS"
 
 
-def test_who_uses_the_port(tmp_path):
+def test_other_use_of_the_port(tmp_path):
     route = "/proc/net/route"
     assert use(controller(tmp_path / "a"), I210).status == "PASS"
     own = controller(tmp_path / "b", **{route: "Iface\tDest\nenp2s0\t00000000"})
@@ -76,7 +76,7 @@ def test_who_uses_the_port(tmp_path):
     assert use(bridged, I210).status == "WARN"
 
 
-def test_network_manager_is_asked_to_leave_the_port_alone(tmp_path):
+def test_network_manager(tmp_path):
     check = managed(laptop(tmp_path / "managed"), I219)
     assert "sudo nmcli device set enp0s31f6 managed no" in check.advice
     assert "avahi-daemon" in check.found
@@ -93,37 +93,37 @@ def test_networkd(tmp_path):
     assert (check.status, "Unmanaged=yes" in check.advice) == ("WARN", True)
 
 
-def test_frames_that_somebody_sent(tmp_path):
+def test_frames_of_other_programs(tmp_path):
     machine = controller(tmp_path)
     quiet, loud = (replace(machine, watched=3.0, sent=sent) for sent in (0, 7))
-    assert traffic(quiet, I210).found == "no frame went out in 3 s"
+    assert traffic(quiet, I210).found == "no frame was sent in 3 s"
     check = traffic(loud, I210)
-    assert (check.status, "7 frames went out in 3 s" in check.found) == ("WARN", True)
+    assert (check.status, "sent 7 frames in 3 s" in check.found) == ("WARN", True)
 
 
-def test_frames_are_counted_by_the_kernel(tmp_path):
-    """The columns of /proc/net/dev: eight of what came, then bytes and packets that went."""
+def test_the_kernel_counts_sent_frames(tmp_path):
+    """/proc/net/dev has eight columns for reception, then bytes and packets sent."""
     line = "enp2s0:  3193  29  0  0  0  0  0  0  4711  31  0  0  0  0  0  0"
     machine = controller(tmp_path, **{"/proc/net/dev": f"Inter-|\n face |\nenp2s00: 1 1\n{line}"})
     assert machine.frames_sent() == 31
     assert make(tmp_path / "other", {}).frames_sent() is None
 
 
-def test_ipv6_addresses_that_would_not_come_back_are_not_taken(tmp_path):
+def test_configured_ipv6_addresses_are_not_removed(tmp_path):
     assert len(ipv6(laptop(tmp_path / "a"), I219).changes) == 1
     lines = "fd000000000000000000000000000002 02 40 00 82 enp0s31f6"
     check = ipv6(laptop(tmp_path / "b", **{"/proc/net/if_inet6": lines}), I219)
     assert (check.status, check.changes) == ("WARN", ())
 
 
-def test_eee_that_is_only_offered(tmp_path):
+def test_eee_that_is_active_or_unsupported(tmp_path):
     machine = laptop(tmp_path)
-    assert "agreed" in eee(machine, I219).found
+    assert "active" in eee(machine, I219).found
     assert eee(machine, replace(I219, eee=None, refusals={"eee": "no"})).status == "PASS"
 
 
-def test_the_adaptive_timer_goes_first(tmp_path):
-    """Drivers refuse rx-usecs while it is on."""
+def test_adaptive_coalescing_is_disabled_first(tmp_path):
+    """Drivers refuse rx-usecs while adaptive-rx is on."""
     card = replace(I210, coalescing=Coalescing(8, 0, True))
     check = coalescing(controller(tmp_path), card)
     assert check.advice == "sudo ethtool -C enp2s0 adaptive-rx off rx-usecs 0"
@@ -133,7 +133,7 @@ def test_the_adaptive_timer_goes_first(tmp_path):
     ]
 
 
-def test_frames_that_wait_for_a_timer(tmp_path):
+def test_offloads_that_delay_frames(tmp_path):
     machine = controller(tmp_path / "a", **{f"{PLACE}/gro_flush_timeout": "20000"})
     check = offloads(machine, I210)
     assert (check.status, "gro_flush_timeout 20000" in check.found) == ("WARN", True)

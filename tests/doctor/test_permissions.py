@@ -1,4 +1,4 @@
-"""Permissions and containers."""
+"""Checks of permissions and containers."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def user(root, capabilities=0, uid_map=ROOT_USERS, **files):
         ("8388608", "0", "FAIL FAIL"),
         ("unlimited", "95", "PASS PASS"),
         ("4294967296", "80", "PASS PASS"),
-        ("unlimited", "79", "PASS FAIL"),  # the loop's thread wants 80
+        ("unlimited", "79", "PASS FAIL"),  # the loop's thread needs 80
     ],
 )
 def test_limits_of_an_ordinary_user(tmp_path, memlock, rtprio, verdicts):
@@ -35,13 +35,13 @@ def test_limits_of_an_ordinary_user(tmp_path, memlock, rtprio, verdicts):
     assert f"{memory_lock(machine).status} {priority(machine).status}" == verdicts
 
 
-def test_capabilities_make_up_for_limits(tmp_path):
+def test_capabilities_override_limits(tmp_path):
     machine = user(tmp_path, ALL, **{"/proc/self/limits": limits(memlock="0", rtprio="0")})
     checks = (memory_lock(machine), priority(machine), raw_frames(machine))
     assert {check.status for check in checks} == {"PASS"}
 
 
-def test_root_of_a_user_namespace_has_raw_frames_alone(tmp_path):
+def test_root_of_a_user_namespace_may_only_send_raw_frames(tmp_path):
     machine = user(
         tmp_path, ALL, "0 1000 1", **{"/proc/self/limits": limits(memlock="8388608", rtprio="0")}
     )
@@ -50,19 +50,22 @@ def test_root_of_a_user_namespace_has_raw_frames_alone(tmp_path):
         assert (check.status, "user namespace" in check.found) == ("FAIL", True)
 
 
-def test_a_limit_of_running_time(tmp_path):
+def test_a_real_time_timeout_warns(tmp_path):
     limit = limits(memlock="0", rtprio="95", timeout="200000")
     check = priority(user(tmp_path, **{"/proc/self/limits": limit}))
     assert (check.status, "200000 us" in check.found) == ("WARN", True)
 
 
-def test_without_permission_the_command_is_given(tmp_path):
+def test_a_missing_permission_gives_the_command(tmp_path):
     check = raw_frames(user(tmp_path))
-    assert (check.status, check.advice) == ("FAIL", "without root, once: sudo setcap ... python")
+    assert (check.status, check.advice) == (
+        "FAIL",
+        "run as root, or run once: sudo setcap ... python",
+    )
 
 
 def test_the_folder_of_shares(tmp_path):
-    """The user of the test owns it, not root: other states are in tests/attack."""
+    """The user of the test owns the folder, not root; tests/attack has other states."""
     group = {"/etc/group": "root:x:0:\ncatenary:x:990:alice,bob"}
     mounts = {"/proc/mounts": "tmpfs /run tmpfs rw,nosuid 0 0"}
     alone = share_folder(make(tmp_path / "alone", {**mounts, "/etc/group": "root:x:0:"}))
@@ -80,12 +83,12 @@ def test_the_folder_of_shares(tmp_path):
 @pytest.mark.parametrize(
     ("files", "status", "words"),
     [
-        ({"/sys/fs/cgroup/a/b/cpu.max": "max 100000"}, "PASS", "none seen"),
-        ({"/sys/fs/cgroup/a/cpu.max": "50000 100000"}, "FAIL", "50 ms of processor in every 100"),
-        ({"/sys/fs/cgroup/cpu,cpuacct/d/cpu.cfs_quota_us": "-1"}, "PASS", "none seen"),
-        ({"/sys/fs/cgroup/cpu,cpuacct/d/cpu.cfs_quota_us": "20000"}, "FAIL", "20 ms of processor"),
+        ({"/sys/fs/cgroup/a/b/cpu.max": "max 100000"}, "PASS", "none detected"),
+        ({"/sys/fs/cgroup/a/cpu.max": "50000 100000"}, "FAIL", "50 ms in every 100 ms"),
+        ({"/sys/fs/cgroup/cpu,cpuacct/d/cpu.cfs_quota_us": "-1"}, "PASS", "none detected"),
+        ({"/sys/fs/cgroup/cpu,cpuacct/d/cpu.cfs_quota_us": "20000"}, "FAIL", "20 ms in every"),
         ({"/sys/fs/cgroup/cpu,cpuacct/d/cpu.rt_runtime_us": "0"}, "FAIL", "SCHED_FIFO is refused"),
-        ({"/sys/fs/cgroup/cpu,cpuacct/d/cpu.rt_runtime_us": "950000"}, "PASS", "none seen"),
+        ({"/sys/fs/cgroup/cpu,cpuacct/d/cpu.rt_runtime_us": "950000"}, "PASS", "none detected"),
     ],
 )
 def test_control_groups(tmp_path, files, status, words):

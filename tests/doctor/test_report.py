@@ -1,4 +1,4 @@
-"""The report for people and for programs."""
+"""The report as text and as JSON."""
 
 from __future__ import annotations
 
@@ -11,24 +11,26 @@ from tests.doctor import machines
 from tests.doctor.test_latency import latency
 
 
-def test_a_line_a_check_with_the_advice_below(tmp_path):
+def test_each_check_has_a_line_and_advice(tmp_path):
     lines = as_text(examine(machines.laptop(tmp_path))).splitlines()
     assert lines[:2] == [
         "Kernel",
-        "  FAIL  kernel-preemption     preemption voluntary (6.8.0-45-generic)",
+        "  FAIL  kernel-preemption     preemption model: voluntary (6.8.0-45-generic)",
     ]
     assert lines[2].strip().startswith("> sudo pro enable realtime-kernel")
 
 
-def test_the_summary_is_last(tmp_path):
+def test_the_summary_comes_last(tmp_path):
     bad = as_text(examine(machines.laptop(tmp_path / "a"))).splitlines()
-    assert bad[-5] == "29 checks: 7 passed, 16 warnings, 4 failed, 2 not known"
-    assert bad[-4].startswith("Not fit for a real-time loop yet; fix first: kernel-preemption")
-    assert bad[-2] == "--apply can change 12 settings, until the next start"
+    assert bad[-5] == "29 checks: 7 passed, 16 warnings, 4 failed, 2 unknown"
+    assert bad[-4].startswith(
+        "This machine is not ready for a real-time loop. Fix first: kernel-preem"
+    )
+    assert bad[-2] == "--apply can change 12 settings; the changes last until the next reboot."
     watched = replace(machines.controller(tmp_path / "b"), watched=3.0, sent=0)
     good = as_text(examine(watched, latency(30e-6))).splitlines()
-    assert good[-3] == "29 checks: 29 passed, 0 warnings, 0 failed, 0 not known"
-    assert good[-2] == "Fit for a real-time loop: no check failed or warned."
+    assert good[-3] == "29 checks: 29 passed, 0 warnings, 0 failed, 0 unknown"
+    assert good[-2] == "This machine is ready for a real-time loop: no check failed or warned."
     unmeasured = as_text(examine(machines.controller(tmp_path / "c"))).splitlines()
     assert unmeasured[-2].endswith("the wake-up latency was not measured.")
 
@@ -40,7 +42,7 @@ def test_a_narrow_terminal(tmp_path):
     assert all(line.startswith(("sudo ", "echo ", "`")) for line in long)
 
 
-def test_commands_stay_whole():
+def test_commands_are_not_wrapped():
     command = "echo performance | sudo tee /sys/devices/system/cpu/cpu*/cpufreq/scaling_governor"
     assert wrap(f"either {command}; or another machine", 40) == [
         "either",
@@ -49,7 +51,7 @@ def test_commands_stay_whole():
     ]
 
 
-def test_colour_only_where_it_is_wanted(tmp_path):
+def test_colour_only_on_request(tmp_path):
     examination = examine(machines.laptop(tmp_path))
     assert "\033[" not in as_text(examination)
     assert "\033[31mFAIL\033[0m" in as_text(examination, colour=True)
@@ -64,15 +66,15 @@ def test_the_histogram(tmp_path):
     ]
 
 
-def test_json_is_as_promised(tmp_path):
+def test_the_json_has_the_documented_keys(tmp_path):
     examination = examine(machines.controller(tmp_path), latency(30e-6))
-    told = json.loads(as_json(examination))
-    assert set(told) == {"checks", "latency_us"}
-    assert all(list(check) == ["id", "status", "found", "advice"] for check in told["checks"])
-    assert [check["id"] for check in told["checks"]] == [check.id for check in examination.checks]
-    assert told["latency_us"]["p50"] == 4.0
-    assert told["latency_us"]["max"] == 30.0
-    assert told["latency_us"]["histogram"] == [[2.0, 4.0, 2999], [30.0, 30.0, 1]]
+    report = json.loads(as_json(examination))
+    assert set(report) == {"checks", "latency_us"}
+    assert all(list(check) == ["id", "status", "found", "advice"] for check in report["checks"])
+    assert [check["id"] for check in report["checks"]] == [check.id for check in examination.checks]
+    assert report["latency_us"]["p50"] == 4.0
+    assert report["latency_us"]["max"] == 30.0
+    assert report["latency_us"]["histogram"] == [[2.0, 4.0, 2999], [30.0, 30.0, 1]]
     assert json.loads(as_json(examine(machines.controller(tmp_path))))["latency_us"] == {}
 
 

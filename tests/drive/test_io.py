@@ -107,9 +107,9 @@ def test_mistakes_name_the_channel() -> None:
     lamps = Outputs(sub)
     with pytest.raises(RuntimeError, match="before a Loop is open"):
         lamps["Channel 1 Output"] = 1
-    with pytest.raises(KeyError, match="there are: Channel 1 Output"):
+    with pytest.raises(KeyError, match="the channels are Channel 1 Output"):
         lamps["Channel 9 Output"] = 1
-    with pytest.raises(ValueError, match="no channel 'Value'"):
+    with pytest.raises(ValueError, match="unknown channel 'Value'"):
         Outputs(sub, scale={"Value": 1.0})
     with pytest.raises(ValueError, match="no output process data"):
         Outputs(terminal(1, Direction.INPUT, 2, "Input"))
@@ -118,7 +118,7 @@ def test_mistakes_name_the_channel() -> None:
 def test_a_device_without_assigned_pdos_shows_its_choice() -> None:
     device = replace(servo(1), inputs=())
     sub = SimpleNamespace(position=1, description=device)
-    with pytest.raises(ValueError, match="none is assigned; choose with pdos= from 0x1A00"):
+    with pytest.raises(ValueError, match="no PDO is assigned; choose with pdos= from 0x1A00"):
         Inputs(sub)
     assert len(Inputs(sub, pdos=[0x1A00]).names) == 5
 

@@ -64,7 +64,9 @@ def test_csp_with_an_infinite_velocity_limit_needs_a_step_limit() -> None:
 
 
 def test_an_infinite_velocity_limit_needs_a_deceleration() -> None:
-    with pytest.raises(ConfigurationError, match=r"3 Servo: velocity_limit=inf.*0x6085") as caught:
+    with pytest.raises(
+        ConfigurationError, match=r"3 Servo: velocity_limit is infinite.*0x6085"
+    ) as caught:
         axis_of(mode="cst", velocity_limit=math.inf)
     assert "deceleration_limit=" in caught.value.hint
     axis = axis_of({**BRAKING, (0x6085, 0): 1000}, mode="cst", velocity_limit=math.inf)
@@ -99,9 +101,9 @@ def test_what_shapes_the_fallback_must_be_finite(option: str) -> None:
 def test_other_impossible_options_are_refused() -> None:
     with pytest.raises(ValueError, match="position_min must be a number"):
         axis_of(position_min=math.nan)
-    with pytest.raises(ValueError, match=r"3 Servo: position_min 1\.0 is not below"):
+    with pytest.raises(ValueError, match=r"3 Servo: position_min 1\.0 must be below"):
         axis_of(position_min=1.0, position_max=1.0)
-    with pytest.raises(ValueError, match=r"on_loss='brake'; known: 'quick_stop'"):
+    with pytest.raises(ValueError, match=r"on_loss='brake'; use one of 'quick_stop'"):
         axis_of(on_loss="brake")
     with pytest.raises(ValueError, match="on_loss has 1 values for 2 axes"):
         Drives([fake_sub(1), fake_sub(2)], counts_per_turn=1, on_loss=["disable"])
@@ -221,8 +223,8 @@ def test_a_linear_axis_has_defaults_and_messages_of_its_own() -> None:
     with pytest.warns(UserWarning, match="no velocity_limit") as warned:
         drives = Drives(subs, counts_per_turn=1000, metres_per_turn=[0.01, None])
     texts = [str(each.message) for each in warned]
-    assert "3 Servo: 0.1 m/s" in texts[0]
-    assert "4 Servo: 6.28 rad/s" in texts[1]
+    assert "3 Servo: the default of 0.1 m/s" in texts[0]
+    assert "4 Servo: the default of 6.28 rad/s" in texts[1]
     tables = drives.tables(FakeLayout.of(dict(drives.pdos(MILLISECOND))))
     linear, rotary = tables.axes
     assert (linear.limits.velocity, linear.standstill, linear.step_floor) == (0.1, 0.005, 0.005)
@@ -244,9 +246,9 @@ def test_a_force_limit_belongs_to_linear_axes_and_a_torque_limit_to_rotary_ones(
         torque_limit=[None, 2.0],
     )
     assert [axis.options.torque_limit for axis in drives._axes] == [60.0, 2.0]
-    with pytest.raises(ValueError, match="it is rotary; use torque_limit"):
+    with pytest.raises(ValueError, match="axis 0, which is rotary; use torque_limit"):
         Drives(both, counts_per_turn=1000, velocity_limit=1.0, force_limit=60.0)
-    with pytest.raises(ValueError, match="it is linear; use force_limit"):
+    with pytest.raises(ValueError, match="which is linear; use force_limit"):
         Drives(
             both, counts_per_turn=1000, velocity_limit=1.0, metres_per_turn=0.01, torque_limit=1.0
         )

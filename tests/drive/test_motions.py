@@ -122,7 +122,7 @@ def test_a_set_point_that_is_not_acknowledged() -> None:
 def test_a_drive_that_does_not_accept_another_set_point() -> None:
     rig = Rig()
     rig.views.statusword[0] = ACKNOWLEDGED
-    with pytest.raises(MoveError, match="left did not accept another set-point"):
+    with pytest.raises(MoveError, match="left did not become ready for another set-point"):
         rig.run(move_profile(rig.port, 1.0, RATES), 1100)
     assert rig.bits == HALT
 
@@ -134,7 +134,7 @@ def test_a_target_that_is_never_reached() -> None:
     rig.views.statusword[0] = ACKNOWLEDGED
     rig.run(steps, 5)
     rig.views.statusword[0] = 0
-    with pytest.raises(MoveError, match=r"did not show target reached \(statusword bit 10\)"):
+    with pytest.raises(MoveError, match=r"did not report target reached \(statusword bit 10\)"):
         rig.run(steps, 10_000)
     assert rig.bits == HALT
 
@@ -186,7 +186,7 @@ def test_a_target_that_a_drive_in_pp_does_not_know_is_no_start(
 def test_an_axis_that_does_not_stop() -> None:
     rig = Rig()
     rig.views.actual_velocity[0] = 1.0
-    with pytest.raises(MoveError, match="did not stop within 5 s of halt"):
+    with pytest.raises(MoveError, match="did not stop within 5 s after halt"):
         rig.run(stop_profile(rig.port), 6000)
     assert rig.bits == HALT
 

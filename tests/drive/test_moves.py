@@ -110,9 +110,9 @@ def test_the_defaults_are_the_limits_of_the_axis() -> None:
 def test_an_infinite_velocity_limit_needs_rates() -> None:
     options: dict[str, Any] = {"velocity_limit": math.inf, "step_limit": 1.0}
     with opened(Servo(), deceleration_limit=10.0, **options) as (arm, loop):
-        with pytest.raises(ValueError, match=r"no velocity for the move: give velocity= \[rad/s\]"):
+        with pytest.raises(ValueError, match=r"the move has no velocity; give velocity= \[rad/s\]"):
             arm.move_to(0.1)
-        with pytest.raises(ValueError, match=r"no acceleration for the move: .*\[rad/s²\]"):
+        with pytest.raises(ValueError, match=r"the move has no acceleration; .*\[rad/s²\]"):
             arm.move_to(0.1, velocity=1.0)
         loop.wait(arm.move_to(0.2, velocity=1.0, acceleration=5.0))
 
@@ -152,7 +152,9 @@ def test_a_new_move_goes_on_from_the_velocity_of_the_old_one(jerk: float | None)
         assert not old.done  # its other axis goes on
         sent = trace(loop, new, lambda: arm.target.position.item(0))
         assert rates(sent)[1] < 5.2
-        with pytest.raises(MoveError, match=r"1 Catenary virtual servo got another move") as raised:
+        with pytest.raises(
+            MoveError, match=r"1 Catenary virtual servo received another move"
+        ) as raised:
             loop.wait(old)
         assert old.outcome == "replaced"
         assert raised.value.axis == arm.names[0]
@@ -205,7 +207,9 @@ def test_a_move_with_too_little_acceleration_to_stop_before_a_limit() -> None:
     with opened(Servo(), position_max=1.0) as (arm, loop):
         fast = arm.move_to(0.9, velocity=2.0, acceleration=8.0)
         loop_for(loop, 0.4)
-        with pytest.raises(ValueError, match=r"0\.5 rad/s² stops it from .* rad, beyond posit"):
+        with pytest.raises(
+            ValueError, match=r"0\.5 rad/s², the axis stops from .* rad, beyond posit"
+        ):
             arm.move_to(0.5, acceleration=0.5)
         loop.wait(fast)
         loop.wait(arm.move_to(0.5, acceleration=0.5))
@@ -259,12 +263,12 @@ def test_axes_by_their_numbers() -> None:
         arm.enable(arm.faults)  # none
         loop_for(loop, 0.1)
         assert arm.enabled.tolist() == [False, False, True]
-        with pytest.raises(ValueError, match="no axis to move"):
+        with pytest.raises(ValueError, match="selects no axis"):
             arm.move_to(0.1, axes=[])
-        with pytest.raises(ValueError, match="no axis to move"):
+        with pytest.raises(ValueError, match="selects no axis"):
             arm.home([])
         for axes in (5, "left", [0.5]):
-            with pytest.raises(IndexError, match="give numbers of the axes: 0: 1 Catenary"):
+            with pytest.raises(IndexError, match="no such axis; the axes are 0: 1 Catenary"):
                 arm.move_to(0.1, axes=axes)  # type: ignore[arg-type]
 
 
@@ -296,7 +300,7 @@ def test_a_law_that_begins_after_the_request_ends_the_move() -> None:
     with opened(Servo()) as (arm, loop):
         loop.start(cat.law(hold))
         move = arm.move_to(0.5)
-        with pytest.raises(MoveError, match="a law or a stream sets its targets now"):
+        with pytest.raises(MoveError, match="a law or a stream now sets its targets"):
             loop.wait(move)
         assert arm.actual.position[0] == pytest.approx(0.0, abs=1e-3)
 
@@ -313,8 +317,8 @@ def test_a_law_that_begins_after_the_request_ends_the_move() -> None:
         ({"position": 0.5, "acceleration": 9.0}, r"acceleration 9 rad/s² is above acc.*limit 8"),
         ({"position": 0.5, "velocity": 0.0}, "velocity must be positive"),
         ({"position": 0.5, "jerk": -1.0}, "jerk must be positive"),
-        ({"position": math.nan}, "position: must be finite"),
-        ({"position": [0.1, 0.2, 0.3]}, r"one number, or 2 for the axes"),
+        ({"position": math.nan}, "position=nan must be finite"),
+        ({"position": [0.1, 0.2, 0.3]}, r"give one number, or 2 numbers"),
     ],
 )
 def test_beyond_a_limit(call: dict[str, Any], text: str) -> None:
@@ -326,7 +330,7 @@ def test_beyond_a_limit(call: dict[str, Any], text: str) -> None:
 def test_a_mode_without_positions() -> None:
     with (
         opened(Servo(), mode="csv") as (arm, _),
-        pytest.raises(ValueError, match=r"need mode csp or pp, its mode is csv: .*switch"),
+        pytest.raises(ValueError, match=r"is in mode csv, but a move needs csp or pp; .*switch"),
     ):
         arm.move_to(0.5)
 
@@ -565,7 +569,7 @@ def test_pp_to_csp_and_back() -> None:
 def test_a_jerk_in_pp_is_refused() -> None:
     with (
         opened(Servo(), mode="pp") as (arm, _),
-        pytest.raises(ValueError, match="jerk= in mode pp"),
+        pytest.raises(ValueError, match="jerk= is not possible in mode pp"),
     ):
         arm.move_to(0.5, jerk=10.0)
 

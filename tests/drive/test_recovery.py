@@ -103,7 +103,7 @@ def test_drives_that_cannot_be_enabled_are_named() -> None:
 
 def test_what_is_waited_for_is_said() -> None:
     with (
-        pytest.raises(DriveError, match="all are, but what they wait for is not ready"),
+        pytest.raises(DriveError, match="all drives are enabled, but not ready"),
         rig(patience=0.2) as there,
     ):
         there.run(1000, lambda now: None, ready=False)

@@ -45,13 +45,13 @@ from catenary.wire import (
 
 @dataclass(frozen=True)
 class Target:
-    """One decoder. `encode` turns its value back into bytes; None: there is no such encoder."""
+    """One decoder. `encode` converts its value back to bytes; None if there is no encoder."""
 
     name: str
     decode: Callable[[bytes], Any]
     encode: Callable[[Any], bytes] | None
     corpus: tuple[bytes, ...]
-    exact: bool = False  # encode restores every byte
+    exact: bool = False  # True if `encode` restores every byte
 
 
 def check(target: Target, data: bytes) -> None:
@@ -80,7 +80,7 @@ def _first(data: bytes) -> datagram.Datagram:
 
 
 def _word(name: str, decode: Callable[[int], Any], size: int, *values: int) -> Target:
-    """A register's word: an int of `size` bytes."""
+    """Return the target of a register word of `size` bytes."""
 
     def from_bytes(data: bytes) -> Any:
         return decode(int.from_bytes(data[:size], "little"))
@@ -263,7 +263,7 @@ _MAXIMUM_SIZE = 4096
 
 
 def mutations(corpus: tuple[bytes, ...], random_source: random.Random) -> Iterator[bytes]:
-    """Bytes near the corpus, without end."""
+    """Yield mutations of the corpus, endlessly."""
     while True:
         data = bytearray(random_source.choice((*corpus, b"")))
         for _ in range(random_source.randint(1, 8)):

@@ -1,4 +1,4 @@
-"""Files from strangers: each parser returns a value or raises its documented error."""
+"""Untrusted files: each parser returns a value or raises its documented error."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def toml(value: object) -> str:
-    """A value as TOML writes it."""
+    """Return a value in TOML syntax."""
     if isinstance(value, dict):
         return "{" + ", ".join(f"{json.dumps(k)} = {toml(v)}" for k, v in value.items()) + "}"
     if isinstance(value, list):
@@ -61,7 +61,7 @@ def toml(value: object) -> str:
 
 
 def names_of(part: Any) -> dict[str, list[str]]:
-    """The fields of each kind of table, from the type of the file."""
+    """Return the fields of each kind of table, from the type of the file."""
     [field] = [each for each in msgspec.structs.fields(SegmentFile) if each.name == part]
     members = field.type.__args__[0].__args__
     return {
@@ -142,7 +142,7 @@ def test_tasks(folder: Path, tasks: list[Any]) -> None:
     "content", [b"\xff\xfe", b"a = " + b"[" * 5000, b"a = 1" + b"0" * 5000, b"\0", b"= = ="]
 )
 @pytest.mark.parametrize("reading", [read_segment, read_demands])
-def test_what_is_no_toml(folder: Path, content: bytes, reading: Callable[[Path], object]) -> None:
+def test_invalid_toml(folder: Path, content: bytes, reading: Callable[[Path], object]) -> None:
     path = folder / "none.toml"
     path.write_bytes(content)
     with pytest.raises(ConfigurationError, match=r"none\.toml"):
@@ -150,7 +150,7 @@ def test_what_is_no_toml(folder: Path, content: bytes, reading: Callable[[Path],
 
 
 def with_error(action: Callable[[], object], *kinds: type[Exception]) -> None:
-    """Run it; these errors are the documented ones."""
+    """Run a function. Only the given errors are documented."""
     try:
         action()
     except kinds:
@@ -158,7 +158,7 @@ def with_error(action: Callable[[], object], *kinds: type[Exception]) -> None:
 
 
 def damaged(whole: bytes, most: int = 4) -> st.SearchStrategy[bytes]:
-    """Bytes in which some were replaced, or cut off."""
+    """Draw bytes of which some are replaced or cut off."""
     places = st.tuples(st.integers(0, max(len(whole) - 1, 0)), st.binary(min_size=1, max_size=4))
 
     def apply(changes: list[tuple[int, bytes]], kept: int) -> bytes:
@@ -181,7 +181,7 @@ def test_an_image_of_an_eeprom(image: bytes) -> None:
     with_error(lambda: text_lines(tolerant(image)), DecodeError)
 
 
-# Recordings: whole chunks with right checksums and invented content
+# Recordings: whole chunks with valid checksums and invented content
 
 ROWS_LAYOUT = make_recording_layout(1)
 ROWS = make_rows(ROWS_LAYOUT, 3)
@@ -284,7 +284,7 @@ def test_a_replayed_capture(folder: Path, data: bytes) -> None:
     with_error(lambda: Replay(path), DecodeError)
 
 
-def test_a_frame_after_centuries_is_not_an_answer(folder: Path) -> None:
+def test_a_frame_with_a_far_future_time_is_not_an_answer(folder: Path) -> None:
     path = folder / "centuries.pcapng"
     late = encode_packet(Packet(2**64 - 1, ANSWER, direction=Direction.INBOUND))
     path.write_bytes(CAPTURE[: -len(late)] + late)
@@ -304,7 +304,7 @@ TURNED = (ValueError, OverflowError)  # `attach` turns them into a ShareError
 
 
 class Mapped:
-    """A segment, without a file."""
+    """A shared-memory segment without a file."""
 
     def __init__(self, content: bytes) -> None:
         self.memory = content
@@ -381,14 +381,14 @@ def test_a_state_of_the_doctor(folder: Path, content: bytes) -> None:
 
 @given(target=st.text(), before=st.text(), after=st.text())
 @example(target="\x00", before="", after="")
-def test_a_change_that_somebody_made_up(folder: Path, target: str, before: str, after: str) -> None:
-    """Saving and undoing end without an error, or with the documented one."""
+def test_an_invented_change(folder: Path, target: str, before: str, after: str) -> None:
+    """Saving and undoing succeed, or raise the documented error."""
     state = HostState(folder / "doctor.json", "b")
     with_error(lambda: state.save([Made(target, before, after)]), StateError, UnicodeEncodeError)
     with_error(lambda: list(undo(MachineGround(folder), state)), StateError)
 
 
-def test_a_state_nested_without_end(folder: Path) -> None:
+def test_a_deeply_nested_state(folder: Path) -> None:
     state = HostState(folder / "deep.json", "b")
     state.path.write_bytes(b'{"boot": "b", "x": ' + b"[" * 100_000)
     os.chmod(state.path, 0o600)

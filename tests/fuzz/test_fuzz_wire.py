@@ -1,4 +1,4 @@
-"""The fuzz targets, for a bounded number of inputs; and that no decoder is without a target."""
+"""The fuzz targets with a limited number of inputs. Every decoder has a target."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def test_names_of_targets_are_unique():
 
 
 @pytest.mark.parametrize("target", TARGETS, ids=lambda target: target.name)
-def test_corpus_holds_values(target: Target):
+def test_the_corpus_holds_valid_values(target: Target):
     values = 0
     for data in target.corpus:
         check(target, data)
@@ -68,7 +68,7 @@ def test_hostile_bytes_give_a_value_or_decode_error(target: Target):
         check(target, data)
 
 
-def test_finds_a_decoder_that_raises_something_else():
+def test_a_decoder_with_a_wrong_error_is_found():
     broken = Target("broken", lambda data: data[3], None, (b"",))
     with pytest.raises(IndexError) as caught:
         fuzz((broken,), seed=1, rounds=100)

@@ -1,4 +1,4 @@
-"""A recording that a disk or a cable has damaged is read up to the damage, or refused in words."""
+"""A damaged recording is read up to the damage, or refused with a clear message."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def whole(folder: Path) -> bytes:
 
 @pytest.fixture(scope="module")
 def starts(folder: Path, whole: bytes) -> list[int]:
-    """Where records begin: what matters most is there."""
+    """Return the offsets at which records begin, which are the most critical places."""
     with (folder / "whole.mcap").open("rb") as stream:
         return [place.offset for place in places(stream)]
 
@@ -49,7 +49,7 @@ DAMAGES = st.lists(
 
 
 def check(path: Path) -> None:
-    """What can be read is what was written."""
+    """Check that the readable part equals the written data."""
     try:
         back = read(path)
     except RecordingError:
@@ -81,7 +81,7 @@ def test_damage_is_found(
 
 
 @given(data=st.binary(max_size=300))
-def test_what_only_begins_like_a_recording(folder: Path, data: bytes) -> None:
+def test_a_file_with_only_the_start_of_a_recording(folder: Path, data: bytes) -> None:
     path = folder / "short.mcap"
     path.write_bytes(b"\x89MCAP0\r\n" + data)
     with pytest.raises(RecordingError):

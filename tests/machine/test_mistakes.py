@@ -239,7 +239,7 @@ MISTAKES: dict[str, tuple[str, ...]] = {
         "velocity_limit = 1.0",
         "velocity_limit = 1.0\nposition_min = 1\nposition_max = 0",
         "drives.gripper.position_min",
-        "is not below position_max",
+        "must be below position_max",
         "position_min = 1",
     ),
     "direction of 2": (
@@ -309,7 +309,7 @@ MISTAKES: dict[str, tuple[str, ...]] = {
         'type = "INT"',
         'type = "VISIBLE_STRING"',
         "process_data.gauge.inputs.force.type",
-        "is not a type of numbers",
+        "is not a numeric type",
     ),
     "scale of 0": (
         "scale = 1e-3",

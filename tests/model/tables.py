@@ -1,4 +1,4 @@
-"""Hand-made tables of error counters on hand-made segments."""
+"""Hand-written segments and tables of error counters."""
 
 from __future__ import annotations
 

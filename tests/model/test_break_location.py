@@ -1,4 +1,4 @@
-"""Which device, or cable before it, a silence begins at."""
+"""Location of a break from the devices that do not answer."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ def names(topology: Topology) -> Names:
     return Names(("",) * len(topology))
 
 
-def test_nobody_silent() -> None:
+def test_no_silent_device_gives_no_finding() -> None:
     assert judge_silence(TREE, names(TREE), []) == ()
 
 
-def test_what_hangs_behind_a_device() -> None:
+def test_devices_behind_a_device() -> None:
     assert behind(TREE, 1) == (2, 3, 4, 5)
     assert behind(TREE, 2) == (3,)
     assert behind(TREE, 5) == ()
@@ -36,7 +36,7 @@ def test_a_cut_line_names_the_cable_before_the_first_silent_device() -> None:
     assert found.devices == (3, 4, 5)
 
 
-def test_a_cut_branch_leaves_the_others() -> None:
+def test_a_cut_branch_does_not_affect_others() -> None:
     [found] = judge_silence(TREE, names(TREE), [2, 3])
     assert found.devices == (2, 3)
     assert "device 1 port 3 and device 2 port 0" in found.where
@@ -62,6 +62,6 @@ def test_a_reset_device_before_a_cut() -> None:
 
 
 @pytest.mark.parametrize("silent", [range(6), [0, 1, 2, 3, 4, 5]])
-def test_all_silent_is_the_first_cable(silent: range | list[int]) -> None:
+def test_silence_of_all_devices_is_the_first_cable(silent: range | list[int]) -> None:
     [found] = judge_silence(TREE, names(TREE), silent)
     assert "between the MainDevice and device 0 port 0" in found.where

@@ -1,4 +1,4 @@
-"""Delays of cables from one latch, on times made by walking a frame through a tree."""
+"""Cable delays from one latch. The times are computed by following a frame through a tree."""
 
 from __future__ import annotations
 
@@ -12,7 +12,10 @@ from tests.model.tables import END, LINE, STAR, line
 
 
 def walk(topology: Topology, ways: list[int], starts: list[int]) -> list[PortTimes]:
-    """Receive times of a frame; `ways[n]`: to device n, one way; `starts[n]`: its clock's zero."""
+    """Return the receive times of a frame.
+
+    `ways[n]` is the one-way delay to device n, and `starts[n]` is the origin of its clock.
+    """
     now = 1000
     times = [[0, 0, 0, 0] for _ in ways]
 
@@ -43,30 +46,30 @@ def test_a_line() -> None:
     assert cable_delays_ns(topology, times) == (None, 300, 150, 20)
 
 
-def test_branches_are_told_apart() -> None:
+def test_delays_of_branches() -> None:
     times = walk(TREE, WAYS, [0] * 6)
     assert cable_delays_ns(TREE, times) == (None, *WAYS[1:])
 
 
 @given(st.lists(st.integers(0, TIME_SPAN - 1), min_size=6, max_size=6))
-def test_clocks_begin_and_wrap_anywhere(starts: list[int]) -> None:
+def test_clocks_with_any_origin_and_wrap_around(starts: list[int]) -> None:
     assert cable_delays_ns(TREE, walk(TREE, WAYS, starts)) == (None, *WAYS[1:])
 
 
-def test_a_device_without_a_clock_is_not_known() -> None:
+def test_a_device_without_a_clock_has_no_delay() -> None:
     times: list[PortTimes | None] = [*walk(TREE, WAYS, [0] * 6)]
     times[2] = None
     assert cable_delays_ns(TREE, times) == (None, 300, None, None, 1000, 70)
 
 
-def test_times_that_cannot_be_are_not_shown() -> None:
+def test_impossible_times_give_no_delay() -> None:
     topology = make_topology(line(2))
     assert cable_delays_ns(topology, [(0, 10, 0, 0), (0, 0, 0, 0)]) == (None, 5)
     third = make_topology(line(3))
     assert cable_delays_ns(third, [(0, 10, 0, 0), (0, 500, 0, 0), (0, 0, 0, 0)])[1] is None
 
 
-def test_a_coupler_with_two_terminals_as_recorded() -> None:
+def test_a_recorded_coupler_with_two_terminals() -> None:
     """EK1100, EL2828, EL2889 in ethercrab's tests/replay-dc.pcapng: DL status and receive times.
     The EL2889 has no clock."""
     topology = make_topology([open_ports(word) for word in (0x5A31, 0x5A33, 0x5613)])

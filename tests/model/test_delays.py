@@ -19,7 +19,7 @@ from catenary.model.topology import PORT_ORDER
 
 @dataclass
 class Node:
-    """A device, what hangs at its ports, and the cable before it [ns]."""
+    """A device, the devices at its ports, and the delay of the cable before it [ns]."""
 
     cable: int = 100
     clock: bool = True
@@ -28,7 +28,7 @@ class Node:
 
 
 def pass_through(root: Node) -> tuple[list[ClockPlace], list[int]]:
-    """The places with their stamps, and when the frame reached each device."""
+    """Return the places with their time stamps, and the arrival time at each device."""
     places: list[ClockPlace] = []
     reached: list[int] = []
 
@@ -65,27 +65,27 @@ def test_a_line() -> None:
     assert reached == [0, 240, 580, 1020, 1560]  # cables and processing units
 
 
-def test_local_times_of_any_origin_and_the_wrap() -> None:
+def test_local_times_with_any_origin_and_wrap_around() -> None:
     nodes = [Node(cable=700, zero=zero) for zero in (2**32 - 500, 2**32 - 1, 12345, 2**31)]
     places, _ = pass_through(line(*nodes))
     assert delays_ns([places]) == (0, 740, 1480, 2220)
 
 
-def test_branches_in_the_order_of_the_ports() -> None:
-    """A junction: what hangs at port 3 is passed first, then port 1, then port 2."""
+def test_branches_follow_the_order_of_the_ports() -> None:
+    """A junction: a frame passes port 3 first, then port 1, then port 2."""
     root = Node(children={3: line(Node(50), Node(60)), 1: Node(1000), 2: line(Node(5), Node(7))})
     places, reached = pass_through(root)
     assert delays_ns([places]) == tuple(reached)
 
 
-def test_devices_without_clocks_are_cable() -> None:
+def test_devices_without_clocks_count_as_cable() -> None:
     chain = line(Node(clock=False), Node(), Node(clock=False), Node(300), Node(clock=False))
     places, _ = pass_through(chain)
     assert delays_ns([places]) == (None, 0, None, 480, None)
 
 
-def test_a_branch_without_clocks_shares_what_is_known_of_no_part() -> None:
-    """A coupler without a clock, one clock on each branch, all cables alike."""
+def test_an_unknown_delay_is_distributed_evenly() -> None:
+    """A coupler without a clock, one clock on each branch, equal cables."""
     coupler = Node(clock=False, children={3: Node(), 1: Node()})
     places, reached = pass_through(Node(children={1: coupler}))
     first, *_ = delays_ns([places])
@@ -93,13 +93,13 @@ def test_a_branch_without_clocks_shares_what_is_known_of_no_part() -> None:
     assert delays_ns([places])[2:] == pytest.approx(reached[2:], abs=PROCESSING_NS)
 
 
-def test_clocks_that_no_clock_precedes() -> None:
+def test_several_first_clocks() -> None:
     root = Node(clock=False, children={3: line(Node(), Node(400)), 1: Node()})
     places, _ = pass_through(root)
-    assert delays_ns([places]) == (None, 0, 440, 880)  # cables to and from the branch not known
+    assert delays_ns([places]) == (None, 0, 440, 880)  # cables to and from the branch are unknown
 
 
-def test_jitter_of_the_stamps_averages_out() -> None:
+def test_jitter_averages_out() -> None:
     places, _ = pass_through(line(Node(), Node(20), Node(20)))
     early = [replace(p, receive_times_ns=shifted(p, 0, +30)) for p in places]
     late = [replace(p, receive_times_ns=shifted(p, 0, -30)) for p in places]
@@ -112,14 +112,14 @@ def shifted(place: ClockPlace, port: int, by: int) -> tuple[int, int, int, int]:
     return (times[0], times[1], times[2], times[3])
 
 
-def test_nothing_measured() -> None:
+def test_no_measurement_is_refused() -> None:
     with pytest.raises(ValueError, match="measurement"):
         delays_ns([])
 
 
 @st.composite
 def trees(draw: st.DrawFn) -> Node:
-    """Any tree of clocks, cables of any length."""
+    """Draw any tree of clocks, with cables of any length."""
     root = Node(zero=draw(st.integers(0, 2**32 - 1)))
     nodes = [root]
     for _ in range(draw(st.integers(0, 30))):
@@ -150,7 +150,7 @@ def test_any_tree_of_clocks(root: Node) -> None:
         max_size=20,
     )
 )
-def test_whatever_is_read_gives_numbers(places: list[ClockPlace]) -> None:
+def test_any_times_give_numbers(places: list[ClockPlace]) -> None:
     for place, delay in zip(places, delays_ns([places]), strict=True):
         assert (delay is None) == (place.receive_times_ns is None)
         assert delay is None or delay >= 0

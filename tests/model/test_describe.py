@@ -1,4 +1,4 @@
-"""Descriptions from real SII images, odd ones included (`data/MANIFEST.tsv` says where from)."""
+"""Descriptions from real and faulty SII images (`data/MANIFEST.tsv` lists the sources)."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ def test_a_terminal_with_two_sync_managers(image: bytes) -> None:
 
 
 @pytest.mark.parametrize("image", ["metalmusings_EaserCAT_6000"], indirect=True)
-def test_a_card_whose_pdos_are_in_its_dictionary_alone(image: bytes) -> None:
+def test_a_card_with_pdos_only_in_its_dictionary(image: bytes) -> None:
     device = described(image)
     assert device.mailbox is not None
     assert device.mailbox.coe
@@ -81,7 +81,7 @@ def test_vendor_0_without_fmmus_and_end_mark(image: bytes) -> None:
 
 
 @pytest.mark.parametrize("image", ["pollen_LeftElbowOrbita2d_fw1.0"], indirect=True)
-def test_a_pdo_of_a_sync_manager_that_is_none_for_it_is_left_out_and_noted(image: bytes) -> None:
+def test_a_pdo_with_an_unsuitable_sync_manager_is_noted(image: bytes) -> None:
     device = described(image)
     assert [(a.sync_manager, [pdo.index for pdo in a.pdos]) for a in device.inputs] == [
         (2, [0x1800])
@@ -90,7 +90,7 @@ def test_a_pdo_of_a_sync_manager_that_is_none_for_it_is_left_out_and_noted(image
 
 
 @pytest.mark.parametrize("image", ["empty_issue286"], indirect=True)
-def test_an_unprogrammed_eeprom_is_a_device_of_which_nothing_is_known(image: bytes) -> None:
+def test_an_unprogrammed_eeprom_gives_an_unknown_device(image: bytes) -> None:
     device = described(image)
     assert device.name == "unknown"
     assert device.mailbox is None
@@ -98,13 +98,13 @@ def test_an_unprogrammed_eeprom_is_a_device_of_which_nothing_is_known(image: byt
 
 
 @pytest.mark.parametrize("image", ["beckhoff_el2004"], indirect=True)
-def test_a_wrong_checksum_alone_is_noted_not_fatal(image: bytes) -> None:
+def test_a_wrong_checksum_is_only_noted(image: bytes) -> None:
     device = described(image[:14] + bytes([image[14] ^ 0xFF]) + image[15:])
     assert device.order == "EL2004"
     assert any("checksum" in note for note in device.notes)
 
 
-def test_every_image_of_the_shared_data_is_described(shared_data: Path) -> None:
+def test_every_shared_image_is_described(shared_data: Path) -> None:
     images = sorted((shared_data / "sii").glob("*.bin"))
     assert images
     for path in images:
@@ -130,12 +130,12 @@ def made(**quirks: object) -> DeviceDescription:
 
 
 @pytest.mark.parametrize("size", [1, 8, 15, 1487, 65535])
-def test_a_mailbox_that_no_datagram_can_carry_is_left_out_with_a_note(size: int) -> None:
+def test_a_mailbox_larger_than_a_datagram_is_omitted_with_a_note(size: int) -> None:
     device = made(mailbox_size=size)
     assert device.mailbox is None
     assert device.notes == (
-        f"its SII has a mailbox of {size} bytes at 0x1000 (16 to 1486 bytes from 0x1000 on are "
-        "possible): the mailbox is not used",
+        f"its SII specifies a mailbox of {size} bytes at 0x1000, which is not used: a mailbox has "
+        "16 to 1486 bytes and begins at 0x1000 or above",
     )
 
 
@@ -147,14 +147,14 @@ def test_any_other_mailbox_is_used(size: int) -> None:
     assert device.notes == ()
 
 
-def test_more_sync_managers_than_the_controller_has_are_left_out_with_a_note() -> None:
+def test_excess_sync_managers_are_omitted_with_a_note() -> None:
     device = made(sync_managers=17)
     assert len(device.sync_managers) == 4  # as in INFORMATION
-    assert device.notes == ("its SII has 17 SyncManagers, its controller 4",)
+    assert device.notes == ("its SII has 17 SyncManagers, its controller has 4",)
     assert made(sync_managers=4).notes == ()
 
 
-def test_control_characters_are_no_part_of_a_name() -> None:
+def test_control_characters_are_removed_from_names() -> None:
     device = made(text_prefix="\x1b[2J\n")
     assert device.name == "[2JCatenary virtual servo"
     assert all(entry.name.isprintable() for entry in mapped_entries(device.outputs))

@@ -1,4 +1,4 @@
-"""Trees from the ports that are open."""
+"""Trees of devices from open ports."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ LINE: Ports = (True, True, False, False)
 FORK: Ports = (True, True, False, True)  # a coupler with E-bus at port 3 ... and cable at 1
 
 
-def test_dl_status_tells_the_open_ports() -> None:
+def test_open_ports_of_dl_status() -> None:
     assert open_ports(0x0200) == (True, False, False, False)
     assert open_ports(0x0A00) == (True, True, False, False)
     assert open_ports(0x5530) == (False, False, False, False)  # links up, all loops closed
@@ -30,7 +30,7 @@ def test_a_fork_fills_port_3_first_then_port_1() -> None:
 
 
 @given(st.lists(st.tuples(*[st.booleans()] * 4), max_size=40))
-def test_whatever_the_ports_say_parents_come_before_their_children(ports: list[Ports]) -> None:
+def test_parents_precede_their_children_for_any_ports(ports: list[Ports]) -> None:
     for position, place in enumerate(tree(ports)):
         assert place.parent is None or place.parent < position
 
@@ -63,17 +63,17 @@ def test_a_star_of_lines() -> None:
     assert [cable.lower for cable in star.children(1)] == [2, 4, 5]
 
 
-def test_the_frame_comes_back_from_every_branch() -> None:
+def test_the_frame_returns_from_every_branch() -> None:
     fork = make_topology([FORK, LINE, END, END])
     assert fork.path() == ((0, 0), (1, 0), (2, 0), (1, 1), (0, 3), (3, 0), (0, 1))
 
 
-def test_a_port_behind_which_nobody_answers_is_named() -> None:
+def test_an_open_port_without_a_device_is_reported() -> None:
     [only] = make_topology([LINE, LINE]).contradictions
     assert only.startswith("device 1 port 1 is open, but no device answers behind it")
 
 
-def test_the_open_end_of_a_ring_is_the_second_interface() -> None:
+def test_the_open_port_of_a_ring_is_the_second_end() -> None:
     ring = make_topology([LINE, LINE, LINE], ring=True)
     assert ring.second_end == (2, 1)
     assert ring.contradictions == ()
@@ -81,7 +81,7 @@ def test_the_open_end_of_a_ring_is_the_second_interface() -> None:
     assert len(make_topology([FORK, LINE, LINE], ring=True).contradictions) == 2
 
 
-def test_a_cut_ring_says_where() -> None:
+def test_a_cut_ring_reports_the_place() -> None:
     behind: Ports = (False, True, False, False)
     ring = make_topology([LINE, END, behind, LINE], ring=True)
     assert ring.contradictions == ("the ring is cut between device 1 and device 2",)
@@ -89,8 +89,8 @@ def test_a_cut_ring_says_where() -> None:
     assert ring.cable_at(3, 0) == Cable(2, 1, 3)
 
 
-def test_a_swapped_device_in_the_middle_is_named() -> None:
-    # on the cable: 0, 2 with IN and OUT swapped, 1; the frame is worked on by 1 before 2
+def test_a_swapped_device_in_the_middle_is_reported() -> None:
+    # in the order of wiring: 0, 2 with IN and OUT swapped, 1; device 1 processes a frame before 2
     [only] = make_topology([LINE, END, LINE]).contradictions
     assert only == (
         "device 2 has no place in the tree: no open port is left for it; its IN and OUT are "
@@ -98,10 +98,10 @@ def test_a_swapped_device_in_the_middle_is_named() -> None:
     )
 
 
-def test_a_swapped_device_at_the_end_is_named() -> None:
+def test_a_swapped_device_at_the_end_is_reported() -> None:
     [only] = make_topology([LINE, SWAPPED_END]).contradictions
     assert only == (
-        "frames enter device 1 by port 1, its port 0 is closed: its IN and OUT are swapped"
+        "frames enter device 1 by port 1, and its port 0 is closed: its IN and OUT are swapped"
     )
 
 
@@ -113,7 +113,7 @@ def test_more_devices_than_ports() -> None:
 
 @st.composite
 def trees(draw: st.DrawFn) -> tuple[list[Ports], list[Place]]:
-    """Any tree of devices, written down as a frame meets them; made apart from the code."""
+    """Draw any tree of devices in the order of the frame, independently of the code."""
     ports: list[Ports] = []
     places: list[Place] = []
 
@@ -131,7 +131,7 @@ def trees(draw: st.DrawFn) -> tuple[list[Ports], list[Place]]:
 
 
 @given(trees())
-def test_any_tree_is_found_again(grown: tuple[list[Ports], list[Place]]) -> None:
+def test_any_tree_is_reconstructed(grown: tuple[list[Ports], list[Place]]) -> None:
     ports, places = grown
     found = make_topology(ports)
     assert list(found.places) == places
@@ -142,7 +142,7 @@ def test_any_tree_is_found_again(grown: tuple[list[Ports], list[Place]]) -> None
 
 
 @given(st.lists(st.tuples(*[st.booleans()] * 4), max_size=40))
-def test_what_is_no_tree_is_said(ports: list[Ports]) -> None:
+def test_contradictions_are_reported(ports: list[Ports]) -> None:
     found = make_topology(ports)
     open_ends = sum(sum(each[1:]) for each in ports) - (len(ports) - 1)
     if ports and (open_ends or not all(each[0] for each in ports)):

@@ -194,7 +194,7 @@ def test_a_device_without_process_data_says_so() -> None:
 
 
 def test_a_wrong_length_is_told() -> None:
-    with pytest.raises(MappingError, match="is mapped with 32 bits, 16 were asked for") as caught:
+    with pytest.raises(MappingError, match="is mapped with 32 bits, 16 were requested") as caught:
         make_mapping(servo(0), Direction.INPUT, [ObjectReference(0x6064, 0, 16)])
     assert "0x6064:00 is mapped with 32 bits already" in caught.value.message
 
@@ -204,7 +204,7 @@ def test_a_wrong_length_is_told() -> None:
     [
         (ObjectInformation(0x60F4, 0, 0), "does not exist"),
         (ObjectInformation(0x60F4, 0, 32, input_mappable=False), "cannot be mapped"),
-        (ObjectInformation(0x60F4, 0, 16), "has 16 bits, 32 were asked for"),
+        (ObjectInformation(0x60F4, 0, 16), "has 16 bits, 32 were requested"),
     ],
 )
 def test_what_the_dictionary_says_is_believed(known: ObjectInformation, match: str) -> None:

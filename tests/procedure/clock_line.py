@@ -1,4 +1,4 @@
-"""A line of clocks for procedures fed by hand: registers of the time loop, and nothing else."""
+"""A simulated line of clocks with the registers of the time loop."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from catenary.wire.datagram import EcatCommand
 from catenary.wire.features import Feature, Information, PortKind
 
 STATION = 0x1001
-CABLE_NS = 300  # forwarding included
+CABLE_NS = 300  # including forwarding
 HOP_NS = CABLE_NS + PROCESSING_NS
-NONE, STAMPS, SHORT, LONG = "none", "stamps", "short", "long"  # what clock a device has
+NONE, STAMPS, SHORT, LONG = "none", "stamps", "short", "long"  # kinds of clocks
 FEATURES = {
     NONE: Feature(0),
     STAMPS: Feature.DISTRIBUTED_CLOCKS | Feature.DISTRIBUTED_CLOCKS_64_BIT,
@@ -24,7 +24,7 @@ FEATURES = {
 
 @dataclass
 class ClockModel:
-    """One device: local time = the time at the master + `zero`, at the frame's arrival."""
+    """One device. When a frame arrives, its local time is the time of the master plus `zero`."""
 
     kind: str
     zero: int = 0
@@ -41,11 +41,11 @@ class ClockModel:
 
 
 class ClockLine:
-    """Answers datagrams for devices on a line; `now` moves a microsecond with each."""
+    """Devices on a line that answer datagrams. Each datagram advances `now` by a microsecond."""
 
     def __init__(self, *clocks: ClockModel) -> None:
         self.clocks = clocks
-        self.now = 5_000_000_000  # beyond what 32 bits hold
+        self.now = 5_000_000_000  # more than 32 bits can hold
         self.dead: set[int] = set()  # positions that do not answer
 
     def descriptions(self) -> list[DeviceDescription]:
@@ -119,6 +119,6 @@ class ClockLine:
         clock.registers[0x918:0x920] = local.to_bytes(8, "little")
 
     def _refresh(self, position: int, clock: ClockModel) -> None:
-        """0x0910 as frames read it: when they passed the reference clock."""
+        """Set 0x0910 to the time at which the frame passed the reference clock."""
         system = self.now + HOP_NS * position + clock.zero + clock.offset - clock.delay
         clock.registers[0x910:0x918] = (system % 2**64).to_bytes(8, "little")

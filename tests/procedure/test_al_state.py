@@ -1,4 +1,4 @@
-"""State changes against a state register fed by hand."""
+"""State changes with a simulated state register."""
 
 from __future__ import annotations
 
@@ -10,16 +10,16 @@ from catenary.errors import ResponseTimeout, SegmentError, StateError
 from catenary.procedure.al_state import read_state, request_state
 from catenary.procedure.exchange import Reply, Request
 from catenary.wire.al import AlState
-from tests.procedure.by_hand import STATION, play
+from tests.procedure.player import STATION, play
 
 
 class Registers:
-    """Owns AL control and AL status of one device. `refuse`: state asked for → status code."""
+    """Owner of AL control and AL status. `refuse` maps refused states to status codes."""
 
     def __init__(self, word: int = 0x01, code: int = 0) -> None:
         self.word, self.code = word, code
         self.refuse: dict[int, int] = {}
-        self.slow = 0  # reads until a state change shows
+        self.slow = 0  # number of reads until a state change is visible
         self.asked: list[int] = []
         self.working_counter = 1
         self._coming: int | None = None
@@ -47,14 +47,14 @@ class Registers:
         self._coming, self.code = state, 0
 
 
-def test_a_state_is_asked_for_once_and_waited_for() -> None:
+def test_a_state_is_requested_once() -> None:
     device = Registers()
     device.slow = 20
     assert play(request_state(STATION, AlState.PRE_OP), device).state is AlState.PRE_OP
     assert device.asked == [0x02]
 
 
-def test_a_device_that_is_there_already_is_left_alone() -> None:
+def test_a_state_that_is_reached_is_not_requested() -> None:
     device = Registers(0x02)
     play(request_state(STATION, AlState.PRE_OP), device)
     assert device.asked == []
@@ -66,7 +66,7 @@ def test_a_pending_error_is_acknowledged_first() -> None:
     assert device.asked == [0x12, 0x04]
 
 
-def test_a_refusal_tells_code_text_and_cause() -> None:
+def test_a_refusal_reports_code_text_and_cause() -> None:
     device = Registers(0x02)
     device.refuse = {0x04: 0x001E}
     with pytest.raises(StateError, match=r"Probe.*SAFE-OP.*PRE-OP.*0x001E.*nput") as caught:
@@ -76,26 +76,26 @@ def test_a_refusal_tells_code_text_and_cause() -> None:
     assert error.hint
 
 
-def test_a_state_never_reached_ends_in_time() -> None:
+def test_a_state_that_is_never_reached_times_out() -> None:
     device = Registers(0x02)
     device.slow = 1_000_000
     with pytest.raises(StateError, match="did not reach"):
         play(request_state(STATION, AlState.SAFE_OP, timeout=0.5), device, steps=1000)
 
 
-def test_a_state_that_is_none_is_waited_out() -> None:
+def test_an_undefined_state_is_waited_out() -> None:
     device = Registers(0x00)
     assert play(request_state(STATION, AlState.PRE_OP), device).state is AlState.PRE_OP
 
 
-def test_a_device_that_went_away_is_named() -> None:
+def test_a_missing_device_is_reported() -> None:
     device = Registers()
     device.working_counter = 0
     with pytest.raises(ResponseTimeout, match=r"Probe.*0x1004"):
         play(read_state(STATION), device)
 
 
-def test_two_devices_at_one_address_are_noticed() -> None:
+def test_two_devices_with_one_address_are_reported() -> None:
     device = Registers()
     device.working_counter = 2
     with pytest.raises(SegmentError, match="2 devices"):

@@ -1,4 +1,4 @@
-"""Our conversations held with real devices, as recorded with another MainDevice (ethercrab)."""
+"""Our conversations compared with recordings of another MainDevice (ethercrab)."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from catenary.wire.frame import decode_frame
 from catenary.wire.mailbox import decode_mailbox
 from catenary.wire.register import DL_STATUS
 from catenary.wire.sii import MailboxProtocol
-from tests.procedure.by_hand import play
+from tests.procedure.player import play
 
 
 class Exchange(NamedTuple):
@@ -32,7 +32,7 @@ class Exchange(NamedTuple):
 
 
 def returned(path: Path) -> Iterator[Datagram]:
-    """All datagrams that devices have answered, in their order."""
+    """Return all datagrams that devices have answered, in order."""
     for packet in decode_capture(path.read_bytes()).packets:
         frame = decode_frame(packet.data)
         if frame.has_passed_controller:
@@ -48,7 +48,7 @@ def exchanges(path: Path) -> list[Exchange]:
 
 
 class Recorded:
-    """Owns a position in a recorded conversation; every mailbox we write must be the next one."""
+    """Owner of a position in a recording. Each mailbox write must equal the next recorded one."""
 
     def __init__(self, conversation: list[Exchange]) -> None:
         self._conversation = iter(conversation)
@@ -83,9 +83,7 @@ def channel(exchange: Exchange) -> MailboxChannel:
 @pytest.mark.parametrize(
     "name", ["ecrab_replay-ek1914-el3004-configure", "ecrab_replay-ek1914-segmented-upload"]
 )
-def test_the_same_questions_byte_for_byte_and_the_same_answers(
-    shared_data: Path, name: str
-) -> None:
+def test_requests_and_answers_match_the_recording(shared_data: Path, name: str) -> None:
     recorded = exchanges(shared_data / "pcap" / f"{name}.pcapng")
     lane = channel(recorded[0])
     device = Recorded(recorded)
@@ -101,7 +99,7 @@ def test_the_same_questions_byte_for_byte_and_the_same_answers(
             assert play(upload(lane, request.index, request.subindex), device) == answer.data
 
 
-def test_an_assignment_is_written_as_a_real_terminal_took_it(shared_data: Path) -> None:
+def test_an_assignment_is_written_as_recorded(shared_data: Path) -> None:
     recorded = exchanges(shared_data / "pcap" / "ecrab_replay-ek1914-el3004-configure.pcapng")
     requests = [decode_coe(decode_mailbox(each.request.data).data) for each in recorded]
     written = [

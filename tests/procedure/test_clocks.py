@@ -1,4 +1,4 @@
-"""Clocks before the cycle, by hand."""
+"""Set-up of clocks before the cycle, with simulated clocks."""
 
 from __future__ import annotations
 
@@ -15,18 +15,18 @@ from catenary.procedure.clocks import (
 )
 from catenary.procedure.exchange import Reply, Request
 from catenary.wire.datagram import EcatCommand
-from tests.procedure.by_hand import ROUND_TRIP_NS, play
 from tests.procedure.clock_line import HOP_NS, LONG, NONE, SHORT, STAMPS, ClockLine, ClockModel
+from tests.procedure.player import ROUND_TRIP_NS, play
 
 EPOCH_NS = 700_000_000_000_000_000
 
 
 def line(*kinds: str) -> ClockLine:
-    """Clocks of any origin."""
+    """Return a line of clocks with arbitrary origins."""
     return ClockLine(*(ClockModel(kind, zero=k * 123_456_789) for k, kind in enumerate(kinds)))
 
 
-def test_the_first_with_a_system_time_is_the_reference() -> None:
+def test_the_first_device_with_a_system_time_is_the_reference() -> None:
     segment = line(NONE, STAMPS, LONG, LONG)
     measured = play(measure(segment.descriptions()), segment)
     assert measured.first == 2
@@ -39,21 +39,21 @@ def test_a_segment_without_clocks() -> None:
     assert play(measure(segment.descriptions()), segment).first is None
 
 
-def test_all_say_what_the_reference_says_as_the_frame_passes_them() -> None:
+def test_all_clocks_agree_with_the_reference() -> None:
     segment = line(LONG, SHORT, STAMPS, LONG)
     devices = segment.descriptions()
     measured = play(measure(devices), segment)
     play(align(devices, measured, 0, EPOCH_NS), segment)
     assert [clock.delay for clock in segment.clocks] == [0, HOP_NS, 0, 3 * HOP_NS]
     times = [play(read_system_time(devices[p]), segment) for p in (0, 1, 3)]
-    assert times[2] == times[0] + 2000  # a microsecond a datagram
+    assert times[2] == times[0] + 2000  # a microsecond per datagram
     assert times[1] == (times[0] + 1000) % 2**32
-    # by_hand has a clock of its own, which counts round trips
+    # `play` has a separate clock, which counts round trips
     assert measured.latched_ns % ROUND_TRIP_NS == ROUND_TRIP_NS // 2
 
 
-def test_a_reference_that_is_given() -> None:
-    """What lies before it on the cable is not told anything: a frame brings it no time."""
+def test_a_chosen_reference() -> None:
+    """Devices before the reference are not aligned: frames do not bring its time to them."""
     segment = line(LONG, LONG, LONG)
     devices = segment.descriptions()
     play(align(devices, play(measure(devices), segment), 1, EPOCH_NS), segment)
@@ -70,8 +70,8 @@ def test_a_reference_without_a_system_time_is_refused() -> None:
             play(align(devices, measured, position, EPOCH_NS), segment)
 
 
-def test_filters_begin_anew_after_offset_and_delay() -> None:
-    """The order of ESC data sheet I §9.1.4: the loop is reset when all it depends on is there."""
+def test_filters_are_reset_after_offset_and_delay() -> None:
+    """ESC data sheet I §9.1.4: the loop is reset after its inputs were written."""
     segment = line(LONG, LONG)
     devices = segment.descriptions()
     play(align(devices, play(measure(devices), segment), 0, EPOCH_NS), segment)
@@ -79,7 +79,7 @@ def test_filters_begin_anew_after_offset_and_delay() -> None:
     assert addresses == [0x920, 0x928, 0x934, 0x935, 0x930]
 
 
-def test_a_device_that_misses_the_latch_is_no_measurement() -> None:
+def test_a_device_that_misses_the_latch_is_an_error() -> None:
     segment = line(LONG, LONG)
 
     def one_missing(request: Request) -> Reply:
@@ -92,7 +92,7 @@ def test_a_device_that_misses_the_latch_is_no_measurement() -> None:
         play(measure(segment.descriptions()), one_missing)
 
 
-def test_a_device_that_is_gone_when_it_is_told_its_offset() -> None:
+def test_a_device_lost_before_its_offset_is_written() -> None:
     segment = line(LONG, LONG)
     devices = segment.descriptions()
     measured = play(measure(devices), segment)
@@ -101,7 +101,7 @@ def test_a_device_that_is_gone_when_it_is_told_its_offset() -> None:
         play(align(devices, measured, 0, EPOCH_NS), segment)
 
 
-def test_the_burst_is_so_many_frames() -> None:
+def test_the_burst_has_the_given_number_of_frames() -> None:
     sent: list[Request] = []
 
     def count(request: Request) -> Reply:
@@ -114,7 +114,7 @@ def test_the_burst_is_so_many_frames() -> None:
     assert all(request.alone and not request.repeatable for request in sent)
 
 
-def test_a_reference_that_follows_is_told_our_time_in_each_frame() -> None:
+def test_each_frame_writes_our_time_to_a_following_reference() -> None:
     told: list[tuple[EcatCommand, int]] = []
 
     def note(request: Request) -> Reply:
@@ -127,7 +127,7 @@ def test_a_reference_that_follows_is_told_our_time_in_each_frame() -> None:
     assert told == [(EcatCommand.FPRD, 0), *burst, (EcatCommand.FRMW, 0)]
 
 
-def test_a_burst_without_a_reference_ends() -> None:
+def test_a_burst_without_a_reference_is_an_error() -> None:
     reference = line(LONG).descriptions()[0]
     for burst in (compensate(reference), lead(reference, 15_000, 0)):
         with pytest.raises(ClockError, match="does not answer"):
@@ -156,9 +156,9 @@ def real_segment(request: Request) -> Reply:
     return Reply(request.data, 1)
 
 
-def test_a_real_segment_as_another_master_measured_it() -> None:
+def test_a_real_segment_matches_the_recorded_measurement() -> None:
     devices = line(LONG, STAMPS, LONG).descriptions()
     measured = play(measure(devices), real_segment)
-    # ethercrab wrote 0x91 and 0x12C to 0x0928: it leaves out what processing units add
+    # ethercrab wrote 0x91 and 0x12C to 0x0928: it ignores the delay of processing units
     assert measured.delays_ns == (0, 0x91 + 20, 0x12C + 20)
     assert measured.local_times_ns == (0xF53C620F52, None, 0xF53C8065EC)

@@ -1,4 +1,4 @@
-"""Configuring process data: what is written for the watchdog is read back."""
+"""Configuration of process data and verification of the watchdog."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ from catenary.procedure.exchange import Reply, Request
 from catenary.procedure.station import Station
 from catenary.wire.datagram import EcatCommand
 from tests.plan.devices import coupler, servo
-from tests.procedure.by_hand import play
+from tests.procedure.player import play
 
 STATION = Station(0, 0x1001, "Servo")
 
 
 class Memory:
-    """Owns a controller's registers. `stuck`: bytes that no write changes, by address."""
+    """Owner of a controller's registers. `stuck` has the constant bytes, by address."""
 
     def __init__(self, stuck: dict[int, int] | None = None) -> None:
         self.stuck = stuck or {}
@@ -56,13 +56,13 @@ def configure(memory: Memory, watchdog: float | None = None) -> Memory:
     return memory
 
 
-def test_the_watchdog_is_on_with_its_trigger() -> None:
+def test_the_watchdog_is_on_with_a_trigger() -> None:
     registers = configure(Memory()).bytes
     assert (registers[0x0420], registers[0x0421]) == (0xE8, 0x03)
     assert registers[0x0814] == 0x64
 
 
-def test_the_watchdog_is_off_without_its_trigger() -> None:
+def test_the_watchdog_is_off_without_a_trigger() -> None:
     registers = configure(Memory(), watchdog=0).bytes
     assert (registers[0x0420], registers[0x0421]) == (0, 0)
     assert registers[0x0814] == 0x24
@@ -89,11 +89,11 @@ def test_a_register_that_does_not_keep_its_value(stuck: dict[int, int], message:
     assert "use watchdog=0" in str(caught.value.hint)
 
 
-def test_a_device_without_any_watchdog_works_with_watchdog_0() -> None:
+def test_a_device_without_a_watchdog_works_with_watchdog_0() -> None:
     configure(Memory({0x0400: 0, 0x0401: 0, 0x0420: 0, 0x0421: 0, 0x0814: 0x24}), watchdog=0)
 
 
-def test_other_bits_of_the_control_byte_are_the_devices() -> None:
+def test_other_bits_of_the_control_byte_are_not_verified() -> None:
     configure(Memory({0x0814: 0x44}))
 
 

@@ -1,4 +1,4 @@
-"""All devices' counters, and traffic to make them count."""
+"""Error counters of all devices."""
 
 from __future__ import annotations
 
@@ -7,13 +7,12 @@ from collections.abc import Iterator
 import pytest
 
 import catenary as cat
-from catenary.errors import NoDeviceError, ResponseTimeout
-from catenary.procedure.cable_traffic import exercise
+from catenary.errors import ResponseTimeout
 from catenary.procedure.error_counters import clear_error_counters, read_error_counters
 from catenary.procedure.exchange import Reply, Request
 from catenary.procedure.station import Station
 from catenary.wire.error_counters import ErrorCounters, PortErrors
-from tests.procedure.by_hand import play
+from tests.procedure.player import play
 
 
 @pytest.fixture
@@ -38,7 +37,7 @@ def test_forty_devices_share_a_frame(segment: cat.Segment, main: cat.MainDevice)
     assert not any(found[:3] + found[4:])
 
 
-def test_a_silent_device_is_none(segment: cat.Segment, main: cat.MainDevice) -> None:
+def test_the_counts_of_a_silent_device_are_none(segment: cat.Segment, main: cat.MainDevice) -> None:
     stations = [sub.station for sub in main.passive_scan(names=False)]
     segment.plug(devices=2)
     found = main.converse(read_error_counters(stations))
@@ -47,15 +46,13 @@ def test_a_silent_device_is_none(segment: cat.Segment, main: cat.MainDevice) -> 
     assert set(found[2:]) == {None}
 
 
-def test_where_no_frame_comes_back_nobody_has_said_anything(
-    segment: cat.Segment, main: cat.MainDevice
-) -> None:
+def test_without_any_reply_all_counts_are_none(segment: cat.Segment, main: cat.MainDevice) -> None:
     stations = [sub.station for sub in main.passive_scan(names=False)]
     segment.unplug()
     assert set(main.converse(read_error_counters(stations))) == {None}
 
 
-def test_a_frame_that_is_lost_is_no_silence() -> None:
+def test_a_lost_frame_is_an_error() -> None:
     def answer(request: Request) -> Reply:
         return Reply(request.data, 1, lost=request.address & 0xFFFF == 0x1002)
 
@@ -64,7 +61,7 @@ def test_a_frame_that_is_lost_is_no_silence() -> None:
         play(read_error_counters(stations), answer)
 
 
-def test_nobody_to_ask(main: cat.MainDevice) -> None:
+def test_no_devices(main: cat.MainDevice) -> None:
     assert main.converse(read_error_counters([])) == ()
 
 
@@ -74,21 +71,3 @@ def test_all_counters_are_cleared(segment: cat.Segment, main: cat.MainDevice) ->
     segment.core.poke(1, 0x0310, b"\x01\x02\x03\x04")
     main.converse(clear_error_counters(stations))
     assert main.converse(read_error_counters(stations))[1] == ErrorCounters()
-
-
-def test_exercise_lasts_as_long_as_asked(segment: cat.Segment, main: cat.MainDevice) -> None:
-    main.passive_scan(names=False)
-    start = segment.now_ns
-    sent, lost = main.converse(exercise(0.5))
-    assert 0.5 <= (segment.now_ns - start) * 1e-9 < 0.51
-    assert 400 < sent < 500
-    assert lost == 0
-
-
-def test_exercise_ends_where_the_segment_is_gone(
-    segment: cat.Segment, main: cat.MainDevice
-) -> None:
-    main.passive_scan(names=False)
-    segment.unplug()
-    with pytest.raises(NoDeviceError, match="the last 50 frames were lost or damaged"):
-        main.converse(exercise(1e6))

@@ -1,4 +1,4 @@
-"""Devices found in SAFE-OP or OP: whether another master refreshes their outputs."""
+"""Devices found in SAFE-OP or OP, and detection of another master."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from catenary.procedure.exchange import Reply, Request
 from catenary.procedure.live_outputs import Running, find_refreshed, find_running
 from catenary.wire.al import AlState
 from catenary.wire.sync_manager import INPUTS, OUTPUTS, SyncManager
-from tests.procedure.by_hand import play
+from tests.procedure.player import play
 
 DIVIDER, UNITS = 2498, 1000  # 100 ms
 SYNC_MANAGERS = SyncManager(0x1100, 4, OUTPUTS).encode() + SyncManager(0x1200, 6, INPUTS).encode()
@@ -51,7 +51,7 @@ def running(*positions: int, state: AlState = AlState.OP) -> list[Running]:
     return [Running(position, state, False, 2) for position in positions]
 
 
-def test_finds_safe_op_and_op() -> None:
+def test_devices_in_safe_op_and_op_are_found() -> None:
     line = Line([0x01, 0x08, 0x14, 0x02])
     assert play(find_running(4), line.answer) == [
         Running(1, AlState.OP, False, 2),
@@ -59,7 +59,7 @@ def test_finds_safe_op_and_op() -> None:
     ]
 
 
-def test_a_silent_device_is_left_out() -> None:
+def test_a_silent_device_is_omitted() -> None:
     assert play(find_running(1), lambda request: Reply(request.data, 0)) == []
 
 
@@ -69,7 +69,7 @@ def test_outputs_of_a_killed_master_expire() -> None:
     assert line.reads == 4
 
 
-def test_outputs_of_a_live_master_do_not() -> None:
+def test_outputs_of_a_live_master_do_not_expire() -> None:
     line = Line([0x08, 0x08], {0: [1, 0], 1: [1]})
     assert play(find_refreshed(running(0, 1)), line.answer) == [1]
     assert 20 <= line.reads <= 25  # twice 100 ms, in steps of 10 ms
@@ -84,12 +84,12 @@ def test_outputs_of_a_live_master_do_not() -> None:
     ],
     ids=["watchdog off", "not triggered by outputs", "too long to wait for"],
 )
-def test_a_device_that_cannot_tell_is_not_asked(line: Line) -> None:
+def test_a_device_without_a_watchdog_is_not_checked(line: Line) -> None:
     assert play(find_refreshed(running(0)), line.answer) == []
     assert line.reads == 0
 
 
-def test_safe_op_is_no_evidence() -> None:
+def test_devices_in_safe_op_are_not_checked() -> None:
     line = Line([0x04], {0: [1]})
     assert play(find_refreshed(running(0, state=AlState.SAFE_OP)), line.answer) == []
     assert line.reads == 0

@@ -1,4 +1,4 @@
-"""What the mailbox does when frames are lost: no message lost, none executed twice."""
+"""Mailbox transfers with lost frames: no message is lost or executed twice."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from catenary.procedure.mailbox import drain
 from catenary.procedure.sdo import download, upload
 from catenary.wire.coe import UploadRequest
 from catenary.wire.mailbox import Mailbox, Type
-from tests.procedure.by_hand import Dictionary, MailboxDevice, channel, play
+from tests.procedure.player import Dictionary, MailboxDevice, channel, play
 
 OBJECT = {(0x2000, 0): b"\x11\x22\x33\x44"}
 
 
-def test_a_read_lost_on_its_way_back_is_repeated_by_the_toggle() -> None:
+def test_a_lost_read_reply_is_repeated_by_the_toggle() -> None:
     device = MailboxDevice(Dictionary(OBJECT))
     device.lose_back = {1}  # 0 is the write, 1 the read
     lane = channel()
@@ -28,23 +28,23 @@ def test_a_read_lost_on_its_way_back_is_repeated_by_the_toggle() -> None:
     assert len(device.received) == 1
 
 
-def test_a_read_lost_on_its_way_out_is_read_again() -> None:
+def test_a_lost_read_request_is_read_again() -> None:
     device = MailboxDevice(Dictionary(OBJECT))
     device.lose_out = {1}
     assert play(upload(channel(), 0x2000, 0), device) == OBJECT[0x2000, 0]
 
 
-def test_a_write_lost_on_its_way_out_is_written_again() -> None:
+def test_a_lost_write_request_is_written_again() -> None:
     device = MailboxDevice(Dictionary(OBJECT))
     device.lose_out = {0}
     assert play(upload(channel(), 0x2000, 0), device) == OBJECT[0x2000, 0]
     assert len(device.received) == 1
 
 
-def test_a_write_lost_on_its_way_back_is_not_written_again() -> None:
+def test_a_lost_write_reply_is_not_written_again() -> None:
     dictionary = Dictionary({})
     device = MailboxDevice(dictionary)
-    device.deduplicates = False  # as stacks that ignore the counter
+    device.deduplicates = False  # like stacks that ignore the counter
     device.lose_back = {0}
     play(download(channel(), 0x2000, 0, b"\x01"), device)
     assert dictionary.written == [(0x2000, 0, b"\x01")]
@@ -55,7 +55,7 @@ def test_a_write_lost_on_its_way_back_is_not_written_again() -> None:
     out=st.sets(st.integers(0, 40), max_size=6),
     back=st.sets(st.integers(0, 40), max_size=6),
 )
-def test_whatever_is_lost_a_segmented_download_arrives_once(out: set[int], back: set[int]) -> None:
+def test_a_segmented_download_arrives_once_despite_losses(out: set[int], back: set[int]) -> None:
     data = bytes(i & 0xFF for i in range(700))
     dictionary = Dictionary({})
     device = MailboxDevice(dictionary)
@@ -64,17 +64,17 @@ def test_whatever_is_lost_a_segmented_download_arrives_once(out: set[int], back:
         play(download(channel(), 0x2000, 1, data), device)
     except ResponseTimeout:
         longest = _longest_run(out | back)
-        assert longest >= 5  # only when as many in a row were lost as are forgiven
+        assert longest >= 5  # only if the tolerated number of frames in a row was lost
         return
     assert dictionary.written == [(0x2000, 1, data)]
 
 
-def test_a_device_that_never_answers_is_named_in_time() -> None:
+def test_a_device_that_never_answers_times_out() -> None:
     with pytest.raises(ResponseTimeout, match=r"device 3 \(Probe\): no answer"):
         play(upload(channel(), 0x2000, 0), MailboxDevice(lambda _: []))
 
 
-def test_a_device_that_does_not_read_its_mailbox_is_named_in_time() -> None:
+def test_a_device_that_does_not_read_its_mailbox_times_out() -> None:
     device = MailboxDevice(lambda _: [])
     device.deaf = True
     lane = channel()
@@ -84,7 +84,7 @@ def test_a_device_that_does_not_read_its_mailbox_is_named_in_time() -> None:
         play(upload(lane, 0x2000, 0), device)
 
 
-def test_counters_go_from_1_to_7_and_again() -> None:
+def test_counters_cycle_from_1_to_7() -> None:
     device = MailboxDevice(Dictionary(OBJECT))
     lane = channel()
     for _ in range(9):
@@ -113,17 +113,17 @@ def _longest_run(numbers: set[int]) -> int:
     return longest
 
 
-def test_a_lost_look_needs_no_repeating_where_the_message_is_still_there() -> None:
+def test_a_lost_poll_that_left_the_message_needs_no_repetition() -> None:
     device = MailboxDevice(Dictionary(OBJECT))
     device.repeats = False
     lane = channel()
     play(upload(lane, 0x2000, 0), device)
-    device.lose_out = {3}  # the look of the second upload: 0 to 2 are write, read, write
+    device.lose_out = {3}  # the poll of the second upload: 0 to 2 are write, read, write
     assert play(upload(lane, 0x2000, 0), device) == OBJECT[0x2000, 0]
     assert not lane.repeat_requested
 
 
-def test_a_look_that_took_the_message_and_was_lost_is_repeated() -> None:
+def test_a_lost_poll_that_took_the_message_is_repeated() -> None:
     device = MailboxDevice(Dictionary(OBJECT))
     lane = channel()
     play(upload(lane, 0x2000, 0), device)
@@ -133,7 +133,7 @@ def test_a_look_that_took_the_message_and_was_lost_is_repeated() -> None:
     assert len(device.received) == 2
 
 
-# What devices do against the protocol.
+# Violations of the protocol by devices
 
 
 def test_a_device_that_answers_twice_stays_in_step() -> None:
@@ -151,7 +151,7 @@ def test_a_device_that_answers_twice_stays_in_step() -> None:
     assert lane.dropped == 4
 
 
-def test_an_answer_of_another_kind_is_no_answer_and_is_told() -> None:
+def test_an_answer_of_another_kind_is_dropped_and_reported() -> None:
     device = MailboxDevice(lambda _: [Mailbox(Type.EOE, bytes(20))])
     lane = channel()
     with pytest.raises(ResponseTimeout, match="1 other messages arrived"):
@@ -159,13 +159,13 @@ def test_an_answer_of_another_kind_is_no_answer_and_is_told() -> None:
     assert lane.dropped == 1
 
 
-def test_a_device_that_babbles_is_an_error_soon() -> None:
+def test_endless_unexpected_messages_are_an_error() -> None:
     device = MailboxDevice(lambda _: [Mailbox(Type.EOE, bytes(20))] * 500)
     with pytest.raises(MailboxError, match="64 unexpected mailbox messages in a row"):
         play(upload(channel(), 0x2000, 0), device)
 
 
-def test_draining_one_that_babbles_ends_too() -> None:
+def test_draining_endless_messages_ends() -> None:
     device = MailboxDevice(lambda _: [])
     for _ in range(500):
         device.send(Mailbox(Type.EOE, bytes(20)))
@@ -175,7 +175,7 @@ def test_draining_one_that_babbles_ends_too() -> None:
 @pytest.mark.parametrize(
     "counters", [[0, 0, 0, 0], [5, 1, 7, 2], [3, 3, 3, 3], [1, 1, 2, 2], [7, 7, 7, 1]]
 )
-def test_counters_that_stand_still_or_jump_mean_nothing(counters: list[int]) -> None:
+def test_constant_or_jumping_counters_are_accepted(counters: list[int]) -> None:
     device = MailboxDevice(Dictionary(OBJECT))
     given = iter(counters)
     device.next_counter = lambda: next(given)
@@ -191,7 +191,7 @@ def test_counters_that_stand_still_or_jump_mean_nothing(counters: list[int]) -> 
     out=st.sets(st.integers(0, 40), max_size=3),
     back=st.sets(st.integers(0, 40), max_size=3),
 )
-def test_whatever_is_lost_segments_are_joined_with_any_counter(
+def test_segments_are_joined_despite_losses_with_any_counter(
     counter: int | None, out: set[int], back: set[int]
 ) -> None:
     """Counters of 0, always 1, or as in the standard. Segments differ in their toggle bit."""
@@ -204,12 +204,14 @@ def test_whatever_is_lost_segments_are_joined_with_any_counter(
     assert play(upload(channel(), 0x2000, 1), device) == data
 
 
-def test_a_repetition_of_what_was_accepted_before_is_dropped() -> None:
-    """The read is lost on its way out: the device repeats the answer before, then sends the new
+def test_a_repetition_of_an_accepted_message_is_dropped() -> None:
+    """The read request is lost: the device repeats the previous answer, then sends the new
     one."""
     values = iter([b"\x01", b"\x01", b"\x02"])
     device = MailboxDevice(lambda message: Dictionary({(0x2000, 0): next(values)})(message))
-    device.next_counter = lambda: 0  # looked at first, so that a lost read is repeated at once
+    device.next_counter = lambda: (
+        0
+    )  # check the status first, so that a lost read is repeated at once
     device.repeats_first = True
     lane = channel()
     assert [play(upload(lane, 0x2000, 0), device) for _ in range(2)] == [b"\x01"] * 2
@@ -220,7 +222,7 @@ def test_a_repetition_of_what_was_accepted_before_is_dropped() -> None:
 
 
 @pytest.mark.parametrize("counter", [0, 1])
-def test_repetitions_of_one_question_do_not_hide_the_answer_to_the_next(counter: int) -> None:
+def test_repetitions_do_not_hide_the_next_answer(counter: int) -> None:
     """Two reads of one answer are lost, so two repetitions are requested and one arrives. Equal
     answers to the next questions are not repetitions."""
     device = MailboxDevice(lambda message: Dictionary({(0x2000, 0): values.pop(0)})(message))
@@ -232,8 +234,8 @@ def test_repetitions_of_one_question_do_not_hide_the_answer_to_the_next(counter:
     assert [play(upload(lane, 0x2000, 0), device) for _ in range(3)] == [b"\x02"] * 3
 
 
-def test_a_device_that_cannot_repeat_answers_the_next_question() -> None:
-    """The read is lost, and so is the answer. The next one equals the last accepted one."""
+def test_a_device_that_cannot_repeat_answers_the_next_request() -> None:
+    """Both the read and the answer are lost. The next answer equals the last accepted one."""
     device = MailboxDevice(Dictionary(OBJECT))
     device.next_counter = lambda: 1
     device.repeats = False
@@ -245,14 +247,14 @@ def test_a_device_that_cannot_repeat_answers_the_next_question() -> None:
     assert play(upload(lane, 0x2000, 0), device) == OBJECT[0x2000, 0]
 
 
-def test_a_length_beyond_the_mailbox_is_the_devices_fault() -> None:
+def test_a_length_beyond_the_mailbox_is_a_mailbox_error() -> None:
     device = MailboxDevice(Dictionary(OBJECT))
     device.spoil = lambda data: (60000).to_bytes(2, "little") + data[2:]
     with pytest.raises(MailboxError, match=r"device 3 \(Probe\): invalid mailbox message"):
         play(upload(channel(), 0x2000, 0), device)
 
 
-def test_an_answer_that_came_too_late_is_not_the_next_ones() -> None:
+def test_a_late_answer_is_not_taken_for_the_next_one() -> None:
     lane = channel()
     answers = Dictionary({(0x2000, 0): b"\x01"})
     device = MailboxDevice(lambda _: [])
@@ -264,7 +266,7 @@ def test_an_answer_that_came_too_late_is_not_the_next_ones() -> None:
     assert play(upload(lane, 0x2000, 0), device) == b"\x02"
 
 
-def test_a_question_given_up_owes_its_answer_to_nobody() -> None:
+def test_the_answer_to_an_abandoned_request_is_dropped() -> None:
     lane = channel()
     device = MailboxDevice(Dictionary({(0x2000, 0): b"\x01"}))
     broken_off = upload(lane, 0x2000, 0)
@@ -274,7 +276,7 @@ def test_a_question_given_up_owes_its_answer_to_nobody() -> None:
     assert play(upload(lane, 0x2000, 0), device) == b"\x02"
 
 
-def test_conversations_take_place_in_the_order_they_were_begun() -> None:
+def test_conversations_run_in_the_order_of_their_start() -> None:
     lane = channel()
     device = MailboxDevice(Dictionary(OBJECT))
     first, second = upload(lane, 0x2000, 0), upload(lane, 0x2000, 0)
@@ -288,7 +290,7 @@ def test_conversations_take_place_in_the_order_they_were_begun() -> None:
 
 
 def play_on(procedure: Procedure[bytes], device: MailboxDevice) -> bytes:
-    """From a pause on."""
+    """Continue a procedure after a pause."""
 
     def rest() -> Procedure[bytes]:
         replies: list[Reply] = []
@@ -302,7 +304,7 @@ def play_on(procedure: Procedure[bytes], device: MailboxDevice) -> bytes:
     return play(rest(), device)
 
 
-def test_a_device_that_thinks_is_not_looked_at_meanwhile() -> None:
+def test_the_first_poll_adapts_to_the_answer_time() -> None:
     """20 ms: looked at again and again for the first answers, a few times for the later ones."""
     lane = channel()
     looks: list[int] = []

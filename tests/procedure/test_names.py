@@ -1,4 +1,4 @@
-"""Names of process data that the SII lacks, from the object dictionary."""
+"""Names of process data from the object dictionary if the SII lacks them."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ def names(device: AppliedDevice) -> tuple[str, ...]:
 
 
 def scan_time(device: AppliedDevice) -> float:
-    """Virtual time of a scan [s]."""
+    """Return the virtual time of a scan [s]."""
     segment = Segment([device])
     with cat.MainDevice(segment) as main:
         assert main.scan()[0].error is None
@@ -26,7 +26,7 @@ def scan_time(device: AppliedDevice) -> float:
 
 @pytest.mark.parametrize("pdos", ["unnamed", "absent"])
 @pytest.mark.parametrize("kind", [AnalogInputs, Servo])
-def test_names_of_the_dictionary_are_those_the_sii_would_have(
+def test_names_in_the_dictionary_match_the_sii(
     kind: type[AnalogInputs] | type[Servo], pdos: str
 ) -> None:
     named = names(kind())
@@ -34,25 +34,25 @@ def test_names_of_the_dictionary_are_those_the_sii_would_have(
     assert len(set(named)) == len(named) > 4
 
 
-def test_if_an_object_is_not_described_its_entry_may_be() -> None:
+def test_an_entry_may_be_described_without_its_object() -> None:
     quirks = MailboxQuirks(malformed_descriptions=(0x6064,), missing_descriptions=(0x6077,))
     found = names(Servo(sii_quirks=SiiQuirks(pdos="unnamed"), mailbox_quirks=quirks))
     assert found == names(Servo())
 
 
-def test_a_device_that_describes_nothing_delays_a_scan_by_seconds_only() -> None:
+def test_a_device_without_descriptions_delays_a_scan_by_seconds() -> None:
     silent = MailboxQuirks(missing_descriptions=(*MAPPED, 0x1600, 0x1A00))
     device = Servo(sii_quirks=SiiQuirks(pdos="unnamed"), mailbox_quirks=silent)
     assert scan_time(device) < scan_time(Servo()) + 15
 
 
-def test_what_the_sii_names_is_not_asked_for() -> None:
+def test_names_in_the_sii_are_not_requested() -> None:
     malformed = MailboxQuirks(malformed_descriptions=(*MAPPED, 0x1600, 0x1A00))
     assert names(Servo(mailbox_quirks=malformed)) == names(Servo())
 
 
-def test_types_of_the_dictionary_are_those_the_sii_would_have() -> None:
-    """Without them a negative position would be read as a large positive one."""
+def test_types_in_the_dictionary_match_the_sii() -> None:
+    """Without types, a negative position would be read as a large positive one."""
 
     def types(device: AppliedDevice) -> list[int]:
         with cat.MainDevice(Segment([device])) as main:

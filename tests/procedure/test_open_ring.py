@@ -1,4 +1,4 @@
-"""A port of a ring closed for as long as something is measured."""
+"""A port of a ring that is closed during a measurement."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ TEMPORARY = 2
 
 
 class Controller:
-    """Owns a DL control register; its port 1 opens again after `patience` requests."""
+    """Owner of a DL control register. Its port 1 opens again after `patience` requests."""
 
     def __init__(self, patience: int = 100) -> None:
         self.control, self.patience, self.seen = BEFORE, patience, []  # type: ignore[var-annotated]
-        self.hesitates = 0  # looks at DL status before the port is closed
+        self.hesitates = 0  # number of reads of DL status before the port is closed
 
     def answer(self, request: Request) -> Reply:
         register = request.address >> 16
@@ -60,27 +60,27 @@ def silent() -> Procedure[int]:
     raise ResponseTimeout(f"no {AL_STATUS.name}")
 
 
-def test_the_port_is_closed_meanwhile_and_all_else_stays_as_it_was() -> None:
+def test_the_port_is_closed_during_the_procedure() -> None:
     controller = Controller()
     assert play(as_line(STATION, 1, seven()), controller) == 7
     assert controller.seen == [BEFORE | CLOSED_1 | TEMPORARY, BEFORE]
 
 
-def test_it_is_opened_again_when_the_measurement_fails() -> None:
+def test_the_port_opens_again_if_the_measurement_fails() -> None:
     controller = Controller()
     with pytest.raises(ResponseTimeout):
         play(as_line(STATION, 1, silent()), controller)
     assert controller.seen[-1] == BEFORE
 
 
-def test_what_took_longer_than_the_port_stays_closed_counts_for_nothing() -> None:
+def test_a_port_that_opened_early_invalidates_the_measurement() -> None:
     controller = Controller(patience=3)
     with pytest.raises(ClockError, match="did not stay closed"):
         play(as_line(STATION, 1, seven()), controller)
     assert controller.seen[-1] == BEFORE
 
 
-def test_a_port_that_cannot_be_closed_is_named_before_anything_is_measured() -> None:
+def test_a_port_that_cannot_be_closed_is_an_error() -> None:
     controller = Controller(patience=0)
     with pytest.raises(
         ClockError, match="port 1, the second end of the ring, cannot be closed"
@@ -91,7 +91,7 @@ def test_a_port_that_cannot_be_closed_is_named_before_anything_is_measured() -> 
     assert controller.seen[-1] == BEFORE
 
 
-def test_a_port_may_take_its_time_to_close() -> None:
+def test_a_port_may_close_slowly() -> None:
     controller = Controller()
     controller.hesitates = 3
     assert play(as_line(STATION, 1, seven()), controller) == 7

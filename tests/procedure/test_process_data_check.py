@@ -1,14 +1,14 @@
-"""Inputs asked for one device at a time."""
+"""Separate check of the inputs of each device."""
 
 from __future__ import annotations
 
 from catenary.procedure.exchange import Reply, Request
 from catenary.procedure.process_data_check import probe_inputs
 from catenary.wire.datagram import EcatCommand
-from tests.procedure.by_hand import play
+from tests.procedure.player import play
 
 
-def test_who_gives_nothing_is_told_from_a_lost_frame() -> None:
+def test_a_missing_input_is_distinguished_from_a_lost_frame() -> None:
     def answer(request: Request) -> Reply:
         assert request.command is EcatCommand.LRD
         counter = {0x10000: 1, 0x10010: 0, 0x10020: 0}[request.address]
@@ -18,7 +18,7 @@ def test_who_gives_nothing_is_told_from_a_lost_frame() -> None:
     assert play(probe_inputs(areas), answer) == (3,)
 
 
-def test_nobody_to_ask() -> None:
+def test_no_devices() -> None:
     assert play(_empty(), lambda request: Reply(b"", 0)) == ()
 
 

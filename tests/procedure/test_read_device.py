@@ -1,4 +1,4 @@
-"""Looking without changing: station addresses are given only to who has none."""
+"""Passive scan: only missing or duplicate station addresses are written."""
 
 from __future__ import annotations
 
@@ -22,9 +22,7 @@ from catenary.wire.al import AlState
         ((0, STATION_BASE), (STATION_BASE + 1, STATION_BASE)),
     ],
 )
-def test_addresses_are_kept_where_they_are_one_devices_own(
-    found: tuple[int, ...], expected: tuple[int, ...]
-) -> None:
+def test_unique_addresses_are_kept(found: tuple[int, ...], expected: tuple[int, ...]) -> None:
     assert distinct(found) == expected
 
 
@@ -39,7 +37,7 @@ def main(segment: cat.Segment) -> Iterator[cat.MainDevice]:
         yield main
 
 
-def test_a_visit_leaves_addresses_and_states(segment: cat.Segment, main: cat.MainDevice) -> None:
+def test_a_visit_keeps_addresses_and_states(segment: cat.Segment, main: cat.MainDevice) -> None:
     main.scan()
     for position in range(3):
         segment.core.poke(position, 0x0010, bytes((0x50 + position, 0)))
@@ -48,7 +46,7 @@ def test_a_visit_leaves_addresses_and_states(segment: cat.Segment, main: cat.Mai
     assert [segment.core.peek(n, 0x0130, 1)[0] for n in range(3)] == [AlState.PRE_OP] * 3
 
 
-def test_a_visit_of_devices_just_switched_on(segment: cat.Segment, main: cat.MainDevice) -> None:
+def test_a_visit_to_devices_after_power_up(segment: cat.Segment, main: cat.MainDevice) -> None:
     found = main.converse(visit(3))
     assert [each.station_address for each in found] == [STATION_BASE + n for n in range(3)]
     assert found[1].dl_status == int.from_bytes(segment.core.peek(1, 0x0110, 2), "little")

@@ -1,4 +1,4 @@
-"""One latch of all clocks."""
+"""Receive times of one latch."""
 
 from __future__ import annotations
 

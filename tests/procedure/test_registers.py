@@ -1,4 +1,4 @@
-"""Any part of a device's memory, and what is refused there."""
+"""Access to the memory of a device, and refusals."""
 
 from __future__ import annotations
 
@@ -22,13 +22,13 @@ def main(segment: cat.Segment) -> Iterator[cat.MainDevice]:
         yield main
 
 
-def test_what_is_written_is_read(main: cat.MainDevice) -> None:
+def test_written_bytes_are_read_back(main: cat.MainDevice) -> None:
     station = main.passive_scan(names=False)[1].station
     main.converse(write_register(station, 0x0400, b"\x34\x12"))
     assert main.converse(read_register(station, 0x0400, 2)) == b"\x34\x12"
 
 
-def test_a_read_only_register_is_told_from_a_silent_device(
+def test_a_read_only_register_is_distinguished_from_a_silent_device(
     segment: cat.Segment, main: cat.MainDevice
 ) -> None:
     station = main.passive_scan(names=False)[1].station
@@ -39,7 +39,7 @@ def test_a_read_only_register_is_told_from_a_silent_device(
         main.converse(write_register(station, 0x0130, b"\x08\x00"))
 
 
-def test_past_the_end_of_memory(main: cat.MainDevice) -> None:
+def test_an_address_beyond_the_memory_is_an_error(main: cat.MainDevice) -> None:
     station = main.passive_scan(names=False)[1].station
     with pytest.raises(RegisterError, match="0xFFFF cannot be read"):
         main.converse(read_register(station, 0xFFFF, 1))

@@ -1,4 +1,4 @@
-"""SDO services against a dictionary fed by hand."""
+"""SDO services with a simulated dictionary."""
 
 from __future__ import annotations
 
@@ -15,18 +15,18 @@ from catenary.wire.coe import (
     decode_coe,
 )
 from catenary.wire.mailbox import ErrorReply, Mailbox, Type
-from tests.procedure.by_hand import Dictionary, MailboxDevice, channel, coe, play
+from tests.procedure.player import Dictionary, MailboxDevice, channel, coe, play
 
 
 @pytest.mark.parametrize("size", [1, 2, 3, 4, 5, 112, 113, 300, 5000])
-def test_upload_of_every_kind(size: int) -> None:
+def test_uploads_of_all_sizes(size: int) -> None:
     data = bytes(i & 0xFF for i in range(size))
     device = MailboxDevice(Dictionary({(0x2000, 7): data}))
     assert play(upload(channel(), 0x2000, 7), device) == data
 
 
 @pytest.mark.parametrize("size", [1, 2, 3, 4, 5, 112, 113, 300, 5000])
-def test_download_of_every_kind(size: int) -> None:
+def test_downloads_of_all_sizes(size: int) -> None:
     data = bytes(i & 0xFF for i in range(size))
     dictionary = Dictionary({})
     play(download(channel(), 0x2000, 7, data), MailboxDevice(dictionary))
@@ -43,7 +43,7 @@ def test_an_abort_names_device_object_and_reason() -> None:
     )
 
 
-def test_a_mailbox_error_is_told_in_words() -> None:
+def test_a_mailbox_error_has_a_text() -> None:
     device = MailboxDevice(lambda _: [Mailbox(Type.ERROR, ErrorReply(2).encode())])
     with pytest.raises(MailboxError, match="protocol is not supported"):
         play(upload(channel(), 0x1000, 0), device)
@@ -56,7 +56,7 @@ def test_a_malformed_mailbox_error_names_its_device(data: bytes) -> None:
         play(upload(channel(), 0x1000, 0), device)
 
 
-def test_an_emergency_on_the_way_is_put_aside() -> None:
+def test_an_emergency_before_the_answer_is_stored() -> None:
     emergency = Emergency(0x7500, 0x11, b"\x01\x02\x03\x04\x05")
     dictionary = Dictionary({(0x1000, 0): b"\x92\x01\x02\x00"})
     device = MailboxDevice(lambda message: [coe(emergency), *dictionary(message)])
@@ -66,7 +66,7 @@ def test_an_emergency_on_the_way_is_put_aside() -> None:
     assert lane.dropped == 0
 
 
-def test_a_late_answer_to_another_question_is_dropped() -> None:
+def test_a_late_answer_to_another_request_is_dropped() -> None:
     dictionary = Dictionary({(0x1000, 0): b"\x01", (0x1001, 0): b"\x02"})
     late = Dictionary({(0x1000, 0): b"\x01"})
     lane = channel()
@@ -91,7 +91,7 @@ def test_a_wrong_toggle_is_aborted() -> None:
     assert decode_coe(device.received[-1].data) == Abort(0x2000, 0, 0x0503_0000)
 
 
-def test_segments_beyond_the_size_told_are_aborted() -> None:
+def test_segments_beyond_the_announced_size_are_aborted() -> None:
     dictionary = Dictionary({(0x2000, 0): bytes(200)})
 
     def respond(message: Mailbox) -> list[Mailbox]:
@@ -104,7 +104,7 @@ def test_segments_beyond_the_size_told_are_aborted() -> None:
         play(upload(channel(), 0x2000, 0), MailboxDevice(respond))
 
 
-def test_an_object_beyond_the_limit_is_broken_off_at_once() -> None:
+def test_an_object_beyond_the_limit_is_aborted_at_once() -> None:
     dictionary = Dictionary({(0x2000, 0): bytes(5000)})
     device = MailboxDevice(dictionary)
     with pytest.raises(MailboxError, match="announces 5000 bytes, the limit is 4999"):
@@ -115,7 +115,7 @@ def test_an_object_beyond_the_limit_is_broken_off_at_once() -> None:
 
 
 def dripping(segment: bytes) -> MailboxDevice:
-    """Return a device that announces 1000 bytes of 0x2000:00 and repeats one segment for ever."""
+    """Return a device that announces 1000 bytes of 0x2000:00 and repeats one segment endlessly."""
     dictionary = Dictionary({(0x2000, 0): bytes(1000)})
 
     def answer(message: Mailbox) -> list[Mailbox]:
@@ -127,7 +127,7 @@ def dripping(segment: bytes) -> MailboxDevice:
     return MailboxDevice(answer)
 
 
-def test_an_upload_that_never_ends_is_bounded_by_its_own_size() -> None:
+def test_an_endless_upload_is_limited_by_the_announced_size() -> None:
     device = dripping(b"x")
     with pytest.raises(MailboxError, match="violates the protocol"):
         play(upload(channel(), 0x2000, 0), device)
@@ -142,12 +142,12 @@ def test_an_upload_has_an_overall_deadline() -> None:
     assert len(device.received) < 500
 
 
-def test_segments_of_nothing_are_no_transfer() -> None:
+def test_empty_segments_are_an_error() -> None:
     with pytest.raises(MailboxError, match="violates the protocol"):
         play(upload(channel(), 0x2000, 0), dripping(b""))
 
 
-def test_complete_access_both_ways() -> None:
+def test_complete_access_in_both_directions() -> None:
     seen: list[object] = []
     dictionary = Dictionary({(0x1C12, 0): b"\x02\x00\x00\x16\x01\x16"})
 

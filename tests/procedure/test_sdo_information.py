@@ -1,4 +1,4 @@
-"""SDO information against answers given by hand."""
+"""SDO information with simulated answers."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from catenary.wire.sdo_information import (
     SdoInformation,
     ValueInfo,
 )
-from tests.procedure.by_hand import MailboxDevice, channel, coe, play
+from tests.procedure.player import MailboxDevice, channel, coe, play
 
 NO_OBJECT, NO_SUBINDEX = 0x0602_0000, 0x0609_0011
 
@@ -51,12 +51,12 @@ def in_parts(opcode: Opcode, data: bytes, size: int) -> list[SdoInformation]:
 
 
 @pytest.mark.parametrize("size", [2, 3, 10, 110])
-def test_a_list_comes_in_fragments_that_nobody_asks_for(size: int) -> None:
+def test_fragments_of_a_list_arrive_without_requests(size: int) -> None:
     indices = tuple(range(0x1000, 0x1040))
     data = ObjectList(ListType.ALL, indices).encode()
     device = answering(lambda _: in_parts(Opcode.LIST_RESPONSE, data, size))
     assert play(read_object_list(channel()), device) == (indices, "")
-    assert len(device.received) == 2  # the list, and how many there are
+    assert len(device.received) == 2  # the list, and the number of objects
 
 
 def dictionary(request: SdoInformation) -> list[SdoInformation]:
@@ -82,7 +82,7 @@ def dictionary(request: SdoInformation) -> list[SdoInformation]:
     return [SdoInformation(Opcode.ENTRY_RESPONSE, entry.encode())]
 
 
-def test_objects_that_are_listed_and_denied_are_left_out() -> None:
+def test_listed_objects_that_do_not_exist_are_omitted() -> None:
     found, notes = play(list_objects(channel()), answering(dictionary))
     assert [(each.index, each.name) for each in found] == [
         (0x1000, "object 1000"),
@@ -101,12 +101,12 @@ def test_an_array_with_a_gap_is_described_without_it() -> None:
     ]
 
 
-def test_what_is_not_there_is_named() -> None:
+def test_a_missing_object_is_reported() -> None:
     with pytest.raises(SdoAbort, match=r"device 3 .*SDO information of 0x3000:00.*not exist"):
         play(describe_object(channel(), 0x3000), answering(dictionary))
 
 
-def test_a_late_answer_about_another_entry_is_not_taken() -> None:
+def test_a_late_answer_about_another_entry_is_dropped() -> None:
     lane = channel()
     device = answering(dictionary)
     late = EntryDescription(0x1000, 0, ValueInfo.NONE, 5, 8, Access.READ_PRE_OP, b"late")
@@ -122,28 +122,28 @@ def test_a_late_answer_about_another_entry_is_not_taken() -> None:
     assert lane.dropped == 1
 
 
-def test_fragments_without_an_end_are_cut_off_with_a_note() -> None:
+def test_endless_fragments_are_truncated_with_a_note() -> None:
     endless = [SdoInformation(Opcode.LIST_RESPONSE, b"\x01\x00" * 50, 7, True)] * 2000
     indices, note = play(read_object_list(channel()), answering(lambda _: endless))
     assert len(indices) > 10_000
-    assert note == "the list of objects is truncated: its fragments have no end"
+    assert note == "the list of objects is truncated: its fragments do not end"
 
 
-def test_of_fragments_that_stop_the_first_ones_are_kept() -> None:
+def test_fragments_before_an_interruption_are_kept() -> None:
     first = in_parts(Opcode.LIST_RESPONSE, ObjectList(ListType.ALL, (0x1000,) * 50).encode(), 10)
     indices, note = play(read_object_list(channel()), answering(lambda _: first[:3]))
     assert indices == (0x1000,) * 14
     assert note.startswith("the list of objects is truncated: no answer to a COE message")
 
 
-def test_a_list_that_announces_fragments_by_their_number_alone() -> None:
-    """IgH (fsm_coe.c) goes on for either of both fields."""
+def test_a_list_may_announce_fragments_only_by_number() -> None:
+    """IgH (fsm_coe.c) continues if either field announces fragments."""
     parts = in_parts(Opcode.LIST_RESPONSE, ObjectList(ListType.ALL, (0x1000,) * 9).encode(), 10)
     plain = [SdoInformation(part.opcode, part.data, part.fragments_left) for part in parts]
     assert play(read_object_list(channel()), answering(lambda _: plain)).indices == (0x1000,) * 9
 
 
-def test_a_list_shorter_than_the_device_counts_has_a_note() -> None:
+def test_a_list_shorter_than_the_reported_number_has_a_note() -> None:
     def short(request: SdoInformation) -> list[SdoInformation]:
         listed = request.data[0] == ListType.ALL
         found = ObjectList(ListType(request.data[0]), (0x1000,) if listed else (57, 0, 0, 0, 0))
@@ -155,15 +155,15 @@ def test_a_list_shorter_than_the_device_counts_has_a_note() -> None:
 
 
 @pytest.mark.parametrize("data", [b"", b"\x01", b"\x00\x10\x01"])
-def test_half_an_index_at_the_end_has_a_note(data: bytes) -> None:
+def test_an_incomplete_index_at_the_end_has_a_note(data: bytes) -> None:
     device = answering(lambda _: [SdoInformation(Opcode.LIST_RESPONSE, b"\x01\x00" + data)])
     indices, note = play(read_object_list(channel()), device)
     assert indices == ((0x1000,) if len(data) > 1 else ())
     assert bool(note) is (len(data) % 2 == 1)
-    assert not note or "are not whole indices" in note
+    assert not note or "are not a whole number of indices" in note
 
 
-def test_a_list_that_does_not_name_its_kind_is_no_answer() -> None:
+def test_a_list_without_its_kind_is_not_an_answer() -> None:
     device = answering(lambda _: [SdoInformation(Opcode.LIST_RESPONSE, b"\x01")])
     with pytest.raises(ResponseTimeout, match="device 3"):
         play(read_object_list(channel()), device)
@@ -191,7 +191,7 @@ def undescribed(*broken: int) -> Callable[[SdoInformation], list[SdoInformation]
     return answer
 
 
-def test_of_an_object_that_is_not_described_the_index_is_kept() -> None:
+def test_an_undescribed_object_keeps_its_index() -> None:
     found, notes = play(list_objects(channel()), answering(undescribed(0x1003, 0x1005)))
     assert [each.index for each in found] == list(range(0x1000, 0x100A))
     assert [each.index for each in found if not each.object_code] == [0x1003, 0x1005]
@@ -199,7 +199,7 @@ def test_of_an_object_that_is_not_described_the_index_is_kept() -> None:
     assert notes[0].startswith("0x1003, 0x1005 cannot be described: invalid SDO information")
 
 
-def test_after_three_failures_in_a_row_nothing_more_is_asked() -> None:
+def test_requests_end_after_three_failures_in_a_row() -> None:
     device = answering(undescribed(*range(0x1002, 0x100A)))
     found, notes = play(list_objects(channel()), device)
     assert len(found) == 10

@@ -1,4 +1,4 @@
-"""Reading the SII from an EEPROM fed by hand, with real images."""
+"""Read access to a simulated EEPROM with real images."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from catenary.errors import EepromError
 from catenary.procedure.exchange import Reply, Request
 from catenary.procedure.sii import read_image
 from catenary.wire.sii import decode_sii
-from tests.procedure.by_hand import STATION, play
+from tests.procedure.player import STATION, play
 
 STRINGS_BODY = bytes([1, 250]) + bytes(range(1, 251)) + bytes(244)
 ONE_LONG_CATEGORY = (
@@ -21,7 +21,7 @@ READ, BUSY, ERROR, EIGHT = 0x0100, 0x8000, 0x2000, 0x0040
 
 
 class Eeprom:
-    """Owns an image behind the registers 0x0502 to 0x050F."""
+    """Owner of an image that is accessed through registers 0x0502 to 0x050F."""
 
     def __init__(self, image: bytes, *, eight: bool, busy_for: int = 0) -> None:
         self.image = image
@@ -29,15 +29,15 @@ class Eeprom:
         self.busy_for = busy_for
         self.fails = 0
         self.reads = 0
-        self.loses: set[int] = set()  # numbers of read commands whose frame does not come back
-        self.slow: set[int] = set()  # numbers of read commands that take a look longer
+        self.loses: set[int] = set()  # numbers of read commands whose frame is lost on the way back
+        self.slow: set[int] = set()  # numbers of read commands that take one poll longer
         self._busy = 0
         self._word = 0
         self._error = False
         self._losing = False
 
     def __call__(self, request: Request) -> Reply:
-        """A frame that is lost has reached the device all the same."""
+        """Answer a request. A lost frame has still reached the device."""
         is_fetch = len(request.data) != 6
         if is_fetch:
             self._losing = not request.repeatable and self.reads in self.loses
@@ -70,7 +70,7 @@ class Eeprom:
 @pytest.mark.parametrize(
     "name", ["beckhoff_ek1100", "beckhoff_el2889", "metalmusings_EaserCAT_6000", "pollen_Orbita2d"]
 )
-def test_a_real_image_reads_as_it_decodes(shared_data: Path, name: str, eight: bool) -> None:
+def test_a_real_image_is_read_completely(shared_data: Path, name: str, eight: bool) -> None:
     image = (shared_data / "sii" / f"{name}.bin").read_bytes()
     read = decode_sii(play(read_image(STATION), Eeprom(image, eight=eight)))
     whole = decode_sii(image)
@@ -90,7 +90,7 @@ def test_an_unprogrammed_eeprom_ends(shared_data: Path) -> None:
     play(read_image(STATION), Eeprom(image, eight=True), steps=2000)
 
 
-def test_no_word_is_read_twice_and_unwanted_categories_not_at_all() -> None:
+def test_no_word_is_read_twice_or_without_need() -> None:
     vendor_specific = struct.pack("<HH", 0x0800, 200) + bytes(400)
     strings = struct.pack("<HH", 10, 4) + b"\x01\x05Probe\x00"
     image = bytes(128) + vendor_specific + strings + b"\xff\xff" + bytes(14)
@@ -105,7 +105,7 @@ def test_busy_is_waited_out() -> None:
     play(read_image(STATION), Eeprom(image, eight=False, busy_for=5))
 
 
-def test_a_missed_acknowledge_is_forgiven_a_dead_eeprom_not() -> None:
+def test_a_few_missing_acknowledgements_are_tolerated() -> None:
     image = bytes(128) + b"\xff\xff"
     eeprom = Eeprom(image, eight=False)
     eeprom.fails = 2
@@ -116,7 +116,7 @@ def test_a_missed_acknowledge_is_forgiven_a_dead_eeprom_not() -> None:
 
 
 @pytest.mark.parametrize("eight", [False, True])
-def test_a_prompt_eeprom_is_commanded_ahead(eight: bool) -> None:
+def test_reads_from_a_fast_eeprom_are_commanded_ahead(eight: bool) -> None:
     eeprom = Eeprom(ONE_LONG_CATEGORY, eight=eight)
     frames = 0
 
@@ -131,13 +131,13 @@ def test_a_prompt_eeprom_is_commanded_ahead(eight: bool) -> None:
 
 @pytest.mark.parametrize("eight", [False, True])
 @pytest.mark.parametrize("trouble", ["slow", "loses"])
-def test_trouble_with_what_was_commanded_ahead_spoils_no_word(trouble: str, eight: bool) -> None:
+def test_failures_of_look_ahead_reads_corrupt_no_word(trouble: str, eight: bool) -> None:
     eeprom = Eeprom(ONE_LONG_CATEGORY, eight=eight)
     getattr(eeprom, trouble).update(range(3, 200, 5))
     assert play(read_image(STATION), eeprom)[:-2] == ONE_LONG_CATEGORY[:628]
 
 
-def test_an_eeprom_busy_for_ever_ends_in_time() -> None:
+def test_an_eeprom_that_stays_busy_times_out() -> None:
     eeprom = Eeprom(bytes(128), eight=False, busy_for=1_000_000)
     with pytest.raises(EepromError, match="busy"):
         play(read_image(STATION), eeprom, steps=1000)

@@ -1,4 +1,4 @@
-"""How large an EEPROM is, also where its image lies or never ends."""
+"""Size of an EEPROM, also with faulty images."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ import catenary as cat
 from catenary.procedure.exchange import Reply, Request
 from catenary.procedure.sii_size import Extent, read_extent
 from catenary.wire.sii import MAXIMUM_SIZE, Header
-from tests.procedure.by_hand import STATION, play
+from tests.procedure.player import STATION, play
 
 
 def eeprom(image: bytes, *, two_byte_address: bool = False) -> Callable[[Request], Reply]:
-    """A controller before an EEPROM that is always ready; reads wrap round at its end."""
+    """Return a controller with an EEPROM that is always ready. Reads wrap around at its end."""
     address = 0
 
     def answer(request: Request) -> Reply:
@@ -40,27 +40,27 @@ def main() -> Iterator[cat.MainDevice]:
         yield main
 
 
-def test_the_header_says_it(main: cat.MainDevice) -> None:
+def test_size_in_the_header(main: cat.MainDevice) -> None:
     assert main.converse(read_extent(main.passive_scan()[1].station)) == Extent(2048, MAXIMUM_SIZE)
 
 
-def test_a_header_that_claims_more_than_its_controller_addresses() -> None:
+def test_a_size_beyond_the_address_range_is_limited() -> None:
     extent = play(read_extent(STATION), eeprom(header(64) + b"\xff" * 1920))
     assert (extent.size, extent.limit) == (2048, 2048)
     assert "its header specifies 8192 bytes" in extent.note
 
 
-def test_an_emulated_eeprom_does_not_begin_anew_though_it_shows_one_address_byte() -> None:
+def test_an_emulated_eeprom_does_not_wrap() -> None:
     extent = play(read_extent(STATION), eeprom(header(64) + b"\xff" * (8192 - 128)))
     assert extent == Extent(8192, MAXIMUM_SIZE)
 
 
-def test_two_address_bytes_reach_further() -> None:
+def test_two_address_bytes_extend_the_range() -> None:
     image = header(64) + b"\xff" * 1920
     assert play(read_extent(STATION), eeprom(image, two_byte_address=True)).size == 8192
 
 
-def test_a_wrong_checksum_leaves_the_end_mark() -> None:
+def test_with_a_wrong_checksum_the_end_mark_gives_the_size() -> None:
     image = bytearray(header(16) + b"\x0a\x00\x02\x00abcd" + b"\xff" * 1912)
     image[14] ^= 1
     extent = play(read_extent(STATION), eeprom(bytes(image)))

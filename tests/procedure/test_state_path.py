@@ -1,4 +1,4 @@
-"""Which states lie between two."""
+"""Intermediate states of a state change."""
 
 from __future__ import annotations
 

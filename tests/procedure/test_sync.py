@@ -1,4 +1,4 @@
-"""SYNC signals, by hand."""
+"""SYNC signals of simulated clocks."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ from catenary.procedure.clocks import align, measure
 from catenary.procedure.exchange import Reply, Request
 from catenary.procedure.sync import bring_together, start, stop
 from catenary.wire.datagram import EcatCommand
-from tests.procedure.by_hand import play
 from tests.procedure.clock_line import LONG, NONE, SHORT, ClockLine, ClockModel
+from tests.procedure.player import play
 
 PERIOD_NS = 1_000_000
 SYNC0 = SyncPlan(0x0300, PERIOD_NS, 0, 0)
@@ -30,7 +30,7 @@ def number(segment: ClockLine, position: int, address: int, size: int) -> int:
     return int.from_bytes(registers[address : address + size], "little")
 
 
-def test_all_are_told_one_beat_each_with_its_shift() -> None:
+def test_all_devices_get_one_start_time_plus_their_shift() -> None:
     segment = aligned(LONG, NONE, LONG, SHORT)
     devices = segment.descriptions()
     syncs = {2: SYNC0, 3: SHIFTED}
@@ -45,7 +45,7 @@ def test_all_are_told_one_beat_each_with_its_shift() -> None:
 
 
 def test_the_order_is_stop_cycle_start_time_activation() -> None:
-    """ETG.1020: a start time is taken while the unit is off, and counts from the activation."""
+    """ETG.1020: the start time is written while the unit is off, and counts from activation on."""
     segment = aligned(LONG, LONG)
     devices = segment.descriptions()
     segment.clocks[1].written.clear()
@@ -53,14 +53,14 @@ def test_the_order_is_stop_cycle_start_time_activation() -> None:
     assert [address for address, _ in segment.clocks[1].written] == [0x981, 0x9A0, 0x990, 0x980]
 
 
-def test_everything_before_the_cycle_in_one() -> None:
+def test_complete_clock_set_up() -> None:
     segment = ClockLine(ClockModel(LONG), ClockModel(LONG, zero=12345))
     measured = play(bring_together(segment.descriptions(), {1: SYNC0}, 0, 0, burst=10), segment)
     assert measured.first == 0
     assert number(segment, 1, 0x0980, 2) == 0x0300
 
 
-def test_telling_takes_too_long() -> None:
+def test_a_start_time_written_too_late_is_an_error() -> None:
     segment = aligned(LONG, LONG)
     devices = segment.descriptions()
 
@@ -69,13 +69,11 @@ def test_telling_takes_too_long() -> None:
             segment.now += 200_000_000
         return segment(request)
 
-    with pytest.raises(
-        ClockError, match=r"took longer than the 1[0-9]+ ms until it, in 3 attempts"
-    ):
+    with pytest.raises(ClockError, match=r"in 3 attempts, writing took longer than 1[0-9]+ ms"):
         play(start(devices, {1: SYNC0}, devices[0], 0), slow)
 
 
-def test_a_device_that_is_gone() -> None:
+def test_a_lost_device_is_an_error() -> None:
     segment = aligned(LONG, LONG)
     devices = segment.descriptions()
     segment.dead.add(1)

@@ -1,4 +1,4 @@
-"""Functions of tasks: processes import them by name."""
+"""Functions of tasks; processes import them by name."""
 
 from __future__ import annotations
 
@@ -22,13 +22,13 @@ def spend(task: Running, seconds: float) -> None:
 
 
 def note(task: Running, notes: Queue) -> None:
-    """What it sees of every job: its number, its release and now, in ns."""
+    """Put the number, the release time and the current time [ns] of every job."""
     for job in task:
         notes.put([job.number, job.release_ns, task.now_ns])
 
 
 def spend_and_note(task: Running, seconds: float, notes: Queue) -> None:
-    """Notes the end of every job."""
+    """Spend time in every job, and put its end time."""
     for job in task:
         task.spend(seconds)
         notes.put([job.number, job.release_ns, task.now_ns])
@@ -52,7 +52,7 @@ def fail_always(task: Running) -> None:
 
 
 def hang_at(task: Running, number: int, there: Value) -> None:
-    """Waits in mid-job, for somebody to kill it; once: its successor goes on."""
+    """Hang in one job until the process is killed. The restarted task continues normally."""
     for job in task:
         if job.number == number and there.number == 0:
             there.write(os.getpid())
@@ -67,7 +67,7 @@ def ignore_the_end(task: Running, there: Value) -> None:
 
 
 def leave_a_trace(task: Running, path: str, there: Value) -> None:
-    """Never waits; says that it could clean up."""
+    """Run without waiting, and write a file in a `finally` block."""
     try:
         there.write(os.getpid())
         while True:
@@ -97,7 +97,7 @@ def set_then_spend(task: Running, alarm: Signal, seconds: float) -> None:
 
 
 def write_forever(task: Running, value: Value) -> None:
-    """Every array holds one number only, as far as it is whole."""
+    """Write arrays whose elements are all equal."""
     import numpy as np
 
     for _job in task:

@@ -1,4 +1,4 @@
-"""Response-time analysis: published examples, the rules at its edges, and the simulator's word."""
+"""Response-time analysis: published examples, limits, and comparison with the simulation."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ MS = 1e-3
 
 
 def responses(*demands: Demand) -> list[float | None]:
-    """[ms], in the order given."""
+    """Return the responses [ms] in the given order."""
     found = {response.name: response.response for response in analyse(demands).responses}
     times = [found[demand.name] for demand in demands]
     return [None if time is None else round(time / MS, 6) for time in times]
 
 
 def demand(name: str, period: float, execution: float, **more: float) -> Demand:
-    """Times in [ms]."""
+    """Return a demand with times in [ms]."""
     given = {
         key: value if key in ("priority", "cpu") else value * MS for key, value in more.items()
     }
@@ -57,8 +57,8 @@ def test_blocking_is_added_once():
     ) == [5, 8]
 
 
-def test_jitter_of_the_higher_brings_its_releases_together():
-    """Released at 4 (late) and 5: two jobs of `a` in a window of 6."""
+def test_jitter_of_a_higher_priority():
+    """Two jobs of `a` are released at 4 (late) and 5, in a window of 6."""
     assert responses(demand("a", 5, 1, priority=2, jitter=4), demand("b", 20, 2, priority=1)) == [
         5,
         4,
@@ -79,7 +79,7 @@ def test_a_response_equal_to_the_deadline_is_in_time():
     assert analyse([demand("a", 10, 3, priority=2), demand("b", 20, 5, priority=1, deadline=8)])
 
 
-def test_equal_priorities_count_for_each_other():
+def test_equal_priorities_delay_each_other():
     assert responses(demand("a", 10, 3, priority=1), demand("b", 10, 4, priority=1)) == [7, 7]
 
 
@@ -87,17 +87,17 @@ def test_full_load_has_a_bound():
     assert responses(demand("a", 2, 1, priority=2), demand("b", 4, 2, priority=1)) == [1, 4]
 
 
-def test_full_load_with_blocking_ends_its_search_and_has_a_bound():
+def test_full_load_with_blocking_has_a_bound():
     assert responses(
         demand("a", 2, 1, priority=2), demand("b", 4, 2, priority=1, blocking=1, deadline=9)
     ) == [1, 6]
 
 
-def test_overload_has_none():
+def test_overload_has_no_bound():
     assert responses(demand("a", 2, 1, priority=2), demand("b", 4, 2.001, priority=1)) == [1, None]
 
 
-def test_without_priorities_the_shorter_deadline_goes_first():
+def test_default_priorities_are_deadline_monotonic():
     verdict = analyse([demand("slow", 20, 1), demand("a", 50, 1, deadline=5), demand("b", 10, 1)])
     assert [(one.name, one.priority) for one in verdict.responses] == [
         ("a", 3),
@@ -106,7 +106,7 @@ def test_without_priorities_the_shorter_deadline_goes_first():
     ]
 
 
-def test_processors_are_apart():
+def test_processors_are_independent():
     assert responses(
         demand("a", 10, 6, priority=2, cpu=0),
         demand("b", 10, 6, priority=1, cpu=1),
@@ -142,19 +142,19 @@ def test_refuses(demands, words):
         {"jitter": -1.0},
     ],
 )
-def test_refuses_times_that_cannot_be(wrong):
+def test_refuses_invalid_times(wrong):
     with pytest.raises(ValueError, match=f"task 'a': .*{next(iter(wrong))}"):
         Demand(**({"name": "a", "period": 1.0, "execution": 0.1} | wrong))
 
 
-def test_a_hyperperiod_beyond_all_numbers_is_infinite():
+def test_a_hyperperiod_beyond_the_range_of_a_float_is_infinite():
     odd = [Demand(name=str(n), period=1 + n * 1e-9, execution=1e-3) for n in range(1, 90)]
     verdict = analyse(odd)
     assert verdict.hyperperiod == math.inf
     assert verdict.schedulable
 
 
-def test_reads_well():
+def test_verdict_as_text():
     text = str(analyse([demand("a", 2, 1, priority=2), demand("b", 4, 3, priority=1)]))
     assert text.splitlines()[1].split() == ["a", "2", "2.000", "1.000", "2.000", "1.000"]
     assert text.splitlines()[2].split()[-2:] == ["unbounded", "MISSED"]
@@ -163,12 +163,14 @@ def test_reads_well():
 
 @st.composite
 def task_sets(draw: st.DrawFn) -> list[Demand]:
-    """Harmonic or not, with ties, deadlines up to twice the period; load below 1."""
+    """Generate task sets with a load below 1 and deadlines up to twice the period."""
     periods = draw(st.lists(st.sampled_from([4, 5, 6, 8, 10, 12, 20]), min_size=1, max_size=4))
     demands = []
     for number, period in enumerate(periods):
         share = draw(st.floats(0.02, 1.0)) / len(periods)
-        execution = max(math.floor(period * share * 1e3) / 1e3, 0.001)  # down: 1 at most in sum
+        execution = max(
+            math.floor(period * share * 1e3) / 1e3, 0.001
+        )  # rounded down, so that the load is at most 1
         priority = draw(st.integers(1, 4))
         demands.append(
             demand(str(number), period, execution, priority=priority, deadline=2 * period)
@@ -177,7 +179,7 @@ def task_sets(draw: st.DrawFn) -> list[Demand]:
 
 
 def simulate(demands: list[Demand], seconds: float) -> dict[str, float]:
-    """The longest response of each, all released together, on one processor."""
+    """Return the longest simulated responses of tasks released together on one processor."""
     tasks = [
         Task(
             spend,
@@ -196,7 +198,7 @@ def simulate(demands: list[Demand], seconds: float) -> dict[str, float]:
 
 @given(task_sets())
 @settings(max_examples=25)
-def test_the_simulation_never_responds_later_than_the_analysis_says(demands):
+def test_the_analysis_bounds_the_simulation(demands):
     verdict = analyse(demands)
     simulated = simulate(demands, 2 * verdict.hyperperiod)
     for one in verdict.responses:
@@ -206,8 +208,8 @@ def test_the_simulation_never_responds_later_than_the_analysis_says(demands):
 
 @given(task_sets())
 @settings(max_examples=25)
-def test_released_together_the_worst_case_happens(demands):
-    """Where priorities differ: the critical instant is the first release, Liu and Layland 1973."""
+def test_a_common_release_is_the_worst_case(demands):
+    """If priorities differ, the critical instant is the first release, Liu and Layland 1973."""
     apart = [
         Demand(
             name=one.name,

@@ -1,4 +1,4 @@
-"""Children: they speak, end when told to, and end with their parent."""
+"""Child processes: output, end on request, and end with the parent."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ import pytest
 
 from catenary.realtime.child import start_program, start_python
 
-STUBBORN = """
+IGNORES_SIGTERM = """
 import signal, sys, time
 signal.signal(signal.SIGTERM, signal.SIG_IGN)
 print("ready", flush=True)
@@ -35,7 +35,7 @@ def script(tmp_path):
     return write
 
 
-def test_a_script_runs_in_a_session_of_its_own_with_its_arguments(script):
+def test_a_script_runs_in_its_own_session_with_its_arguments(script):
     with start_python([script(WAITING), "--one", "two"]) as child:
         line = child.read_line(20.0)
         assert line == f"{child.pid} {child.pid} --one two"
@@ -43,41 +43,41 @@ def test_a_script_runs_in_a_session_of_its_own_with_its_arguments(script):
     assert not child.running
 
 
-def test_a_module_runs_as_with_m():
+def test_run_a_module():
     with start_python(["-m", "platform", "terse"]) as child:
         assert "Linux" in (child.read_line(20.0) or "")
 
 
-def test_a_program_runs():
+def test_run_a_program():
     with start_program(["sh", "-c", "echo $1", "sh", "spoken"]) as child:
         assert child.read_line(20.0) == "spoken"
 
 
-def test_output_ends_with_the_child():
+def test_the_output_ends_with_the_child():
     with start_program(["sh", "-c", "echo a; echo b"]) as child:
         assert [child.read_line(20.0) for _ in range(3)] == ["a", "b", None]
 
 
-def test_silence_is_waited_for_no_longer_than_asked(script):
+def test_read_line_times_out(script):
     with start_python([script(WAITING)]) as child:
         child.read_line(20.0)
         assert child.read_line(0.0) is None
 
 
-def test_is_ended_by_sigterm(script):
+def test_end_by_sigterm(script):
     child = start_python([script(WAITING)])
     child.read_line(20.0)
     assert child.end() == -signal.SIGTERM
     assert child.end() == -signal.SIGTERM
 
 
-def test_a_stubborn_child_is_killed(script):
-    child = start_python([script(STUBBORN)])
+def test_a_child_that_ignores_sigterm_is_killed(script):
+    child = start_python([script(IGNORES_SIGTERM)])
     assert child.read_line(20.0) == "ready"
     assert child.end(0.05) == -signal.SIGKILL
 
 
-def test_ends_with_its_parent_however_that_ends(script):
+def test_a_child_ends_with_its_parent(script):
     parent = (
         "from catenary.realtime.child import start_python; import sys, time\n"
         "child = start_python([sys.argv[1]])\n"

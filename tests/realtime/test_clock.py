@@ -1,4 +1,4 @@
-"""Virtual time: fixed priorities, preemption, lockstep; threads and processes alike."""
+"""Virtual time: fixed priorities, preemption and lockstep of threads and processes."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def records(queue: Queue) -> list[list[int]]:
 
 
 def run_threads(clock: VirtualClock, until: int, *bodies: tuple[Participant, Callable]) -> None:
-    """Runs bodies in lockstep; the clock's own thread waits until `until`."""
+    """Run bodies in lockstep. The thread of the clock waits until `until`."""
     threads = [threading.Thread(target=leaving, args=body) for body in bodies]
     for thread in threads:
         thread.start()
@@ -40,7 +40,7 @@ def leaving(participant: Participant, body: Callable[[Participant], None]) -> No
     participant.leave()
 
 
-def test_time_passes_only_while_all_wait():
+def test_time_advances_only_while_all_wait():
     with VirtualClock() as clock:
         assert clock.now_ns == 0
         assert clock.wait_until(5 * MS)
@@ -49,7 +49,7 @@ def test_time_passes_only_while_all_wait():
         assert clock.now_ns == 255 * MS
 
 
-def test_a_deadline_that_has_passed_is_not_waited_for():
+def test_a_passed_deadline_returns_immediately():
     with VirtualClock() as clock:
         clock.wait_until(5 * MS)
         assert clock.wait_until(MS)
@@ -72,11 +72,11 @@ def raise_signalled(number, frame):
     raise SignalledError
 
 
-def test_a_signal_that_does_not_end_the_sleep_is_seen_nevertheless():
-    """It comes just before the sleep, or, as here, to another thread: nothing is interrupted."""
+def test_a_signal_to_another_thread_is_handled():
+    """The signal arrives at another thread, so that it does not interrupt the sleep."""
 
     def send() -> None:
-        pause.wait(0.05)  # the wait has begun; if it has not, the signal is seen all the same
+        pause.wait(0.05)  # the wait has usually begun; the test passes in either case
         signal.pthread_kill(threading.get_ident(), signal.SIGUSR1)
 
     pause, rescued = threading.Event(), threading.Event()
@@ -96,8 +96,8 @@ def test_a_signal_that_does_not_end_the_sleep_is_seen_nevertheless():
     assert not rescued.is_set()
 
 
-def test_the_higher_priority_preempts():
-    """Low spends 10 ms from 0; high needs 3 ms at 4: low is done at 13."""
+def test_a_higher_priority_preempts():
+    """Low spends 10 ms from 0, and high spends 3 ms from 4, so low ends at 13."""
     seen = []
 
     def low(participant):
@@ -119,8 +119,8 @@ def test_the_higher_priority_preempts():
     assert seen == [("high", 7), ("low", 13)]
 
 
-def test_equals_are_served_in_the_order_of_their_release():
-    """The one released later waits, however long the other takes: SCHED_FIFO."""
+def test_equal_priorities_run_in_the_order_of_release():
+    """The participant released later waits until the other one has ended (SCHED_FIFO)."""
     seen = []
 
     def body(name: str, start: int) -> Callable[[Participant], None]:
@@ -137,7 +137,7 @@ def test_equals_are_served_in_the_order_of_their_release():
     assert seen == [("first", 6), ("second", 11)]
 
 
-def test_processors_spend_side_by_side():
+def test_processors_run_in_parallel():
     seen = []
 
     def body(participant):
@@ -173,17 +173,17 @@ def test_a_job_that_ends_when_another_is_released_is_not_preempted():
     assert seen == [("low", 4), ("high", 7)]
 
 
-def test_sixty_four_take_part_and_no_more():
+def test_at_most_64_participants():
     with VirtualClock() as clock:
         places = [clock.participate() for _ in range(63)]
-        with pytest.raises(ValueError, match="room for 64"):
+        with pytest.raises(ValueError, match="all 64 slots"):
             clock.participate()
         places[7].leave()
         assert clock.participate().timer.slot == places[7].timer.slot
 
 
-def test_compiled_code_sees_the_same_clock():
-    """The table of native/clock.h: version, flags, self, now."""
+def test_the_capsule_for_compiled_code():
+    """The capsule contains the table of native/clock.h."""
 
     class Table(ctypes.Structure):
         _fields_ = (
@@ -205,7 +205,7 @@ def test_compiled_code_sees_the_same_clock():
         assert table.now(table.self) == clock.now_ns == 5 * MS
 
 
-def test_a_clock_goes_to_another_process_only_with_its_task():
+def test_a_participant_can_only_be_passed_to_a_new_process():
     context = multiprocessing.get_context("spawn")
     with (
         VirtualClock() as clock,
@@ -215,7 +215,7 @@ def test_a_clock_goes_to_another_process_only_with_its_task():
 
 
 @pytest.mark.parametrize("run", ["threads", "processes"])
-def test_two_runs_are_alike_to_the_bit(run):
+def test_runs_are_deterministic(run):
     def once() -> list[list[list[int]]]:
         queues = [Queue("i8", 3, length=1000) for _ in range(3)]
         tasks = [
@@ -248,8 +248,8 @@ def test_threads_and_processes_give_the_same_schedule():
     assert responses("threads") == responses("processes")
 
 
-def test_a_signal_releases_at_the_instant_it_is_set():
-    """`low` signals in mid-job, at 2 ms; the sporadic task is higher and preempts it there."""
+def test_a_signal_releases_its_task_immediately():
+    """`low` sets the signal at 2 ms. The sporadic task has a higher priority and preempts it."""
     alarm, notes = Signal(), Queue("i8", 3, length=10)
     tasks = [
         Task(set_then_spend, (alarm, 4e-3), name="low", period=10e-3, priority=1),

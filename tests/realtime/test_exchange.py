@@ -1,4 +1,4 @@
-"""Values and queues: whole, in order, counted; across processes, and across their deaths."""
+"""Values and queues between tasks and processes, even if processes are killed."""
 
 from __future__ import annotations
 
@@ -26,17 +26,17 @@ def test_a_value_is_zeros_until_it_is_written():
     assert value.read().tolist() == [0.0, 1.0, 2.0]
 
 
-def test_silence_counts_looks_without_news_once_there_was_some():
+def test_silence_counts_calls_without_a_new_value():
     value = Value("f8")
     silence = Silence(value)
     assert [silence.look() for _ in range(3)] == [0, 0, 0]
     value.write(1.0)
     assert [silence.look() for _ in range(3)] == [0, 1, 2]
-    value.write(1.0)  # the same again is news
+    value.write(1.0)  # an equal value is new, too
     assert [silence.look() for _ in range(2)] == [0, 1]
 
 
-def test_a_value_may_be_a_single_number_or_a_structure():
+def test_a_value_can_be_a_scalar_or_a_structure():
     single = Value("i4")
     single.write(7)
     assert single.read() == 7
@@ -46,7 +46,7 @@ def test_a_value_may_be_a_single_number_or_a_structure():
 
 
 @pytest.mark.parametrize("wrong", [[1.0, 2.0], [[1.0, 2.0, 3.0]], 1.0, ["a", "b", "c"]])
-def test_what_does_not_fit_is_refused(wrong):
+def test_arrays_of_another_form_are_refused(wrong):
     value, queue = Value("f8", 3), Queue("f8", 3, length=2)
     for use in (value.write, queue.put):
         with pytest.raises(ValueError, match=r"float64 of shape \(3,\)"):
@@ -58,7 +58,7 @@ def test_what_does_not_fit_is_refused(wrong):
     ("make", "error", "words"),
     [
         (lambda: Value("O"), TypeError, "Python objects"),
-        (lambda: Value("f8", 0), ValueError, "no bytes"),
+        (lambda: Value("f8", 0), ValueError, "a size of 0 bytes"),
         (lambda: Queue("f8", length=0), ValueError, "length of 0 records"),
         (lambda: Queue("f8", length=4, full="wait"), ValueError, '"refuse" or "overwrite"'),
     ],
@@ -68,14 +68,14 @@ def test_refuses(make, error, words):
         make()
 
 
-def test_a_full_queue_refuses_the_newest_and_counts():
+def test_a_full_queue_refuses_and_counts_the_newest():
     queue = Queue("i8", length=3)
     assert [queue.put(k) for k in range(5)] == [True, True, True, False, False]
     assert (len(queue), queue.refused, queue.lost) == (3, 2, 0)
     assert [queue.take() for _ in range(4)] == [0, 1, 2, None]
 
 
-def test_a_full_queue_overwrites_the_oldest_where_asked():
+def test_a_full_queue_can_overwrite_the_oldest():
     queue = Queue("i8", length=3, full="overwrite")
     assert all(queue.put(k) for k in range(5))
     assert [queue.take() for _ in range(4)] == [2, 3, 4, None]
@@ -83,8 +83,8 @@ def test_a_full_queue_overwrites_the_oldest_where_asked():
 
 
 @given(st.lists(st.booleans(), max_size=60), st.sampled_from(["refuse", "overwrite"]))
-def test_a_queue_is_a_queue(steps, full):
-    """Against a list: True puts the next number, False takes one."""
+def test_a_queue_keeps_the_order(steps, full):
+    """Compare with a list. True puts the next number, False takes one."""
     queue, model, number = Queue("i8", length=4, full=full), [], 0
     for put in steps:
         if not put:
@@ -99,7 +99,7 @@ def test_a_queue_is_a_queue(steps, full):
 
 
 def in_a_thread(call) -> list[object]:
-    """What the call returned or raised there; the thread lives until it is looked at."""
+    """Return the result or the exception of a call in another thread, which still runs."""
     found, done, looked = [], threading.Event(), threading.Event()
 
     def body() -> None:
@@ -118,29 +118,31 @@ def in_a_thread(call) -> list[object]:
     return found
 
 
-def test_one_writer_one_producer_one_consumer():
+def test_only_one_writer_producer_and_consumer():
     value, queue = Value("i8"), Queue("i8", length=4)
     value.write(1)
     queue.put(1)
     queue.take()
-    again = copy.copy(value), copy.copy(queue)  # as another task has them
+    again = copy.copy(value), copy.copy(queue)  # as in another task
     assert "already has a writer" in str(in_a_thread(lambda: again[0].write(2)))
     assert "already has a producer" in str(in_a_thread(lambda: again[1].put(2)))
     assert "already has a consumer" in str(in_a_thread(again[1].take))
 
 
-def test_the_successor_of_a_writer_that_died_may_write():
+def test_a_new_writer_replaces_one_that_ended():
     value = Value("i8")
     [writer] = in_a_thread(lambda: value.write(1) or threading.get_native_id())
-    while os.path.exists(f"/proc/{writer}"):  # Python's join returns a little before its end
+    while os.path.exists(
+        f"/proc/{writer}"
+    ):  # Python's join returns slightly before the thread ends
         threading.Event().wait(0.001)
     successor = copy.copy(value)
     successor.write(2)
     assert successor.read() == 2
 
 
-def test_read_while_written_by_another_process_and_after_its_death():
-    """Every array that is read holds one number: none is torn, also not by SIGKILL in mid-write."""
+def test_read_a_value_of_another_process_that_is_killed():
+    """All elements of each array are equal, even after SIGKILL during a write."""
     value = Value("f8", 512)
     task = Task(write_forever, (value,), period=1e-3, on_failure="continue")
     with Tasks(task, workers="processes") as tasks:
@@ -153,13 +155,13 @@ def test_read_while_written_by_another_process_and_after_its_death():
         tasks.join(10.0)
     last = value.read()
     assert last.min() == last.max() == value.number
-    value.write(np.zeros(512))  # whose writer is dead
+    value.write(np.zeros(512))  # the previous writer was killed
     assert value.read().max() == 0.0
 
 
 @pytest.mark.parametrize("full", ["refuse", "overwrite"])
-def test_taken_while_put_by_another_process_and_after_its_death(full):
-    """Records are whole and in order; what is missing was counted."""
+def test_take_records_of_another_process_that_is_killed(full):
+    """Records are complete and in order, and missing records are counted."""
     queue = Queue("f8", 64, length=8, full=full)
     task = Task(put_forever, (queue,), period=1e-3, on_failure="continue")
     taken, last = 0, 0.0
@@ -177,4 +179,4 @@ def test_taken_while_put_by_another_process_and_after_its_death(full):
         last, taken = float(record[0]), taken + 1
     if full == "overwrite":
         assert taken + queue.lost == last
-    assert queue.put(np.zeros(64))  # whose producer is dead
+    assert queue.put(np.zeros(64))  # the previous producer was killed

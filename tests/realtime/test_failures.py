@@ -1,5 +1,4 @@
-"""Tasks that fail: they raise, are killed in mid-cycle, do not end, cannot be started: with real
-processes and real kills."""
+"""Failures of tasks: exceptions, killed processes, tasks that do not end or cannot be started."""
 
 from __future__ import annotations
 
@@ -30,14 +29,14 @@ BOTH = pytest.mark.parametrize("run", ["threads", "processes"])
 
 
 def wait_for(value: Value, tasks: Tasks) -> int:
-    """Until a task has written it; its deadline is the task's own."""
+    """Wait until a task has written the value."""
     while value.number == 0:
         tasks.join(0.01)
     return int(value.read())
 
 
 @BOTH
-def test_a_task_that_raises_stops_all_and_is_named(run):
+def test_an_exception_stops_all_tasks(run):
     tasks = [
         Task(bodies.fail_at, (2,), name="bad", period=2e-3),
         Task(bodies.idle, name="good", period=1e-3),
@@ -55,7 +54,7 @@ def test_a_task_that_raises_stops_all_and_is_named(run):
 
 
 @BOTH
-def test_continue_goes_on_without_it(run):
+def test_on_failure_continue(run):
     tasks = [
         Task(bodies.fail_at, (0,), name="bad", period=2e-3, on_failure="continue"),
         Task(bodies.count_to, (20,), name="good", period=2e-3),
@@ -67,14 +66,14 @@ def test_continue_goes_on_without_it(run):
 
 
 @BOTH
-def test_restarted_too_often_it_stops_all(run):
+def test_too_many_restarts_stop_all_tasks(run):
     task = Task(bodies.fail_always, name="bad", period=1e-3, on_failure="restart")
     with pytest.raises(TaskError, match="the sum"), Tasks(task, workers=run) as running:
         running.join(30.0)
-    assert len(running.failures) == 4  # the first, and three restarts
+    assert len(running.failures) == 4  # the first failure and three restarts
 
 
-def test_killed_in_mid_cycle_the_error_says_which_and_when():
+def test_the_error_of_a_killed_task_names_the_job_and_time():
     there = Value("i8")
     tasks = [
         Task(bodies.hang_at, (3, there), name="victim", period=2e-3),
@@ -91,7 +90,7 @@ def test_killed_in_mid_cycle_the_error_says_which_and_when():
     assert not running["other"].running
 
 
-def test_killed_in_mid_cycle_it_is_restarted_at_a_release_and_its_figures_go_on():
+def test_a_killed_task_restarts_and_keeps_its_statistics():
     there = Value("i8")
     task = Task(bodies.hang_at, (3, there), name="victim", period=2e-3, on_failure="restart")
     other = Task(bodies.idle, name="other", period=2e-3)
@@ -104,11 +103,11 @@ def test_killed_in_mid_cycle_it_is_restarted_at_a_release_and_its_figures_go_on(
         assert [failure.exit_code for failure in running.failures] == [-signal.SIGKILL]
         assert running["other"].running
         statistics = running["victim"].statistics
-    assert statistics.skipped > 0  # while there was nobody
-    assert statistics.response.count >= statistics.jobs - 2  # the one it died in has no end
+    assert statistics.skipped > 0  # while the task did not run
+    assert statistics.response.count >= statistics.jobs - 2  # the interrupted job has no end
 
 
-def test_killed_on_a_virtual_clock_time_goes_on_without_it():
+def test_virtual_time_advances_after_a_task_is_killed():
     there, notes = Value("i8"), Queue("i8", 3, length=100)
     tasks = [
         Task(bodies.hang_at, (1, there), name="victim", period=10e-3, on_failure="continue"),
@@ -124,13 +123,13 @@ def test_killed_on_a_virtual_clock_time_goes_on_without_it():
         pause = threading.Event()
         thread = threading.Thread(target=kill)
         thread.start()
-        running.join(50e-3)  # time stands while the victim hangs in its job
+        running.join(50e-3)  # time stands still while the task hangs in its job
         thread.join()
         assert [failure.task for failure in running.failures] == ["victim"]
     assert [release // MS for _, release, _ in records(notes)] == [0, 10, 20, 30, 40]
 
 
-def test_a_process_that_does_not_end_is_ended_by_force_and_named():
+def test_a_process_that_does_not_end_is_killed():
     there = Value("i8")
     task = Task(bodies.ignore_the_end, (there,), name="deaf", period=1e-3)
     running = Tasks(task, workers="processes")
@@ -141,7 +140,7 @@ def test_a_process_that_does_not_end_is_ended_by_force_and_named():
     assert not running["deaf"].running
 
 
-def test_a_process_that_never_waits_can_clean_up_when_it_is_ended(tmp_path):
+def test_a_process_that_never_waits_can_clean_up_on_sigterm(tmp_path):
     there, trace = Value("i8"), tmp_path / "trace"
     task = Task(bodies.leave_a_trace, (str(trace), there), name="deaf", period=1e-3)
     running = Tasks(task, workers="processes")
@@ -167,7 +166,7 @@ if __name__ == "__main__":
 """
 
 
-def test_tasks_end_with_their_parent_however_that_ends(tmp_path):
+def test_tasks_end_with_their_parent(tmp_path):
     script, trace = tmp_path / "parent.py", tmp_path / "trace"
     script.write_text(PARENT)
     parent = subprocess.Popen(
@@ -184,13 +183,13 @@ def test_tasks_end_with_their_parent_however_that_ends(tmp_path):
     assert trace.read_text() == "cleaned up"
 
 
-def test_arguments_that_cannot_be_handed_over_are_an_error():
+def test_arguments_that_cannot_be_pickled_are_an_error():
     task = Task(bodies.spend, (lambda: 1,), name="a", period=1e-3)
     with pytest.raises(TaskError, match=r"task 'a'.*could not be started"):
         Tasks(task, workers="processes").start()
 
 
-def test_priorities_that_are_refused_are_an_error_that_says_how_to_get_them(monkeypatch):
+def test_a_refused_priority_is_an_error_with_a_hint(monkeypatch):
     def refuse(*_: object) -> None:
         raise PermissionError(1, "Operation not permitted")
 
@@ -207,8 +206,8 @@ def test_priorities_that_are_refused_are_an_error_that_says_how_to_get_them(monk
         assert "SCHED_FIFO 50 refused" in str(running)
 
 
-def test_killed_at_any_instant_the_others_go_on():
-    """Ten deaths while processes hand virtual time to one another thousands of times a second."""
+def test_other_tasks_continue_after_random_kills():
+    """Kill a task ten times while processes pass the turn thousands of times per second."""
     tasks = [
         Task(bodies.spend, (10e-6,), name="victim", period=50e-6, on_failure="continue"),
         Task(bodies.spend, (10e-6,), name="other", period=70e-6, on_failure="continue"),
@@ -244,7 +243,7 @@ if __name__ == "__main__":
 
 @BOTH
 @pytest.mark.parametrize("clock", ["virtual", "machine"])
-def test_ctrl_c_ends_all(run, clock, tmp_path):
+def test_ctrl_c_ends_all_tasks(run, clock, tmp_path):
     script = tmp_path / "interrupted.py"
     script.write_text(INTERRUPTED)
     process = subprocess.Popen(
@@ -256,7 +255,9 @@ def test_ctrl_c_ends_all(run, clock, tmp_path):
     )
     assert process.stdout is not None
     assert process.stdout.readline() == "ready\n"
-    os.killpg(process.pid, signal.SIGINT)  # as a terminal does: the tasks' processes get it too
+    os.killpg(
+        process.pid, signal.SIGINT
+    )  # like a terminal, which also signals the processes of the tasks
     out, _ = process.communicate(timeout=30.0)
     assert out == "stopped False ()\n"
 
@@ -268,7 +269,7 @@ def test_a_thread_that_cannot_be_started_is_an_error():
 
 
 @BOTH
-def test_restarted_on_a_virtual_clock_it_takes_its_place_again(run):
+def test_a_restarted_task_keeps_its_slot_on_the_virtual_clock(run):
     notes = Queue("i8", 3, length=100)
     tasks = [
         Task(bodies.fail_at, (1,), name="bad", period=10e-3, priority=9, on_failure="restart"),
@@ -282,7 +283,7 @@ def test_restarted_on_a_virtual_clock_it_takes_its_place_again(run):
     assert [release // MS for _, release, _ in records(notes)] == [0, 10, 20, 30, 40]
 
 
-def test_a_session_that_is_refused_leaves_nothing_started(monkeypatch):
+def test_a_refused_session_starts_no_task(monkeypatch):
     def refuse(*_: object) -> None:
         raise PermissionError(1, "Operation not permitted")
 
@@ -292,14 +293,14 @@ def test_a_session_that_is_refused_leaves_nothing_started(monkeypatch):
         task = Task(bodies.idle, period=1e-3)
         with pytest.raises(RealtimeError, match=r"locked memory refused .*not permitted"):
             Tasks(task, workers="threads", clock=clock, session=session()).start()
-        assert clock.wait_until(MS)  # nobody is waited for
+        assert clock.wait_until(MS)  # no participant is left
     assert sys.getswitchinterval() == interval
 
 
-def test_more_tasks_than_a_virtual_clock_has_places_leave_it_as_it_was():
+def test_too_many_tasks_leave_the_virtual_clock_unchanged():
     tasks = [Task(bodies.idle, name=str(number), period=1e-3) for number in range(64)]
     with VirtualClock() as clock:
-        with pytest.raises(ValueError, match="room for 64"):
+        with pytest.raises(ValueError, match="all 64 slots"):
             Tasks(*tasks, workers="threads", clock=clock).start()
         assert clock.wait_until(MS)
         with Tasks(*tasks[:63], workers="threads", clock=clock) as running:
@@ -307,7 +308,7 @@ def test_more_tasks_than_a_virtual_clock_has_places_leave_it_as_it_was():
         assert sum(handle.statistics.jobs for handle in running) == 126
 
 
-def test_a_thread_that_does_not_end_is_named():
+def test_a_thread_that_does_not_end_is_reported():
     event = threading.Event()
     running = Tasks(Task(bodies.wait_for_event, (event,), name="deaf", period=1e-3))
     running.start()
@@ -326,7 +327,7 @@ Tasks(Task(idle, period=1e-3), workers="processes").start()
 """
 
 
-def test_a_program_without_a_guard_is_told_so(tmp_path):
+def test_a_program_without_a_main_guard_gets_a_hint(tmp_path):
     script = tmp_path / "program.py"
     script.write_text(WITHOUT_GUARD)
     done = subprocess.run(

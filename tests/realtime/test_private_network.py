@@ -1,4 +1,4 @@
-"""Private networks: programs run inside them, and are told where there is none."""
+"""Private networks: programs run inside, or get the reason for a refusal."""
 
 from __future__ import annotations
 
@@ -31,34 +31,37 @@ def run_python(*arguments: str, **environment: str) -> subprocess.CompletedProce
     )
 
 
-def test_importing_it_imports_no_numpy():
-    modules = "private_network, scheduling, child"
-    code = f"import sys; from catenary.realtime import {modules}; print('numpy' in sys.modules)"
+def test_the_import_does_not_import_numpy():
+    modules = "private_network, child"
+    code = (
+        f"import sys; from catenary.realtime import {modules}; "
+        "from catenary.realtime.system import scheduling; print('numpy' in sys.modules)"
+    )
     assert run_python("-c", code).stdout == "False\n"
 
 
-def test_a_program_enters_and_is_alone(veth):
+def test_a_program_enters_a_network_without_other_interfaces(veth):
     done = run_python("-c", REPORT)
     assert done.stdout == "Private()\nlo\n", done.stderr
 
 
-def test_a_program_run_by_another_stays_in_its_network(veth):
+def test_a_child_program_stays_in_the_network(veth):
     done = run_python("-c", REPORT, **{VARIABLE: INSIDE})
     assert done.stdout.splitlines()[0] == "Private()"
     assert veth[0] in done.stdout
 
 
-def test_modules_run_inside_from_the_shell(veth):
+def test_run_a_module_inside_from_the_shell(veth):
     done = run_python("-m", private_network.MODULE, "-c", REPORT)
     assert done.stdout == "Private()\nlo\n", done.stderr
 
 
-def test_where_it_is_refused_the_program_runs_on_and_knows_the_reason(tmp_path):
+def test_a_refused_program_continues_and_has_the_reason(tmp_path):
     done = run_python("-c", REPORT, PATH=str(tmp_path))
     assert done.stdout.startswith("Refused(reason='`unshare` is not installed"), done.stderr
 
 
-def test_a_machine_that_lets_unshare_pass_and_refuses_the_rest_is_found_out(tmp_path):
+def test_a_refusal_after_unshare_is_detected(tmp_path):
     unshare = tmp_path / "unshare"
     unshare.write_text('#!/bin/sh\nwhile [ "${1#--}" != "$1" ]; do shift; done\nexec "$@"\n')
     ip = tmp_path / "ip"
@@ -70,19 +73,19 @@ def test_a_machine_that_lets_unshare_pass_and_refuses_the_rest_is_found_out(tmp_
     assert "Operation not permitted" in done.stdout
 
 
-def test_children_of_a_refused_program_are_not_asked_again(monkeypatch):
+def test_children_of_a_refused_program_do_not_probe_again(monkeypatch):
     monkeypatch.setenv(VARIABLE, "no such luck")
     assert private_network.enter() == Refused("no such luck")
 
 
-def test_says_where_it_is(monkeypatch):
+def test_state_by_the_environment(monkeypatch):
     monkeypatch.setenv(VARIABLE, INSIDE)
     assert private_network.state() == Private()
     monkeypatch.delenv(VARIABLE)
     assert private_network.state() == Refused("not started in a private network namespace")
 
 
-def test_pairs_carry_no_ipv6_and_go_away(veth):
+def test_pairs_have_no_ipv6_and_are_removed(veth):
     names = {name for _, name in socket.if_nameindex()}
     assert set(veth) <= names
     shown = subprocess.run(["ip", "-6", "address"], capture_output=True, text=True, check=True)
@@ -93,8 +96,8 @@ def test_pairs_carry_no_ipv6_and_go_away(veth):
 
 
 @pytest.mark.parametrize(("late", "looks"), [(0, 1), (3, 4), (10**9, 2000)])
-def test_a_pair_is_there_when_the_kernel_knows_of_both_ends(monkeypatch, late, looks):
-    """Until then frames are dropped, and a probe by one frame said that there is no network."""
+def test_a_pair_is_ready_when_both_ends_are_up(monkeypatch, late, looks):
+    """The kernel drops frames until then, so that a probe with one frame would fail."""
     asked, now = [], 0.0
 
     def run_ip(*arguments):
@@ -130,6 +133,6 @@ def test_the_first_frame_of_a_pair_arrives(veth):
             assert receiver.recv(2048) == frame
 
 
-def test_an_error_of_ip_is_raised_with_its_words():
+def test_an_error_of_ip_is_raised_with_its_message():
     with pytest.raises(OSError, match=r"ip link delete none0: .*none0"):
         private_network.run_ip("link", "delete", "none0")

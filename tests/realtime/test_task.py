@@ -1,4 +1,4 @@
-"""What a task may be: every mistake is an error that names the task and what it takes."""
+"""Validation of tasks: every error names the task and the permitted values."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ from tests.realtime.bodies import idle
         ({"period": math.nan}, "is not positive"),
         ({"period": math.inf}, "is not positive"),
         ({"period": 1e-6}, "period of 1 us is too short.*at least 20 us"),
-        ({"period": 1e7}, "is it in seconds"),
+        ({"period": 1e7}, "give it in seconds"),
         ({"deadline": 0.0}, "deadline of 0.0 s is not positive"),
         ({"priority": 0}, r"priority 0 is not within 1\.\.99"),
         ({"priority": 100}, r"priority 100 is not within 1\.\.99"),
         ({"cpu": -1}, "CPU -1 does not exist"),
         ({"cpu": 5000}, "CPU 5000 does not exist"),
-        ({"stack_size": 1000}, "invalid stack of 1000 bytes"),
-        ({"stack_size": 65537}, "a multiple of 4096 from 32768"),
+        ({"stack_size": 1000}, "invalid stack size of 1000 bytes"),
+        ({"stack_size": 65537}, "a multiple of 4096, at least 32768"),
         ({"on_miss": "ignore"}, 'on_miss must be "count", "skip", "stop" or a function'),
         ({"on_failure": "ignore"}, 'on_failure must be "stop", "restart" or "continue"'),
     ],
@@ -45,17 +45,17 @@ def test_refuses(options, words):
         (lambda: Task(idle, period=True), "a number of seconds"),
     ],
 )
-def test_refuses_what_is_of_another_kind(make, words):
+def test_refuses_other_types(make, words):
     with pytest.raises(TypeError, match=words):
         make()
 
 
-def test_is_called_like_its_function():
+def test_the_default_name_is_the_name_of_the_function():
     assert Task(idle, period=1e-3).name == "idle"
     assert Task(idle, period=1e-3) == Task(idle, period=1e-3)
 
 
-def test_a_set_refuses():
+def test_refuses_invalid_sets_of_tasks():
     one, other = Task(idle, period=1e-3), Task(idle, period=2e-3)
     alarm = Signal()
     with pytest.raises(ValueError, match="no tasks"):
@@ -75,8 +75,8 @@ def test_a_set_refuses():
         )
 
 
-def test_a_cpu_that_is_kept_free_may_be_asked_for():
-    """isolcpus takes it out of everybody's set, and sched_setaffinity gives it."""
+def test_an_isolated_cpu_is_permitted():
+    """With isolcpus, a CPU is not in the default set, but sched_setaffinity permits it."""
     ours = os.sched_getaffinity(0)
     os.sched_setaffinity(0, {min(ours)})
     try:
@@ -86,13 +86,13 @@ def test_a_cpu_that_is_kept_free_may_be_asked_for():
         os.sched_setaffinity(0, ours)
 
 
-def test_a_function_that_a_process_cannot_import_is_refused_before_anything_starts():
+def test_a_function_that_cannot_be_imported_is_refused():
     tasks = Tasks(Task(lambda task: None, name="arm", period=1e-3), workers="processes")
-    with pytest.raises(TypeError, match=r"'arm': its process cannot import .*top of a module"):
+    with pytest.raises(TypeError, match=r"'arm': its process cannot import .*top level"):
         tasks.start()
 
 
-def test_before_they_are_started():
+def test_errors_before_the_start():
     tasks = Tasks(Task(idle, period=1e-3))
     with pytest.raises(RuntimeError, match="have not been started"):
         tasks.join()

@@ -1,4 +1,4 @@
-"""A task from its first instruction to its last."""
+"""Main function of a task."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from catenary.realtime.task_main import Work, start_thread
 from tests.realtime import bodies
 
 
-def test_what_follows_the_last_job_is_no_longer_real_time():
-    """Ending a process takes 100 ms, in which tasks of lower priority would miss their instants."""
+def test_ordinary_scheduling_after_the_last_job():
+    """The end of a process takes 100 ms, which would delay tasks of lower priority."""
     found = Value("i8", 4)
     task = Task(bodies.report_scheduling, (found,), period=1e-3, priority=7)
     handle = Handle(task, None)

@@ -1,4 +1,4 @@
-"""Tasks that run: on a virtual clock what they do, on the machine's that it is done."""
+"""Running tasks: exact results on a virtual clock, and basic behaviour on the machine's clock."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from tests.realtime.test_clock import MS, records
 BOTH = pytest.mark.parametrize("run", ["threads", "processes"])
 
 
-# what they do, in virtual time
+# exact results in virtual time
 
 
 @BOTH
@@ -40,7 +40,7 @@ def test_a_period_changed_by_the_task_itself(run):
     assert [release // MS for _, release, _ in records(notes)] == [0, 10, 30, 50]
 
 
-def test_a_period_changed_by_another():
+def test_a_period_changed_from_outside():
     notes = Queue("i8", 3, length=100)
     task = Task(bodies.note, (notes,), period=10e-3)
     with VirtualClock() as clock, Tasks(task, clock=clock) as tasks:
@@ -61,7 +61,7 @@ def test_a_period_changed_by_another():
     ]
 
 
-def test_a_missed_deadline_is_counted_and_later_releases_happen_late():
+def test_on_miss_count_continues_with_late_releases():
     notes = Queue("i8", 3, length=100)
     task = Task(bodies.overrun_once, (1, 25e-3, notes), name="a", period=10e-3)
     with VirtualClock() as clock, Tasks(task, clock=clock) as tasks:
@@ -79,7 +79,7 @@ def test_a_missed_deadline_is_counted_and_later_releases_happen_late():
     assert statistics.response.max == pytest.approx(25e-3)
 
 
-def test_skip_leaves_out_the_releases_that_have_passed():
+def test_on_miss_skip_omits_passed_releases():
     notes = Queue("i8", 3, length=100)
     task = Task(bodies.overrun_once, (1, 25e-3, notes), name="a", period=10e-3, on_miss="skip")
     with VirtualClock() as clock, Tasks(task, clock=clock) as tasks:
@@ -89,7 +89,7 @@ def test_skip_leaves_out_the_releases_that_have_passed():
     assert (statistics.jobs, statistics.misses, statistics.skipped) == (4, 1, 2)
 
 
-def test_stop_ends_the_task_with_an_error():
+def test_on_miss_stop_ends_the_task_with_an_error():
     notes = Queue("i8", 3, length=100)
     task = Task(
         bodies.overrun_once,
@@ -101,14 +101,14 @@ def test_stop_ends_the_task_with_an_error():
     )
     with (
         VirtualClock() as clock,
-        pytest.raises(TaskError, match=r"job 1, .*0\.010000 s: .*deadline of 4\.000 ms") as told,
+        pytest.raises(TaskError, match=r"job 1, .*0\.010000 s: .*deadline of 4\.000 ms") as caught,
         Tasks(task, clock=clock) as tasks,
     ):
         tasks.join(60e-3)
-    assert told.value.task == "a"
+    assert caught.value.task == "a"
 
 
-def test_call_is_told_which_job_was_late():
+def test_on_miss_function_receives_the_late_job():
     notes, late = Queue("i8", 3, length=100), []
     task = Task(
         bodies.overrun_once,
@@ -122,8 +122,8 @@ def test_call_is_told_which_job_was_late():
     assert late == [(1, pytest.approx(10e-3)), (2, pytest.approx(20e-3))]
 
 
-def test_a_sporadic_task_keeps_its_distance():
-    """Three signals at once, one job every 3 ms."""
+def test_a_sporadic_task_keeps_its_minimum_period():
+    """Three signals at the same time release one job every 3 ms."""
     alarm, notes = Signal(), Queue("i8", 3, length=100)
     tasks = [
         Task(bodies.set_at_every_job, (alarm, 3), name="cause", period=20e-3, priority=9),
@@ -134,7 +134,7 @@ def test_a_sporadic_task_keeps_its_distance():
     assert [now // MS for _, _, now in records(notes)] == [0, 3, 6, 20, 23, 26]
 
 
-def test_signals_beyond_what_can_wait_are_refused_and_counted():
+def test_too_many_pending_signals_are_refused_and_counted():
     alarm = Signal()
     task = Task(bodies.idle, period=1e-3, trigger=alarm)
     with VirtualClock() as clock, Tasks(task, clock=clock) as running:
@@ -158,7 +158,7 @@ def test_statistics_of_the_published_experiment():
     tau3 = running["tau3"].statistics
     assert tau3.jobs == 10
     assert tau3.period.min == tau3.period.max == pytest.approx(40e-3)
-    assert tau3.jitter.max == pytest.approx(8e-3)  # released at 0, it starts when the others rest
+    assert tau3.jitter.max == pytest.approx(8e-3)  # it is released at 0 and starts after the others
     assert tau3.response.max == tau3.response.p50 == pytest.approx(29e-3)
     assert tau3.execution.max == pytest.approx(10e-3)
     [(low, above, count)] = running["tau3"].histogram("response")
@@ -170,7 +170,7 @@ def test_statistics_of_the_published_experiment():
     assert str(running).splitlines()[3].split()[:3] == ["tau3", "10", "0"]
 
 
-def test_without_a_job_there_is_no_verdict():
+def test_no_verdict_before_the_first_job():
     task = Task(bodies.idle, period=1e-3, trigger=Signal())
     with (
         VirtualClock() as clock,
@@ -180,7 +180,7 @@ def test_without_a_job_there_is_no_verdict():
         running.verdict()
 
 
-def test_a_histogram_places_values_within_half_a_percent():
+def test_histogram_resolution_is_half_a_percent():
     task = Task(bodies.spend, (1.234567e-3,), period=10e-3)
     with VirtualClock() as clock, Tasks(task, clock=clock) as running:
         running.join(1.0)
@@ -191,17 +191,17 @@ def test_a_histogram_places_values_within_half_a_percent():
     assert figure.sd == pytest.approx(0.0, abs=1e-12)
 
 
-def test_join_without_an_end_lets_virtual_time_pass_until_all_have_ended():
+def test_join_without_a_timeout_in_virtual_time():
     tasks = [Task(bodies.count_to, (n,), name=f"to {n}", period=1e-3) for n in (30, 500)]
     with VirtualClock() as clock, Tasks(*tasks, clock=clock) as running:
         assert running.join()
         assert clock.now_ns == 500 * MS
 
 
-def test_all_on_a_virtual_clock_share_a_processor_until_the_end():
+def test_a_virtual_clock_binds_all_tasks_to_one_processor():
     before = os.sched_getaffinity(0)
     found = Value("i8", 4)
-    task = Task(bodies.report_scheduling, (found,), period=1e-3, cpu=7)  # a simulated one
+    task = Task(bodies.report_scheduling, (found,), period=1e-3, cpu=7)  # a simulated processor
     with VirtualClock() as clock, Tasks(task, workers="processes", clock=clock) as running:
         [ours] = os.sched_getaffinity(0)
         running.join(1e-3)
@@ -209,7 +209,7 @@ def test_all_on_a_virtual_clock_share_a_processor_until_the_end():
     assert os.sched_getaffinity(0) == before
 
 
-# on the machine's clock: that it is done
+# basic behaviour on the machine's clock
 
 
 @BOTH
@@ -221,13 +221,13 @@ def test_tasks_end_by_themselves(run):
         assert [handle.statistics.jobs for handle in running] == [4, 6]
 
 
-def test_more_than_one_run_as_processes_one_as_a_thread():
+def test_several_tasks_run_as_processes_and_one_as_a_thread():
     one, two = (Task(bodies.idle, name=name, period=1e-3) for name in "ab")
     assert Tasks(one).workers == "threads"
     assert Tasks(one, two).workers == "processes"
 
 
-def test_a_sporadic_task_sleeps_until_it_is_signalled_from_another_process():
+def test_a_signal_from_another_process():
     alarm = Signal()
     tasks = [
         Task(bodies.set_at_every_job, (alarm, 1), name="cause", period=2e-3),
@@ -240,7 +240,7 @@ def test_a_sporadic_task_sleeps_until_it_is_signalled_from_another_process():
 
 
 @BOTH
-def test_the_place_that_is_asked_for_is_obtained(run):
+def test_the_requested_scheduling_is_obtained(run):
     cpu = max(os.sched_getaffinity(0))
     found = Value("i8", 4)
     task = Task(bodies.report_scheduling, (found,), period=1e-3, cpu=cpu, priority=7)
@@ -255,7 +255,7 @@ def test_the_place_that_is_asked_for_is_obtained(run):
 
 
 @BOTH
-def test_a_stack_of_its_own_size(run):
+def test_stack_size(run):
     before = threading.stack_size(), resource.getrlimit(resource.RLIMIT_STACK)
     found = Value("i8", 2)
     task = Task(bodies.stack_deep, (found,), period=1e-3, stack_size=256 * 1024)
@@ -266,12 +266,12 @@ def test_a_stack_of_its_own_size(run):
     assert (threading.stack_size(), resource.getrlimit(resource.RLIMIT_STACK)) == before
 
 
-# what runs beside them
+# functions in parallel with the tasks
 
 
 @BOTH
-def test_a_loop_beside_tasks_has_a_place_on_their_clock(run):
-    """1 ms of every 10 is the task's, of higher priority, on the same processor."""
+def test_a_loop_in_parallel_with_tasks(run):
+    """A task of higher priority uses 1 ms of every 10 ms on the same processor."""
     notes = Queue("i8", 3, length=100)
     task = Task(bodies.spend_and_note, (1e-3, notes), period=10e-3, priority=50)
 
@@ -289,7 +289,7 @@ def test_a_loop_beside_tasks_has_a_place_on_their_clock(run):
     assert len(records(notes)) >= 3
 
 
-def test_what_it_raises_comes_out():
+def test_exceptions_of_the_function_propagate():
     def fails(place):
         raise LookupError("beside")
 
@@ -297,14 +297,14 @@ def test_what_it_raises_comes_out():
     with VirtualClock() as clock, Tasks(task, clock=clock) as tasks:
         with pytest.raises(LookupError, match="beside"):
             tasks.beside(fails)
-        tasks.join(20e-3)  # time goes on
+        tasks.join(20e-3)  # time advances
 
 
-def test_ctrl_c_waits_for_its_end_and_time_goes_on():
+def test_ctrl_c_waits_for_the_function_while_time_passes():
     ends = []
 
     def work(place):
-        place.wait_until(10 * MS)  # time has passed: the other thread lets it
+        place.wait_until(10 * MS)  # the other thread lets time pass
         os.kill(os.getpid(), signal.SIGINT)
         place.wait_until(5_000 * MS)
         ends.append(place.now_ns)
@@ -316,7 +316,7 @@ def test_ctrl_c_waits_for_its_end_and_time_goes_on():
         assert ends == [5_000 * MS]
 
 
-def test_on_the_machines_clock_it_runs_here():
+def test_the_function_runs_in_this_thread_on_the_machines_clock():
     with Tasks(Task(bodies.idle, period=10e-3)) as tasks:
         assert tasks.beside(lambda place, x: (place, x, threading.get_ident()), 3) == (
             None,
@@ -326,7 +326,7 @@ def test_on_the_machines_clock_it_runs_here():
 
 
 @BOTH
-def test_on_the_machines_clock_it_is_in_the_session_too(run):
+def test_the_function_runs_in_the_session_on_the_machines_clock(run):
     collects = gc.isenabled()
     prepared = session(best_effort=True)
     with Tasks(Task(bodies.idle, period=10e-3), workers=run, session=prepared) as tasks:

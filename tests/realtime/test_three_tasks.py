@@ -1,4 +1,4 @@
-"""examples/three_tasks.py runs, and shows what was published."""
+"""examples/three_tasks.py runs, and shows the published responses."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from pathlib import Path
 EXAMPLE = Path(__file__).resolve().parents[2] / "examples" / "three_tasks.py"
 
 
-def test_its_responses_are_the_published_ones():
+def test_the_responses_equal_the_published_ones():
     done = subprocess.run(
         [sys.executable, str(EXAMPLE)], capture_output=True, text=True, check=True
     )
@@ -19,5 +19,5 @@ def test_its_responses_are_the_published_ones():
     assert lines[8].startswith("schedulable: utilisation 80.0%")
 
 
-def test_it_is_short():
+def test_the_example_is_short():
     assert len(EXAMPLE.read_text().splitlines()) <= 40

@@ -1,4 +1,4 @@
-"""A loop that shares its cycles in virtual time, and a recorder in a process of its own."""
+"""A loop that shares its cycles in virtual time, and a recorder in a separate process."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from pathlib import Path
 import catenary as cat
 
 PERIOD = 1e-3
-DEADLINE = 60.0  # [s] for another process on a machine that may stand still
+DEADLINE = 60.0  # [s] for another process, even on a machine under heavy load
 
 
 @dataclass
 class SharedLoop:
-    """A loop that runs when it is told to."""
+    """A loop that runs for a number of cycles on request."""
 
     loop: cat.Loop
     arm: cat.Drives
@@ -35,7 +35,10 @@ class SharedLoop:
 
 @contextmanager
 def shared_loop(name: str, *, axes: int = 3, history: float = 30.0) -> Iterator[SharedLoop]:
-    """Remembers so much that a recorder that starts late, or is slow, loses nothing."""
+    """Open a loop with a share.
+
+    The default history is so long that a late or slow recorder loses nothing.
+    """
     segment = cat.Segment([cat.virtual.Coupler(), *(cat.virtual.Servo() for _ in range(axes))])
     with cat.MainDevice(segment) as main:
         arm = cat.Drives(main.scan().drives, counts_per_turn=2**20, velocity_limit=100.0)
@@ -52,7 +55,7 @@ def command(*arguments: object) -> list[str]:
 
 @contextmanager
 def recorder(*arguments: object, wrap: tuple[str, ...] = ()) -> Iterator[subprocess.Popen[str]]:
-    """`catenary record ...`, once it is recording; killed at the end of the block if it lives."""
+    """Run `catenary record ...`; start the block when it is recording, and kill it afterwards."""
     with subprocess.Popen(
         [*wrap, *command("record", *arguments)],
         stdout=subprocess.PIPE,
@@ -68,12 +71,12 @@ def recorder(*arguments: object, wrap: tuple[str, ...] = ()) -> Iterator[subproc
 
 
 def until(condition: Callable[[], bool]) -> bool:
-    """Whether it comes true in real time."""
+    """Wait for a condition in real time. Return False if it does not hold before the deadline."""
     deadline = time.monotonic() + DEADLINE
     while time.monotonic() < deadline:
         if condition():
             return True
-        time.sleep(0.01)  # another process: there is no virtual clock to wait on
+        time.sleep(0.01)  # another process has no virtual clock to wait for
     return False
 
 

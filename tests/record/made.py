@@ -1,4 +1,4 @@
-"""A loop's rows, made without a loop."""
+"""Layouts, rows and events for tests, made without a loop."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ PERIOD_NS = 1_000_000
 
 
 def make_layout(axes: int, *, period: float = 1e-3) -> Layout:
-    """What a share of so many axes has, and an odd column or two."""
+    """Return the layout of a share with these axes, and two columns with unusual names."""
 
     def per_axis(name: str, dtype: str, unit: str = "") -> Field:
         return Field(name, dtype, (axes,), unit, True)
@@ -45,7 +45,7 @@ def make_layout(axes: int, *, period: float = 1e-3) -> Layout:
 
 
 def make_rows(layout: Layout, count: int, *, first: int = 1) -> npt.NDArray[np.void]:
-    """A smooth motion with some noise; every value differs."""
+    """Return rows of a smooth motion with noise; every value differs."""
     random = np.random.default_rng(first)
     rows = np.zeros(count, layout.dtype)
     n = np.arange(first, first + count)

@@ -1,4 +1,4 @@
-"""Golden bytes after OMG DDS-XTypes 1.3 §7.4.3; foreign decoders judge in test_file.py."""
+"""Golden bytes by OMG DDS-XTypes 1.3 §7.4.3; test_file.py compares with other decoders."""
 
 import numpy as np
 import pytest
@@ -6,7 +6,7 @@ import pytest
 from catenary.record.cdr import CdrLayout
 
 
-def test_primitives_are_aligned_behind_the_encapsulation() -> None:
+def test_primitives_are_aligned_after_the_encapsulation() -> None:
     layout = CdrLayout()
     layout.field("small", "|u1")
     layout.field("wide", "<f8")
@@ -16,14 +16,14 @@ def test_primitives_are_aligned_behind_the_encapsulation() -> None:
     columns = {"small": np.array([1]), "wide": np.array([1.0]), "short": np.array([2])}
     assert message.encode(columns, 1) == bytes.fromhex(
         "00010000"  # CDR, little endian
-        "01 00000000000000"  # seven bytes so that the double begins at 8
+        "01 00000000000000"  # seven bytes of padding: the double starts at 8
         "000000000000f03f"
         "0200 0000"
         "00000000"
     )
 
 
-def test_strings_count_their_zero() -> None:
+def test_the_length_of_a_string_includes_the_final_zero() -> None:
     layout = CdrLayout()
     layout.text("arm")
     layout.text("")
@@ -54,7 +54,7 @@ def test_a_sequence_of_strings() -> None:
 
 
 @pytest.mark.parametrize("count", [0, 1, 7])
-def test_many_messages_are_encoded_together_and_come_back(count: int) -> None:
+def test_many_messages_are_encoded_together_and_decoded_again(count: int) -> None:
     layout = CdrLayout()
     layout.field("number", "<u4")
     layout.text("x")

@@ -1,4 +1,4 @@
-"""What a picture holds, asked of the figure; how it looks was looked at."""
+"""Contents of the figures and of the HTML page."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ def test_events_are_marked_at_their_time() -> None:
 
 
 def named(recording: Recording) -> list[str]:
-    """What the timeline calls by name."""
+    """Return the names on the timeline."""
     return [text.get_text() for text in draw(recording).subfigs[1].axes[0].texts]
 
 
@@ -71,7 +71,7 @@ def test_events_are_named_on_the_timeline() -> None:
     assert named(many)[-1] == "and 76 more"
 
 
-def test_a_part_is_drawn_at_the_times_of_the_whole(tmp_path: Path) -> None:
+def test_a_part_keeps_the_times_of_the_whole_recording(tmp_path: Path) -> None:
     whole = make_recording(1)
     path = tmp_path / "x.mcap"
     file = RecordingFile(path, whole.layout)
@@ -92,18 +92,18 @@ def test_quick_stops_are_marked_in_the_cycle_that_sends_them() -> None:
     words = recording.rows["controlword"]
     words[:] = 0x0F
     words[200:, 1] = 0x02
-    words[250:260] = 0x8012  # of the manufacturer and of the mode: theirs
-    words[300:, 0] = 0x06  # to be switched off is no quick stop
+    words[250:260] = 0x8012  # bits of the manufacturer and of the mode do not matter
+    words[300:, 0] = 0x06  # switching off is not a quick stop
     assert quick_stops(recording) == [(200, [1]), (250, [0, 2])]
     assert named(recording) == ["DeviceLost", "quick stop: joint1", "quick stop: 2 axes"]
     lines = draw(recording).subfigs[0].axes[0].lines[-3:]
     assert [line.get_xdata()[0] for line in lines] == pytest.approx([0.099, 0.2, 0.25])
 
 
-def test_a_late_cycle_is_seen_on_the_timeline_of_a_long_recording() -> None:
+def test_a_late_cycle_is_visible_on_the_timeline_of_a_long_recording() -> None:
     recording = make_recording(1, 20_000)
     recording.rows["lateness_ns"][12_345] = 800_000
-    recording.rows["process_ns"][::2] = -1  # not known in every other cycle
+    recording.rows["process_ns"][::2] = -1  # unknown in every other cycle
     lateness, controller = draw(recording).subfigs[1].axes[0].lines[:2]
     assert len(lateness.get_xdata()) == 1400
     assert lateness.get_ydata().max() == 800.0
@@ -127,7 +127,7 @@ def test_a_recording_without_a_cycle_is_drawn() -> None:
     assert "0 cycles" in figure.get_suptitle()
 
 
-def test_what_was_not_commanded_is_not_drawn() -> None:
+def test_a_command_that_is_always_zero_is_not_drawn() -> None:
     recording = make_recording(2)
     recording.rows["commanded_torque"] = 0.0
     recording.rows["commanded_torque"][0] = np.nan
@@ -149,7 +149,7 @@ def test_pictures(tmp_path: Path, kind: str) -> None:
 
 
 class Page(HTMLParser):
-    """What a page shows, and whether it fetches or executes anything."""
+    """Parser that collects the text of a page and its references to other files and scripts."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -171,7 +171,7 @@ class Page(HTMLParser):
         self.words.append(data.strip())
 
 
-def test_a_page_is_self_contained_and_says_everything_in_words(tmp_path: Path) -> None:
+def test_a_page_is_self_contained_and_has_tables(tmp_path: Path) -> None:
     recording = make_recording(2)
     evil = msgspec.structs.replace(recording.events[0], message="<script>alert(1)</script>")
     record.plot(replace(recording, events=(evil,)), tmp_path / "x.html")
@@ -184,22 +184,22 @@ def test_a_page_is_self_contained_and_says_everything_in_words(tmp_path: Path) -
     assert f"{np.sqrt((error[:, 0] ** 2).mean()) * 1e3:.4g}" in words
 
 
-def test_the_same_recording_is_the_same_page(tmp_path: Path) -> None:
+def test_equal_recordings_result_in_equal_pages(tmp_path: Path) -> None:
     for name in ("a", "b"):
         record.plot(make_recording(0), tmp_path / f"{name}.html")
     assert (tmp_path / "a.html").read_bytes() == (tmp_path / "b.html").read_bytes()
 
 
-def test_what_cannot_be_drawn_is_said(tmp_path: Path) -> None:
+def test_invalid_plot_options_are_refused(tmp_path: Path) -> None:
     recording = make_recording(2)
     with pytest.raises(RecordingError, match="no axis 'elbow'") as caught:
         record.plot(recording, tmp_path / "x.png", axes=["elbow"])
-    assert caught.value.hint == "it has joint0, joint1"
+    assert caught.value.hint == "its axes are joint0, joint1"
     with pytest.raises(RecordingError, match="no field 'target_position'"):
         record.plot(recording, tmp_path / "x.png", reference="target_position")
     with pytest.raises(ValueError, match=r"\.png, \.svg, \.pdf or \.html"):
         record.plot(recording, tmp_path / "x.bmp")
-    with pytest.raises(ValueError, match="not 'turns'"):
+    with pytest.raises(ValueError, match="unit 'turns'"):
         record.plot(recording, tmp_path / "x.png", unit="turns")
     assert not list(tmp_path.iterdir())
 

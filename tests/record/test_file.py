@@ -1,5 +1,7 @@
-"""What is written is read by others: by mcap with mcap-ros2-support and by rosbags, which share no
-code with each other or with us, and by ourselves."""
+"""Files are readable by mcap with mcap-ros2-support, by rosbags, and by catenary.
+
+The three readers share no code.
+"""
 
 from __future__ import annotations
 
@@ -33,7 +35,7 @@ def write(path: Path, layout: Layout, count: int = 1200) -> np.ndarray:
 
 
 @pytest.mark.parametrize("axes", AXES)
-def test_everything_comes_back(tmp_path: Path, axes: int) -> None:
+def test_reading_returns_everything_that_was_written(tmp_path: Path, axes: int) -> None:
     layout = make_layout(axes)
     rows = write(tmp_path / "x.mcap", layout)
     back = read(tmp_path / "x.mcap")
@@ -66,8 +68,11 @@ def test_mcap_ros2_support_reads_it(tmp_path: Path, axes: int) -> None:
 
 
 def test_plotjuggler_reads_it_on_a_machine_that_is_up_for_a_year(tmp_path: Path) -> None:
-    """Its parser throws "Floating point truncated" where an integer is no double, unless a
-    preference says otherwise (rosx_introspection, conversion_impl.hpp, checkTruncation)."""
+    """Every integer must be exact as a double.
+
+    Otherwise PlotJuggler's parser throws "Floating point truncated" by default
+    (rosx_introspection, conversion_impl.hpp, checkTruncation).
+    """
     layout = make_layout(1)
     rows = make_rows(layout, 10)
     rows["scheduled_ns"] += 1 << 53
@@ -141,7 +146,7 @@ def test_it_is_compressed_in_chunks_with_an_index(tmp_path: Path) -> None:
     assert summary is not None
     assert summary.statistics is not None
     assert summary.statistics.message_count == 3 * 3000 + 2
-    assert 5 <= len(summary.chunk_indexes) <= 8  # of half a second
+    assert 5 <= len(summary.chunk_indexes) <= 8  # half a second each
     assert {index.compression for index in summary.chunk_indexes} == {"zstd"}
     assert all(index.message_index_offsets for index in summary.chunk_indexes)
     times = [(i.message_start_time, i.message_end_time) for i in summary.chunk_indexes]
@@ -165,15 +170,15 @@ def test_an_existing_file_is_refused(tmp_path: Path) -> None:
     assert len(read(tmp_path / "x.mcap")) == 0
 
 
-def test_a_field_that_is_no_number_is_named(tmp_path: Path) -> None:
+def test_a_field_that_is_not_a_number_is_refused(tmp_path: Path) -> None:
     layout = make_layout(1)
     odd = Layout("x", 1e-3, (), (*layout.fields, Field("label", "<U5")))
-    with pytest.raises(RecordingError, match="'label' of <U5"):
+    with pytest.raises(RecordingError, match="'label' has dtype <U5"):
         RecordingFile(tmp_path / "x.mcap", odd)
     assert not (tmp_path / "x.mcap").exists()
 
 
-def test_names_that_fall_together_are_kept_apart(tmp_path: Path) -> None:
+def test_names_that_collide_get_distinct_field_names(tmp_path: Path) -> None:
     base = make_layout(0)
     twins = tuple(Field(name, "<f8") for name in ("in.0", "IN 0", "header", "2nd", "é", "in"))
     layout = Layout("x", 1e-3, (), (*base.fields, *twins))
@@ -192,9 +197,9 @@ def test_names_that_fall_together_are_kept_apart(tmp_path: Path) -> None:
 def test_a_file_has_one_recorder(tmp_path: Path) -> None:
     path = tmp_path / "x.mcap"
     first = RecordingFile(path, make_layout(1))
-    with pytest.raises(RecordingError, match="is being recorded by another process"):
+    with pytest.raises(RecordingError, match="is being written by another recorder"):
         RecordingFile(path, make_layout(1), force=True)
-    with pytest.raises(RecordingError, match="is being recorded by another process"):
+    with pytest.raises(RecordingError, match="is being written by another recorder"):
         repair(path)
     first.write(make_rows(make_layout(1), 10))
     first.finish({})

@@ -27,7 +27,7 @@ def written(path: Path, *, log_axes: bool = True) -> Path:
     return path
 
 
-def test_it_has_the_fields_of_a_recording(tmp_path: Path) -> None:
+def test_a_csv_file_has_the_fields_of_a_recording(tmp_path: Path) -> None:
     recording = record.read_csv(written(tmp_path / "run.csv"))
     assert (recording.name, recording.axes) == ("run", ("shoulder", "elbow"))
     assert recording.period == pytest.approx(1e-3)
@@ -36,10 +36,10 @@ def test_it_has_the_fields_of_a_recording(tmp_path: Path) -> None:
     assert recording["position"][-1] == pytest.approx(recording["target_position"][-1], abs=5e-3)
     assert recording.lost == 0
     assert np.diff(recording.time) == pytest.approx(1e-3)
-    assert recording.time[0] < 0.0  # the start-up, on the clock of cycle.time
+    assert recording.time[0] < 0.0  # the start-up: cycle.time is 0 at the first iteration
 
 
-def test_a_part_by_the_clock_of_the_cycle(tmp_path: Path) -> None:
+def test_a_part_is_selected_by_cycle_time(tmp_path: Path) -> None:
     recording = record.read_csv(written(tmp_path / "run.csv"), start=0.1, end=0.2)
     assert recording.time[0] == pytest.approx(0.1, abs=1.1e-3)
     assert recording.time[-1] == pytest.approx(0.2, abs=1.1e-3)
@@ -64,7 +64,7 @@ def test_plot(tmp_path: Path, log_axes: bool, capsys: pytest.CaptureFixture[str]
         ("time,number,scheduled_ns\n0.0,1,0\n", "two cycles"),
     ],
 )
-def test_what_is_not_a_log(tmp_path: Path, text: str, named: str) -> None:
+def test_a_file_that_is_not_a_log_is_refused(tmp_path: Path, text: str, named: str) -> None:
     (tmp_path / "x.csv").write_text(text)
     with pytest.raises(RecordingError, match=named):
         record.read_csv(tmp_path / "x.csv")

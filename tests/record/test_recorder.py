@@ -1,4 +1,4 @@
-"""From a share to a file: nothing is lost unnoticed, and every end is a clean one."""
+"""Recording from a share to a file: lost cycles are counted, and every file is complete."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def name() -> Iterator[str]:
         yield name
 
 
-def test_what_is_recorded_is_what_the_loop_saw(name: str, tmp_path: Path) -> None:
+def test_a_recording_equals_the_rows_of_the_share(name: str, tmp_path: Path) -> None:
     with shared_loop(name) as shared, cat.attach(name) as reader:
         with record.Recorder(reader, tmp_path / "x.mcap") as recorder:
             shared.run(300)
@@ -80,17 +80,17 @@ def test_events_are_recorded(name: str, tmp_path: Path) -> None:
                 recorder = record.Recorder(name, tmp_path / "x.mcap")
                 for cycle in loop:
                     if cycle.number == 10:
-                        segment.plug(2)  # what is behind is gone
+                        segment.plug(2)  # disconnects the last device
                     assert cycle.number < 100
             recorder.close()
     back = record.read(tmp_path / "x.mcap")
     assert back.ended == "the loop ended"
     assert "WorkingCounterError" in [event.kind for event in back.events]
     assert all(event.number >= 10 for event in back.events)
-    assert not back["flags"][-1] & 1  # the last cycle was not whole
+    assert not back["flags"][-1] & 1  # the last cycle was not complete
 
 
-def test_cycles_that_were_overwritten_are_counted_and_said(name: str, tmp_path: Path) -> None:
+def test_overwritten_cycles_are_counted_and_reported(name: str, tmp_path: Path) -> None:
     with (
         shared_loop(name, history=0.064) as shared,
         record.Recorder(name, tmp_path / "x.mcap") as recorder,
@@ -110,7 +110,7 @@ def test_cycles_that_were_overwritten_are_counted_and_said(name: str, tmp_path: 
 
 
 class Overtaken:
-    """A reader of a loop that goes on while rows are copied: some of them are overwritten."""
+    """A reader whose loop overwrites some rows while they are copied."""
 
     def __init__(self, reader: Reader, gone: set[int]) -> None:
         self._reader = reader
@@ -118,14 +118,14 @@ class Overtaken:
 
     def rows(self, after: int) -> tuple[Rows, int]:
         rows, lost = self._reader.rows(after)
-        there = rows[~np.isin(rows["number"], list(self._gone))]
-        return there, lost + int(there["number"][-1]) - int(rows["number"][0]) + 1 - len(there)
+        left = rows[~np.isin(rows["number"], list(self._gone))]
+        return left, lost + int(left["number"][-1]) - int(rows["number"][0]) + 1 - len(left)
 
     def __getattr__(self, name: str) -> object:
         return getattr(self._reader, name)
 
 
-def test_each_gap_is_said_where_it_is(name: str, tmp_path: Path) -> None:
+def test_each_gap_is_reported_at_its_place(name: str, tmp_path: Path) -> None:
     with shared_loop(name) as shared, cat.attach(name) as reader:
         shared.run(10)
         first = reader.number
@@ -143,7 +143,7 @@ def test_each_gap_is_said_where_it_is(name: str, tmp_path: Path) -> None:
         assert at == pytest.approx(times[event.number + 1] - back.period, abs=1e-6)
 
 
-def test_events_that_were_overwritten_are_counted_and_said(name: str, tmp_path: Path) -> None:
+def test_overwritten_events_are_counted_and_reported(name: str, tmp_path: Path) -> None:
     with shared_loop(name) as shared, record.Recorder(name, tmp_path / "x.mcap"):
         for number in range(EVENT_COUNT + 44):
             shared.share.report(Incident("Emergency", f"the {number}th", 1.0))
@@ -152,10 +152,10 @@ def test_events_that_were_overwritten_are_counted_and_said(name: str, tmp_path: 
     assert (back.events[0].kind, back.events[0].details) == ("EventsLost", {"events": 44})
 
 
-def test_what_comes_while_it_ends_is_not_called_the_end(
+def test_a_loop_that_ends_during_close_is_not_reported_as_ended(
     name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A loop that ends between the last look and the question has cycles that were not taken."""
+    """A loop that ends after the last read has cycles that the recorder has not read."""
     with shared_loop(name) as shared, cat.attach(name) as reader:
         recorder = record.Recorder(reader, tmp_path / "x.mcap")
         take = recorder.take
@@ -171,7 +171,7 @@ def test_what_comes_while_it_ends_is_not_called_the_end(
         assert recorder.ended == "stopped"
 
 
-def test_what_was_forgotten_before_it_began_is_not_lost(name: str, tmp_path: Path) -> None:
+def test_cycles_before_the_start_do_not_count_as_lost(name: str, tmp_path: Path) -> None:
     with shared_loop(name, history=0.064) as shared:
         shared.run(500)
         with record.Recorder(name, tmp_path / "x.mcap") as recorder:
@@ -182,7 +182,7 @@ def test_what_was_forgotten_before_it_began_is_not_lost(name: str, tmp_path: Pat
     assert set(np.diff(back["number"].astype(int))) == {1}
 
 
-def test_it_ends_with_the_loop(name: str, tmp_path: Path) -> None:
+def test_the_recording_ends_with_the_loop(name: str, tmp_path: Path) -> None:
     with shared_loop(name) as shared, recorder(name, tmp_path / "x.mcap") as child:
         shared.run(200)
         shared.loop.__exit__(None, None, None)
@@ -204,7 +204,7 @@ with shared_loop(sys.argv[1]) as shared:
 """
 
 
-def test_it_ends_when_the_loop_is_killed(name: str, tmp_path: Path) -> None:
+def test_the_recording_ends_when_the_loop_is_killed(name: str, tmp_path: Path) -> None:
     with subprocess.Popen(
         [sys.executable, "-c", WRITER, name],
         stdin=subprocess.PIPE,
@@ -232,7 +232,7 @@ def test_it_ends_when_the_loop_is_killed(name: str, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("kind", [signal.SIGINT, signal.SIGTERM])
-def test_it_ends_on_a_signal(name: str, tmp_path: Path, kind: signal.Signals) -> None:
+def test_the_recording_ends_on_a_signal(name: str, tmp_path: Path, kind: signal.Signals) -> None:
     path = tmp_path / "x.mcap"
     with shared_loop(name) as shared, recorder(name, path) as child:
         shared.run(2000)
@@ -244,16 +244,16 @@ def test_it_ends_on_a_signal(name: str, tmp_path: Path, kind: signal.Signals) ->
     assert record.read(path).ended == "stopped"
 
 
-def test_it_ends_after_so_many_seconds(name: str, tmp_path: Path) -> None:
+def test_the_recording_ends_after_its_duration(name: str, tmp_path: Path) -> None:
     with shared_loop(name) as shared:
         shared.run(10)
         with record.Recorder(name, tmp_path / "x.mcap") as recorder:
-            recorder.run(seconds=0.05)  # nothing comes meanwhile
+            recorder.run(seconds=0.05)  # no cycle in this time
     assert record.read(tmp_path / "x.mcap").ended == "stopped"
 
 
-def test_a_loop_that_is_opened_again_is_another_recording(name: str, tmp_path: Path) -> None:
-    """It may have other axes and other fields; its cycles begin with 1 again."""
+def test_a_reopened_loop_needs_a_new_recording(name: str, tmp_path: Path) -> None:
+    """It may have other axes and other fields, and its cycle numbers start at 1 again."""
     segment = cat.Segment([cat.virtual.Coupler(), cat.virtual.Servo(), cat.virtual.Servo()])
     with cat.MainDevice(segment) as main, cat.Share(name) as share:
         drives = main.scan().drives
@@ -270,13 +270,13 @@ def test_a_loop_that_is_opened_again_is_another_recording(name: str, tmp_path: P
             assert len(record.read(tmp_path / f"{axes}.mcap").axes) == axes
 
 
-def test_nothing_is_made_where_there_is_no_share(tmp_path: Path) -> None:
+def test_without_a_share_no_file_is_created(tmp_path: Path) -> None:
     with pytest.raises(ShareError, match="no share 'nobody-here'"):
         record.Recorder("nobody-here", tmp_path / "x.mcap")
     assert not (tmp_path / "x.mcap").exists()
 
 
-def test_without_the_extra_it_is_named(
+def test_the_error_names_the_missing_extra(
     name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     for module in [each for each in sys.modules if each.partition(".")[0] == "mcap"]:

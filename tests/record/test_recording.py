@@ -1,4 +1,4 @@
-"""Reading a part, and what a recording says of itself."""
+"""Reading a recording or a part of it, and its properties."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ def test_a_part_is_read_by_its_seconds(
     assert len(part.events) == (1 if start <= at <= end else 0)
 
 
-def test_what_it_says_of_itself(path: Path) -> None:
+def test_the_properties_of_a_recording(path: Path) -> None:
     recording = record.read(path)
     assert (recording.name, recording.period) == ("cell-1", 1e-3)
     assert recording.axes == ("joint0", "joint1", "joint2", "joint3")
@@ -61,23 +61,23 @@ def test_what_it_says_of_itself(path: Path) -> None:
     assert [recording.unit(field) for field in ("torque", "flags", "no")] == ["N·m", "", ""]
 
 
-def test_a_field_that_is_not_there_is_answered_with_those_that_are(path: Path) -> None:
-    with pytest.raises(KeyError, match=r"no field 'speed'; it has number, .*velocity"):
+def test_the_error_for_an_unknown_field_lists_the_fields(path: Path) -> None:
+    with pytest.raises(KeyError, match=r"no field 'speed'; its fields are number, .*velocity"):
         record.read(path)["speed"]
 
 
 @pytest.mark.parametrize("part", [{"start": np.nan}, {"start": np.inf}, {"end": np.nan}])
-def test_a_part_that_cannot_be_is_the_callers_mistake(path: Path, part: dict[str, float]) -> None:
-    with pytest.raises(ValueError, match="numbers of seconds"):
+def test_an_invalid_part_is_refused(path: Path, part: dict[str, float]) -> None:
+    with pytest.raises(ValueError, match="must be valid times"):
         record.read(path, **part)
 
 
-def test_a_file_that_is_not_there() -> None:
+def test_a_missing_file_raises_file_not_found() -> None:
     with pytest.raises(FileNotFoundError):
         record.read("/nowhere/x.mcap")
 
 
-def test_an_event_before_the_first_cycle_is_of_the_first_part(tmp_path: Path) -> None:
+def test_a_part_from_zero_includes_events_before_the_first_cycle(tmp_path: Path) -> None:
     layout = make_layout(0)
     file = RecordingFile(tmp_path / "x.mcap", layout)
     file.write_event(make_event(1))

@@ -1,4 +1,4 @@
-"""A file that was cut off can be read, and be made whole for programs that need its index."""
+"""Reading and repair of truncated files."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def cut(whole: Path, folder: Path, length: int) -> Path:
 
 
 def chunk_ends(path: Path) -> list[tuple[int, int]]:
-    """Of every chunk, and of the index behind it."""
+    """Return the end of every chunk, and the end of the index after it."""
     with path.open("rb") as stream:
         found = list(places(stream))
     chunks = [n for n, place in enumerate(found) if place.opcode == CHUNK]
@@ -53,7 +53,7 @@ def chunk_ends(path: Path) -> list[tuple[int, int]]:
 
 
 def cuts(whole: Path) -> list[int]:
-    """Within chunks and their indexes, between records, within the end."""
+    """Return lengths that cut chunks, indexes or the summary, or fall between records."""
     ends, size = chunk_ends(whole), whole.stat().st_size
     inside = [*(end - 100 for end, _ in ends), *(end + 5 for end, _ in ends)]
     between = [place for pair in ends for place in pair]
@@ -61,7 +61,9 @@ def cuts(whole: Path) -> list[int]:
     return [ends[0][0] // 2, *inside, *between, *near_the_end]
 
 
-def test_a_cut_file_is_read_as_far_as_it_is_whole(whole: Path, tmp_path: Path) -> None:
+def test_a_truncated_file_is_read_up_to_its_last_complete_chunk(
+    whole: Path, tmp_path: Path
+) -> None:
     rows = read(whole).rows
     ends = chunk_ends(whole)
     read_before = 0
@@ -73,7 +75,7 @@ def test_a_cut_file_is_read_as_far_as_it_is_whole(whole: Path, tmp_path: Path) -
     assert read_before == COUNT
 
 
-def test_a_cut_file_is_made_whole(whole: Path, tmp_path: Path) -> None:
+def test_a_truncated_file_is_repaired(whole: Path, tmp_path: Path) -> None:
     rows = read(whole).rows
     for length in cuts(whole):
         path = cut(whole, tmp_path, length)
@@ -83,12 +85,12 @@ def test_a_cut_file_is_made_whole(whole: Path, tmp_path: Path) -> None:
         after = read(path)
         assert np.array_equal(after.rows, rows[: len(after)])
         assert np.array_equal(after.rows, before.rows)
-        assert path.stat().st_size <= whole.stat().st_size + 200  # why it ends
+        assert path.stat().st_size <= whole.stat().st_size + 200  # the end record
         judge(path, len(after), repaired.chunks)
 
 
 def judge(path: Path, count: int, chunks: int) -> None:
-    """By the library of MCAP's authors, through the index."""
+    """Check a file with the MCAP library, which uses the index."""
     with path.open("rb") as stream:
         reader = make_reader(stream, validate_crcs=True)
         summary = reader.get_summary()
@@ -126,7 +128,7 @@ def test_rosbags_reads_a_repaired_file(whole: Path, tmp_path: Path) -> None:
     assert len(positions) > 500
 
 
-def test_what_the_recorder_said_of_its_end_stays(whole: Path, tmp_path: Path) -> None:
+def test_repair_keeps_the_end_record_of_the_recorder(whole: Path, tmp_path: Path) -> None:
     path = cut(whole, tmp_path, whole.stat().st_size - 1)
     repair(path)
     assert (read(path).ended, read(path).lost) == ("the loop ended", 4)
@@ -136,14 +138,14 @@ def test_what_the_recorder_said_of_its_end_stays(whole: Path, tmp_path: Path) ->
     assert read(path).ended == "cut off, and repaired"
 
 
-def test_a_whole_file_is_left_alone(whole: Path, tmp_path: Path) -> None:
+def test_repair_does_not_change_a_complete_file(whole: Path, tmp_path: Path) -> None:
     path = cut(whole, tmp_path, whole.stat().st_size)
     assert repair(path).dropped == 0
     assert path.read_bytes() == whole.read_bytes()
 
 
-def test_a_damaged_chunk_ends_what_is_kept(whole: Path, tmp_path: Path) -> None:
-    """A machine that lost its power leaves zeros where bytes should be."""
+def test_repair_removes_everything_from_a_damaged_chunk_on(whole: Path, tmp_path: Path) -> None:
+    """After a power failure, a file may contain zeros instead of data."""
     data = bytearray(whole.read_bytes())
     end = chunk_ends(whole)[2][0]
     data[end - 4000 : end - 3000] = bytes(1000)
@@ -155,7 +157,7 @@ def test_a_damaged_chunk_ends_what_is_kept(whole: Path, tmp_path: Path) -> None:
     judge(path, kept, 2)
 
 
-def test_zeros_behind_the_last_record_are_no_records(whole: Path, tmp_path: Path) -> None:
+def test_zeros_after_the_last_record_are_ignored(whole: Path, tmp_path: Path) -> None:
     path = cut(whole, tmp_path, chunk_ends(whole)[1][1])
     with path.open("ab") as stream:
         stream.write(bytes(5000))
@@ -163,7 +165,7 @@ def test_zeros_behind_the_last_record_are_no_records(whole: Path, tmp_path: Path
     judge(path, len(read(path)), 2)
 
 
-def test_the_summary_takes_the_room_of_a_chunk_where_there_is_no_other(
+def test_on_a_full_disk_the_summary_replaces_the_last_chunk(
     whole: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     path = cut(whole, tmp_path, chunk_ends(whole)[3][1])
@@ -182,7 +184,7 @@ def test_the_summary_takes_the_room_of_a_chunk_where_there_is_no_other(
 
 
 class Narrow:
-    """A file on a disk that is full behind `room` bytes."""
+    """A file on a disk that is full after `room` bytes."""
 
     def __init__(self, file: object, room: int) -> None:
         self._file = file
@@ -205,14 +207,14 @@ class Narrow:
 
 
 @pytest.mark.parametrize("content", [b"", b"\x89MCAP0\r\n", b"not a recording at all" * 9])
-def test_what_is_no_recording_is_refused(tmp_path: Path, content: bytes) -> None:
+def test_a_file_that_is_not_a_recording_is_refused(tmp_path: Path, content: bytes) -> None:
     path = tmp_path / "x.mcap"
     path.write_bytes(content)
-    with pytest.raises(RecordingError, match=r"x\.mcap is no"):
+    with pytest.raises(RecordingError, match=r"x\.mcap is not"):
         read(path)
 
 
-def test_repair_does_not_touch_what_is_no_mcap_file(tmp_path: Path) -> None:
+def test_repair_does_not_change_other_files(tmp_path: Path) -> None:
     path = tmp_path / "thesis.txt"
     path.write_text("three years of work")
     with pytest.raises(RecordingError, match="is not an MCAP file"):
@@ -220,7 +222,7 @@ def test_repair_does_not_touch_what_is_no_mcap_file(tmp_path: Path) -> None:
     assert path.read_text() == "three years of work"
 
 
-def test_others_files_are_not_touched(tmp_path: Path) -> None:
+def test_repair_does_not_change_mcap_files_of_other_programs(tmp_path: Path) -> None:
     path = tmp_path / "camera.mcap"
     with path.open("wb") as stream:
         writer = Writer(stream)

@@ -1,3 +1,5 @@
+"""Series for plots, on recordings with known values."""
+
 from __future__ import annotations
 
 from dataclasses import replace
@@ -25,7 +27,7 @@ def make_recording(axes: int = 2, count: int = 100) -> Recording:
     return Recording(layout, make_rows(layout, count), (), 0, "the loop ended")
 
 
-def test_rms_and_largest_look_only_at_what_is_known() -> None:
+def test_rms_and_largest_ignore_nan() -> None:
     values = np.array([[3.0, np.nan, np.nan], [-4.0, 2.0, np.nan]])
     assert rms(values) == pytest.approx([np.sqrt(12.5), 2.0, 0.0])
     assert largest(values) == pytest.approx([4.0, 2.0, 0.0])
@@ -39,7 +41,7 @@ def test_tracking_error_is_reference_minus_actual() -> None:
     assert tracking_error(recording, "target_position") is None
 
 
-def test_positions_are_compared_only_where_a_drive_followed_them() -> None:
+def test_the_default_reference_needs_a_drive_in_csp() -> None:
     recording = make_recording()
     assert reference_of(recording) == "commanded_position"  # the mode was not recorded
     fields = (*recording.layout.fields, Field("mode", "|i1", (2,), per_axis=True))
@@ -52,7 +54,7 @@ def test_positions_are_compared_only_where_a_drive_followed_them() -> None:
     assert reference_of(replace(torque, rows=rows)) == "commanded_position"
 
 
-def test_timing_leaves_out_what_a_cycle_did_not_know() -> None:
+def test_timing_leaves_out_unknown_phases() -> None:
     recording = make_recording(0, 4)
     recording.rows["receive_ns"] = [1000, -1, 1000, 1000]
     recording.rows["process_ns"] = [2000, 2000, -1, 2000]
@@ -64,7 +66,7 @@ def test_timing_leaves_out_what_a_cycle_did_not_know() -> None:
     assert timing_us(recording, "send") is None
 
 
-def test_a_line_is_not_drawn_across_lost_cycles() -> None:
+def test_lost_cycles_interrupt_a_line() -> None:
     recording = make_recording(1, 10)
     recording.rows["number"][4:] += 7
     time, values = with_gaps(recording, recording["position"])
@@ -90,5 +92,5 @@ def test_thinning_keeps_extremes_and_gaps() -> None:
     ("top", "prefix"),
     [(0.0, ""), (12.0, ""), (0.4, ""), (0.04, "m"), (3e-4, "m"), (3e-5, "µ"), (1e-12, "n")],
 )
-def test_units_have_the_prefix_that_leaves_digits(top: float, prefix: str) -> None:
+def test_the_prefix_fits_the_largest_value(top: float, prefix: str) -> None:
     assert prefix_for(np.array([0.0, -top, np.nan]))[1] == prefix

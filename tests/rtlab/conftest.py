@@ -1,4 +1,4 @@
-"""A guest to boot, where this machine can."""
+"""Fixture that boots a guest, if this machine can."""
 
 from __future__ import annotations
 
@@ -16,15 +16,15 @@ from tools.rtlab.errors import LabError
 
 @dataclass(frozen=True, slots=True)
 class Lab:
-    """Boots a guest with this interpreter and nothing of Catenary: it is up sooner."""
+    """Boot a guest with this interpreter and without Catenary, which takes less time."""
 
     kernel: kernel.Kernel
     folder: Path
 
     def run(self, script: str, seconds: float) -> tuple[list[str], dict[str, Any]]:
-        """What `script` prints, and what it leaves in the file it is given."""
+        """Run `script` in a guest. Return the lines that it prints and the result in its file."""
         image = self.folder / "root.cpio"
-        copy = archive.folder("/tmp/copy")  # CI's working copy lies there
+        copy = archive.folder("/tmp/copy")  # the folder of CI's working copy
         files = root.entries(self.kernel, [*root.interpreter(), *root.programs()])
         with image.open("wb") as file:
             archive.write([*files, copy], file)
@@ -36,7 +36,7 @@ class Lab:
 
 @pytest.fixture
 def rtlab(pytestconfig: pytest.Config, tmp_path: Path) -> Lab:
-    """With the kernel that `make rtlab` has left: a test downloads nothing."""
+    """Laboratory with the kernel that `make rtlab` downloaded. Tests download nothing."""
     try:
         machine.program()
     except LabError as error:

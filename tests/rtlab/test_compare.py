@@ -1,4 +1,4 @@
-"""Two runs: their medians by name, and what cannot be compared."""
+"""Comparison of two runs: medians by name, and errors."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def write(file: Path, median: float, command: str = "python -m benchmarks table 
     return file
 
 
-def test_the_medians_furthest_apart_are_named(tmp_path: Path, capsys) -> None:
+def test_the_largest_differences_of_medians_are_printed(tmp_path: Path, capsys) -> None:
     one, other = write(tmp_path / "a.json", 100.0), write(tmp_path / "b.json", 99.0)
     assert lab.main(["--compare", str(one), str(other)]) == 0
     said = capsys.readouterr().out.strip()
@@ -42,7 +42,7 @@ def test_folders_are_compared_table_by_table(tmp_path: Path, capsys) -> None:
 @pytest.mark.parametrize(
     ("text", "said"), [("[]", "is not a result of the lab"), ("{", "is not a result of the lab")]
 )
-def test_what_is_no_result_is_said_in_one_line(
+def test_an_invalid_result_is_an_error_of_one_line(
     tmp_path: Path, capsys, text: str, said: str
 ) -> None:
     one, other = write(tmp_path / "a.json", 1.0), tmp_path / "b.json"
@@ -53,7 +53,7 @@ def test_what_is_no_result_is_said_in_one_line(
     assert said in captured
 
 
-def test_two_commands_are_not_compared(tmp_path: Path, capsys) -> None:
+def test_results_of_different_commands_are_not_compared(tmp_path: Path, capsys) -> None:
     one = write(tmp_path / "a.json", 1.0)
     other = write(tmp_path / "b.json", 1.0, "python -m benchmarks table y")
     assert lab.main(["--compare", str(one), str(other)]) == 1

@@ -1,4 +1,4 @@
-"""A build of the IgH master for the guest: found and checked, or its table is skipped, and said."""
+"""A build of the IgH master for the guest. Without a valid build, its table is skipped."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from tools.rtlab import igh, image, kernel, machine
 from tools.rtlab.kernel import Kernel
 
 RELEASE = "6.1.0-56-rt-amd64"
-# as in the .modinfo of a module
+# format of the .modinfo section of a module
 MODULE = "\0license=GPL\0depends=\0name=ec\0vermagic={} SMP preempt_rt mod_unload modversions \0"
 
 
@@ -22,7 +22,7 @@ def system(tmp_path: Path) -> Kernel:
 
 
 def built(folder: Path, release: str = RELEASE) -> Path:
-    """As a build in its own source tree leaves it."""
+    """Create the result of a build in the source tree."""
     for name in ("master/ec_master.ko", "devices/ec_generic.ko", "lib/.libs/libethercat.so.1"):
         file = folder / name
         file.parent.mkdir(parents=True, exist_ok=True)
@@ -30,7 +30,7 @@ def built(folder: Path, release: str = RELEASE) -> Path:
     return folder
 
 
-def test_the_guest_gets_modules_library_and_program(tmp_path: Path, system: Kernel) -> None:
+def test_modules_library_and_program_of_the_guest(tmp_path: Path, system: Kernel) -> None:
     entries = igh.provide(built(tmp_path), system)
     assert [Path(entry.path).name for entry in entries] == [
         *("ec_master.ko", "ec_generic.ko", "libethercat.so.1", "igh_table.py")
@@ -39,16 +39,18 @@ def test_the_guest_gets_modules_library_and_program(tmp_path: Path, system: Kern
 
 
 @pytest.mark.parametrize(
-    ("missing", "said"),
+    ("missing", "message"),
     [
         ("master/ec_master.ko", "no ec_master.ko"),
         ("devices/ec_generic.ko", "no ec_generic.ko"),
         ("lib/.libs/libethercat.so.1", "no libethercat.so.1"),
     ],
 )
-def test_what_is_missing_is_named(tmp_path: Path, system: Kernel, missing: str, said: str) -> None:
+def test_a_missing_part_is_named(
+    tmp_path: Path, system: Kernel, missing: str, message: str
+) -> None:
     (built(tmp_path) / missing).unlink()
-    with pytest.raises(igh.NotThere, match=said):
+    with pytest.raises(igh.NotThere, match=message):
         igh.provide(tmp_path, system)
 
 
@@ -71,7 +73,7 @@ def test_without_a_build_the_table_is_skipped(
     assert "igh: skipped: IGH=path is not a build" in capsys.readouterr().out
 
 
-def test_the_makefile_passes_the_folder_on() -> None:
+def test_the_makefile_passes_the_folder() -> None:
     done = subprocess.run(
         ["make", "-n", "rtlab", "TABLE=igh", "IGH=/opt/igh"],
         cwd=lab.REPOSITORY,

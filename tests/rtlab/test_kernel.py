@@ -1,4 +1,4 @@
-"""Debian's kernel: what apt prints, what modules say, and every failure in one line."""
+"""Debian's kernel: output of apt, dependencies of modules, and errors of one line."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ NAME = "linux-image-6.1.0-56-rt-amd64_6.1.192-2"
 
 
 def unpacked(cache: Path, name: str = NAME) -> Path:
-    """As `download` leaves it, with modules that need each other."""
+    """Create the result of `download`, with modules that depend on each other."""
     top = cache / name
     modules = top / "lib" / "modules" / "6.1.0-56-rt-amd64" / "kernel" / "drivers" / "net"
     modules.mkdir(parents=True)
@@ -37,7 +37,7 @@ def unpacked(cache: Path, name: str = NAME) -> Path:
 
 @pytest.fixture
 def apt(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A machine whose programs are what a test writes into the folder."""
+    """Machine whose programs are scripts that a test writes to a folder."""
     programs = tmp_path / "programs"
     programs.mkdir()
     write(programs / "apt-cache", f"""[ $1 = depends ] && echo '{DEPENDS}' || echo '{POLICY}'""")
@@ -52,25 +52,23 @@ def write(program: Path, script: str) -> None:
     program.chmod(0o755)
 
 
-def test_the_package_is_the_newest_that_apt_knows(apt: Path) -> None:
+def test_the_newest_package_of_apt_is_used(apt: Path) -> None:
     assert kernel.wanted() == NAME
 
 
 @pytest.mark.parametrize("shown", ["", "  Depends: linux-base\n"])
-def test_an_apt_that_does_not_know_it_is_told_what_to_do(shown: str) -> None:
+def test_an_unknown_package_has_a_hint(shown: str) -> None:
     with pytest.raises(LabError, match="apt-get update"):
         kernel.first_dependency(shown)
 
 
 @pytest.mark.parametrize("shown", ["", "  Candidate: (none)\n"])
-def test_a_package_without_a_version_is_told_what_to_do(shown: str) -> None:
+def test_a_package_without_a_version_has_a_hint(shown: str) -> None:
     with pytest.raises(LabError, match="apt-get update"):
         kernel.candidate(shown)
 
 
-def test_a_download_that_fails_says_why_in_a_line_and_leaves_nothing(
-    apt: Path, tmp_path: Path
-) -> None:
+def test_a_failed_download_gives_the_reason_and_leaves_no_files(apt: Path, tmp_path: Path) -> None:
     cache = tmp_path / "cache"
     cache.mkdir()
     with pytest.raises(LabError) as caught:
@@ -80,7 +78,7 @@ def test_a_download_that_fails_says_why_in_a_line_and_leaves_nothing(
     assert list(cache.iterdir()) == []
 
 
-def test_without_apt_it_says_whose_packages_it_takes(
+def test_without_apt_the_error_names_debian(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("PATH", str(tmp_path))
@@ -88,12 +86,12 @@ def test_without_apt_it_says_whose_packages_it_takes(
         kernel.provide(tmp_path)
 
 
-def test_an_older_kernel_does_where_the_newest_cannot_be_had(apt: Path, tmp_path: Path) -> None:
+def test_an_older_kernel_is_used_without_the_newest(apt: Path, tmp_path: Path) -> None:
     unpacked(tmp_path, "linux-image-6.1.0-50-rt-amd64_6.1.170-1")
     assert kernel.provide(tmp_path).package == "linux-image-6.1.0-50-rt-amd64_6.1.170-1"
 
 
-def test_what_lies_there_is_not_downloaded_again(apt: Path, tmp_path: Path) -> None:
+def test_existing_files_are_not_downloaded_again(apt: Path, tmp_path: Path) -> None:
     unpacked(tmp_path)
     found = kernel.provide(tmp_path)
     assert found.package == NAME
@@ -101,7 +99,7 @@ def test_what_lies_there_is_not_downloaded_again(apt: Path, tmp_path: Path) -> N
     assert found.release == "6.1.0-56-rt-amd64"
 
 
-def test_modules_come_behind_those_they_need(tmp_path: Path) -> None:
+def test_modules_follow_their_dependencies(tmp_path: Path) -> None:
     found = kernel.found_in(unpacked(tmp_path)).with_dependencies(("veth",))
     assert [path.name for path in found] == ["under.ko", "over.ko.xz", "veth.ko"]
 
@@ -111,17 +109,17 @@ def test_a_compressed_module_is_unpacked(tmp_path: Path) -> None:
     assert kernel.read_module(over) == b"x\0depends=under\0"
 
 
-def test_a_module_that_is_not_there_is_named(tmp_path: Path) -> None:
+def test_a_missing_module_is_named(tmp_path: Path) -> None:
     with pytest.raises(LabError, match=r"no module .*9p"):
         kernel.found_in(unpacked(tmp_path)).with_dependencies(("9p",))
 
 
-def test_half_a_kernel_is_told(tmp_path: Path) -> None:
+def test_an_incomplete_kernel_is_an_error(tmp_path: Path) -> None:
     with pytest.raises(LabError, match="delete it"):
         kernel.found_in(tmp_path)
 
 
-def test_what_no_benchmark_needs_is_dropped(tmp_path: Path) -> None:
+def test_unneeded_modules_are_omitted(tmp_path: Path) -> None:
     top = unpacked(tmp_path)
     others = top / "lib" / "modules" / "6.1.0-56-rt-amd64" / "kernel"
     for name in ("fs/ext4", "drivers/gpu"):
@@ -131,7 +129,7 @@ def test_what_no_benchmark_needs_is_dropped(tmp_path: Path) -> None:
     assert [path.name for path in (others / "drivers").iterdir()] == ["net"]
 
 
-def test_without_a_network_the_newest_that_lies_there_counts() -> None:
+def test_without_a_network_the_newest_local_kernel_is_used() -> None:
     names = ["linux-image-6.1.0-9-rt-amd64_6.1.27-1", "linux-image-6.1.0-56-rt-amd64_6.1.192-2"]
     marks = [Path("cache", name, "unpacked") for name in names]
     assert sorted(reversed(marks), key=kernel.by_version) == marks

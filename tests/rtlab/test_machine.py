@@ -1,4 +1,4 @@
-"""QEMU as a child: how it is asked, how it ends. A shell script stands in for it."""
+"""QEMU as a child process: its arguments and its end. A shell script replaces it."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ from tools.rtlab.kernel import Kernel
 ROOT = Path(__file__).resolve().parents[2]
 KERNEL = Kernel(Path("/boot/vmlinuz"), Path("/lib/modules/6.1.0-rt"), "linux-image-rt_6.1")
 ANSWER = {"kernel": "6.1", "status": 0, "seconds": 2.5, "result": {"lost": 0}}
-GENEROUS = 60.0  # [s]: a busy machine
+GENEROUS = 60.0  # [s] for a busy machine
 
 
 @pytest.fixture
 def qemu(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A program of QEMU's name; what it does, a test writes with `becomes`."""
+    """Program with the name of QEMU. A test writes its script with `becomes`."""
     program = tmp_path / "bin" / machine.PROGRAM
     program.parent.mkdir()
     monkeypatch.setenv("PATH", f"{program.parent}:{os.environ['PATH']}")
@@ -32,7 +32,7 @@ def qemu(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def becomes(program: Path, script: str) -> None:
-    """In it $RESULTS is the file of the second serial line, as QEMU's last argument names it."""
+    """Write the script. $RESULTS is the file of the second serial line, QEMU's last argument."""
     find = 'for last; do :; done; RESULTS="${last#file:}"'
     program.write_text(f"#!/bin/sh\n{find}\n{script}\n")
     program.chmod(0o755)
@@ -44,7 +44,7 @@ def run(folder: Path, seconds: float = GENEROUS) -> tuple[list[str], dict[str, o
 
 
 def ended(pid: int) -> bool:
-    """Whether this process ends, soon."""
+    """Return True if the process ends within GENEROUS seconds."""
     try:
         descriptor = os.pidfd_open(pid)
     except ProcessLookupError:
@@ -55,30 +55,28 @@ def ended(pid: int) -> bool:
         os.close(descriptor)
 
 
-def test_time_counts_instructions_and_idle_time_is_passed_over(qemu: Path) -> None:
+def test_guest_time_counts_instructions_and_skips_idle_time(qemu: Path) -> None:
     becomes(qemu, "")
     asked = " ".join(machine.command(KERNEL, Path("/root.cpio"), Path("/out"), {"name": "x"}))
     for part in ("-accel tcg", "-icount shift=0,sleep=off", "-rtc clock=vm", "-smp 1"):
         assert part in asked
-    assert "-drive" not in asked  # a disk answers in the host's time
+    assert "-drive" not in asked  # a disk responds in host time
 
 
-def test_what_the_guest_prints_and_answers_is_brought_back(qemu: Path, tmp_path: Path) -> None:
+def test_output_and_answer_of_the_guest(qemu: Path, tmp_path: Path) -> None:
     becomes(qemu, f"printf 'one\\r\\ntwo'; echo '{json.dumps(ANSWER)}' >$RESULTS")
     assert run(tmp_path) == (["one", "two"], ANSWER)
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["bin"]  # nothing stays
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["bin"]  # no files are left
 
 
-def test_a_progress_line_that_is_written_over_is_shown_when_it_is(
-    qemu: Path, tmp_path: Path
-) -> None:
+def test_progress_lines_are_printed_immediately(qemu: Path, tmp_path: Path) -> None:
     shown = "\\r\\033[K1 of 2\\r\\033[K2 of 2\\n"
     becomes(qemu, f"printf '{shown}'; echo '{json.dumps(ANSWER)}' >$RESULTS")
     assert run(tmp_path)[0] == ["", "1 of 2", "2 of 2"]
 
 
 @pytest.mark.parametrize(
-    ("script", "said"),
+    ("script", "message"),
     [
         ("echo 'qemu: no kernel' >&2; echo more >&2; exit 1", "status 1: qemu: no kernel$"),
         ("exit 3", "status 3: it said nothing$"),
@@ -86,14 +84,14 @@ def test_a_progress_line_that_is_written_over_is_shown_when_it_is(
         ('echo \'{"status": 2, "result": null}\' >$RESULTS', "status 2; its output is above"),
     ],
 )
-def test_what_goes_wrong_is_one_line(qemu: Path, tmp_path: Path, script: str, said: str) -> None:
+def test_errors_have_one_line(qemu: Path, tmp_path: Path, script: str, message: str) -> None:
     becomes(qemu, script)
-    with pytest.raises(LabError, match=said) as caught:
+    with pytest.raises(LabError, match=message) as caught:
         run(tmp_path)
     assert "\n" not in str(caught.value)
 
 
-def test_a_guest_that_does_not_end_is_ended(qemu: Path, tmp_path: Path) -> None:
+def test_a_guest_that_does_not_end_is_killed(qemu: Path, tmp_path: Path) -> None:
     becomes(qemu, f"echo $$ >{tmp_path}/pid; exec sleep 1000")
     with pytest.raises(LabError, match="not done within"):
         run(tmp_path, 2.0)
@@ -101,7 +99,7 @@ def test_a_guest_that_does_not_end_is_ended(qemu: Path, tmp_path: Path) -> None:
     assert not pid.exists() or ended(int(pid.read_text()))
 
 
-def test_without_qemu_one_line_names_the_package(tmp_path: Path) -> None:
+def test_a_missing_qemu_names_the_package(tmp_path: Path) -> None:
     done = subprocess.run(
         [sys.executable, "-m", "tools.rtlab", "quick"],
         cwd=ROOT,
@@ -148,7 +146,7 @@ def test_an_interrupted_run_leaves_no_process(
         assert list(folder.iterdir()) == []
 
 
-def test_a_guest_that_dies_before_its_first_word_is_started_again(
+def test_a_guest_that_ends_before_its_first_output_is_restarted(
     qemu: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(machine, "BOOT_SECONDS", 1.0)
@@ -160,7 +158,7 @@ def test_a_guest_that_dies_before_its_first_word_is_started_again(
     assert answer == ANSWER
 
 
-def test_a_job_that_the_kernel_would_cut_off_is_refused() -> None:
+def test_a_job_that_exceeds_the_kernel_command_line_is_refused() -> None:
     kernel = Kernel(Path("vmlinuz"), Path("modules"), "a kernel")
     with pytest.raises(LabError, match="at most 2047"):
         machine.command(kernel, Path("root"), Path("results"), {"arguments": ["x" * 1800]})

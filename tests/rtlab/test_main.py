@@ -1,4 +1,4 @@
-"""The command: what it runs, keeps, and says when it cannot."""
+"""The command `make rtlab`: tables, results and errors."""
 
 from __future__ import annotations
 
@@ -15,15 +15,15 @@ from tools.rtlab.errors import LabError
 ROOT = Path(__file__).resolve().parents[2]
 
 
-def test_all_leaves_out_quick_and_two_lengths_of_tocabi() -> None:
+def test_all_omits_quick_and_two_lengths_of_tocabi() -> None:
     assert set(tables.choose(["all"])) == set(tables.TABLES) - {"quick", "tocabi-60", "tocabi-8k"}
 
 
-def test_tables_are_asked_for_by_name_with_commas_or_without() -> None:
+def test_tables_are_selected_by_name_with_or_without_commas() -> None:
     assert list(tables.choose(["quick,law", "loop"])) == ["quick", "law", "loop"]
 
 
-def test_an_unknown_table_is_answered_with_those_there_are(capsys) -> None:
+def test_an_unknown_table_lists_the_known_ones(capsys) -> None:
     assert lab.main(["nothing"]) == 1
     said = capsys.readouterr().err
     assert said.count("\n") == 1
@@ -35,7 +35,7 @@ def test_every_table_is_a_benchmark_that_writes_its_figures() -> None:
     from benchmarks.cli.main import make_parser
 
     commands = [table for table in tables.TABLES.values() if not table.program]
-    assert len(commands) == len(tables.TABLES) - 1  # igh is a program of the guest's own
+    assert len(commands) == len(tables.TABLES) - 1  # igh is a program of the guest
     for table in commands:
         asked = make_parser().parse_args(table.arguments)
         assert asked.json == Path(tables.RESULT)
@@ -49,7 +49,7 @@ def test_every_table_is_a_benchmark_that_writes_its_figures() -> None:
         (LabError("no apt"), "no apt"),
     ],
 )
-def test_what_cannot_be_is_one_line(
+def test_errors_have_one_line(
     error: Exception, said: str, capsys, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def refuse(*_: object) -> None:
@@ -65,7 +65,9 @@ def test_what_cannot_be_is_one_line(
     assert said in captured
 
 
-def test_a_full_disk_leaves_no_half_image(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_full_disk_leaves_no_partial_image(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     def full(*_: object) -> None:
         raise OSError(errno.ENOSPC, "No space left on device")
 
@@ -75,7 +77,7 @@ def test_a_full_disk_leaves_no_half_image(tmp_path: Path, monkeypatch: pytest.Mo
     assert list(tmp_path.iterdir()) == []
 
 
-def test_the_image_is_made_once_and_anew_when_the_kernel_changes(
+def test_the_image_is_rebuilt_only_if_the_kernel_changes(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys
 ) -> None:
     monkeypatch.setattr(image.root, "entries", lambda *_: [])
@@ -89,7 +91,7 @@ def test_the_image_is_made_once_and_anew_when_the_kernel_changes(
     assert [made(name) for name in ("a", "a", "b", "b")] == [True, False, True, False]
 
 
-def test_a_record_says_what_its_figures_depend_on(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_record_contains_the_conditions_of_its_figures(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(machine, "version", lambda: "7.2.22")
     answer = {"kernel": "6.1 PREEMPT_RT", "status": 0, "seconds": 2.0, "result": {"lost": 0}}
     made = record.make(

@@ -1,4 +1,4 @@
-"""What the guest's root holds."""
+"""Content of the guest's root."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ LDD = """/usr/bin/ip:
 """
 
 
-def test_what_a_distribution_needs_follows_the_extras() -> None:
+def test_the_dependencies_of_a_distribution_include_extras() -> None:
     plain = {"numpy", "foo.bar"}
     assert {name for name, _ in root.needed_by(REQUIRES, frozenset())} == plain
     found = dict(root.needed_by(REQUIRES, frozenset({"law", "log"})))
@@ -37,17 +37,17 @@ def test_what_a_distribution_needs_follows_the_extras() -> None:
     assert found["mcap"] == {"zstd", "lz4"}
 
 
-def test_all_that_catenary_imports_in_a_benchmark_is_there() -> None:
+def test_all_imports_of_a_benchmark_are_included() -> None:
     found = {each.metadata["Name"].lower() for each in root.distributions("catenary", ["law"])}
     assert {"catenary", "numpy", "msgspec", "numba", "llvmlite"} <= found
 
 
-def test_a_distribution_that_is_not_installed_is_one_line() -> None:
+def test_a_missing_distribution_is_an_error_of_one_line() -> None:
     with pytest.raises(LabError, match=r"no-such-thing is not installed.*make build"):
         root.distributions("no-such-thing")
 
 
-def test_tests_of_a_distribution_stay_behind() -> None:
+def test_the_tests_of_a_distribution_are_omitted() -> None:
     files = list(root.files_of(distribution("numpy")))
     assert any(path.name == "__init__.py" for path in files)
     assert not any("tests" in path.parts for path in files)
@@ -60,19 +60,19 @@ def test_libraries_and_the_loader_are_read_from_ldd() -> None:
     ]
 
 
-def test_the_interpreter_finds_its_library_and_the_c_library() -> None:
+def test_the_libraries_of_the_interpreter_are_included() -> None:
     names = {path.name for path in root.libraries([Path(sys.executable)])}
     assert "libc.so.6" in names
 
 
-def test_the_interpreter_comes_with_the_standard_library_and_without_its_tests() -> None:
+def test_the_standard_library_is_included_without_its_tests() -> None:
     files = list(root.interpreter())
     assert Path(sys.executable) in files
     assert any(path.name == "argparse.py" for path in files)
     assert not any("site-packages" in path.parts or "test" in path.parts for path in files)
 
 
-def test_a_missing_program_is_told_with_its_package(
+def test_a_missing_program_names_its_package(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("PATH", str(tmp_path))

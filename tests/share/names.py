@@ -1,4 +1,4 @@
-"""Names of shares that no other test has, and nothing left behind."""
+"""Unique names of shares, whose files are removed after the test."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def own_name(what: str) -> Iterator[str]:
 
 
 def files_of(name: str) -> list[Path]:
-    """All files of a share, a mutex or of several with names that begin so; and drafts."""
+    """Return all files of shares and mutexes whose names begin with `name`, and drafts."""
     folder = own_folder()
     return [*folder.glob(f"*-{name}*"), *folder.glob(f".draft-{os.getpid()}-*")]
 
@@ -31,6 +31,6 @@ def state_file(name: str) -> Path:
 
 
 def mutex_file(name: str) -> Path:
-    """Its folder exists, too."""
+    """Return the path of a mutex, and create its folder."""
     own_folder().mkdir(0o700, exist_ok=True)
     return own_folder() / f"mutex-{name}"

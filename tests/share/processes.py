@@ -1,4 +1,4 @@
-"""Programs in processes of their own, for tests that kill them."""
+"""Programs in separate processes, for tests that kill them."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from threading import Event
 
-DEADLINE = 60.0  # [s] machines stop for a while
+DEADLINE = 60.0  # [s] a loaded machine can pause for a long time
 
 LOOP = """
 import sys
@@ -23,7 +23,7 @@ with cat.MainDevice(Segment([Servo(), Servo()])) as main:
             arm.target.position[:] = 1e-6 * cycle.number
             if cycle.number == 100:
                 print("running", flush=True)
-"""  # in virtual time: thousands of cycles a second, none of which waits
+"""  # virtual time: thousands of cycles per second, without waiting
 
 
 class Program:
@@ -45,7 +45,7 @@ class Program:
         )
 
     def line(self) -> str:
-        """What it says next."""
+        """Return the next line of its standard output."""
         assert self.process.stdout is not None
         return self.process.stdout.readline().strip()
 
@@ -70,7 +70,7 @@ def started(text: str, *arguments: str) -> Iterator[Program]:
 
 
 def comes_true(condition: Callable[[], bool]) -> bool:
-    """Looks again and again, for as long as a machine may need."""
+    """Return True as soon as the condition holds, and False after DEADLINE."""
     pause = Event()
     for _ in range(round(DEADLINE / 0.01)):
         if condition():

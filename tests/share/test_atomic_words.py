@@ -1,5 +1,7 @@
-"""Words in shared memory. (That they are stored and loaded in order no test on x86 can show; what
-the loop and its clients make of that order is tests/share/test_lease.py.)"""
+"""Words in shared memory: addresses and bounds.
+
+No test on x86 can show the memory ordering. tests/share/test_lease.py tests the protocol on top.
+"""
 
 from __future__ import annotations
 
@@ -8,7 +10,7 @@ import pytest
 from catenary.share._atomic_words import Words
 
 
-def test_words_lie_where_they_are_said_to() -> None:
+def test_words_are_at_their_offsets() -> None:
     memory = bytearray(8 + 2 * 24 + 8)
     words = Words(memory, 8, 3, 24)
     for k in range(3):
@@ -19,11 +21,11 @@ def test_words_lie_where_they_are_said_to() -> None:
 
 
 @pytest.mark.parametrize("k", [3, 2**63])
-def test_a_word_that_is_not_there(k: int) -> None:
+def test_word_out_of_range_raises_index_error(k: int) -> None:
     words = Words(bytearray(24), 0, 3)
-    with pytest.raises(IndexError, match=f"word {k} of 3"):
+    with pytest.raises(IndexError, match=f"word {k}"):
         words.load(k)
-    with pytest.raises(IndexError, match=f"word {k} of 3"):
+    with pytest.raises(IndexError, match=f"word {k}"):
         words.store(k, 0)
 
 
@@ -31,6 +33,6 @@ def test_a_word_that_is_not_there(k: int) -> None:
     "place",
     [(0, 4, 8), (8, 3, 8), (4, 1, 8), (0, 2, 12), (0, 2, 24), (0, 0, 8), (0, 1, 0), (32, 1, 8)],
 )
-def test_words_that_do_not_lie_in_the_memory(place: tuple[int, int, int]) -> None:
-    with pytest.raises(ValueError, match="words at"):
+def test_words_outside_of_the_memory_are_refused(place: tuple[int, int, int]) -> None:
+    with pytest.raises(ValueError, match="words"):
         Words(bytearray(24), *place)

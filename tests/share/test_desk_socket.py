@@ -1,4 +1,4 @@
-"""The socket that sends clients the memory for commands: answers, silence and deadlines."""
+"""Socket that sends clients the memory for commands: answers, silent servers and timeouts."""
 
 from __future__ import annotations
 
@@ -34,12 +34,12 @@ def test_each_client_gets_the_same_memory(served: Path) -> None:
     assert second[:5] == b"jello"
 
 
-def test_one_that_answers_for_another_user_is_refused(served: Path) -> None:
-    with pytest.raises(ShareError, match=f"is answered by user {os.geteuid()}"):
+def test_server_of_another_user_is_refused(served: Path) -> None:
+    with pytest.raises(ShareError, match=f"user {os.geteuid()} answers on"):
         request_descriptor(served, os.geteuid() + 1)
 
 
-def test_a_client_that_asks_and_does_not_read_delays_nobody(served: Path) -> None:
+def test_client_that_does_not_read_does_not_delay_others(served: Path) -> None:
     silent = [socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET) for _ in range(8)]
     for each in silent:
         each.connect(str(served))
@@ -48,9 +48,11 @@ def test_a_client_that_asks_and_does_not_read_delays_nobody(served: Path) -> Non
         each.close()
 
 
-def test_a_full_queue_is_waited_for(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The kernel refuses a client at once if others fill the queue, whatever its time-out."""
-    monkeypatch.setattr(desk_socket, "PATIENCE", 0.02)
+def test_client_retries_while_the_queue_is_full(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """If the queue is full, the kernel refuses a client at once, regardless of its timeout."""
+    monkeypatch.setattr(desk_socket, "TIMEOUT", 0.02)
     with socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET) as full:
         full.bind(str(tmp_path / "socket-x"))
         full.listen(0)
@@ -64,7 +66,7 @@ def test_a_full_queue_is_waited_for(tmp_path: Path, monkeypatch: pytest.MonkeyPa
         first.close()
 
 
-def test_a_socket_that_a_killed_process_has_left(tmp_path: Path) -> None:
+def test_socket_of_a_killed_process_refuses_connections(tmp_path: Path) -> None:
     with socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET) as left:
         left.bind(str(tmp_path / "socket-x"))
     with pytest.raises(ShareError, match="does not answer: Connection refused"):
@@ -73,10 +75,8 @@ def test_a_socket_that_a_killed_process_has_left(tmp_path: Path) -> None:
         request_descriptor(tmp_path / "socket-y", os.geteuid())
 
 
-def test_one_that_is_silent_is_waited_for_until_a_deadline(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(desk_socket, "PATIENCE", 0.02)
+def test_silent_server_times_out(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(desk_socket, "TIMEOUT", 0.02)
     with socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET) as silent:
         silent.bind(str(tmp_path / "socket-x"))
         silent.listen(1)
@@ -84,7 +84,7 @@ def test_one_that_is_silent_is_waited_for_until_a_deadline(
             request_descriptor(tmp_path / "socket-x", os.geteuid())
 
 
-def test_its_name_ends_with_it(tmp_path: Path) -> None:
+def test_close_removes_the_socket(tmp_path: Path) -> None:
     descriptor, _ = make_sealed("test", SIZE)
     serving = DeskSocket(tmp_path, descriptor, 0o600)
     assert [path.name[:7] for path in tmp_path.iterdir()] == [".draft-"]
@@ -95,7 +95,7 @@ def test_its_name_ends_with_it(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("change", [lambda d: os.ftruncate(d, 0), lambda d: os.ftruncate(d, 9999)])
-def test_the_memory_cannot_change_its_size(change: object) -> None:
+def test_memory_cannot_be_resized(change: object) -> None:
     descriptor, _ = make_sealed("test", SIZE)
     with pytest.raises(PermissionError):
         change(descriptor)  # type: ignore[operator]

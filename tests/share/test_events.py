@@ -1,4 +1,4 @@
-"""Events fit their rows, whatever is in them; the oldest give way and are counted."""
+"""Every event fits its row. Overwritten events are counted."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from catenary.share.events import decode_event, encode_event
 from catenary.share.layout import EVENT_COUNT, EVENT_SIZE
 from catenary.virtual import Segment, Servo
 
-text = st.text(st.characters(exclude_categories=[]), max_size=3000)  # also what no UTF-8 has
+text = st.text(st.characters(exclude_categories=[]), max_size=3000)  # including surrogates
 
 
 @given(text, text, st.integers(1, 2**60))
@@ -28,12 +28,12 @@ def test_every_event_fits_its_row(message: str, detail: str, number: int) -> Non
     assert event.details in ({"data": detail}, {})
 
 
-def test_what_is_no_event_is_refused() -> None:
+def test_damaged_event_is_refused() -> None:
     with pytest.raises(ShareError, match="damaged"):
         decode_event(b"[]")
 
 
-def test_the_oldest_give_way(name: str) -> None:
+def test_oldest_events_are_overwritten(name: str) -> None:
     with cat.MainDevice(Segment([Servo()])) as main, cat.Share(name) as share:
         arm = cat.Drives(main.scan().drives, counts_per_turn=2**20, velocity_limit=100.0)
         with cat.Loop(arm, sink=share) as loop, cat.attach(name) as reader:
@@ -45,4 +45,4 @@ def test_the_oldest_give_way(name: str) -> None:
             assert events[-1].message == f"number {EVENT_COUNT + 9}"
             assert events[0].number == reader.number
             assert "number 10" in str(events[0])
-        share.report(Incident("Test", "behind the end", 0.0))  # goes nowhere
+        share.report(Incident("Test", "after the end", 0.0))  # discarded

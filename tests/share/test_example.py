@@ -1,4 +1,4 @@
-"""The example runs: it reads along, commands an axis, and the loop it does it to ends in peace."""
+"""The example reads cycles, commands an axis, and ends without an error."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from tests.share.names import files_of
 EXAMPLE = Path(__file__).resolve().parents[2] / "examples" / "attach_from_another_process.py"
 
 
-def test_it_reads_and_commands() -> None:
+def test_example_reads_and_commands() -> None:
     done = subprocess.run(
         [sys.executable, str(EXAMPLE)], capture_output=True, text=True, timeout=120, check=False
     )

@@ -1,4 +1,4 @@
-"""Folders of shares: locks with a deadline, drafts of killed processes, owners of files."""
+"""Folders of shares: lock timeouts, drafts of killed processes, owners of files."""
 
 from __future__ import annotations
 
@@ -21,10 +21,10 @@ sys.stdin.readline()
 """
 
 
-def test_a_lock_is_waited_for_until_a_deadline(
+def test_lock_times_out_and_names_its_holder(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(folder, "LOCK_PATIENCE", 0.02)
+    monkeypatch.setattr(folder, "LOCK_TIMEOUT", 0.02)
     with started(HOLD, str(tmp_path)) as holder:
         assert holder.line() == "locked"
         locked = pytest.raises(ShareError, match=f"locked for .* by process {holder.process.pid}")
@@ -42,7 +42,7 @@ def ended_process() -> int:
 @pytest.mark.parametrize(
     ("alive", "age", "stays"), [(False, 100.0, False), (False, 0.0, True), (True, 100.0, True)]
 )
-def test_drafts_of_killed_processes_are_removed(
+def test_old_drafts_of_killed_processes_are_removed(
     tmp_path: Path, alive: bool, age: float, stays: bool
 ) -> None:
     draft = tmp_path / f".draft-{os.getpid() if alive else ended_process()}-0123"
@@ -57,7 +57,7 @@ def test_drafts_of_killed_processes_are_removed(
 
 @pytest.fixture
 def user_folders(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """As /dev/shm, and no common folder."""
+    """Replace /dev/shm, and remove the group folder."""
     monkeypatch.setattr(folder, "USER_FOLDERS", tmp_path)
     monkeypatch.setattr(folder, "GROUP_FOLDER", tmp_path / "none")
     return tmp_path
@@ -66,28 +66,28 @@ def user_folders(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 @pytest.mark.parametrize(
     ("file_mode", "folder_mode"), [(0o600, 0o700), (0o640, 0o711), (0o604, 0o711), (0o664, 0o711)]
 )
-def test_others_can_pass_where_a_file_is_for_them(
+def test_folder_is_searchable_if_a_file_grants_access(
     user_folders: Path, file_mode: int, folder_mode: int
 ) -> None:
     own = folder.own_folder()
     assert own == user_folders / f"catenary-{os.geteuid()}"
     folder.prepare(own, file_mode)
     assert own.stat().st_mode & 0o7777 == folder_mode
-    folder.prepare(own, 0o600)  # another file keeps what the first one needs
+    folder.prepare(own, 0o600)  # a second file does not revoke the permissions
     assert own.stat().st_mode & 0o7777 == folder_mode
 
 
-def test_a_folder_has_the_users_id_outside_of_the_namespace(
+def test_folder_name_has_the_user_id_outside_of_the_namespace(
     user_folders: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """An ordinary user is root in a private network, and took the folder of the real one."""
+    """In a private network an ordinary user is root, but must not use the folder of root."""
     (tmp_path / "uid_map").write_text("         0      64001          1\n")
     monkeypatch.setattr(folder, "USER_IDS", tmp_path / "uid_map")
     assert folder.user_folder(0) == user_folders / "catenary-64001"
-    assert folder.user_folder(7) == user_folders / "catenary-7"  # it has no id there
+    assert folder.user_folder(7) == user_folders / "catenary-7"  # not mapped
 
 
-def test_a_folder_that_was_open_is_closed(user_folders: Path) -> None:
+def test_permissions_of_an_open_folder_are_restricted(user_folders: Path) -> None:
     own = folder.own_folder()
     own.mkdir()
     own.chmod(0o777)
@@ -95,13 +95,13 @@ def test_a_folder_that_was_open_is_closed(user_folders: Path) -> None:
     assert own.stat().st_mode & 0o066 == 0
 
 
-def test_what_is_in_the_folders_place_is_refused(user_folders: Path) -> None:
+def test_file_instead_of_a_folder_is_refused(user_folders: Path) -> None:
     folder.own_folder().touch()
     with pytest.raises(ShareError, match="and is not a folder"):
         folder.prepare(folder.own_folder(), 0o600)
 
 
-def test_a_common_folder_that_everybody_may_write_is_not_used(
+def test_group_folder_with_unsafe_permissions_is_not_used(
     user_folders: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     common = user_folders / "common"
@@ -111,13 +111,13 @@ def test_a_common_folder_that_everybody_may_write_is_not_used(
     assert folder.own_folder() == folder.user_folder(os.geteuid())
     common.chmod(0o2770)  # not sticky: its group could replace the files of others
     assert folder.own_folder() == folder.user_folder(os.geteuid())
-    if os.geteuid() == 0:  # else it is not root's
+    if os.geteuid() == 0:  # otherwise root does not own the folder
         for mode in (0o755, 0o3771):
             common.chmod(mode)
             assert folder.own_folder() == common
 
 
-def test_what_is_not_there(user_folders: Path) -> None:
+def test_missing_file_is_not_found(user_folders: Path) -> None:
     with pytest.raises(FileNotFoundError):
         folder.find("share-arm", None)
     assert folder.names(None) == []

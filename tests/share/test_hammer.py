@@ -1,4 +1,4 @@
-"""No torn record in a million: a native writer at full speed, and readers in other processes."""
+"""A native writer at full speed and a reader in another process: no record is torn."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from tests.share.processes import started
 
 ROWS = 1_000_000
 CHUNK = 20_000
-SIZES = (64, 640, 320)  # bytes of the blocks: as of a few axes
+SIZES = (64, 640, 320)  # bytes of the blocks, as for a few axes
 
 LAYOUT = SinkLayout(
     period=1e-6,
@@ -38,7 +38,7 @@ def torn(rows):
     number = rows["number"][..., None]
     return sum(int((rows[part] != number).sum()) for part in ("record", "actual", "target"))
 
-found = [0, 0, 0, 0, 0]  # records, rows, rows that were lost, torn, wrong
+found = [0, 0, 0, 0, 0]  # records, rows, lost rows, torn, wrong
 with cat.attach(sys.argv[1]) as share:
     print("attached", flush=True)
     after = 0
@@ -65,11 +65,11 @@ def table_of(capsule: object) -> int:
     return int(pointer(capsule, b"catenary.sink"))
 
 
-def test_no_torn_record_in_a_million(name: str) -> None:
+def test_a_million_rows_are_read_without_torn_records(name: str) -> None:
     hammer = compiled(Path(__file__).with_name("hammer.c"))
     with cat.Share(name, history=1e-6) as share:
         capsule = share.open(LAYOUT)
-        assert share.layout.rows.count == 64  # often overtaken
+        assert share.layout.rows.count == 64  # the writer often overtakes the reader
         table = ctypes.c_void_p(table_of(capsule))
         with started(READER, name) as reader:
             assert reader.line() == "attached"
@@ -82,4 +82,4 @@ def test_no_torn_record_in_a_million(name: str) -> None:
     assert (torn, wrong) == (0, 0)
     assert records > 0
     assert rows > 0
-    assert lost > 0  # it was overtaken, and knows
+    assert lost > 0  # the reader was overtaken and counted the loss

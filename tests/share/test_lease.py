@@ -1,5 +1,7 @@
-"""Commands of clients: two never have one axis; a lease ends when it is released, not renewed, or
-its loop ends. (Clients that are killed: tests/scenario/72_client_killed_with_a_lease.py.)"""
+"""Leases and commands of clients: exclusive axes, and the reasons why a lease ends.
+
+Killed clients: see tests/scenario/72_client_killed_with_a_lease.py.
+"""
 
 from __future__ import annotations
 
@@ -19,7 +21,7 @@ from catenary.share.process import Process
 from catenary.share.reader import Reader
 from catenary.virtual import Segment, Servo
 
-LONG = 600.0  # [s] no test takes so long
+LONG = 600.0  # [s] longer than any test
 
 
 class Cell:
@@ -55,7 +57,7 @@ def cell(name: str) -> Iterator[Cell]:
 
 
 class Time:
-    """The clock of the leases, as the test says."""
+    """Clock of the leases, which the test advances."""
 
     def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
         self.now = 1_000_000_000
@@ -71,7 +73,7 @@ def clock(monkeypatch: pytest.MonkeyPatch) -> Time:
     return Time(monkeypatch)
 
 
-def test_what_a_client_sends_is_what_its_axes_do(cell: Cell) -> None:
+def test_axes_follow_the_commands_of_the_client(cell: Cell) -> None:
     with cell.reader.lease(axes=[cell.names[2], 0], for_=LONG) as command:
         command.send(position=[0.02, 0.01])
         cell.cycles(200)
@@ -80,7 +82,7 @@ def test_what_a_client_sends_is_what_its_axes_do(cell: Cell) -> None:
         assert now["position"] == pytest.approx([0.01, 0.0, 0.02], abs=1e-4)
 
 
-def test_the_newest_command_counts_and_quantities_stay_apart(name: str) -> None:
+def test_newest_command_is_applied_to_its_quantity_only(name: str) -> None:
     with cell_of(name, mode="csv") as cell:
         with cell.reader.lease(for_=LONG) as command:
             for speed in (0.1, 0.2, 0.3):
@@ -105,7 +107,7 @@ def test_commands_can_be_read_one_by_one(cell: Cell) -> None:
         assert cell.share.commands() == []
 
 
-def test_no_axis_has_two_masters(cell: Cell) -> None:
+def test_leased_axis_is_refused_to_another_client(cell: Cell) -> None:
     with cell.reader.lease(axes=[0, 1], for_=LONG):
         with pytest.raises(LeaseError, match=r"'1 .*' is leased to process \d+ .* for another"):
             cell.reader.lease(axes=[1, 2], for_=LONG)
@@ -115,7 +117,7 @@ def test_no_axis_has_two_masters(cell: Cell) -> None:
         pass
 
 
-def test_a_lease_that_is_not_renewed_ends_and_its_axis_holds(cell: Cell, clock: Time) -> None:
+def test_expired_lease_ends_and_its_axis_holds(cell: Cell, clock: Time) -> None:
     command = cell.reader.lease(axes=[0], for_=0.5)
     command.send(position=0.01)
     cell.cycles(20)
@@ -127,21 +129,21 @@ def test_a_lease_that_is_not_renewed_ends_and_its_axis_holds(cell: Cell, clock: 
     [end] = cell.cycles()
     assert (end.axes, end.reason) == ((cell.names[0],), Reason.EXPIRED)
     assert "not renewed in time" in str(end)
-    with pytest.raises(LeaseError, match="is over: not renewed in time"):
+    with pytest.raises(LeaseError, match="has ended: not renewed in time"):
         command.send(position=0.02)
     cell.cycles(20)
     assert cell.arm.target.position[0] == pytest.approx(0.01)
     command.release()  # harmless
 
 
-def test_the_next_client_takes_what_has_expired_before_the_loop_looks(
+def test_expired_axis_can_be_leased_before_the_loop_detects_the_end(
     cell: Cell, clock: Time
 ) -> None:
     late = cell.reader.lease(axes=[0, 1], for_=0.5)
     cell.cycles()
     clock.pass_(0.6)
     with cell.reader.lease(axes=[1], for_=0.5) as command:
-        with pytest.raises(LeaseError, match="is over"):
+        with pytest.raises(LeaseError, match="has ended"):
             late.send(position=[1.0, 1.0])
         command.send(position=0.003)
         ends = cell.cycles()
@@ -152,7 +154,7 @@ def test_the_next_client_takes_what_has_expired_before_the_loop_looks(
         assert cell.cycles() == []
 
 
-def test_what_was_sent_under_a_lease_that_is_over_is_not_taken(cell: Cell) -> None:
+def test_commands_of_an_ended_lease_are_discarded(cell: Cell) -> None:
     with cell.reader.lease(axes=[0], for_=LONG) as command:
         cell.cycles()
         command.send(position=1.0)
@@ -160,7 +162,7 @@ def test_what_was_sent_under_a_lease_that_is_over_is_not_taken(cell: Cell) -> No
     assert cell.arm.target.position[0] == pytest.approx(0.0, abs=1e-6)
 
 
-def test_an_axis_holds_where_it_is_commanded_and_not_where_it_was_sent(name: str) -> None:
+def test_axis_holds_its_commanded_position_and_not_its_target(name: str) -> None:
     with cell_of(name, velocity_limit=1.0, step_limit=2.0) as cell:
         with cell.reader.lease(axes=[0], for_=LONG) as command:
             command.send(position=1.0)  # a thousand cycles away
@@ -169,7 +171,7 @@ def test_an_axis_holds_where_it_is_commanded_and_not_where_it_was_sent(name: str
         assert 0.005 < cell.arm.target.position[0] < 0.012
 
 
-def test_a_loop_that_does_not_take_commands_is_noticed(cell: Cell) -> None:
+def test_send_fails_if_the_loop_does_not_read_commands(cell: Cell) -> None:
     with cell.reader.lease(axes=[0], for_=LONG) as command:
         for _ in range(COMMANDS):
             command.send(position=0.0)
@@ -179,10 +181,10 @@ def test_a_loop_that_does_not_take_commands_is_noticed(cell: Cell) -> None:
         command.send(position=0.0)
 
 
-def test_a_client_that_was_stopped_with_the_desk_does_not_hold_others_for_ever(
+def test_client_stopped_with_the_lock_does_not_block_others(
     cell: Cell, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(lease, "PATIENCE_NS", 10_000_000)
+    monkeypatch.setattr(lease, "LOCK_TIMEOUT_NS", 10_000_000)
     with cell.reader.lease(axes=[0], for_=LONG) as command:
         mutex = command._desk.mutex
         has_it, may_go = threading.Event(), threading.Event()
@@ -196,14 +198,14 @@ def test_a_client_that_was_stopped_with_the_desk_does_not_hold_others_for_ever(
         other = threading.Thread(target=hold)
         other.start()
         has_it.wait()
-        with pytest.raises(LeaseError, match="another client has held the desk"):
+        with pytest.raises(LeaseError, match="another client has locked the desk"):
             command.send(position=0.0)
-        assert cell.cycles(3) == []  # the loop does not notice
+        assert cell.cycles(3) == []  # the loop is not affected
         may_go.set()
         other.join()
 
 
-def test_axes_of_several_drives(name: str) -> None:
+def test_commands_reach_the_axes_of_several_drives(name: str) -> None:
     with cat.MainDevice(Segment([Servo(), Servo(), Servo()])) as main:
         subs = main.scan().drives
         left = cat.Drives(subs[:1], counts_per_turn=2**20, velocity_limit=100.0)
@@ -217,7 +219,7 @@ def test_axes_of_several_drives(name: str) -> None:
                 assert right.target.position.tolist() == [0.002, 0.003]
 
 
-def test_as_many_clients_as_there_are_places(cell: Cell, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_number_of_clients_is_limited(cell: Cell, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("catenary.share.lease.axis_numbers", lambda *_: [])
     leases = [cell.reader.lease(for_=LONG) for _ in range(PLACES)]
     with pytest.raises(LeaseError, match=f"{PLACES} clients"):
@@ -226,11 +228,13 @@ def test_as_many_clients_as_there_are_places(cell: Cell, monkeypatch: pytest.Mon
     cell.reader.lease(for_=LONG)
 
 
-def test_a_place_that_changes_hands_while_the_loop_looks(
+def test_place_is_reassigned_while_the_loop_reads_it(
     cell: Cell, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The loop takes no lock: a lease it reads may be given back and its place taken by another
-    client meanwhile. It must not make one lease of the two, nor lose what the other sends."""
+    """While the loop reads a lease without the lock, another client can take over the place.
+
+    The loop must neither mix the two leases nor lose commands of the second one.
+    """
     leases = [cell.reader.lease(axes=[0], for_=LONG)]
     client_of = Desk.client
 
@@ -251,32 +255,32 @@ def test_a_place_that_changes_hands_while_the_loop_looks(
     assert [end.axes for end in cell.share.ended()] == [cell.names[1:]]
 
 
-def test_a_command_of_a_lease_that_the_loop_has_not_seen_yet_stays(
+def test_command_of_an_unrecorded_lease_is_kept(
     cell: Cell, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     first = cell.reader.lease(axes=[0], for_=LONG)
     cell.share.commands()
     follow = CommandReader._follow_leases
 
-    def and_then_another_takes_it(reader: CommandReader) -> None:
+    def follow_and_replace(reader: CommandReader) -> None:
         follow(reader)
         first.release()
         cell.reader.lease(axes=[0], for_=LONG).send(position=0.001)
 
-    monkeypatch.setattr(CommandReader, "_follow_leases", and_then_another_takes_it)
+    monkeypatch.setattr(CommandReader, "_follow_leases", follow_and_replace)
     assert cell.share.commands() == []
     monkeypatch.undo()
     [command] = cell.share.commands()
     assert command.position == pytest.approx([0.001])
 
 
-def test_a_lease_taken_while_the_loop_ends_is_over(
+def test_lease_taken_while_the_loop_ends_is_not_valid(
     name: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     with cell_of(name) as cell:
         cell.reader.lease()  # opens the desk
         cell.cycles()
-    monkeypatch.setattr(Reader, "alive", True)  # as it was when it was asked
+    monkeypatch.setattr(Reader, "alive", True)  # the loop ends just after the check
     with (
         pytest.raises(LeaseError, match="the loop has ended"),
         cell.reader.lease(for_=LONG) as command,
@@ -284,7 +288,7 @@ def test_a_lease_taken_while_the_loop_ends_is_over(
         command.send(position=0.0)
 
 
-def test_the_end_of_the_loop_ends_all_leases(name: str) -> None:
+def test_end_of_the_loop_ends_all_leases(name: str) -> None:
     with cat.MainDevice(Segment([Servo()])) as main, cat.Share(name) as share:
         arm = cat.Drives(main.scan().drives, counts_per_turn=2**20, velocity_limit=100.0)
         with cat.Loop(arm, sink=share) as loop:
@@ -305,38 +309,40 @@ def test_the_end_of_the_loop_ends_all_leases(name: str) -> None:
 
 
 @pytest.mark.parametrize(
-    ("asked", "named"),
+    ("arguments", "message"),
     [
         ({"axes": ["elbow"]}, "no axis 'elbow'"),
         ({"axes": [3]}, "no axis 3"),
-        ({"axes": [0, 0]}, "each once"),
+        ({"axes": [0, 0]}, "each axis only once"),
         ({"axes": []}, "at least one"),
         ({"axes": "0 Servo"}, "a list of names"),
-        ({"for_": 0.0}, "more than 0"),
-        ({"for_": float("nan")}, "more than 0"),
+        ({"for_": 0.0}, "must be positive"),
+        ({"for_": float("nan")}, "must be positive"),
     ],
 )
-def test_refuses_what_cannot_be_leased(cell: Cell, asked: dict, named: str) -> None:
-    with pytest.raises(ValueError, match=named):
-        cell.reader.lease(**asked)
+def test_invalid_arguments_of_a_lease_are_refused(
+    cell: Cell, arguments: dict, message: str
+) -> None:
+    with pytest.raises(ValueError, match=message):
+        cell.reader.lease(**arguments)
 
 
 @pytest.mark.parametrize(
-    ("sent", "named"),
+    ("sent", "message"),
     [
         ({}, "nothing to send"),
-        ({"position": [1.0, 2.0]}, r"each of 1 axes, not \(2,\)"),
+        ({"position": [1.0, 2.0]}, r"has shape \(2,\); pass a scalar or shape \(1,\)"),
         ({"velocity": np.nan}, "NaN or infinity"),
     ],
 )
-def test_refuses_what_cannot_be_sent(cell: Cell, sent: dict, named: str) -> None:
+def test_invalid_set_points_are_refused(cell: Cell, sent: dict, message: str) -> None:
     with (
         cell.reader.lease(axes=[0], for_=LONG) as command,
-        pytest.raises(ValueError, match=named),
+        pytest.raises(ValueError, match=message),
     ):
         command.send(**sent)
 
 
-def test_a_share_without_a_loop_takes_no_commands(name: str) -> None:
+def test_share_without_a_loop_refuses_to_read_commands(name: str) -> None:
     with cat.Share(name) as share, pytest.raises(RuntimeError, match="before a Loop is open"):
         share.commands()

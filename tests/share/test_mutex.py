@@ -1,4 +1,4 @@
-"""The mutex among threads. (Owners that are killed: scenario 73_client_killed_with_the_mutex.)"""
+"""The mutex between threads. Killed owners: see scenario 73_client_killed_with_the_mutex."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ from tests.share.names import mutex_file
 COUNTS = 2000
 
 
-def test_one_at_a_time(name: str) -> None:
-    there = [0]
+def test_only_one_thread_at_a_time_holds_the_mutex(name: str) -> None:
+    inside = [0]
     most = 0
 
     def work() -> None:
@@ -26,27 +26,27 @@ def test_one_at_a_time(name: str) -> None:
         mutex = Mutex(name)
         for _ in range(COUNTS):
             with mutex:
-                there[0] += 1
-                most = max(most, there[0])
-                there[0] -= 1
+                inside[0] += 1
+                most = max(most, inside[0])
+                inside[0] -= 1
 
     threads = [threading.Thread(target=work) for _ in range(4)]
     for thread in threads:
         thread.start()
     for thread in threads:
         thread.join()
-    assert (most, there) == (1, [0])
+    assert (most, inside) == (1, [0])
 
 
-def test_a_thread_that_has_it_is_told_so(name: str) -> None:
+def test_second_acquire_and_release_without_lock_fail(name: str) -> None:
     mutex = Mutex(name)
     with mutex, pytest.raises(RuntimeError, match="already"):
         mutex.acquire()
-    with pytest.raises(RuntimeError, match="does not have"):
+    with pytest.raises(RuntimeError, match="this thread does not"):
         mutex.release()
 
 
-def test_waiting_has_an_end(name: str) -> None:
+def test_acquire_times_out(name: str) -> None:
     with Mutex(name) as mutex:
         got = []
         other = threading.Thread(target=lambda: got.append(Mutex(name).acquire(timeout=0.01)))
@@ -58,7 +58,7 @@ def test_waiting_has_an_end(name: str) -> None:
     mutex.release()
 
 
-def test_a_thread_that_ended_with_it_is_recovered_from(name: str) -> None:
+def test_mutex_of_an_ended_thread_is_recovered(name: str) -> None:
     mutex = Mutex(name)
     thread = threading.Thread(target=mutex.acquire)
     thread.start()
@@ -69,7 +69,7 @@ def test_a_thread_that_ended_with_it_is_recovered_from(name: str) -> None:
         assert not mutex.recovered
 
 
-def test_the_name_stays_until_it_is_taken_away(name: str) -> None:
+def test_file_exists_until_unlink(name: str) -> None:
     path = mutex_file(name)
     Mutex(name, mode=0o660)
     assert path.stat().st_mode & 0o777 == 0o660
@@ -77,10 +77,10 @@ def test_the_name_stays_until_it_is_taken_away(name: str) -> None:
     assert not path.exists()
 
 
-def test_a_file_that_is_no_mutex(name: str) -> None:
+def test_file_without_a_mutex_is_refused(name: str) -> None:
     mutex_file(name).write_bytes(bytes(4096))
     mutex_file(name).chmod(0o600)
-    with pytest.raises(ShareError, match="no mutex"):
+    with pytest.raises(ShareError, match="mutex of this version"):
         Mutex(name)
 
 
@@ -93,8 +93,8 @@ with Mutex(sys.argv[1]):
 """
 
 
-def test_a_waiter_lends_its_priority_to_the_owner(name: str) -> None:
-    """What the kernel says of the owner: proc(5), field 18: a real-time priority is negative."""
+def test_owner_inherits_the_priority_of_its_waiter(name: str) -> None:
+    """Read the priority of the owner in /proc: field 18 is negative for real time, proc(5)."""
     try:
         os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(10))
         os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))

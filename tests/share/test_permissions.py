@@ -1,4 +1,4 @@
-"""The mode of a share, tried as another user. (Hostile users: tests/attack.)"""
+"""Permissions of a share, tested as another user. Hostile users: see tests/attack."""
 
 from __future__ import annotations
 
@@ -48,15 +48,17 @@ def as_nobody(name: str, verb: str) -> list[str]:
 
 @pytest.mark.skipif(os.geteuid() != 0, reason="only root can become another user")
 @pytest.mark.parametrize(
-    ("mode", "verb", "said"),
+    ("mode", "verb", "expected"),
     [
-        (0o600, "read", ["may not be read"]),
+        (0o600, "read", ["no permission to read"]),
         (0o604, "read", ["True"]),
-        (0o604, "command", ["True", "may not be commanded"]),
+        (0o604, "command", ["True", "no permission to command"]),
         (0o606, "command", ["True"]),
     ],
 )
-def test_another_user(name: str, mode: int, verb: str, said: list[str]) -> None:
+def test_mode_decides_what_another_user_can_do(
+    name: str, mode: int, verb: str, expected: list[str]
+) -> None:
     with cat.MainDevice(Segment([Servo()])) as main:
         arm = cat.Drives(main.scan().drives, counts_per_turn=2**20, velocity_limit=100.0)
         with cat.Share(name, mode=mode) as share, cat.Loop(arm, sink=share) as loop:
@@ -65,8 +67,8 @@ def test_another_user(name: str, mode: int, verb: str, said: list[str]) -> None:
             found = as_nobody(name, verb)
             next(loop)
             share.apply(arm)
-    assert len(found) == len(said)
-    for line, part in zip(found, said, strict=True):
+    assert len(found) == len(expected)
+    for line, part in zip(found, expected, strict=True):
         assert part in line
 
 
@@ -80,7 +82,7 @@ def test_only_the_writer_can_write_cycles(name: str, mode: int) -> None:
             assert (desk.name, desk.stat().st_mode & 0o777) == (f"socket-{name}", mode)
 
 
-def test_a_full_disk_is_told_and_nothing_is_left(
+def test_full_file_system_is_reported_and_leaves_no_files(
     name: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def allocate(descriptor: int, offset: int, size: int) -> None:
@@ -91,14 +93,14 @@ def test_a_full_disk_is_told_and_nothing_is_left(
     with cat.MainDevice(segment) as main:
         arm = cat.Drives(main.scan().drives, counts_per_turn=2**20, velocity_limit=100.0)
         share = cat.Share(name)
-        no_room = pytest.raises(ShareError, match=r"has no room for .* MiB")
+        no_room = pytest.raises(ShareError, match=r"has not enough space for .* MiB")
         with no_room, share, cat.Loop(arm, sink=share):
             pass
         assert segment[0].state & 0x0F == 2  # PRE-OP
     assert not files_of(name)
 
 
-def test_memory_for_commands_that_is_refused_leaves_nothing(
+def test_failed_allocation_of_the_desk_leaves_no_files(
     name: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def refused(name: str, size: int) -> None:
@@ -114,7 +116,7 @@ def test_memory_for_commands_that_is_refused_leaves_nothing(
 
 
 @pytest.mark.skipif(os.geteuid() != 0, reason="only root can become another user")
-def test_a_mutex_of_another_user(name: str) -> None:
+def test_mutex_of_another_user_is_refused(name: str) -> None:
     mutex = cat.share.Mutex(name)
     assert "belongs to another user" in as_nobody(name, "mutex")[0]
     mutex.unlink()

@@ -1,4 +1,4 @@
-"""Processes as the kernel describes them."""
+"""Identity of processes, read from /proc."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ input()
 """
 
 
-def test_a_process_can_have_any_name() -> None:
-    """A client with such a name ended the loop: its lease is judged by /proc/PID/stat."""
+def test_process_can_have_any_name() -> None:
+    """A client with such a name once ended the loop, which parses /proc/PID/stat."""
     with started(RENAMED) as program:
         pid, start_time = map(int, program.line().split())
         assert is_running(pid)

@@ -1,4 +1,4 @@
-"""What a loop does is what a reader reads: every cycle, by names, in every order."""
+"""A reader gets every cycle of a loop, by field name, in both execution modes."""
 
 from __future__ import annotations
 
@@ -41,9 +41,9 @@ def run(name: str, order: str, body: Callable[[cat.Loop, cat.Drives, Reader], No
 
 
 @pytest.mark.parametrize("order", ["threaded", "inline"])
-def test_a_reader_sees_the_cycle_that_the_loop_is_in(name: str, order: str) -> None:
+def test_reader_gets_the_current_cycle(name: str, order: str) -> None:
     def body(loop: cat.Loop, arm: cat.Drives, reader: Reader) -> None:
-        behind = 1 if order == "inline" else 0  # its tail comes when the body has ended
+        behind = 1 if order == "inline" else 0  # post-processing runs after the body
         seen = []
         for cycle in loop:
             arm.target.position[:] = 0.01 * cycle.time
@@ -60,7 +60,7 @@ def test_a_reader_sees_the_cycle_that_the_loop_is_in(name: str, order: str) -> N
 
 
 @pytest.mark.parametrize("order", ["threaded", "inline"])
-def test_no_cycle_is_missing_and_each_has_its_times(name: str, order: str) -> None:
+def test_no_cycle_is_missing_and_times_match_the_log(name: str, order: str) -> None:
     def body(loop: cat.Loop, arm: cat.Drives, reader: Reader) -> None:
         for cycle in loop:
             if cycle.number == 200:
@@ -80,7 +80,7 @@ def test_no_cycle_is_missing_and_each_has_its_times(name: str, order: str) -> No
 
 
 @pytest.mark.parametrize("order", ["threaded", "inline"])
-def test_a_law_is_read_along(name: str, order: str) -> None:
+def test_reader_gets_the_cycles_of_a_law(name: str, order: str) -> None:
     def body(loop: cat.Loop, arm: cat.Drives, reader: Reader) -> None:
         before = reader.read()["number"]
         loop.run(hold, memory=[0.003, 0.004])
@@ -94,7 +94,7 @@ def test_a_law_is_read_along(name: str, order: str) -> None:
 
 
 @pytest.mark.parametrize("order", ["threaded", "inline"])
-def test_a_quick_stop_is_in_the_cycle_that_sends_it(name: str, order: str) -> None:
+def test_quick_stop_is_recorded_in_the_cycle_that_sends_it(name: str, order: str) -> None:
     def body(loop: cat.Loop, arm: cat.Drives, reader: Reader) -> None:
         arm.enable()
         for _ in loop:
@@ -106,13 +106,13 @@ def test_a_quick_stop_is_in_the_cycle_that_sends_it(name: str, order: str) -> No
         rows, _ = reader.rows(after=asked - 2)
         words = dict(zip(rows["number"].tolist(), rows["controlword"].tolist(), strict=True))
         assert words[asked - 1] == [0x0F, 0x0F]
-        # inline: the frames of the cycle itself; threaded: those of the next, which go first
+        # inline: sent in the same cycle; threaded: sent at the start of the next cycle
         assert words[asked + (order == "threaded")] == [0x02, 0x02]
 
     run(name, order, body)
 
 
-def test_the_layout_describes_itself(name: str) -> None:
+def test_layout_describes_the_loop_and_its_fields(name: str) -> None:
     def body(loop: cat.Loop, arm: cat.Drives, reader: Reader) -> None:
         layout = reader.layout
         assert (layout.name, layout.period, layout.clock) == (name, 1e-3, "virtual")
@@ -130,7 +130,7 @@ def test_the_layout_describes_itself(name: str) -> None:
     run(name, "threaded", body)
 
 
-def test_columns_of_one_name_get_their_devices_with_it(name: str) -> None:
+def test_equal_column_names_are_made_unique(name: str) -> None:
     segment = Segment([Coupler(), AnalogInputs(channels=2), DigitalOutputs(), DigitalOutputs()])
     with cat.MainDevice(segment) as main:
         subs = main.scan()
@@ -148,7 +148,7 @@ def test_columns_of_one_name_get_their_devices_with_it(name: str) -> None:
                 assert now[inputs.names[0]] == inputs[inputs.names[0]]
 
 
-def test_bytes_of_process_data_are_in_the_rows(name: str) -> None:
+def test_rows_contain_raw_process_data(name: str) -> None:
     segment = Segment([Coupler(), ForceSensor(), DigitalOutputs()])
     with cat.MainDevice(segment) as main:
         subs = main.scan()
@@ -177,22 +177,22 @@ def test_waiting_ends_with_the_loop(name: str) -> None:
                 next(loop)
                 assert reader.wait(timeout=0.0)
                 assert reader.alive
-            assert reader.wait()  # cycles of the way down
+            assert reader.wait()  # cycles while the loop shuts down
             assert not reader.wait()
             assert reader.state == "ended"
             assert reader.read()["number"] > 1
 
 
-def test_the_last_cycles_are_seen_where_the_loop_ends_while_it_is_asked(
+def test_last_cycle_is_read_if_the_loop_ends_during_the_check(
     name: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("catenary.share.reader.LOOK_NS", 1_000_000)
+    monkeypatch.setattr("catenary.share.reader.ALIVE_CHECK_NS", 1_000_000)
 
     def body(loop: cat.Loop, arm: cat.Drives, reader: Reader) -> None:
         reader.read()
 
         def alive(reader: Reader) -> bool:
-            """One more cycle comes, and then the end, before the answer."""
+            """Run one more cycle, and report the end of the loop."""
             next(loop)
             return False
 
@@ -203,7 +203,7 @@ def test_the_last_cycles_are_seen_where_the_loop_ends_while_it_is_asked(
     run(name, "threaded", body)
 
 
-def test_a_second_loop_begins_a_share_of_its_own(name: str) -> None:
+def test_second_loop_creates_a_new_segment(name: str) -> None:
     segment = Segment([Servo()])
     with cat.MainDevice(segment) as main, cat.Share(name) as share:
         arm = cat.Drives(main.scan().drives, counts_per_turn=TURN, velocity_limit=100.0)
@@ -237,7 +237,7 @@ def test_overwritten_cycles_are_counted(name: str) -> None:
             assert len(reader.rows(after=reader.number)[0]) == 0
 
 
-def test_events_and_the_error_that_ends_the_loop(name: str) -> None:
+def test_events_include_the_error_that_ends_the_loop(name: str) -> None:
     segment = Segment([Coupler(), Servo()])
     with cat.MainDevice(segment) as main, cat.Share(name) as share:
         arm = cat.Drives(main.scan().drives, counts_per_turn=TURN, velocity_limit=100.0)
@@ -277,7 +277,7 @@ def test_a_name_in_use_is_refused(name: str) -> None:
                 share.open(None)  # type: ignore[arg-type]
 
 
-def test_a_share_that_was_not_entered_leaves_nothing_open(name: str) -> None:
+def test_share_that_was_not_entered_is_refused(name: str) -> None:
     segment = Segment([Servo()])
     with cat.MainDevice(segment) as main:
         arm = cat.Drives(main.scan().drives, counts_per_turn=TURN, velocity_limit=100.0)
@@ -289,12 +289,12 @@ def test_a_share_that_was_not_entered_leaves_nothing_open(name: str) -> None:
         assert segment[0].state & 0x0F == 2
 
 
-def test_networks_need_a_sink_each(name: str) -> None:
+def test_each_network_needs_a_sink(name: str) -> None:
     with pytest.raises(ValueError, match="1 for 2 networks"):
         one_sink_each(cat.Share(name), 2)
 
 
-def test_two_networks_have_a_share_each(name: str) -> None:
+def test_two_networks_use_two_shares(name: str) -> None:
     clock = cat.realtime.VirtualClock()
     segments = [Segment([Servo()], clock=clock) for _ in range(2)]
     with cat.MainDevice(segments[0]) as one, cat.MainDevice(segments[1]) as two:
@@ -317,14 +317,14 @@ def test_two_networks_have_a_share_each(name: str) -> None:
 
 
 @pytest.mark.parametrize("bad", ["", "a/b", "../x", ".hidden", "x" * 65])
-def test_names_that_cannot_be(bad: str) -> None:
-    with pytest.raises(ValueError, match="a name has"):
+def test_invalid_names_are_refused(bad: str) -> None:
+    with pytest.raises(ValueError, match="invalid name"):
         cat.Share(bad)
-    with pytest.raises(ValueError, match="a name has"):
+    with pytest.raises(ValueError, match="invalid name"):
         cat.attach(bad)
 
 
-def test_the_mode_of_the_file_is_the_permission(name: str) -> None:
+def test_file_has_the_given_mode(name: str) -> None:
     segment = Segment([Servo()])
     with cat.MainDevice(segment) as main:
         arm = cat.Drives(main.scan().drives, counts_per_turn=TURN, velocity_limit=100.0)
@@ -333,8 +333,8 @@ def test_the_mode_of_the_file_is_the_permission(name: str) -> None:
 
 
 @pytest.mark.parametrize("order", ["threaded", "inline"])
-def test_in_real_time_too(name: str, order: str) -> None:
-    """Nothing is said of how timely: only that every cycle is shared, whatever thread runs it."""
+def test_every_cycle_is_shared_in_real_time(name: str, order: str) -> None:
+    """Check that no cycle is missing; timing is not asserted."""
     segment = Segment([Servo()], clock="monotonic")
     with cat.MainDevice(segment) as main:
         arm = cat.Drives(main.scan().drives, counts_per_turn=TURN, velocity_limit=100.0)
@@ -358,7 +358,7 @@ def test_in_real_time_too(name: str, order: str) -> None:
             assert (rows["wake_ns"] >= rows["scheduled_ns"]).all()
 
 
-def test_patience_waits_for_a_share_to_come(name: str) -> None:
+def test_patience_waits_for_a_share_to_appear(name: str) -> None:
     tried: list[int] = []
 
     def jobs() -> Iterator[int]:
@@ -375,4 +375,4 @@ def test_patience_waits_for_a_share_to_come(name: str) -> None:
             assert again.layout == reader.layout
 
     run(name, "threaded", body)
-    assert tried == [0, 1, 2]  # it was there at once
+    assert tried == [0, 1, 2]  # no retry was necessary

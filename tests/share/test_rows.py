@@ -1,4 +1,4 @@
-"""Rings of rows: what a reader finds who was overtaken while it copied."""
+"""Rings of rows: results of a reader that the writer overtakes during the copy."""
 
 from __future__ import annotations
 
@@ -7,11 +7,11 @@ import pytest
 from catenary.share._rows import Ring, memory_size
 
 COUNT, SIZE = 8, 8
-SLOTS, STRIDE = 64, 64  # ring.h: where the slots begin, and how far apart they are
+SLOTS, STRIDE = 64, 64  # offset of the first slot and distance of the slots, ring.h
 
 
 class Overtaken:
-    """A ring as a reader sees it who has read `newest` and was then stopped for a while."""
+    """A ring whose reader was paused after it had read `newest`."""
 
     def __init__(self, written: int) -> None:
         self.memory = bytearray(memory_size(COUNT, SIZE))
@@ -20,7 +20,7 @@ class Overtaken:
             self.ring.write(number.to_bytes(SIZE, "little"))
 
     def overwrite(self, number: int) -> None:
-        """The row's slot is being written again, for the row of the next round."""
+        """Mark the slot of this row as being overwritten by the row of the next round."""
         at = SLOTS + number % COUNT * STRIDE
         self.memory[at : at + 8] = (2 * (number + COUNT) + 1).to_bytes(8, "little")
 
@@ -32,7 +32,7 @@ class Overtaken:
         return numbers, lost
 
 
-def test_what_was_overwritten_before_it_was_copied_is_lost() -> None:
+def test_overwritten_rows_are_counted_as_lost() -> None:
     ring = Overtaken(8)
     ring.overwrite(1)
     ring.overwrite(2)
@@ -40,8 +40,8 @@ def test_what_was_overwritten_before_it_was_copied_is_lost() -> None:
 
 
 @pytest.mark.parametrize("gone", [[8], [6, 7, 8], [1, 2, 3, 4, 5, 6, 7, 8]])
-def test_what_lies_behind_the_last_row_copied_is_not_lost_yet(gone: list[int]) -> None:
-    """The next call counts it, from where this one ended: else it would be counted twice."""
+def test_rows_after_the_last_copied_row_are_counted_by_the_next_call(gone: list[int]) -> None:
+    """Otherwise they would be counted twice."""
     ring = Overtaken(8)
     for number in gone:
         ring.overwrite(number)
@@ -53,7 +53,7 @@ def test_what_lies_behind_the_last_row_copied_is_not_lost_yet(gone: list[int]) -
     assert (again, lost) == (list(range(9, 17)), len(gone))
 
 
-def test_a_gap_among_the_rows() -> None:
+def test_gap_between_rows_is_counted_as_lost() -> None:
     ring = Overtaken(8)
     ring.overwrite(4)
     assert ring.after(0) == ([1, 2, 3, 5, 6, 7, 8], 1)

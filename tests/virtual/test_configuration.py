@@ -52,7 +52,7 @@ def test_a_segment_is_read(tmp_path: Path) -> None:
         ('[[device]]\nkind = "motor"', "motor"),
         ('[[device]]\nkind = "servo"\naxes = "two"', r"device\[0\].axes"),
         ('[[device]]\nkind = "servo"\naxes = 9', "axes must be 1 to 8"),
-        ('[[device]]\nkind = "digital_outputs"\nbits = 17', "1 to 16 bits"),
+        ('[[device]]\nkind = "digital_outputs"\nbits = 17', "bits must be 1 to 16"),
         ('[[device]]\nkind = "servo"\ninertia = -1.0', "inertia"),
         ('[[device]]\nkind = "servo"\ncrystal = { ppm = 900.0 }', "at most 500 ppm"),
         ('[[device]]\nkind = "coupler"\ncrystal = { error = 1 }', r"device\[0\].crystal"),
@@ -168,7 +168,7 @@ def test_errors_of_faults_name_the_field(tmp_path: Path, text: str, says: str) -
     ("text", "says"),
     [
         ('kind = "servo"\nbehind = [0, 3]', "device 0 has no port 3"),
-        ('kind = "servo"\nbehind = [1, 1]', "must be behind one of 0 to 0"),
+        ('kind = "servo"\nbehind = [1, 1]', "must be behind one of the devices 0 to 0"),
         ('kind = "junction"\nport_count = 5', "port_count"),
     ],
 )

@@ -78,6 +78,6 @@ def test_a_terminal_with_a_clock_that_is_not_used_switches_with_the_frame() -> N
 
 
 def test_a_clock_is_for_one_byte() -> None:
-    with pytest.raises(ValueError, match="1 to 8 bits, not 16"):
+    with pytest.raises(ValueError, match="bits must be 1 to 8 with dc=True, not 16"):
         DigitalOutputs(bits=16, dc=True)
     assert DigitalOutputs(bits=8, dc=True, crystal=Crystal(ppm=20)).crystal.ppm == 20

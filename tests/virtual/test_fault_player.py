@@ -425,7 +425,7 @@ def test_more_faults_of_frames_than_there_is_room_for_miss() -> None:
         (power_cycle(5), "power_cycle: device: device 5 does not exist; the last one is 4"),
         (cut(between=(1, 3)), "cut: between: 1 and 3 are not neighbours"),
         (corrupt(between=(4, 5)), "between"),
-        (mailbox_silent(0), "device 0, coupler, has no application"),
+        (mailbox_silent(0), r"device 0 \(coupler\) has no application"),
         (drive_fault(1), "is not a servo"),
         (drive_fault(2, axis=1), "axis"),
         (exchange(2, 2), "other"),

@@ -91,7 +91,9 @@ def test_a_simulation_beyond_all_bounds_stops_and_says_so(tmp_path: Path) -> Non
     segment, servo = free(tmp_path)
     time = Time(segment)
     servo.apply_load(3e9)
-    with pytest.raises(ConfigurationError, match=r"after 0\.000. s: joint 'swing' exceeded all"):
+    with pytest.raises(
+        ConfigurationError, match=r"after 0\.000. s: joint 'swing' exceeded 1e6 rad/s"
+    ):
         time.pass_by(0.01)
 
 
@@ -139,6 +141,6 @@ def test_in_real_time_it_stands_still_and_frames_are_answered_on(
         until(lambda: bool(said))
         near.send(BRD)
         assert answer(near) == 1
-        with pytest.raises(ConfigurationError, match="exceeded all bounds"):
+        with pytest.raises(ConfigurationError, match="exceeded 1e6 rad/s"):
             server.raise_failure()
     assert isinstance(said[0], ConfigurationError)

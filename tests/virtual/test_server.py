@@ -44,7 +44,7 @@ def test_virtual_time_cannot_be_served() -> None:
 
 
 def test_only_a_ring_has_two_interfaces() -> None:
-    with pytest.raises(ValueError, match="needs a ring"):
+    with pytest.raises(ValueError, match="requires a ring"):
         Server(Segment([Coupler()], clock="monotonic"), "veth0", second="veth1")
 
 

@@ -339,7 +339,7 @@ def test_quirks_come_from_toml(tmp_path: Path) -> None:
     assert isinstance(servo, Servo)
     assert servo.quirks == ServoQuirks(bit_12="never", quick_stop_option=-1, refused_modes=(10,))
     path.write_text('[[device]]\nkind = "servo"\nquirks = { mode_delay = -1.0 }\n')
-    with pytest.raises(ConfigurationError, match="mode_delay must be 0 or more seconds"):
+    with pytest.raises(ConfigurationError, match="mode_delay must be at least 0 s"):
         read_segment(path)
 
 

@@ -430,7 +430,7 @@ def test_the_sii_has_the_op_modes_given(modes: tuple[OpMode, ...]) -> None:
 
 
 def test_an_op_mode_that_does_not_fit_is_refused() -> None:
-    with pytest.raises(ValueError, match="shift_ns must fit 32 bits, signed"):
+    with pytest.raises(ValueError, match="shift_ns must be a signed 32-bit number"):
         OpMode(name="DC", shift_ns=1 << 31)
-    with pytest.raises(ValueError, match="assign_activate must fit 16 bits"):
+    with pytest.raises(ValueError, match="assign_activate must be an unsigned 16-bit"):
         OpMode(name="DC", assign_activate=-1)

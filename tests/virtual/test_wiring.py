@@ -37,7 +37,7 @@ def test_branches_come_by_port_3_then_1_then_2() -> None:
         ({2: (0, 1)}, "port 1 of device 0 is already connected to device 1"),
         ({2: (1, 3)}, "device 1 has no port 3"),
         ({2: (0, 0)}, "device 0 has no port 0"),
-        ({1: (2, 1)}, "behind one of 0 to 0, not 2"),
+        ({1: (2, 1)}, "behind one of the devices 0 to 0, not 2"),
         ({5: (0, 1)}, "device 5 cannot be placed"),
         ({0: (1, 1)}, "device 0 cannot be placed"),
     ],
@@ -56,6 +56,6 @@ def test_a_ring_needs_a_way_back() -> None:
 
 def test_strangers_are_no_neighbours() -> None:
     with pytest.raises(
-        ValueError, match=r"0 and 2 are not neighbours \(cables: main-0, 0-1, 1-2\)"
+        ValueError, match=r"0 and 2 are not neighbours; the cables are main-0, 0-1, 1-2"
     ):
         Wiring([LINE] * 3, {}, ring=False).between(0, 2)

@@ -11,6 +11,6 @@ def test_codes_have_text():
     assert len(ABORT_CODES) == 31
 
 
-def test_unknown_codes_say_so():
+def test_unknown_codes_have_a_generic_text():
     assert abort_code(0x12345678).text == "Unknown abort code"
     assert abort_code(0x12345678).code == 0x12345678

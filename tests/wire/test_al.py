@@ -28,7 +28,7 @@ def test_status_words(word, status):
 @pytest.mark.parametrize(
     ("word", "control"),
     [
-        # the same capture, frame 2: acknowledges while asking for INIT
+        # the same capture, frame 2: an acknowledgement with a request for INIT
         (0x0011, AlControl(AlState.INIT, acknowledge=True)),
         (0x0008, AlControl(AlState.OP)),
         (0x0022, AlControl(AlState.PRE_OP, request_identification=True)),
@@ -41,7 +41,7 @@ def test_control_words(word, control):
 
 
 @given(u16)
-def test_every_word_is_a_value_or_decode_error(word):
+def test_every_word_gives_a_value_or_decode_error(word):
     if word & 0x0F in list(AlState):
         assert AlStatus.from_word(word).word == word & 0x3F
         assert AlControl.from_word(word).word == word & 0x3F
@@ -57,7 +57,7 @@ def test_states_of_a_broadcast_read():
     assert states_in(0) == set()
 
 
-def test_states_are_written_as_in_the_standard():
+def test_state_names_are_those_of_the_standard():
     assert [str(state) for state in AlState] == ["INIT", "PRE-OP", "BOOT", "SAFE-OP", "OP"]
 
 
@@ -68,6 +68,6 @@ def test_status_codes_have_text_and_cause():
     assert all(entry.text and entry.code == code for code, entry in STATUS_CODES.items())
 
 
-def test_unknown_status_codes_say_so():
+def test_unknown_status_codes_have_a_generic_text():
     assert status_code(0x9000).text == "Vendor specific AL status code"
     assert status_code(0x7000).text == "Unknown AL status code"

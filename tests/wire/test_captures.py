@@ -1,4 +1,4 @@
-"""Captures and SII images of real devices in the shared data: all decodes and comes back."""
+"""Captures and SII images of real devices in the shared data: all of them round-trip."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ from catenary.wire.register import (
 from catenary.wire.sii import MailboxProtocol, decode_sii
 from catenary.wire.sync_manager import decode_sync_manager
 
-# Of shared/data/MANIFEST.tsv: frames in each capture, CoE messages among them
+# From shared/data/MANIFEST.tsv: number of frames in each capture, and of CoE messages
 CAPTURES = {
     "ecrab_replay-dc.pcapng": (3604, 0),
     "ecrab_replay-ek1100-el2828-el2889.pcapng": (3578, 0),
@@ -51,7 +51,7 @@ IMAGES = {
     "beckhoff_el2889.bin": (2, 0x0B493052, "EL2889 16K. Dig. Ausgang 24V, 0.5A, negativ"),
     "metalmusings_EaserCAT_2000.bin": (2730, 0x00BBBCCC, "MetalMusings EaserCAT 2000"),
     "metalmusings_EaserCAT_6000.bin": (2730, 0x6000, "MetalMusings EaserCAT 6000"),
-    # vendor 0 by its vendor's mistake: a fact about the device, not a fault of the format
+    # vendor 0 is a mistake of the vendor, not a fault of the format
     "pollen_LeftElbowOrbita2d_fw1.0.bin": (0, 1, "LeftElbowOrbita2d"),
     "pollen_Orbita2d.bin": (0, 1, "Orbita2d"),
 }
@@ -72,7 +72,7 @@ def frames_of(folder: Path, name: str) -> list[Frame]:
 
 
 def mailboxes(frames: list[Frame]) -> Iterator[tuple[Datagram, Mailbox]]:
-    """Messages that a device took or gave: in the memory of mailboxes, whole buffers."""
+    """Return the mailbox messages that devices received or sent, as whole buffers."""
     for frame in frames:
         for datagram in frame.datagrams:
             physical = datagram.command in (EcatCommand.FPRD, EcatCommand.FPWR)
@@ -80,7 +80,7 @@ def mailboxes(frames: list[Frame]) -> Iterator[tuple[Datagram, Mailbox]]:
                 yield datagram, decode_mailbox(datagram.data)
 
 
-def test_every_frame_of_every_capture_comes_back_byte_for_byte(shared_data):
+def test_every_captured_frame_round_trips(shared_data):
     counts = {}
     for path in (shared_data / "pcap").glob("*.pcapng"):
         packets = captured(path)
@@ -93,7 +93,7 @@ def test_every_frame_of_every_capture_comes_back_byte_for_byte(shared_data):
 
 
 @pytest.mark.parametrize("name", CAPTURES)
-def test_every_mailbox_message_comes_back(shared_data, name):
+def test_every_mailbox_message_round_trips(shared_data, name):
     frames = frames_of(shared_data, name)
     count = 0
     for datagram, message in mailboxes(frames):
@@ -109,7 +109,7 @@ def check_coe(command: EcatCommand, data: bytes) -> None:
     message = decode_coe(data)
     if command is EcatCommand.FPWR:
         assert message.encode() == data
-    else:  # the reserved bytes of the EL3004's download responses hold rubbish
+    else:  # the reserved bytes of the EL3004's download responses contain arbitrary values
         assert decode_coe(message.encode()) == message
         assert message.encode()[:6] == data[:6]
 
@@ -118,19 +118,19 @@ def messages_of(frames: list[Frame]) -> list[Message]:
     return [decode_coe(message.data) for _, message in mailboxes(frames)]
 
 
-def test_the_conversation_with_an_analogue_input(shared_data):
+def test_messages_of_an_analogue_input(shared_data):
     messages = messages_of(frames_of(shared_data, "ecrab_replay-ek1914-el3004-configure.pcapng"))
     kinds = [type(message) for message in messages]
     assert kinds == [DownloadRequest, DownloadResponse] * 7 + [UploadRequest, UploadResponse] * 5
     assert messages[-1] == UploadResponse(0x1C13, 0, b"\x04", 1, expedited=True)
 
 
-def test_the_upload_of_a_name(shared_data):
+def test_upload_of_a_name(shared_data):
     messages = messages_of(frames_of(shared_data, "ecrab_replay-ek1914-segmented-upload.pcapng"))
     assert messages == [UploadRequest(0x1008, 0), UploadResponse(0x1008, 0, b"EK1914", 6)]
 
 
-def test_blocks_of_sync_managers_and_fmmus_come_back(shared_data):
+def test_sync_manager_and_fmmu_blocks_round_trip(shared_data):
     frames = frames_of(shared_data, "ecrab_replay-dc.pcapng")
     blocks = [
         datagram
@@ -143,7 +143,7 @@ def test_blocks_of_sync_managers_and_fmmus_come_back(shared_data):
         assert DECODERS[datagram.ado](datagram.data).encode() == datagram.data
 
 
-def test_every_sii_image_comes_back_byte_for_byte_or_is_refused(shared_data):
+def test_every_sii_image_round_trips_or_is_refused(shared_data):
     refused = {}
     for path in (shared_data / "sii").glob("*.bin"):
         image = path.read_bytes()
@@ -163,7 +163,7 @@ def test_identity_and_name_in_sii_images(shared_data, name, expected):
     assert found == expected
 
 
-def test_the_pdos_of_a_drive(shared_data):
+def test_pdos_of_a_drive(shared_data):
     sii = decode_sii((shared_data / "sii" / "pollen_Orbita2d.bin").read_bytes())
     assert [pdo.index for pdo in sii.transmit_pdos] == [0x1700, 0x1800]
     assert [pdo.index for pdo in sii.receive_pdos] == [0x1600]
@@ -171,7 +171,7 @@ def test_the_pdos_of_a_drive(shared_data):
     assert sii.header.mailbox_protocols == MailboxProtocol.COE | MailboxProtocol.FOE
 
 
-def test_intel_hex_and_binary_of_one_image_are_the_same(shared_data):
+def test_intel_hex_and_binary_images_are_equal(shared_data):
     text = (shared_data / "sii" / "metalmusings_EaserCAT_2000.hex").read_text()
     records = [bytes.fromhex(line[1:]) for line in text.split()]
     image = b"".join(record[4:-1] for record in records if record[3] == 0)

@@ -47,13 +47,13 @@ def test_at_most_one_state(statusword):
     assert state_of(statusword) is (matching[0] if matching else None)
 
 
-def test_a_word_that_codes_no_state():
+def test_a_statusword_without_a_valid_state():
     assert state_of(0x0001) is None  # ready to switch on, but in quick stop
     assert state_of(0x0022) is None
 
 
 def test_the_numbers_of_states_are_fixed():
-    # core and the plan's Views exchange them as bytes
+    # the core and the Views of the plan exchange them as bytes
     assert [state.value for state in AxisState] == list(range(8))
     assert AxisState.OPERATION_ENABLED == 4
 
@@ -70,12 +70,12 @@ def test_the_numbers_of_states_are_fixed():
         (0x0080, {"fault reset"}),
     ],
 )
-def test_commands_in_controlwords(controlword, names):
+def test_command_of_a_controlword(controlword, names):
     assert {each.name for each in COMMANDS if each.matches(controlword)} == names
 
 
 @given(u16)
-def test_a_command_keeps_the_bits_that_are_not_its_own(controlword):
+def test_a_command_keeps_all_other_bits(controlword):
     for each in COMMANDS:
         applied = each.apply(controlword)
         assert each.matches(applied)
@@ -86,7 +86,7 @@ def test_the_table_has_all_transitions_in_order():
     assert [each.number for each in TRANSITIONS] == list(range(17))
 
 
-def test_every_command_leads_from_a_state_to_one_other():
+def test_a_command_has_one_target_per_state():
     for state in AxisState:
         for command in COMMANDS:
             targets = [
@@ -109,7 +109,7 @@ def test_enabling_takes_three_commands():
     ]
 
 
-def test_modes_and_their_bits():
+def test_supported_bits_of_modes():
     assert (Mode.CSP, Mode.CSV, Mode.CST) == (8, 9, 10)
     assert Mode.CSP.supported_bit == 0x80
     assert Mode.NONE.supported_bit == 0

@@ -35,7 +35,7 @@ def test_receive_times_of_a_coupler():
 
 
 @given(clocks)
-def test_comes_back(clock):
+def test_round_trip(clock):
     assert decode_clock(clock.encode()) == clock
 
 
@@ -48,7 +48,7 @@ def test_the_difference_is_sign_magnitude(raw, difference_ns):
 
 
 @given(difference)
-def test_a_difference_comes_back(value):
+def test_a_difference_round_trips(value):
     assert decode_difference(encode_difference(value)) == value
 
 

@@ -1,4 +1,4 @@
-"""CoE: SDO services in all their forms, emergency."""
+"""CoE: all forms of SDO services, emergency."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ GOLDEN = {
     "002040131c0100000000": UploadRequest(0x1C13, 1),
     # ethercrab's tests/replay-ek1914-segmented-upload.pcapng: 0x1008, one normal upload
     "00304108100006000000454b31393134": UploadResponse(0x1008, 0, b"EK1914", 6),
-    # by the bit tables of ETG.1000.6 §5.6.2
+    # from the bit tables of ETG.1000.6 §5.6.2
     "00304200100100000000": UploadResponse(0x1000, 1, bytes(4), 4, expedited=True),  # no size
     "00203100160009000000020010004060": DownloadRequest(
         0x1600, 0, bytes.fromhex("020010004060"), 9, complete_access=True
@@ -77,12 +77,12 @@ def test_golden_bytes(data, message):
     ("data", "message"),
     [(data, message) for data, message in GOLDEN.items() if data[4:6] != "42"],
 )
-def test_golden_bytes_are_made(data, message):
+def test_golden_bytes_are_encoded(data, message):
     assert message.encode() == bytes.fromhex(data)
 
 
 @given(messages)
-def test_comes_back(message):
+def test_round_trip(message):
     assert decode_coe(message.encode()) == message
 
 
@@ -98,30 +98,30 @@ def test_any_bytes_give_a_value_or_decode_error(header, data):
 
 
 @given(st.integers(0, 20), flag)
-def test_a_segment_has_at_least_seven_bytes_and_tells_its_own(size, last):
+def test_a_short_segment_is_padded(size, last):
     encoded = UploadSegment(False, last, bytes(size)).encode()
     assert len(encoded) == 3 + max(size, 7)
     assert encoded[2] >> 1 & 7 == max(7 - size, 0)
 
 
-def test_what_follows_the_complete_size_means_nothing():
+def test_bytes_after_the_complete_size_are_ignored():
     data = UploadResponse(0x1008, 0, b"abc", 3).encode() + b"stale"
     assert decode_coe(data) == UploadResponse(0x1008, 0, b"abc", 3)
 
 
-def test_an_abort_in_a_response_is_understood():
+def test_an_abort_in_a_response_is_decoded():
     data = Abort(0x1018, 1, 0x06090011).encode()
     assert decode_coe(b"\x00\x30" + data[2:]) == Abort(0x1018, 1, 0x06090011)
 
 
-def test_sdo_information_is_passed_on():
+def test_sdo_information_is_decoded():
     assert isinstance(decode_coe(bytes.fromhex("0080010000000100")), SdoInformation)
 
 
 @pytest.mark.parametrize(
     ("data", "reason"),
     [
-        ("00", "1 bytes, the header needs 2"),
+        ("00", "needs 2 bytes, received 1"),
         ("0050" + "00" * 8, "service 5 is not supported"),
         ("0020" + "40181001", "SDO: needs 10 bytes, received 6"),
         ("0020a0" + "00" * 7, "unknown command specifier 5"),
@@ -129,7 +129,7 @@ def test_sdo_information_is_passed_on():
         ("001010862101", "emergency: needs 10 bytes"),
     ],
 )
-def test_refusals_say_why(data, reason):
+def test_errors_name_the_reason(data, reason):
     with pytest.raises(DecodeError, match=reason):
         decode_coe(bytes.fromhex(data))
 
@@ -149,6 +149,6 @@ def test_refusals_say_why(data, reason):
         Emergency(0x10000, 0),
     ],
 )
-def test_what_does_not_fit_is_refused(message):
+def test_values_that_do_not_fit_are_refused(message):
     with pytest.raises(ValueError, match=r"SDO|emergency"):
         message.encode()

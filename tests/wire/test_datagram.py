@@ -1,4 +1,4 @@
-"""Datagrams: golden bytes, round trips, what is refused."""
+"""Datagrams: golden bytes, round trips, errors."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def test_golden_bytes():
 
 
 @given(datagrams, st.booleans(), st.binary(max_size=20))
-def test_comes_back_from_any_offset(datagram, more_follows, before):
+def test_round_trip_at_any_offset(datagram, more_follows, before):
     encoded = before + datagram.encode(more_follows=more_follows) + b"rest"
     assert decode_datagram(encoded, len(before)) == (datagram, more_follows)
     assert datagram.size == len(encoded) - len(before) - 4
@@ -37,18 +37,18 @@ def test_circulating_is_bit_14_of_the_length():
 @pytest.mark.parametrize(
     ("data", "reason"),
     [
-        (GOLDEN[:11], "11 bytes left, needs 12"),
+        (GOLDEN[:11], "needs 12 bytes, 11 left"),
         (GOLDEN[:-1], "specifies 2 bytes of data, 1 received"),
         (b"\x0f" + GOLDEN[1:], "unknown command 15"),
         (GOLDEN[:7] + b"\x08" + GOLDEN[8:], "reserved bits"),
     ],
 )
-def test_refusals_say_why(data, reason):
+def test_errors_name_the_reason(data, reason):
     with pytest.raises(DecodeError, match=reason):
         decode_datagram(data)
 
 
-def test_an_offset_outside_is_refused():
+def test_an_offset_outside_the_data_is_refused():
     for offset in (-1, len(GOLDEN)):
         with pytest.raises(DecodeError):
             decode_datagram(GOLDEN, offset)
@@ -67,7 +67,7 @@ def test_fields_that_do_not_fit_are_refused_before_sending(datagram):
         datagram.encode()
 
 
-def test_commands_know_what_they_do():
+def test_reads_writes_and_is_logical():
     readers = [command for command in EcatCommand if command.reads]
     assert EcatCommand.LRW.reads
     assert EcatCommand.LRW.writes

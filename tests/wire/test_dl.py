@@ -21,7 +21,7 @@ def test_status_of_a_coupler():
 
 
 @given(u16)
-def test_every_status_word_comes_back_without_its_reserved_bit(word):
+def test_status_words_round_trip_without_the_reserved_bit(word):
     assert DlStatus.from_word(word).word == word & ~0x0008
 
 
@@ -31,11 +31,11 @@ def test_every_status_word_comes_back_without_its_reserved_bit(word):
         *(flag, flag, st.tuples(*[st.sampled_from(Loop)] * 4), st.integers(0, 7), flag, flag),
     )
 )
-def test_control_comes_back(control):
+def test_control_round_trips(control):
     assert DlControl.from_word(control.word) == control
 
 
-def test_control_bits_sit_where_the_data_sheet_says():
+def test_control_bits_match_the_data_sheet():
     assert DlControl().word == 0x0007_0001  # the value after power-on
     closed = DlControl(loops=(Loop.AUTO, Loop.CLOSED, Loop.AUTO, Loop.AUTO), alias_enabled=True)
     assert closed.word == 0x0107_0C01

@@ -1,4 +1,4 @@
-"""Texts of drives' error codes."""
+"""Texts of error codes of drives."""
 
 import pytest
 
@@ -9,7 +9,7 @@ from catenary.wire.drive_error import error_text
     ("code", "text"),
     [
         (0x8611, "following error"),
-        (0x7308, "sensor"),  # by its group
+        (0x7308, "sensor"),  # text of its group
         (0x2315, "continuous over-current"),
         (0xFF42, "manufacturer specific"),
         (0x8210, "process data too short"),
@@ -17,5 +17,5 @@ from catenary.wire.drive_error import error_text
         (0xB123, "unknown error"),
     ],
 )
-def test_a_code_has_a_text_or_that_of_its_group(code: int, text: str) -> None:
+def test_a_code_has_its_own_text_or_that_of_its_group(code: int, text: str) -> None:
     assert error_text(code) == text

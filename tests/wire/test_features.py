@@ -25,18 +25,18 @@ def test_a_coupler_with_64_bit_clocks_and_lrw():
     ("features", "clock_bits", "lrw"),
     [(0, 0, True), (Feature.NO_LRW, 0, False), (Feature.DISTRIBUTED_CLOCKS, 32, True)],
 )
-def test_what_the_features_say(features, clock_bits, lrw):
+def test_properties_of_features(features, clock_bits, lrw):
     ports = (PortKind.MII,) * 4
     information = Information(0, 0, 0, 0, 0, 0, ports, Feature(features))
     assert (information.clock_bits, information.supports_lrw) == (clock_bits, lrw)
 
 
 @given(st.binary(min_size=10, max_size=10))
-def test_ten_bytes_come_back(data):
+def test_ten_bytes_round_trip(data):
     assert decode_information(data).encode() == data
 
 
-def test_another_length_is_refused():
+def test_a_wrong_length_is_refused():
     for size in (0, 9, 11):
         with pytest.raises(DecodeError, match="needs 10"):
             decode_information(bytes(size))

@@ -1,4 +1,4 @@
-"""FMMU blocks, bit by bit."""
+"""FMMU blocks."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def test_golden_block():
 
 
 @given(blocks)
-def test_comes_back(block):
+def test_round_trip(block):
     assert decode_fmmu(block.encode()) == block
 
 
@@ -34,7 +34,7 @@ def test_bits_across_bytes():
 
 
 @given(st.integers(0, 1 << 34), st.integers(0, 1 << 18), st.integers(1, 4000))
-def test_bits_maps_as_many_bits_as_asked(logical, physical, length):
+def test_bits_maps_the_given_number_of_bits(logical, physical, length):
     made = fmmu.bits(logical, physical, length, writes=True)
     assert made.bit_length == length
     assert made.logical_address * 8 + made.logical_start_bit == logical

@@ -24,14 +24,14 @@ def test_two_datagrams_in_a_frame():
     assert decoded.encode() == FRAME
 
 
-def test_a_header_that_counts_padding():
+def test_a_header_length_that_includes_padding():
     decoded = decode_frame(TWINCAT_FRAME)
     assert (len(decoded.padding), decoded.counted_padding) == (31, 1)
     assert decoded.encode() == TWINCAT_FRAME
 
 
 @given(frames())
-def test_comes_back(value):
+def test_round_trip(value):
     assert decode_frame(value.encode()) == value
 
 
@@ -42,7 +42,7 @@ def test_any_payload_gives_a_frame_with_the_same_bytes_or_decode_error(payload):
         assert decode_frame(data).encode() == data
 
 
-def test_pads_to_the_minimum_of_ethernet():
+def test_padding_to_the_ethernet_minimum():
     encoded = encode_frame([Datagram(EcatCommand.BRD, 0, b"\x00")])
     assert len(encoded) == 60
     assert encoded[12:16] == bytes.fromhex("88a40d10")
@@ -72,27 +72,27 @@ def test_impossible_frames_are_refused(value):
 @pytest.mark.parametrize(
     ("data", "reason"),
     [
-        (b"", "0 bytes, needs 28"),
-        (FRAME[:27], "27 bytes, needs 28"),
+        (b"", "0 bytes, needs at least 28"),
+        (FRAME[:27], "27 bytes, needs at least 28"),
         (FRAME.ljust(1515), "at most 1514"),
         (FRAME[:12] + b"\x08\x00" + FRAME[14:], "EtherType 0x0800"),
         (FRAME[:12] + b"\x81\x00\x00\x01" + FRAME[12:], "VLAN-tagged"),
-        (FRAME[:14] + b"\x1c\x40" + FRAME[16:], "type 4, needs 1"),
+        (FRAME[:14] + b"\x1c\x40" + FRAME[16:], "type 4 instead of 1"),
         (FRAME[:14] + b"\x1c\x18" + FRAME[16:], "reserved bit 11"),
     ],
 )
-def test_alien_frames_are_named(data, reason):
+def test_alien_frames_are_refused_with_the_reason(data, reason):
     assert is_alien(data)
     with pytest.raises(DecodeError, match=reason):
         decode_frame(data)
 
 
-def test_a_frame_that_was_cut_off_is_refused():
-    with pytest.raises(DecodeError, match="specifies 28 bytes, 27 received"):
+def test_a_truncated_frame_is_refused():
+    with pytest.raises(DecodeError, match="specifies 28 bytes, but 27 were received"):
         decode_frame(FRAME[:-1])
 
 
-def test_own_frames_are_known_by_their_source_also_after_a_controller():
+def test_own_frames_are_recognised_after_a_controller():
     source = FRAME[6:12]
     passed = FRAME[:6] + bytes([source[0] | frame.PASSED_CONTROLLER]) + FRAME[7:]
     assert is_own(FRAME, source)

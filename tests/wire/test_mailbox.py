@@ -36,7 +36,7 @@ def test_golden_bytes():
 
 
 @given(mailboxes, st.binary(max_size=20))
-def test_comes_back_whatever_follows_it(message, stale):
+def test_round_trip_with_trailing_bytes(message, stale):
     assert decode_mailbox(message.encode() + stale) == message
 
 
@@ -52,17 +52,17 @@ def test_any_bytes_give_a_value_or_decode_error(data):
 @pytest.mark.parametrize(
     ("data", "reason"),
     [
-        (GOLDEN[:5], "5 bytes, the header needs 6"),
+        (GOLDEN[:5], "needs 6 bytes, received 5"),
         (GOLDEN[:15], "specifies 10 bytes, 9 received"),
         (GOLDEN[:5] + b"\x17" + GOLDEN[6:], "unknown protocol 7"),
     ],
 )
-def test_refusals_say_why(data, reason):
+def test_errors_name_the_reason(data, reason):
     with pytest.raises(DecodeError, match=reason):
         decode_mailbox(data)
 
 
-def test_what_does_not_fit_is_refused():
+def test_values_that_do_not_fit_are_refused():
     with pytest.raises(ValueError, match="exceeds the mailbox of 15"):
         decode_mailbox(GOLDEN).encode(15)
     with pytest.raises(ValueError, match="out of range"):
@@ -71,7 +71,7 @@ def test_what_does_not_fit_is_refused():
         Mailbox(Type.COE, b"", address=0x10000).encode()
 
 
-def test_the_counter_leaves_out_zero():
+def test_the_counter_skips_zero():
     counters = [0]
     for _ in range(8):
         counters.append(next_counter(counters[-1]))
@@ -85,11 +85,11 @@ def test_errors_have_a_text(code):
     assert "unknown" not in reply.text
 
 
-def test_an_error_that_the_standard_does_not_know():
+def test_an_error_code_that_the_standard_does_not_define():
     assert decode_error(b"\x01\x00\x34\x12").text == "unknown mailbox error 0x1234"
 
 
-def test_an_error_of_another_kind_is_refused():
+def test_a_reply_of_another_type_is_refused():
     with pytest.raises(DecodeError, match="type 2"):
         decode_error(b"\x02\x00\x01\x00")
     with pytest.raises(DecodeError, match="needs 4"):

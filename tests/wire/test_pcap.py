@@ -1,4 +1,4 @@
-"""Captures in pcap: both byte orders, both units, files that were cut off."""
+"""Captures in pcap format: both byte orders, both time units, truncated files."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ MICROSECONDS, NANOSECONDS = 0xA1B2C3D4, 0xA1B23C4D
 
 
 def pcap(*packets: Packet, order: str = "<", magic: int = MICROSECONDS, tick: int = 1000) -> bytes:
-    """A file as draft-ietf-opsawg-pcap describes it, with link type 1 and a check sequence flag."""
+    """Return a file as in draft-ietf-opsawg-pcap, with link type 1 and a check sequence flag."""
     data = struct.pack(order + "IHHiIII", magic, 2, 4, 0, 0, 262144, 0x2400_0001)
     for packet in packets:
         seconds, rest = divmod(packet.time_ns, 1_000_000_000)
@@ -40,12 +40,14 @@ PACKETS = (
 @pytest.mark.parametrize(
     ("magic", "tick", "resolution"), [(MICROSECONDS, 1000, 6), (NANOSECONDS, 1, 9)]
 )
-def test_both_orders_and_units(order: str, magic: int, tick: int, resolution: int) -> None:
+def test_both_byte_orders_and_time_units(
+    order: str, magic: int, tick: int, resolution: int
+) -> None:
     data = pcap(*PACKETS, order=order, magic=magic, tick=tick)
     assert decode_pcap(data) == Capture((Interface(resolution=resolution),), PACKETS)
 
 
-def test_a_cut_record_is_left_out_and_counted() -> None:
+def test_a_truncated_record_is_omitted_and_counted() -> None:
     whole = pcap(PACKETS[0])
     for size in range(len(whole), len(pcap(*PACKETS))):
         capture = decode_pcap(pcap(*PACKETS)[:size])
@@ -58,16 +60,16 @@ def test_a_cut_record_is_left_out_and_counted() -> None:
     [
         (b"", "magic number missing"),
         (b"\x0a\x0d\x0d\x0a", "magic number 0a0d0d0a"),
-        (pcap()[:23], "23 bytes, the header needs 24"),
+        (pcap()[:23], "needs 24 bytes, received 23"),
     ],
 )
-def test_refusals_say_why(data: bytes, reason: str) -> None:
+def test_errors_name_the_reason(data: bytes, reason: str) -> None:
     with pytest.raises(DecodeError, match=reason):
         decode_pcap(data)
 
 
 @given(st.binary(max_size=80))
-def test_any_rest_is_a_capture(rest: bytes) -> None:
+def test_any_bytes_after_the_header_give_a_capture(rest: bytes) -> None:
     assert is_pcap(pcap() + rest)
     assert decode_pcap(pcap() + rest).cut <= len(rest)
 
@@ -82,7 +84,7 @@ def test_a_capture_is_read_in_either_format() -> None:
 
 
 @pytest.mark.skipif(shutil.which("editcap") is None, reason="editcap is not installed")
-def test_what_wireshark_converts_is_the_same(tmp_path) -> None:  # type: ignore[no-untyped-def]
+def test_a_conversion_by_wireshark_is_equal(tmp_path) -> None:  # type: ignore[no-untyped-def]
     source, converted = tmp_path / "a.pcapng", tmp_path / "a.pcap"
     source.write_bytes(encode_header() + b"".join(map(encode_packet, PACKETS)))
     subprocess.run(["editcap", "-F", "nsecpcap", source, converted], check=True)

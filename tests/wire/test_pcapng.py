@@ -1,4 +1,4 @@
-"""Captures: round trips, foreign byte order and resolution, broken files."""
+"""Captures in pcapng format: round trips, other byte order and resolutions, damaged files."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ packets = st.builds(
 )
 
 # A big-endian section of one Ethernet interface (microseconds, as no resolution is given), an
-# enhanced and a simple packet: by the figures of draft-ietf-opsawg-pcapng.
+# enhanced and a simple packet, from the figures of draft-ietf-opsawg-pcapng.
 BIG_ENDIAN = (
     struct.pack(">IIIHHqI", 0x0A0D0D0A, 28, 0x1A2B3C4D, 1, 0, -1, 28)
     + struct.pack(">IIHHII", 1, 20, 1, 0, 0, 20)
@@ -45,7 +45,7 @@ BIG_ENDIAN = (
 
 
 @given(st.lists(packets, max_size=5), st.text(max_size=10))
-def test_comes_back(values, name):
+def test_round_trip(values, name):
     data = encode_header(name) + b"".join(encode_packet(packet) for packet in values)
     assert decode_pcapng(data) == Capture((Interface(name),), tuple(values))
 
@@ -59,7 +59,7 @@ def test_big_endian_microseconds_and_simple_packets():
     )
 
 
-def test_interfaces_count_anew_in_each_section():
+def test_interface_numbers_restart_in_each_section():
     data = encode_header("a") + encode_packet(Packet(1, b"x"))
     data += encode_header("b") + encode_packet(Packet(2, b"y"))
     capture = decode_pcapng(data)
@@ -76,8 +76,8 @@ def test_resolutions(resolution, ticks, time_ns):
     assert capture.packets[0].time_ns == time_ns
 
 
-def test_a_cut_block_is_left_out_and_counted():
-    """A killed program or a full disk leaves such files."""
+def test_a_truncated_block_is_omitted_and_counted():
+    """Such files remain after a program was killed, or if a disk is full."""
     first, second = encode_packet(Packet(1, b"first")), encode_packet(Packet(2, b"second"))
     start = encode_header() + first
     for size in range(len(second)):
@@ -86,13 +86,13 @@ def test_a_cut_block_is_left_out_and_counted():
         assert capture.cut == size
 
 
-def test_other_blocks_are_left_out():
+def test_other_blocks_are_omitted():
     statistics = encode_statistics(5, received=3, dropped=1)
     assert decode_pcapng(encode_header() + statistics).packets == ()
 
 
 @given(st.integers(0, len(BIG_ENDIAN) - 1), st.integers(0, 255))
-def test_any_byte_wrong_gives_a_value_or_decode_error(place, byte):
+def test_any_wrong_byte_gives_a_value_or_decode_error(place, byte):
     data = BIG_ENDIAN[:place] + bytes([byte]) + BIG_ENDIAN[place + 1 :]
     try:
         capture = decode_pcapng(data)
@@ -104,7 +104,7 @@ def test_any_byte_wrong_gives_a_value_or_decode_error(place, byte):
 @pytest.mark.parametrize(
     ("data", "reason"),
     [
-        (b"\x00" * 11, "11 bytes, a block needs at least 12"),
+        (b"\x00" * 11, "needs 12 bytes, received 11"),
         (b"\x01" * 12, "does not begin with a section header"),
         (encode_header()[:20], "block at byte 0 has an invalid length"),
         (encode_header() + struct.pack("<III", 6, 13, 13), "length of 13 bytes"),
@@ -113,7 +113,7 @@ def test_any_byte_wrong_gives_a_value_or_decode_error(place, byte):
         (encode_header()[:-4] + bytes(4), "has two different lengths"),
     ],
 )
-def test_refusals_say_why(data, reason):
+def test_errors_name_the_reason(data, reason):
     with pytest.raises(DecodeError, match=reason):
         decode_pcapng(data)
 
@@ -128,7 +128,7 @@ def test_refusals_say_why(data, reason):
         Packet(0, b"", "x" * 70000),
     ],
 )
-def test_what_does_not_fit_is_refused(packet):
+def test_values_that_do_not_fit_are_refused(packet):
     with pytest.raises(ValueError, match="pcapng"):
         encode_packet(packet)
 

@@ -1,4 +1,4 @@
-"""Registers: formats, indexed ones, and that the map does not contradict itself."""
+"""Registers: formats, indexed registers, and consistency of the map."""
 
 from __future__ import annotations
 
@@ -43,11 +43,11 @@ INTEGERS = [each for each in REGISTERS if not each.format.endswith("s")]
     ],
     ids=str,
 )
-def test_sits_where_the_data_sheet_says(each, first, last):
+def test_addresses_match_the_data_sheet(each, first, last):
     assert (each.address, each.address + each.size - 1) == (first, last)
 
 
-def test_single_values_do_not_overlap_unless_one_is_a_half_of_the_other():
+def test_numbers_overlap_only_with_their_halves():
     ranges = sorted((each.address, each.address + each.size, each.name) for each in INTEGERS)
     overlaps = [(low[2], high[2]) for low, high in itertools.pairwise(ranges) if high[0] < low[1]]
     assert overlaps == [
@@ -63,13 +63,13 @@ def test_single_values_do_not_overlap_unless_one_is_a_half_of_the_other():
 @pytest.mark.parametrize("each", INTEGERS, ids=str)
 @settings(max_examples=10)
 @given(data=st.data())
-def test_integers_come_back(each, data):
+def test_integers_round_trip(each, data):
     raw = data.draw(st.binary(min_size=each.size, max_size=each.size))
     assert each.pack(each.unpack(raw)) == raw
 
 
 @pytest.mark.parametrize("each", REGISTERS, ids=str)
-def test_another_length_is_refused(each):
+def test_a_wrong_length_is_refused(each):
     for size in (0, each.size - 1, each.size + 1):
         with pytest.raises(DecodeError, match=str(each.size)):
             each.unpack(bytes(size))
@@ -83,12 +83,12 @@ def test_little_endian_and_signs():
 def test_values_that_do_not_fit_are_refused_before_sending():
     with pytest.raises(ValueError, match=r"AL control \(0x0120\)"):
         register.AL_CONTROL.pack(0x10000)
-    with pytest.raises(ValueError, match="exactly 8 bytes"):
+    with pytest.raises(ValueError, match="needs 8 bytes, got 7"):
         register.sync_manager(0).pack(bytes(7))
 
 
 @pytest.mark.parametrize("make", [register.fmmu, register.sync_manager, register.receive_time])
-def test_numbers_beyond_the_map_are_refused(make):
+def test_indices_outside_the_map_are_refused(make):
     for number in (-1, 16):
         with pytest.raises(ValueError, match=str(number)):
             make(number)

@@ -1,4 +1,4 @@
-"""What registers mean, in words."""
+"""Explanations of register contents."""
 
 from __future__ import annotations
 
@@ -31,23 +31,23 @@ from catenary.wire.register_text import _EXPLANATIONS, explain
         ),
     ],
 )
-def test_meaning(name: str, data: bytes, text: str) -> None:
+def test_explanation(name: str, data: bytes, text: str) -> None:
     assert explain(by_name(name), data) == text
 
 
-def test_dl_status_tells_each_port() -> None:
-    # EK1100 with one terminal behind it: link and communication on ports 0 and 1, 2 and 3 closed
+def test_explanation_of_dl_status_has_all_ports() -> None:
+    # EK1100 with one terminal: link and communication on ports 0 and 1; 2 and 3 are closed
     text = explain(register.DL_STATUS, (0x5A31).to_bytes(2, "little"))
     assert text == "port 0: open; port 1: open; port 2: no link; port 3: no link; EEPROM loaded"
 
 
-def test_an_fmmu_tells_what_it_maps() -> None:
+def test_explanation_of_an_fmmu() -> None:
     block = Fmmu(0x0001_0000, 2, 0, 7, 0x1100, 0, reads=True).encode()
     text = explain(register.fmmu(1), block)
     assert text == "16 bits of inputs: logical 0x00010000 bit 0, physical 0x1100 bit 0"
 
 
-def test_a_register_that_is_just_a_number_has_no_text() -> None:
+def test_a_register_with_a_plain_number_has_no_explanation() -> None:
     assert explain(register.WATCHDOG_DIVIDER, b"\xc2\x09") is None
 
 

@@ -35,7 +35,7 @@ entries = st.builds(
 )
 
 
-# By the tables of ETG.1000.6 §5.6.3
+# From the tables of ETG.1000.6 §5.6.3
 def test_requests():
     assert sdo_information.list_request(ListType.ALL).encode().hex() == "0080010000000100"
     assert sdo_information.object_request(0x1018).encode().hex() == "0080030000001810"
@@ -63,7 +63,7 @@ def test_an_entry():
     assert entry.name == "Vendor ID"
 
 
-def test_the_name_of_an_entry_follows_the_values_asked_for():
+def test_the_name_of_an_entry_follows_the_selected_fields():
     info = ValueInfo.UNIT | ValueInfo.DEFAULT | ValueInfo.MAXIMUM
     rest = bytes(4) + b"\x05\x00" + b"\xff\xff" + b"Speed"
     entry = EntryDescription(0x2000, 1, info, 6, 16, Access.READ_OP, rest)
@@ -71,22 +71,22 @@ def test_the_name_of_an_entry_follows_the_values_asked_for():
 
 
 @given(messages)
-def test_a_message_comes_back(message):
+def test_a_message_round_trips(message):
     assert decode_sdo_information(message.encode()) == message
 
 
 @given(lists)
-def test_a_list_comes_back(value):
+def test_a_list_round_trips(value):
     assert decode_object_list(value.encode()) == value
 
 
 @given(objects)
-def test_an_object_comes_back(value):
+def test_an_object_round_trips(value):
     assert decode_object_description(value.encode()) == value
 
 
 @given(entries)
-def test_an_entry_comes_back(value):
+def test_an_entry_round_trips(value):
     assert decode_entry_description(value.encode()) == value
 
 
@@ -108,7 +108,7 @@ def test_any_bytes_give_a_value_or_decode_error(decode, data):
     assert decode(value.encode()) == value
 
 
-def test_refusals_say_why():
+def test_errors_name_the_reason():
     with pytest.raises(DecodeError, match="unknown opcode 9"):
         decode_sdo_information(bytes.fromhex("008009000000"))
     with pytest.raises(DecodeError, match="CoE service 2"):
@@ -119,11 +119,11 @@ def test_refusals_say_why():
         decode_object_list(b"\x06\x00")
 
 
-def test_an_abort_without_a_complete_code_has_none():
+def test_an_incomplete_abort_code_gives_none():
     assert decode_error(bytes.fromhex("00000206")) == 0x06020000
     assert decode_error(bytes(3)) is None
     assert decode_error(b"") is None
 
 
-def test_half_an_index_at_the_end_of_a_list_is_ignored():
+def test_an_incomplete_index_at_the_end_is_ignored():
     assert decode_object_list(b"\x01\x00\x00\x10\x08").indices == (0x1000,)

@@ -48,24 +48,24 @@ vendor_categories = st.builds(Category, st.integers(0x8000, 0xFFFE), words)
         "80060344640000000000000000001400",
     ],
 )
-def test_the_checksum_of_real_headers(words):
+def test_checksums_of_real_headers(words):
     data = bytes.fromhex(words)
     assert checksum_of(data) == data[14]
 
 
 @given(headers)
-def test_a_header_comes_back(header):
+def test_a_header_round_trips(header):
     decoded = decode_header(header.encode())
     assert decoded == dataclasses.replace(header, checksum=checksum_of(header.encode()))
 
 
 @given(headers, st.lists(vendor_categories, max_size=5), st.sampled_from((b"", b"\xff\xff")))
-def test_an_image_comes_back(header, categories, trailing):
+def test_an_image_round_trips(header, categories, trailing):
     image = Sii(header, tuple(categories), trailing).encode()
     assert decode_sii(image).encode() == image
 
 
-def test_categories_by_their_meaning():
+def test_decoded_categories():
     image = decode_sii(IMAGE)
     assert image.strings == ("Servo", "drive", "in")
     assert image.general is not None
@@ -88,14 +88,14 @@ def test_categories_of_one_kind_are_joined():
     assert [pdo.index for pdo in image.transmit_pdos] == [0x1600, 0x1600]
 
 
-def test_what_is_not_there_is_empty():
+def test_missing_categories_are_empty():
     image = decode_sii(Sii(Header(1, 2, 3)).encode())
     assert image.general is None
     assert image.strings == image.fmmus == image.sync_managers == ()
     assert image.string(0) == image.string(1) == ""
 
 
-def test_is_filled_up_to_the_size_of_the_eeprom():
+def test_an_image_is_padded_to_the_eeprom_size():
     image = Sii(Header(1, 2, 3)).encode(2048)
     assert len(image) == 2048
     assert set(image[128:]) == {0xFF}
@@ -103,13 +103,13 @@ def test_is_filled_up_to_the_size_of_the_eeprom():
         Sii(Header(1, 2, 3)).encode(100)
 
 
-def test_a_wrong_checksum_is_refused_with_both():
+def test_a_wrong_checksum_error_names_both_values():
     broken = b"\x01" + IMAGE[1:]
     with pytest.raises(DecodeError, match=r"checksum 0x.+, expected 0x"):
         decode_sii(broken)
 
 
-def test_the_debugging_checksum_is_accepted_as_controllers_do():
+def test_the_debugging_checksum_is_accepted_as_by_controllers():
     image = IMAGE[:14] + b"\xa4\x88" + IMAGE[16:]
     assert decode_sii(image).header.checksum == 0x88A4
     assert decode_sii(image).encode() == image
@@ -118,15 +118,15 @@ def test_the_debugging_checksum_is_accepted_as_controllers_do():
 @pytest.mark.parametrize(
     ("image", "reason"),
     [
-        (IMAGE[:127], "127 bytes, the header needs 128"),
+        (IMAGE[:127], "needs 128 bytes, received 127"),
         (
             IMAGE[:128] + b"\x0a\x00\xff\x7f",
-            r"category 10 at byte 128 specifies 65534 bytes, 0 left",
+            r"category 10 at byte 128 specifies 65534 bytes, but 0 are left",
         ),
-        (IMAGE[:128] + b"\x0a\x00\x00", "a category header needs 4 bytes, 3 left"),
+        (IMAGE[:128] + b"\x0a\x00\x00", "category header: needs 4 bytes, 3 left"),
         (IMAGE[:128] + bytes(0x10000), "more than 512 categories"),
-        (IMAGE[:128] + bytes(0x20000), "at most 131072"),
-        (IMAGE[:128] + bytes.fromhex("0a0001000505"), "string 1 at byte 1 does not fit"),
+        (IMAGE[:128] + bytes(0x20000), "the maximum is 131072"),
+        (IMAGE[:128] + bytes.fromhex("0a0001000505"), "string 1 of 5 at byte 1 exceeds"),
         (IMAGE[:128] + bytes.fromhex("1e0001000505"), "general category"),
         (IMAGE[:128] + bytes.fromhex("320004000016ff0000000000"), r"PDO 0x1600: 255 entries"),
     ],
@@ -136,7 +136,7 @@ def test_hostile_images_are_refused_with_the_reason(image, reason):
         decode_sii(image)
 
 
-def test_reading_word_by_word_knows_how_far_to_go():
+def test_category_headers_give_the_length():
     assert decode_category_header(IMAGE[128:132]) == (10, len(STRINGS))
     assert decode_category_header(b"\xff\xff\xff\xff") == (sii.END_OF_CATEGORIES, 0)
     assert decode_category_header(b"\xff\xff") == (sii.END_OF_CATEGORIES, 0)
@@ -154,7 +154,7 @@ def test_reading_word_by_word_knows_how_far_to_go():
         General(reserved=b""),
     ],
 )
-def test_what_does_not_fit_is_refused(value):
+def test_values_that_do_not_fit_are_refused(value):
     with pytest.raises(ValueError, match="SII"):
         value.encode()
 

@@ -1,4 +1,4 @@
-"""The contents of SII categories."""
+"""Contents of SII categories."""
 
 from __future__ import annotations
 
@@ -61,7 +61,7 @@ def test_general_of_an_el2004():
     assert general.encode() == data
 
 
-def test_a_coupler_feeds_current():
+def test_a_coupler_has_a_negative_current():
     # ethercrab's dumps/ek1100-eeprom-dump.bin
     data = bytes.fromhex("02000104020000000000000030f8030031010000000000000000000000000000")
     assert decode_general(data).current_ma == -2000
@@ -86,29 +86,29 @@ def test_sync_managers_of_a_drive():
 
 
 @given(generals)
-def test_general_comes_back(general):
+def test_general_round_trips(general):
     assert decode_general(general.encode()) == general
 
 
 @given(texts)
-def test_strings_come_back(strings):
+def test_strings_round_trip(strings):
     encoded = encode_strings(strings)
     assert len(encoded) % 2 == 0
     assert decode_strings(encoded) == tuple(strings)
 
 
 @given(sync_managers)
-def test_sync_managers_come_back(values):
+def test_sync_managers_round_trip(values):
     assert decode_sync_managers(encode_sync_managers(values)) == tuple(values)
 
 
 @given(pdos)
-def test_pdos_come_back(values):
+def test_pdos_round_trip(values):
     assert decode_pdos(encode_pdos(values)) == tuple(values)
 
 
 @given(clock_modes)
-def test_clock_modes_come_back(values):
+def test_clock_modes_round_trip(values):
     assert decode_clock_modes(encode_clock_modes(values)) == tuple(values)
 
 
@@ -125,13 +125,13 @@ def test_any_bytes_give_a_value_or_decode_error(decode, data):
     assert value is not None
 
 
-def test_filling_at_the_end_is_ignored():
+def test_padding_at_the_end_is_ignored():
     entry = SyncManagerEntry(0x1000, 128, 0x26)
     assert decode_sync_managers(entry.encode() + b"\xff\xff") == (entry,)
     assert decode_pdos(Pdo(0x1A00).encode() + b"\x00\x00") == (Pdo(0x1A00),)
 
 
-def test_fmmus_are_filled_up():
+def test_fmmus_are_padded():
     assert encode_fmmus((1, 2, 3)) == b"\x01\x02\x03\xff"
     assert encode_fmmus((1, 2)) == b"\x01\x02"
 
@@ -146,6 +146,6 @@ def test_fmmus_are_filled_up():
         ClockMode(cycle_time_ns=-1),
     ],
 )
-def test_what_does_not_fit_is_refused(value):
+def test_values_that_do_not_fit_are_refused(value):
     with pytest.raises(ValueError, match="SII"):
         value.encode()

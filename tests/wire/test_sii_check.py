@@ -1,4 +1,4 @@
-"""Images that may be written, and those that should not be."""
+"""Checks of EEPROM images before a write."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ def spoiled(at: int, value: bytes, image: bytes = GOOD) -> bytes:
     return image[:at] + value + image[at + len(value) :]
 
 
-def test_a_good_image_is_not_objected_to() -> None:
+def test_a_good_image_has_no_objections() -> None:
     assert objections(GOOD) == ()
 
 
@@ -33,7 +33,7 @@ def test_a_good_image_is_not_objected_to() -> None:
         (spoiled(14, b"\x00"), "the checksum in word 7 is 0x0000"),
     ],
 )
-def test_what_nobody_may_insist_on(image: bytes, text: str) -> None:
+def test_objections_that_cannot_be_overridden(image: bytes, text: str) -> None:
     first = objections(image)[0]
     assert text in first.text
     assert not first.insist
@@ -48,7 +48,7 @@ def test_what_nobody_may_insist_on(image: bytes, text: str) -> None:
         (spoiled(128, bytes(1920)), "the categories have no end mark"),
     ],
 )
-def test_what_somebody_may_insist_on(image: bytes, text: str) -> None:
+def test_objections_that_can_be_overridden(image: bytes, text: str) -> None:
     [only] = objections(image)
     assert text in only.text
     assert only.insist
@@ -59,5 +59,5 @@ def test_the_debugging_checksum_is_accepted() -> None:
 
 
 @given(st.binary(max_size=4096))
-def test_any_bytes_are_judged(image: bytes) -> None:
+def test_any_bytes_are_checked(image: bytes) -> None:
     assert all(each.text and each.hint for each in objections(image))

@@ -10,7 +10,7 @@ from catenary.wire.sii_interface import ControlStatus, SiiCommand
 from tests.wire.strategies import u16
 
 
-def test_a_busy_reading_eight_byte_interface():
+def test_a_busy_interface_with_eight_byte_reads():
     status = ControlStatus.from_word(0x8140)
     assert status == ControlStatus(SiiCommand.READ, eight_bytes=True, busy=True)
     assert status.read_size == 8
@@ -30,7 +30,7 @@ def test_errors(word):
 
 
 @given(u16)
-def test_every_word_is_a_value_or_decode_error(word):
+def test_every_word_gives_a_value_or_decode_error(word):
     if word >> 8 & 7 in list(SiiCommand):
         assert ControlStatus.from_word(word).word == word & ~0x001E
     else:

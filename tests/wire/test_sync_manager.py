@@ -46,12 +46,12 @@ def test_the_four_usual_controls():
 
 
 @given(blocks)
-def test_comes_back(block):
+def test_round_trip(block):
     assert decode_sync_manager(block.encode()) == block
 
 
 @given(u8)
-def test_a_control_byte_is_a_value_or_decode_error(byte):
+def test_a_control_byte_gives_a_value_or_decode_error(byte):
     if byte & 3 in (0, 2) and byte >> 2 & 3 in (0, 1):
         assert Control.from_byte(byte).byte == byte & 0x7F
     else:
@@ -59,7 +59,7 @@ def test_a_control_byte_is_a_value_or_decode_error(byte):
             Control.from_byte(byte)
 
 
-def test_another_length_and_what_does_not_fit_are_refused():
+def test_wrong_lengths_and_values_are_refused():
     with pytest.raises(DecodeError, match="needs 8"):
         decode_sync_manager(bytes(7))
     with pytest.raises(ValueError, match="SyncManager"):

@@ -11,7 +11,8 @@ from tools.rtlab.errors import LabError
 
 MEDIAN = "p50"
 THEIRS = ("published", "date", "machine")  # prefixes of values that are not measured
-NAMES = ("load", "way", "who", "event", "rate", "name")  # keys that identify an entry of a list
+# Keys that identify an entry of a list
+NAMES = ("load", "way", "who", "event", "rate", "name")  # words: ok
 
 
 def compare(one: Path, other: Path) -> str:

@@ -1,9 +1,9 @@
-"""Measurements of this machine: `catenary bench loop`, `latency` and `report`.
+"""Measurements of the loop on this machine: `catenary bench loop`, `latency` and `report`.
 
-Comparisons with other programs and with published figures are in `benchmarks/` of the repository.
+The folder `benchmarks/` of the repository compares it with other programs and published figures.
 
-Call `enter_private_network` first. It may restart the program, which must not have threads (NumPy)
-at that time. Therefore all imports here are inside functions.
+Call `enter_private_network` first. It may restart the program, which must not have started threads
+before (NumPy starts some). Therefore all imports in this file are inside functions.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ def enter_private_network() -> None:
     """Continue this program in its own network namespace.
 
     Raises:
-        LinkError: This machine does not permit one.
+        LinkError: This machine does not permit a private network.
     """
     from catenary.errors import LinkError
     from catenary.realtime import private_network

@@ -38,7 +38,7 @@ In Catenary's native thread: send = w → s, receive = last frame received → i
 
 class Body(StrEnum):
     SINE = "sine"  # one sine for all drives, written as target positions
-    PD = "pd"  # a PD law on every drive: position and velocity in, torque out
+    PD = "pd"  # a PD law for every drive, from position and velocity to torque
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,17 +51,17 @@ class Job:
     period_ns: int
     warm_up: int  # cycles before the measured ones
     cycles: int
-    cpu: int | None  # of the loop; None: any
-    priority: int | None  # SCHED_FIFO; None: unchanged
+    cpu: int | None  # processor of the loop; None for any
+    priority: int | None  # SCHED_FIFO priority; None to leave it unchanged
     counts_per_turn: float
-    rated_torque: float  # of every drive [N·m]
-    spin: bool = False  # run a busy Python thread next to the loop
-    storm: bool = False  # that thread also creates and collects garbage
-    amplitude: float = 3.0  # of the sine [rad]
-    stiffness: float = 0.5  # PD [N·m/rad]
-    damping: float = 0.02  # PD [N·m/(rad/s)]
-    second: str = ""  # interface of a ring's other end
-    busy_wait: float = 0.0  # [s] of our loops and `c-busy` before each cycle start
+    rated_torque: float  # [N·m] of every drive
+    spin: bool = False  # True to run a busy Python thread next to the loop
+    storm: bool = False  # True if this thread also creates and collects garbage
+    amplitude: float = 3.0  # [rad] of the sine
+    stiffness: float = 0.5  # [N·m/rad] of the PD law
+    damping: float = 0.02  # [N·m/(rad/s)] of the PD law
+    second: str = ""  # second interface, for a ring
+    busy_wait: float = 0.0  # [s] before each cycle start, in Catenary's loops and `c-busy`
 
     @property
     def interfaces(self) -> tuple[str, ...]:
@@ -69,7 +69,7 @@ class Job:
 
     @property
     def log(self) -> int:
-        """Length of a loop's log: all cycles of the round, and some more."""
+        """Length of the log: all cycles of the round and a reserve."""
         return self.warm_up + self.cycles + 100
 
     @property
@@ -86,14 +86,12 @@ class Job:
 class Round:
     """Result of one peer in one round."""
 
-    samples: Nanoseconds  # (cycles, phases) [ns]; -1: did not occur in that cycle
+    samples: Nanoseconds  # (cycles, phases) [ns]; -1 if the phase did not occur in a cycle
     lost: int
     cpu_per_cycle_ns: float  # CPU time of the process (all threads, user and system) / cycles
     scheduling: str = ""
-    uncommitted: int = (
-        0  # cycles sent without fresh set-points because Python was late; threaded only
-    )
-    answers: int = 0  # to SDO requests, from all devices, over the measured cycles
+    uncommitted: int = 0  # cycles sent without fresh set-points because Python was late (threaded)
+    answers: int = 0  # answers of all devices to SDO requests during the measured cycles
 
 
 class _Summary(msgspec.Struct):

@@ -27,8 +27,8 @@ def measure(
         seconds: Duration of the measurement [s].
         period: Period of the wake-ups [s].
         priority: SCHED_FIFO priority of the thread.
-        cpu: CPU of the thread; None: the one that `catenary doctor` selects for a loop.
-        file: File of the figures; None writes none.
+        cpu: CPU of the thread; None for the one that `catenary doctor` selects for a loop.
+        file: File for the figures; None to write no file.
 
     Returns:
         True unless the verdict is FAIL.

@@ -1,4 +1,4 @@
-"""Catenary's compiled laws: the same bodies in the native thread."""
+"""Peer `catenary-law`: the same loop bodies as compiled laws in the native thread."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from catenary.bench.job import Body, Job, Round
 from catenary.bench.python_loop import opened, samples_of
 from catenary.loop import LawRun
 
-AMPLITUDE, STIFFNESS, DAMPING, END = range(4)  # of the parameters
-CYCLE_OK = 1  # bit of a record's flags
+AMPLITUDE, STIFFNESS, DAMPING, END = range(4)  # indices of the parameters
+CYCLE_OK = 1  # bit in the flags of a record
 NEVER = 1e9  # [s]
-LOOK = 500  # cycles between two checks that the law is still running
+CHECK_CYCLES = 500  # cycles between two checks that the law is still running
 
 
 @cat.law
@@ -47,22 +47,22 @@ def _measure(loop: cat.Loop, law: Any, home: Any, job: Job) -> Round:
         law,
         memory=home,
         parameters=[job.amplitude, job.stiffness, job.damping, NEVER],
-        budget=0,  # a long step does not end the law: the other peers continue, too
+        budget=0,  # no limit, because the other peers also continue after a long step
     )
     _sleep(loop, running, job.warm_up, job)
     first, cpu = running.steps, time.process_time_ns()
     _sleep(loop, running, first + job.cycles, job)
     cpu, cycles = time.process_time_ns() - cpu, running.steps - first
     log = loop.log
-    log = log[log["process_ns"] >= 0][-job.cycles :]  # not the cycle in progress
+    log = log[log["process_ns"] >= 0][-job.cycles :]  # omit the cycle in progress
     lost = int(np.count_nonzero(log["flags"] & CYCLE_OK == 0))
     return Round(samples_of(log), lost=lost, cpu_per_cycle_ns=cpu / cycles)
 
 
 def _sleep(loop: cat.Loop, running: LawRun, steps: int, job: Job) -> None:
-    """Sleep until the law has made `steps` steps. The law does not need this thread meanwhile."""
+    """Sleep until the law has made `steps` steps. The law runs without this thread."""
     while (left := steps - running.steps) > 0:
         before = running.steps
-        time.sleep(min(left, LOOK) * job.period_ns * 1e-9)
+        time.sleep(min(left, CHECK_CYCLES) * job.period_ns * 1e-9)
         if running.steps == before:
-            next(loop)  # raises the reason
+            next(loop)  # raises the error that stopped the law

@@ -1,4 +1,4 @@
-"""`catenary bench loop`: run the loop of this machine in all its execution modes, and report."""
+"""`catenary bench loop`: measure the loop on this machine in all its execution modes."""
 
 from __future__ import annotations
 
@@ -25,21 +25,21 @@ from catenary.bench.setting import Setting
 from catenary.bench.statistics import Run, combine
 
 OURS = ("catenary-inline", "catenary-threaded")
-LAW = "catenary-law"  # where Numba is installed
-STORM = "catenary-law-storm"  # next to a thread that spins and creates garbage
+LAW = "catenary-law"  # only if Numba is installed
+STORM = "catenary-law-storm"  # next to a busy thread that creates garbage
 MODULES = {
     "catenary-inline": "catenary.bench.python_loop",
     "catenary-threaded": "catenary.bench.python_loop",
     LAW: "catenary.bench.law_loop",
 }
-ROUND_CYCLES = 900  # less than a second at 1 kHz: disturbances affect all peers alike
+ROUND_CYCLES = 900  # less than a second at 1 kHz, so that disturbances affect all peers alike
 
 
 def measure(setting: Setting, file: Path | None) -> None:
     """Print the timing of all execution modes, and write it to `file` as JSON.
 
     Raises:
-        ValueError: a busy-wait that is not less than the period.
+        ValueError: The busy-wait is not less than the period.
     """
     names = own_names()
     show(setting, run_setting(setting, {name: MODULES[name] for name in names}), {}, file)
@@ -51,7 +51,7 @@ def own_names() -> list[str]:
 
 
 def run_setting(setting: Setting, modules: Mapping[str, str]) -> list[Run]:
-    """Run the peers, given by name and module, on a segment of their own."""
+    """Run the peers, given by name and module, on a new segment."""
     check_busy_wait(setting.busy_wait, setting.rate)
     with served(setting.drives) as segment:
         return run_all(
@@ -67,10 +67,11 @@ def run_setting(setting: Setting, modules: Mapping[str, str]) -> list[Run]:
 
 
 def check_busy_wait(busy_wait: float, rate: int) -> None:
-    """Raise ValueError for a busy-wait that a loop cannot use."""
+    """Raise ValueError unless the busy-wait is less than the period."""
     if not 0 <= busy_wait < 1 / rate:
         raise ValueError(
-            f"busy-wait of {busy_wait} s: must be less than the period of {1 / rate} s"
+            f"busy-wait of {busy_wait} s: it must be at least 0 and less than the period of "
+            f"{1 / rate} s"
         )
 
 
@@ -80,7 +81,7 @@ def show(
     """Print the figures of all runs and the verdicts, and write the figures to `file` as JSON."""
     print(loop_text(machine(), setting, runs, ratios))
     chosen = asdict(setting)
-    del chosen["rounds"]  # of each run, below
+    del chosen["rounds"]  # each run has its own rounds
     write(file, as_json(runs, ratios, chosen))
 
 
@@ -95,9 +96,9 @@ def run_all(
     rounds: int | None = None,
     busy_wait: float = 0.0,
 ) -> list[Run]:
-    """Run all peers, given by name and module, in turn.
+    """Run all peers, given by name and module, in alternating rounds.
 
-    `rounds` of each; None: as many as keep a round below a second.
+    `rounds` is the number of rounds per peer; None for rounds of less than a second.
     """
     cycles = round(seconds * rate)
     rounds = rounds or math.ceil(cycles / ROUND_CYCLES)
@@ -118,8 +119,10 @@ def make_jobs(
     spin: bool,
     busy_wait: float = 0.0,
 ) -> list[Job]:
-    """Make the jobs of one round, the same for each peer. C peers other than `c-busy` and PySOEM
-    ignore `busy_wait`."""
+    """Make the jobs of one round, with the same parameters for each peer.
+
+    PySOEM and the C peers other than `c-busy` ignore `busy_wait`.
+    """
     return [
         Job(
             peer=name,

@@ -1,4 +1,4 @@
-"""Catenary as its users write it, inline and threaded."""
+"""Peers `catenary-inline` and `catenary-threaded`: ordinary Catenary loops in Python."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from catenary.bench.job import PHASES, Body, Job, Nanoseconds, Round
 from catenary.log import Log
 from catenary.loop.laws.law import Law
 
-# Like the peers, a loop counts lost and late cycles and continues; by default it stops the drives.
+# Count lost and late cycles and continue, like the other peers. A loop stops the drives by default.
 LOST_LIMIT = 1000
 LATE_LIMIT = 10.0  # [s]
 MODE = {Body.SINE: "csp", Body.PD: "cst"}
@@ -59,7 +59,7 @@ def opened(
 
 
 def body_of(arm: cat.Drives, job: Job) -> Callable[[float], None]:
-    """Return the body of a cycle. The motion starts at the present positions."""
+    """Return the body of a cycle. The motion starts at the current positions."""
     return _sine(arm, job) if job.body is Body.SINE else _pd(arm, job)
 
 
@@ -70,7 +70,7 @@ def measure(
     answers: Sequence[int],
     body: Callable[[float], None] | None = None,
 ) -> Round:
-    """Iterate the loop and return its figures. `body`: a body that is already running, or None."""
+    """Run the loop and return its figures. `body` is a body that already runs, or None."""
     body = body or body_of(arm, job)
     before, cpu, first, answered = loop.timing.counters, 0.0, 0, 0
     last_unmeasured, end = job.warm_up - 1, job.warm_up + job.cycles

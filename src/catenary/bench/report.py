@@ -19,11 +19,11 @@ HEADLINES = {
 }
 COLUMNS = ("period", "lateness", "receive", "process", "send", "in_controller", "tail")
 FIGURES = ("max", "p50", "p99")  # in the order of catenary.figures
-NAME, FIGURE, GAP = 20, 9, "   "  # widths of a name and of a figure, between groups of figures
+NAME, FIGURE, GAP = 20, 9, "   "  # width of a name, width of a figure, and separator of groups
 
 
 def machine() -> str:
-    """Return the processor, the number of CPUs, the kernel and the interpreter."""
+    """Return a description of the processor, the CPUs, the kernel and the interpreter."""
     return (
         f"{processor()}, {os.cpu_count()} CPUs, {platform.system()} {platform.release()} "
         f"{preemption()}, {platform.python_implementation()} {platform.python_version()}"
@@ -76,7 +76,7 @@ def as_json(
 def loop_text(
     machine: str, setting: Setting, runs: Sequence[Run], ratios: Mapping[str, float]
 ) -> str:
-    """Return the machine, the setting, all tables and the verdicts."""
+    """Return the machine, the setting, all tables and the verdicts as text."""
     blocks = [f"{machine}\n{setting}", as_text(runs, ratios), verdict.as_text(runs, setting.rate)]
     return "\n\n".join(blocks)
 
@@ -88,7 +88,7 @@ def as_text(runs: Sequence[Run], ratios: Mapping[str, float]) -> str:
 
 
 def _headlines(runs: Sequence[Run]) -> str:
-    """Return output delay, input age and CPU time: the main figures of an execution mode."""
+    """Return a table of the main figures: output delay, input age and CPU time."""
     wide = FIGURE * len(FIGURES)
     groups = GAP.join(f"{title:>{wide}}" for title in HEADLINES.values())
     figures = GAP.join("".join(f"{name:>{FIGURE}}" for name in FIGURES) for _ in HEADLINES)
@@ -125,7 +125,7 @@ def _counters(runs: Sequence[Run]) -> str:
 
 
 def _ratios(ratios: Mapping[str, float]) -> str:
-    """Return a table with a row per pair of peers and a column per phase.
+    """Return a table of ratios, with a row for each pair of peers and a column for each phase.
 
     The keys of `ratios` are "phase: a / b".
     """

@@ -1,6 +1,6 @@
-"""Short rounds of peers in turn (A B C B C A ...), each round in a new process.
+"""Alternating short rounds of all peers (A B C B C A ...), each in a new process.
 
-Disturbances of the machine therefore affect all peers alike, and no peer is always the first.
+Disturbances of the machine therefore affect all peers alike, and no peer is always first.
 """
 
 from __future__ import annotations
@@ -16,9 +16,9 @@ from catenary.errors import CatenaryError
 from catenary.realtime.child import start_python
 
 WARM_UP_CYCLES = 200
-BRING_UP_SECONDS = 60.0  # longest bring-up and enabling in a round
+BRING_UP_SECONDS = 60.0  # maximum time for the bring-up and enabling in a round
 
-MOST_FAILED = 10  # largest number of repeated rounds
+MOST_FAILED = 10  # maximum number of repeated rounds
 
 T = TypeVar("T")
 Progress = Callable[[str, int, int], None]  # peer, round, rounds
@@ -28,7 +28,7 @@ class RoundError(CatenaryError):
     """A peer could not complete its round."""
 
 
-def begin_anew(run: Callable[[], T], failed: list[str]) -> T:
+def run_with_retries(run: Callable[[], T], failed: list[str]) -> T:
     """Run a round, and repeat it if it fails.
 
     A round fails, for example, if the machine pauses for longer than the devices' watchdog.
@@ -58,7 +58,7 @@ def interleave(
         jobs: One job for each peer.
         rounds: Number of rounds per job.
         progress: Called before each round.
-        failed: Receives the reasons of failed rounds, which are repeated; None: do not repeat.
+        failed: Receives the reasons of failed rounds, which are repeated. None to raise instead.
 
     Returns:
         The rounds by name of the peer.
@@ -70,7 +70,7 @@ def interleave(
             for job in (*jobs[first:], *jobs[:first]):
                 progress(job.peer, number + 1, rounds)
                 run = partial(run_round, job, Path(name))
-                found[job.peer].append(run() if failed is None else begin_anew(run, failed))
+                found[job.peer].append(run() if failed is None else run_with_retries(run, failed))
     return found
 
 
@@ -81,8 +81,8 @@ def run_round(job: Job, folder: Path) -> Round:
     arguments = ["-m", "catenary.bench.worker", str(job_path), str(result_path)]
     seconds = BRING_UP_SECONDS + (job.warm_up + job.cycles) * job.period_ns * 1e-9
     with start_python(arguments) as worker:
-        said = worker.read_line(seconds)
-    if said != "done":
-        reason = said or f"no result within {seconds:.0f} s"
+        line = worker.read_line(seconds)
+    if line != "done":
+        reason = line or f"no result within {seconds:.0f} s"
         raise RoundError(f"the peer {job.peer} failed: {reason}")
     return read_round(result_path)

@@ -1,4 +1,4 @@
-"""`catenary bench report`: print a saved result again, with the verdict."""
+"""`catenary bench report`: print a saved result with its verdict."""
 
 from __future__ import annotations
 

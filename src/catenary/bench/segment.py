@@ -1,7 +1,7 @@
-"""The segment of the benchmarks: a coupler and drives, served on a network interface.
+"""Segment of the benchmarks: a coupler and drives, served on a network interface.
 
 `python -m catenary.bench.segment NIC SECOND DRIVES INPUTS AXES CPU` is the process that serves it.
-SECOND is the interface of a ring's other end, or empty.
+SECOND is the second interface of a ring, or empty.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ START_SECONDS = 30.0
 COUNTS_PER_TURN = 2**20
 RATED_TORQUE = 2.0  # [N·m]
 PRIORITY = 80
-BELOW = 10  # reduction of the segment's priority if it shares the only processor
+BELOW = 10  # reduction of the segment's priority if it shares the only processor with the loop
 ANALOG_CHANNELS = 4  # per input terminal
 
 
@@ -33,13 +33,13 @@ class Served:
     interface: str  # of the MainDevice
     drives: tuple[int, ...]  # positions
     second: str = ""  # second interface of the MainDevice if the segment is a ring
-    far: str = ""  # interface of the segment
+    far: str = ""  # network interface of the segment
     pid: int = 0  # process that serves the segment
 
 
 @dataclass(frozen=True, slots=True)
 class Processors:
-    """One processor for the segment and one for all masters; None if there is only one."""
+    """Processors of the segment and of all masters; None if there is only one processor."""
 
     segment: int | None
     masters: int | None
@@ -60,7 +60,7 @@ def make_segment(
     clock: Literal["virtual", "monotonic"] | VirtualClock = "monotonic",
     ring: bool = False,
 ) -> Segment:
-    """Return a segment of a coupler, servos and analogue input terminals.
+    """Make a segment with a coupler, servos and analogue input terminals.
 
     Args:
         drives: Number of servos.
@@ -79,7 +79,7 @@ def make_segment(
 
 @contextmanager
 def served(drives: int, inputs: int = 0, axes: int = 1, *, ring: bool = False) -> Iterator[Served]:
-    """Serve the segment on one end of an interface pair during the block; a ring on two pairs."""
+    """Serve the segment on one end of an interface pair, or of two pairs for a ring."""
     cpu = processors().segment
     with ExitStack() as stack:
         ours, theirs = stack.enter_context(veth_pair())
@@ -90,7 +90,11 @@ def served(drives: int, inputs: int = 0, axes: int = 1, *, ring: bool = False) -
         arguments = [theirs, their_second, *numbers, "" if cpu is None else str(cpu)]
         server = stack.enter_context(start_python(["-m", "catenary.bench.segment", *arguments]))
         if server.read_line(START_SECONDS) is None:
-            raise LinkError("the segment of the benchmark did not start")
+            raise LinkError(
+                "the segment of the benchmark did not start: its process ended, or did not answer "
+                f"within {START_SECONDS:g} s",
+                hint="see the message of the process above, if there is one",
+            )
         yield Served(ours, tuple(range(1, drives + 1)), second, theirs, server.pid)
 
 

@@ -1,4 +1,4 @@
-"""Setting: what one run of `catenary bench loop` measures."""
+"""Setting: the parameters of `catenary bench loop`."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ class Setting:
     rate: int = 1000  # [Hz]
     seconds: float = 10.0  # per peer
     body: str = "sine"  # or "pd"
-    spin: bool = False  # a Python thread spins next to every loop
-    rounds: int | None = None  # per peer; None: rounds of less than a second
-    busy_wait: float = 0.0  # [s] before each cycle start, of Catenary's loops and of `c-busy`
+    spin: bool = False  # True to run a busy Python thread next to every loop
+    rounds: int | None = None  # per peer; None for rounds of less than a second
+    busy_wait: float = 0.0  # [s] before each cycle start, in Catenary's loops and `c-busy`
 
     def __str__(self) -> str:
         notes = [f"{self.drives} drives at {self.rate} Hz, body {self.body}"]

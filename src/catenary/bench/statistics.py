@@ -15,9 +15,12 @@ Timing = dict[str, dict[str, float]]
 
 IN_CONTROLLER, WITH_TAIL, WAKE_TO_SENT = "in_controller", "in_controller+tail", "wake_to_sent"
 DERIVED = (IN_CONTROLLER, WITH_TAIL, WAKE_TO_SENT)
-"""Columns computed in every cycle from the phases: receive + process + send; the same + tail;
-output_delay - lateness (wake-up → last cyclic frame handed to the kernel)."""
-PER_ROUND = ("p50", "p99", "max")  # figures kept of each round
+"""Columns computed from the phases of every cycle.
+
+in_controller = receive + process + send; in_controller+tail = in_controller + tail;
+wake_to_sent = output_delay - lateness (wake-up → last cyclic frame passed to the kernel).
+"""
+PER_ROUND = ("p50", "p99", "max")  # figures stored for each round
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,7 +31,7 @@ class Rounds:
     lost: list[int]
     uncommitted: list[int]
     cpu_us_per_cycle: list[float]
-    timing_us: dict[str, dict[str, list[float | None]]]  # None: the phase did not occur
+    timing_us: dict[str, dict[str, list[float | None]]]  # None if the phase did not occur
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,11 +46,11 @@ class Run:
     scheduling: str
     timing_us: Timing
     rounds: Rounds
-    answers: int = 0  # to SDO requests
+    answers: int = 0  # number of answers to SDO requests
 
 
 def combine(name: str, rounds: Sequence[Round]) -> Run:
-    """Return the figures of all cycles of a peer, and those of each round."""
+    """Return the figures of a peer over all cycles and for each round."""
     each = [columns_of(one) for one in rounds]
     together = {column: np.concatenate([one[column] for one in each]) for column in each[0]}
     counts = [len(one.samples) for one in rounds]
@@ -72,13 +75,13 @@ def combine(name: str, rounds: Sequence[Round]) -> Run:
 
 
 def columns_of(one: Round) -> dict[str, Values]:
-    """Return the phases and the derived columns of a round [us], without cycles that lack them."""
+    """Return the phases and the derived columns of a round [us], without missing values."""
     samples = np.where(one.samples < 0, np.nan, one.samples * 1e-3)
     columns = dict(zip(PHASES, samples.T, strict=True))
     columns[IN_CONTROLLER] = columns["receive"] + columns["process"] + columns["send"]
     columns[WITH_TAIL] = columns[IN_CONTROLLER] + columns["tail"]
     columns[WAKE_TO_SENT] = columns["output_delay"] - columns["lateness"]
-    columns["period"] = columns["period"][1:]  # the first one started before the round
+    columns["period"] = columns["period"][1:]  # the first period started before the round
     return {name: values[~np.isnan(values)] for name, values in columns.items()}
 
 
@@ -88,7 +91,7 @@ def _per_round(rounds: Sequence[Values]) -> dict[str, list[float | None]]:
 
 
 def summarise(values: Values) -> dict[str, float]:
-    """Return the figures of at least one value."""
+    """Return the figures of one or more values."""
     p50, p99, p999 = np.percentile(values, [50.0, 99.0, 99.9])
     figures = {
         "mean": values.mean(),

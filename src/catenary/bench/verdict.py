@@ -1,4 +1,4 @@
-"""Verdicts on a loop: whether this machine sends its frames in time."""
+"""Verdicts on the output delay and the lost cycles of a loop."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ NAME = 20  # width of a name
 
 
 def as_text(runs: Sequence[Run], rate: int) -> str:
-    """Return one line per run: the verdict, and the figures that it follows from."""
+    """Return the verdict on each run, with the figures that determine it."""
     period_us = 1e6 / rate
     lines = [
         f"verdict (PASS: output delay at most {GOOD_SHARE:.0%} of the period, no cycle lost; "
@@ -28,7 +28,7 @@ def as_text(runs: Sequence[Run], rate: int) -> str:
 
 
 def status_of(run: Run, period_us: float) -> Status:
-    """Judge the worst output delay as `catenary doctor` judges the worst wake-up."""
+    """Judge the worst output delay by the limits of `catenary doctor` for the worst wake-up."""
     worst = run.timing_us["output_delay"]["max"]
     if worst > BAD_SHARE * period_us:
         return "FAIL"

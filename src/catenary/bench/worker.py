@@ -1,7 +1,7 @@
-"""One round of one peer, in its own process: `python -m catenary.bench.worker JOB RESULT`.
+"""Worker process for one round of one peer: `python -m catenary.bench.worker JOB RESULT`.
 
-Every peer gets the same processor and scheduling. With a new process for every round, all peers
-start from the same state, and the memory of one peer does not affect the timing of another.
+Every peer gets the same processor and scheduling. Every round has a new process, so that all peers
+start from the same state and the memory of one peer does not affect the timing of another.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ def main(arguments: Sequence[str]) -> None:
 def schedule(job: Job) -> Scheduling:
     if job.priority is None:
         return what_scheduling()
-    # This locks the memory of the Python peers; the C programs lock their own.
+    # Lock the memory of the Python peers. The C programs lock their own memory.
     return request_scheduling(priority=job.priority, lock_memory=True, cpu=job.cpu)
 
 
@@ -42,7 +42,8 @@ def schedule(job: Job) -> Scheduling:
 def spinning(job: Job) -> Iterator[None]:
     """Run a busy Python thread on the processor of the loop during the block.
 
-    The thread has ordinary scheduling: it starts before the main thread requests a priority.
+    The thread has ordinary scheduling, because it starts before the main thread requests a
+    priority.
     """
     stop = threading.Event()
 
@@ -75,6 +76,6 @@ if __name__ == "__main__":
     try:
         main(sys.argv[1:])
     except Exception as error:
-        # One line for the process that runs the benchmark; the traceback for debugging the peer.
+        # The benchmark process reads this line. The traceback on stderr is for debugging.
         print(f"{type(error).__name__}: {' '.join(str(error).split())}", flush=True)
         raise

@@ -59,12 +59,13 @@ class MainDevice:
     """
 
     def __init__(self, source: LinkSource, *, force: bool = False) -> None:
-        self.subs = SubDevices()
+        self.subs = SubDevices()  # devices of the last scan
         self.notes: tuple[str, ...] = ()  # irregularities found by the last scan
-        self.clock_delays_ns: tuple[int | None, ...] = ()  # after the first clock, by position
+        self.clock_delays_ns: tuple[int | None, ...] = ()  # to the first clock, by position
         self.clock_epoch_ns = 0  # system time of the clocks minus link time
-        self.events = events = Events()  # iterate, or get(timeout=)
+        self.events = Events()  # iterate, or get(timeout=)
         self._callbacks = callbacks = Callbacks()
+        events = self.events
         events.listen(lambda each: callbacks.report(events.stamped(each)))
         self._source = source
         self._force = force

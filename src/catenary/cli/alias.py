@@ -1,4 +1,4 @@
-"""`catenary alias TARGET POSITION [VALUE]`: the station alias in a device's EEPROM."""
+"""`catenary alias TARGET POSITION [VALUE]`: show or write the station alias of a device."""
 
 from __future__ import annotations
 
@@ -27,13 +27,17 @@ def add_parser(commands: Commands) -> None:
         "alias",
         help="show or write the station alias of a device",
         description="Shows the station alias, by which a program finds a device at any position. "
-        "With VALUE: writes it into the EEPROM. The device uses it after its next power cycle.",
+        "With VALUE, writes the alias to the EEPROM. The device uses it after its next power-up.",
         example="catenary alias eth0 2\ncatenary alias eth0 2 10\ncatenary alias eth0 2 0",
     )
     add_target(parser)
     add_position(parser)
-    parser.add_argument("value", metavar="VALUE", nargs="?", type=alias, help="1 to 65535; 0: none")
-    parser.add_argument("--force", action="store_true", help="even if another device has it")
+    parser.add_argument(
+        "value", metavar="VALUE", nargs="?", type=alias, help="1 to 65535; 0 for none"
+    )
+    parser.add_argument(
+        "--force", action="store_true", help="write it even if another device has it"
+    )
     add_json(parser)
     parser.set_defaults(run=run)
 
@@ -59,7 +63,7 @@ def run(arguments: argparse.Namespace) -> int:
         device = device_at(devices, arguments.position)
         if arguments.value is not None:
             if arguments.value and not arguments.force:
-                refuse_twins(main, devices, device, arguments.value)
+                check_unique(main, devices, device, arguments.value)
             main.converse(with_eeprom(device.station, write_alias(device.station, arguments.value)))
         stored = main.converse(with_eeprom(device.station, read_alias(device.station)))
     if arguments.json:
@@ -70,7 +74,7 @@ def run(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def refuse_twins(
+def check_unique(
     main: MainDevice, devices: Sequence[SubDevice], device: SubDevice, value: int
 ) -> None:
     """Check that no other device has the alias, now or after its next power-up.
@@ -89,7 +93,7 @@ def refuse_twins(
         if value in (other.alias, stored):
             raise ConfigurationError(
                 f"{other.station} already has the alias {value}",
-                hint="choose another alias, or use --force if that device gets a new alias, too",
+                hint="choose another alias, or use --force if that device also gets a new alias",
             )
 
 
@@ -101,4 +105,4 @@ def show(device: SubDevice, stored: int) -> str:
     if stored == device.alias:
         return f"{name}: {now}"
     then = f"alias {stored}" if stored else "no alias"
-    return f"{name}: {now}, after its next power-up {then}"
+    return f"{name}: {now}; {then} after the next power-up"

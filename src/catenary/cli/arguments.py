@@ -7,7 +7,7 @@ import os
 from dataclasses import dataclass
 from pathlib import Path
 
-FIRST_OBJECT = 0x1000  # below are data types, not objects: ETG.1000.6 §5.6.7.1
+FIRST_OBJECT = 0x1000  # lower indices are data types, ETG.1000.6 §5.6.7.1
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,7 +35,7 @@ def position(text: str) -> int:
 
 
 def entry(text: str) -> Entry:
-    """Return the entry for `0x6041` or `0x1018:1`."""
+    """Parse an entry such as `0x6041` or `0x1018:1`."""
     index_text, _, subindex_text = text.partition(":")
     if index_text.isalnum() and not index_text.lower().startswith("0x"):
         raise argparse.ArgumentTypeError(
@@ -57,7 +57,7 @@ def positive_number(text: str) -> int:
 
 
 def positive_numbers(text: str) -> list[int]:
-    """Return the numbers of a list such as `4000,8000`."""
+    """Parse a list of numbers such as `4000,8000`."""
     return [positive_number(each) for each in text.split(",")]
 
 
@@ -87,12 +87,12 @@ def _positive_time(text: str, unit: str) -> float:
 
 
 def result_file(text: str) -> Path:
-    """Return the path of a result file. Check before the measurement that it can be written."""
+    """Return the path of a result file. Raises ArgumentTypeError if it cannot be written."""
     path = Path(text)
     if os.path.isdir(path):  # no error if the folder is not readable
         raise argparse.ArgumentTypeError(f"{text} is a folder")
     if not os.path.isdir(path.parent):
-        raise argparse.ArgumentTypeError(f"there is no folder {path.parent}")
+        raise argparse.ArgumentTypeError(f"the folder {path.parent} does not exist")
     if not os.access(path if os.path.exists(path) else path.parent, os.W_OK):
         raise argparse.ArgumentTypeError(f"{text} cannot be written: no permission")
     return path

@@ -1,4 +1,4 @@
-"""`catenary bench`: measure this machine, and print a measurement again."""
+"""`catenary bench`: measure the loop on this machine, or print a saved result."""
 
 from __future__ import annotations
 
@@ -17,8 +17,9 @@ def add_parser(commands: Commands) -> None:
         commands,
         "bench",
         help="measure the loop on this machine",
-        description="Measures this machine. Comparisons with C, PySOEM and published figures are "
-        "`python -m benchmarks` in a clone of the repository (docs/explanation/benchmarks.md).",
+        description="Measures the loop on this machine. To compare it with C, PySOEM and published "
+        "figures, run `python -m benchmarks` in a clone of the repository "
+        "(docs/explanation/benchmarks.md).",
         example="catenary bench loop --seconds 10 --json loop.json\n"
         "catenary bench latency --seconds 60\n"
         "catenary bench report loop.json",
@@ -33,9 +34,9 @@ def _add_loop(group: Commands) -> None:
         group,
         "loop",
         help="measure the phases of the cyclic exchange",
-        description="Runs catenary-inline, catenary-threaded and catenary-law (where Numba is "
+        description="Runs catenary-inline, catenary-threaded and catenary-law (if Numba is "
         "installed) alternately in short rounds, on virtual devices in a private network. Prints "
-        "output delay, input age and CPU time per cycle, then the phases.",
+        "the output delay, the input age and the CPU time per cycle, then the phases.",
         example="catenary bench loop --seconds 10 --json loop.json\n"
         "catenary bench loop --drives 33 --rate 4000 --body pd\n"
         "catenary bench loop --busy-wait 0.00005",
@@ -69,7 +70,7 @@ def _add_latency(group: Commands) -> None:
         "--cpu",
         type=number,
         metavar="N",
-        help="CPU of the thread (the last isolated, else the last)",
+        help="CPU of the thread (default: the last isolated CPU, else the last CPU)",
     )
     add_file(parser)
     parser.set_defaults(run=run_latency)
@@ -79,7 +80,7 @@ def _add_report(group: Commands) -> None:
     parser = add_command(
         group,
         "report",
-        help="print a saved result again",
+        help="print a saved result",
         description="Prints the figures and the verdict from a JSON file of `loop` or `latency`.",
         example="catenary bench report loop.json",
     )

@@ -20,14 +20,17 @@ def add_parser(commands: Commands) -> None:
         commands,
         "check",
         help="compare a machine file with the segment",
-        description="Compares addresses and identities of the devices with a machine file, "
-        "without changing a device. Exit status: 0 if they match, 1 if they differ, 2 if the file "
+        description="Compares the addresses and identities of the devices with a machine file, "
+        "and changes no device. Exit status: 0 if they match, 1 if they differ, 2 if the file "
         "or the segment cannot be read.",
         example="catenary check machine.toml\ncatenary check machine.toml eth1 --json",
     )
     parser.add_argument("file", metavar="FILE", help="the machine file")
     parser.add_argument(
-        "target", metavar="TARGET", nargs="?", help="replaces the target in the file: eth0 ..."
+        "target",
+        metavar="TARGET",
+        nargs="?",
+        help="target instead of the one in the file: eth0 ...",
     )
     add_json(parser)
     parser.set_defaults(run=run)
@@ -49,7 +52,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def compare_with_segment(file: str, target: str | None) -> Sequence[Comparison]:
-    """Return the comparisons of a file with its segment, or with that of another target."""
+    """Compare a file with its segment, or with the segment of another target."""
     from catenary.machine import compare, read_machine
     from catenary.target import MainDevice, source_of
 
@@ -61,7 +64,7 @@ def compare_with_segment(file: str, target: str | None) -> Sequence[Comparison]:
 
 
 def as_table(found: Sequence[Comparison]) -> str:
-    """Return one line per device."""
+    """Return the comparisons as a table with one line per device."""
     from catenary.cli.tables import table
     from catenary.machine import address
 
@@ -75,7 +78,7 @@ def as_table(found: Sequence[Comparison]) -> str:
 
 
 def as_json(found: Sequence[Comparison]) -> str:
-    """Return the comparisons for programs."""
+    """Return the comparisons as JSON."""
     from catenary.machine import address, expected_identity
 
     return json.dumps(

@@ -1,4 +1,4 @@
-"""Entry point of the `catenary` command. It handles Ctrl-C even during the imports."""
+"""Entry point of the `catenary` command, which handles Ctrl-C even during the imports."""
 
 INTERRUPTED = 130  # 128 + SIGINT
 

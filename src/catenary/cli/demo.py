@@ -13,13 +13,14 @@ def add_parser(commands: Commands) -> None:
     parser = add_command(
         commands,
         "demo",
-        help="three virtual drives follow a sine at 1 kHz",
-        description="Three virtual servo drives follow a sine at 1 kHz over real EtherCAT frames, "
-        "in a private network. Prints the timing and writes demo.json and demo.html.",
+        help="run three virtual drives that follow a sine at 1 kHz",
+        description="Runs three virtual servo drives that follow a sine at 1 kHz, with real "
+        "EtherCAT frames in a private network. Prints the timing and writes demo.json and "
+        "demo.html.",
         example="catenary demo\ncatenary demo --seconds 3 --out /tmp/demo",
     )
     parser.add_argument(
-        "--seconds", type=positive_seconds, default=10.0, help="how long to run (default 10)"
+        "--seconds", type=positive_seconds, default=10.0, help="duration of the motion (10)"
     )
     parser.add_argument(
         "--out", type=Path, default=Path("out"), metavar="DIR", help="folder of the report (out)"
@@ -27,7 +28,7 @@ def add_parser(commands: Commands) -> None:
     parser.add_argument(
         "--in-process",
         action="store_true",
-        help="without a network: run the segment in this process",
+        help="run the segment in this process, without a network",
     )
     parser.set_defaults(run=run)
 

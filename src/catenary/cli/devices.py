@@ -59,7 +59,7 @@ def as_json(devices: Sequence[SubDevice]) -> str:
 def device_at(devices: Sequence[SubDevice], position: int) -> SubDevice:
     if position >= len(devices):
         raise UsageError(
-            f"there is no device {position}: the segment has {len(devices)}",
-            hint=f"positions go from 0 to {len(devices) - 1}; catenary scan lists them",
+            f"there is no device {position}; the segment has {len(devices)} devices",
+            hint=f"use a position from 0 to {len(devices) - 1}; `catenary scan` lists the devices",
         )
     return devices[position]

@@ -29,9 +29,9 @@ def add_parser(commands: Commands) -> None:
         "diag",
         help="find the cable or device at fault",
         description="Reads the error counters of all devices and reports the cable, device or "
-        f"supply at fault. The counters contain errors {SINCE_POWER_UP}, including those of "
-        "switching on. With --seconds, only new errors count, and frames are sent to provoke "
-        "them. Exit status 1 if a fault is found.",
+        f"power supply at fault. The counters contain errors {SINCE_POWER_UP}, including errors at "
+        "power-up. With --seconds, sends frames to provoke errors, and reports only new errors. "
+        "Exit status 1 if there is a fault.",
         example="catenary diag eth0\ncatenary diag eth0 --seconds 10\ncatenary diag eth0 --clear",
     )
     add_target(parser)
@@ -39,7 +39,7 @@ def add_parser(commands: Commands) -> None:
         "--seconds",
         metavar="N",
         type=positive_seconds,
-        help="watch for N seconds; report new errors only",
+        help="measure for N seconds and report only new errors",
     )
     parser.add_argument("--clear", action="store_true", help="set all counters to zero afterwards")
     add_force(parser)
@@ -75,8 +75,8 @@ def as_text(found: Diagnosis, sent: int, arguments: argparse.Namespace) -> str:
     if arguments.seconds is not None:
         span = f"within {arguments.seconds:g} s ({sent} frames sent)"
     if not found:
-        return f"nothing found: {len(found.topology)} devices have counted no error {span}"
-    lines = [f"{len(found.findings)} found, {span}:", *map(str, found.findings)]
+        return f"no fault found: {len(found.topology)} devices counted no error {span}"
+    lines = [f"number of faults: {len(found.findings)}, {span}", *map(str, found.findings)]
     rows = counter_rows(found)
     return "\n".join([*lines, "", table([HEADINGS, *rows])] if rows else lines)
 

@@ -24,7 +24,7 @@ class Row:
     """An entry, or the heading of an object with several entries."""
 
     index: int
-    subindex: int | None  # None: heading
+    subindex: int | None  # None for a heading
     name: str
     type: str
     bit_length: int
@@ -34,14 +34,14 @@ class Row:
 
 
 def rows_of(device: SubDevice, notes: list[str], *, values: bool) -> Iterator[Row]:
-    """Read all objects one after the other, and yield their rows.
+    """Read all objects one by one, and yield their rows.
 
-    An object that the device does not describe has a row with the reason.
+    If the device does not describe an object, its row has the reason.
 
     Args:
         device: The device to read.
         notes: Receives notes about missing descriptions.
-        values: True to read the values of readable entries, too.
+        values: True to also read the values of readable entries.
     """
     known = device.sdo.list()
     notes += device.sdo.notes
@@ -87,7 +87,7 @@ def _with_value(device: SubDevice, entry: EntryDescription, row: Row) -> Row:
         return replace(row, problem=error.message)
     try:
         return replace(row, value=by_index(entry.data_type).decode(data))
-    except (ValueError, CatenaryError):  # a manufacturer's own type, or a wrong length
+    except (ValueError, CatenaryError):  # a manufacturer-specific type, or a wrong length
         return replace(row, value=data)
 
 
@@ -133,7 +133,7 @@ def _value_text(row: Row) -> str:
     if isinstance(row.value, bytes):
         return f" = {row.value.hex(' ')}"
     if isinstance(row.value, str):
-        return f" = {row.value!r}"  # escapes control characters, too
+        return f" = {row.value!r}"  # also escapes control characters
     hexadecimal = f" (0x{row.value:X})" if isinstance(row.value, int) and row.value > 9 else ""
     return f" = {row.value}{hexadecimal}"
 

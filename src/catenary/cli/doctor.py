@@ -1,4 +1,4 @@
-"""`catenary doctor [NIC]`: check that this machine is fit for a real-time loop."""
+"""`catenary doctor [NIC]`: check whether this machine is ready for a real-time loop."""
 
 from __future__ import annotations
 
@@ -30,21 +30,21 @@ def add_parser(commands: Commands) -> None:
     parser = add_command(
         commands,
         "doctor",
-        help="check if this machine is fit for real time",
+        help="check whether this machine is ready for real time",
         description="Checks the kernel, processors, clocks, permissions and a network card, and "
-        "measures the wake-up latency of threads. Shows the commands that solve a problem. Sends "
-        "nothing, and changes nothing without --apply. docs/how_to/doctor.md explains every "
+        "measures the wake-up latency of threads. Shows commands that solve the problems. Sends "
+        "no frames, and changes nothing without --apply. docs/how_to/doctor.md explains every "
         "check. Exit status 1 if a check failed.",
         example=EXAMPLE,
     )
     parser.add_argument(
-        "nic", metavar="NIC", nargs="?", help="the network card of the segment: eth0"
+        "nic", metavar="NIC", nargs="?", help="network card of the segment, such as eth0"
     )
     parser.add_argument(
         "--seconds",
         type=seconds,
         default=3.0,
-        help="duration of the latency test (default 3; 0: none)",
+        help="duration of the latency test (default 3; 0 for no test)",
     )
     parser.add_argument(
         "--period",
@@ -54,20 +54,27 @@ def add_parser(commands: Commands) -> None:
         help="period of the loop (default 0.001)",
     )
     parser.add_argument(
-        "--priority", type=priority, default=80, help="priority of its thread, 1 to 99 (default 80)"
+        "--priority",
+        type=priority,
+        default=80,
+        help="priority of the loop's thread, 1 to 99 (default 80)",
     )
     parser.add_argument(
         "--cpu",
         type=number,
-        help="CPU of its thread (default: the last isolated one, else the last)",
+        help="CPU of the loop's thread (default: the last isolated CPU, else the last CPU)",
     )
     add_json(parser)
     doing = parser.add_mutually_exclusive_group()
     doing.add_argument(
-        "--apply", action="store_true", help="list reversible changes, ask, then apply them"
+        "--apply",
+        action="store_true",
+        help="list reversible changes, ask for confirmation, and apply them",
     )
-    doing.add_argument("--undo", action="store_true", help="undo the changes of --apply")
-    parser.add_argument("--yes", action="store_true", help="with --apply: do not ask")
+    doing.add_argument("--undo", action="store_true", help="undo the changes by --apply")
+    parser.add_argument(
+        "--yes", action="store_true", help="with --apply, do not ask for confirmation"
+    )
     parser.set_defaults(run=run)
 
 
@@ -78,7 +85,7 @@ def run(arguments: argparse.Namespace) -> int:
         raise UsageError("--json cannot be combined with --apply or --undo")
     if arguments.undo:
         return undo()
-    examination = look(arguments)
+    examination = examine_machine(arguments)
     if arguments.json:
         print(as_json(examination))
     else:
@@ -91,7 +98,7 @@ def run(arguments: argparse.Namespace) -> int:
     return FAILED if examination.failed else 0
 
 
-def look(arguments: argparse.Namespace) -> Examination:
+def examine_machine(arguments: argparse.Namespace) -> Examination:
     from catenary.doctor import examine, obtainable_cpu, this_machine, watch
     from catenary.errors import LinkError
 
@@ -112,7 +119,7 @@ def look(arguments: argparse.Namespace) -> Examination:
 
 
 def apply(changes: tuple[Change, ...], *, ask: bool) -> int:
-    """List the changes, ask, and apply them. Return the exit status: 1 if one was refused."""
+    """List the changes, ask for confirmation, and apply them. Return the exit status."""
     from catenary.doctor import MachineGround, change_lines, open_state
     from catenary.doctor import apply as make
 
@@ -133,7 +140,7 @@ def apply(changes: tuple[Change, ...], *, ask: bool) -> int:
 def agreed() -> bool:
     if not sys.stdin.isatty():
         raise UsageError(
-            "--apply asks before changes, but stdin is not a terminal", hint="--apply --yes"
+            "--apply asks for confirmation, but stdin is not a terminal", hint="use --apply --yes"
         )
     return input("Apply these changes? [y/N] ").strip().lower() in ("y", "yes")
 
@@ -144,7 +151,7 @@ def undo() -> int:
 
     state = open_state()
     if not state.load():
-        print(f"Nothing to undo: {state.path} contains no change since this machine was started.")
+        print(f"Nothing to undo: {state.path} contains no changes since the last reboot.")
         return 0
     return print_report(take_back(MachineGround(), state))
 

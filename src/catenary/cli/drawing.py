@@ -1,4 +1,4 @@
-"""The drawing of a segment: its content, and its form as text."""
+"""Drawing of a segment: its content, and its representation as text."""
 
 from __future__ import annotations
 
@@ -11,18 +11,18 @@ from catenary.wire.error_counters import ErrorCounters, PortErrors
 
 @dataclass(frozen=True, slots=True)
 class Node:
-    """One device. `delay_ns`: one-way delay of its cable and the previous device, or None."""
+    """One device. `delay_ns` is the one-way delay of its cable and the previous device, or None."""
 
     name: str
     alias: int
     state: str
     delay_ns: int | None
-    errors: ErrorCounters | None  # None: no answer
+    errors: ErrorCounters | None  # None without an answer
 
 
 @dataclass(frozen=True, slots=True)
 class Drawing:
-    """The tree of a segment, and its devices by position."""
+    """Tree of a segment, and its devices by position."""
 
     target: str
     topology: Topology
@@ -33,7 +33,7 @@ HEADINGS = ("device", "cable from", "delay", "state", "alias", "errors")
 
 
 def as_text(drawing: Drawing) -> str:
-    """Return the drawing as text. Devices in line form a column, and branches are indented."""
+    """Return the drawing as text. Devices in a line form a column; branches are indented."""
     rows = [
         (f"{indent}{position} {node.name}", _from(drawing, position), *_facts(node))
         for position, (indent, node) in enumerate(
@@ -82,7 +82,7 @@ def error_text(errors: ErrorCounters | None) -> str:
 
 
 def inner_text(errors: ErrorCounters | None) -> str:
-    """Return the counters of PDI and processing unit; the latter only if port 0 counted none."""
+    """Return the counters of the PDI, and of the processing unit if port 0 counted no errors."""
     if errors is None:
         return ""
     outside = errors.ports[0].invalid_frames or errors.ports[0].forwarded

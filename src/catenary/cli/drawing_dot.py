@@ -1,4 +1,4 @@
-"""The drawing of a segment as a Graphviz graph: `catenary graph eth0 --dot | dot -Tsvg`."""
+"""Drawing of a segment as a Graphviz graph: `catenary graph eth0 --dot | dot -Tsvg`."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _GOOD, _BAD, _GREY = "#2f5d8a", "#c62828", "#777777"
 
 
 def as_dot(drawing: Drawing) -> str:
-    """Return a Graphviz graph: a node per device, an edge per cable; red if it has errors."""
+    """Return a Graphviz graph with a node per device and an edge per cable; errors are red."""
     lines = [*_HEAD, f"  main [shape=box, style=rounded, label={_quoted(drawing.target)}];"]
     for position, node in enumerate(drawing.nodes):
         lines.append(f"  d{position} [label={_label(drawing, position, node)}];")
@@ -41,7 +41,9 @@ def _label(drawing: Drawing, position: int, node: Node) -> str:
     left = _port(0, rows) if drawing.topology.ports[position][0] else ""
     body = f'<tr>{left}<td rowspan="{rows}">{name}</td>{first}</tr>'
     body += "".join(f"<tr>{port}</tr>" for port in others)
-    color = _BAD if inner or "ERROR" in node.state else _GOOD  # cables show the port errors
+    color = (
+        _BAD if inner or "ERROR" in node.state else _GOOD
+    )  # the edges show the errors of the ports
     return (
         f'<<table border="1" color="{color}" cellborder="0" cellspacing="0" cellpadding="4">'
         f"{body}</table>>"
@@ -64,7 +66,10 @@ def _edges(drawing: Drawing) -> Iterator[str]:
         )
         lost = any(end and end.lost_links for end in _ends(drawing, cable))
         color = _BAD if noisy or lost else _GREY
-        words = [_delay(drawing.nodes[cable.lower]), *(_told(end) for end in _ends(drawing, cable))]
+        words = [
+            _delay(drawing.nodes[cable.lower]),
+            *(_port_label(end) for end in _ends(drawing, cable)),
+        ]
         label = "\\n".join(word for word in words if word)
         yield f'{upper} -- {lower} [color="{color}", label="{label}"];'
 
@@ -77,7 +82,7 @@ def _ends(drawing: Drawing, cable: Cable) -> list[PortErrors | None]:
     return found
 
 
-def _told(end: PortErrors | None) -> str:
+def _port_label(end: PortErrors | None) -> str:
     return port_text(end) if end else ""
 
 

@@ -16,12 +16,12 @@ FILE_HINTS: Mapping[type[OSError], str] = {
     FileExistsError: "a folder is needed, but a file with that name exists",
     NotADirectoryError: "a part of the path is a file",
     IsADirectoryError: "a file is needed, but this is a folder",
-    PermissionError: "it belongs to another user: ls -l",
+    PermissionError: "check its owner and permissions: ls -l",
 }
 
 
 class UsageError(Exception):
-    """An invalid command line, detected after the parsing of the arguments."""
+    """An invalid command line, detected after argument parsing."""
 
     def __init__(self, message: str, *, hint: str = "") -> None:
         super().__init__(message)
@@ -29,7 +29,7 @@ class UsageError(Exception):
 
 
 def report(error: Exception, program: str = "catenary") -> int:
-    """Print one line and a hint to stderr; return the exit status."""
+    """Print an error and its hint to stderr, and return the exit status."""
     message, hint = describe(error)
     print(f"{program}: {message}", file=sys.stderr)
     if hint:
@@ -48,11 +48,13 @@ def describe(error: Exception) -> tuple[str, str]:
     if isinstance(error, ValueError | OSError):
         return one_line(str(error)), ""
     if isinstance(error, ImportError) and (error.name or "").startswith("catenary."):
-        return one_line(str(error)), "the compiled modules have another version: make build"
+        return one_line(
+            str(error)
+        ), "the compiled modules do not match the Python code: run `make build`"
     kind = type(error).__name__
     return (
         f"internal error: {kind}: {one_line(str(error))}",
-        "--debug shows the traceback; please report this error",
+        "report this error with the traceback that --debug shows",
     )
 
 
@@ -62,7 +64,7 @@ def one_line(text: str) -> str:
 
 
 def with_hint(error: CatenaryError) -> str:
-    """Return message and hint of an error that does not end the command."""
+    """Return the message and the hint of an error that does not end the command."""
     hint = f"\n  hint: {one_line(error.hint)}" if error.hint else ""
     return f"{one_line(error.message)}{hint}"
 

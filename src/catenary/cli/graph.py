@@ -19,9 +19,9 @@ def add_parser(commands: Commands) -> None:
         commands,
         "graph",
         help="draw the wiring of the devices",
-        description="Draws the tree of the segment: devices, ports, cable delays, states and "
-        "error counters. Devices with clocks measure the delays (one way, including the previous "
-        "device). Exit status 1 if the ports contradict each other.",
+        description="Draws the devices, ports, cable delays, states and error counters of the "
+        "segment as a tree. Devices with clocks measure the one-way delays, including the previous "
+        "device. Exit status 1 if the ports contradict each other.",
         example="catenary graph eth0\ncatenary graph eth0 --dot | dot -Tsvg -o segment.svg",
     )
     add_target(parser)
@@ -34,7 +34,7 @@ def run(arguments: argparse.Namespace) -> int:
     from catenary.cli.drawing_dot import as_dot
     from catenary.target import MainDevice, named_target
 
-    with MainDevice(arguments.target, force=True) as main:  # it only reads
+    with MainDevice(arguments.target, force=True) as main:  # this command only reads
         note_other_masters(main)
         subs = main.passive_scan()
         drawing = draw(named_target(arguments.target), main, subs)
@@ -55,7 +55,9 @@ def draw(target: str, main: MainDevice, subs: Sequence[SubDevice]) -> Drawing:
     found = main.diagnose(subs=subs)
     times = main.converse(read_receive_times([sub.description for sub in subs]))
     answers = main.converse(survey([sub.station for sub in subs]))
-    closed = found.topology.second_end is not None  # ring: frames from both ends latch the times
+    closed = (
+        found.topology.second_end is not None
+    )  # in a ring, frames from both ends latch the times
     delays = cable_delays_ns(found.topology, [None if closed else each for each in times])
     nodes = tuple(
         Node(sub.name, sub.alias, _state(answer.word), delay, errors)

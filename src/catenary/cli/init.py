@@ -22,9 +22,9 @@ def add_parser(commands: Commands) -> None:
         commands,
         "init",
         help="write a machine file from the devices of a segment",
-        description="Brings all devices to PRE-OP and writes machine.toml: devices with their "
-        "identities, drives, process data by name. Lines marked FILL IN need your values. With "
-        "--schema: prints the JSON schema of machine files, for editors.",
+        description="Brings all devices to PRE-OP and writes machine.toml with the identities of "
+        "the devices, the drives, and the names of process data. Lines marked FILL IN need your "
+        "values. With --schema, prints the JSON schema of machine files for editors.",
         example="catenary init eth0 -o machine.toml\ncatenary init --schema",
     )
     parser.add_argument(
@@ -52,9 +52,9 @@ def run(arguments: argparse.Namespace) -> int:
         print(json.dumps(json_schema(), indent=2, ensure_ascii=False))
         return 0
     if arguments.target is None:
-        raise UsageError("TARGET is missing", hint="catenary init eth0")
+        raise UsageError("TARGET is missing", hint="for example: catenary init eth0")
     if arguments.output.exists() and not arguments.force:
-        raise UsageError(f"{arguments.output} exists already", hint="-o FILE, or --force")
+        raise UsageError(f"{arguments.output} already exists", hint="use -o FILE or --force")
     return write(arguments.target, arguments.output)
 
 
@@ -68,7 +68,7 @@ def write(target: str, output: Path) -> int:
         devices = main.scan(strict=False)
         encoders = read_encoders(devices)
     text = machine_text(
-        [device.description for device in devices], seen_from(target, output), encoders
+        [device.description for device in devices], target_in_file(target, output), encoders
     )
     output.write_text(text, encoding="utf-8")
     open_lines = [n for n, line in enumerate(text.splitlines(), 1) if f"# {FILL_IN}" in line]
@@ -82,7 +82,7 @@ def write(target: str, output: Path) -> int:
 
 
 def read_encoders(devices: Sequence[SubDevice]) -> Mapping[tuple[int, int], float]:
-    """Return the counts per turn by (position, slot) of drives that report them (0x608F)."""
+    """Return the encoder counts per turn (0x608F) by (position, slot), where reported."""
     from catenary.errors import CatenaryError
     from catenary.machine.text import ENCODER
     from catenary.types import UDINT
@@ -97,14 +97,14 @@ def read_encoders(devices: Sequence[SubDevice]) -> Mapping[tuple[int, int], floa
                     for index, subindex in ENCODER
                 )
             except CatenaryError:
-                continue  # an optional object: the line has no value
+                continue  # the object is optional; the line stays without a value
             if counts and turns:
                 found[device.position, slot] = counts / turns
     return found
 
 
-def seen_from(target: str, output: Path) -> str:
-    """Return the target for the file: paths are relative to the folder of the file."""
+def target_in_file(target: str, output: Path) -> str:
+    """Return the target as written in the file, with a path relative to the folder of the file."""
     from catenary.target import named_target
     from catenary.target.toml_file import VIRTUAL
 

@@ -1,4 +1,4 @@
-"""`catenary`: parse the arguments, run one command, report an error in one line and a status."""
+"""`catenary`: parse the arguments, run one command, and report errors."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ from catenary.cli import (
 )
 from catenary.cli.failure import USAGE, report, silence_stdout
 
-VIRTUAL_TIME = "virtual time: the segment's own clock, not this machine's"
+VIRTUAL_TIME = "times are virtual: they come from the segment's clock, not from this machine's"
 PROGRAM = "catenary"
 DESCRIPTION = "Real-time EtherCAT for Python."
 COMMANDS = (
@@ -53,14 +53,14 @@ example:
 
 
 class Parser(argparse.ArgumentParser):
-    """A parser that reports errors in one line, with a hint to its help."""
+    """Parser that reports an error in one line, with a hint."""
 
     def error(self, message: str) -> NoReturn:
         self.exit(USAGE, f"{self.prog}: {message}\n  hint: {self.prog} --help\n")
 
 
 class ShowVersion(argparse.Action):
-    """Print the version. It is looked up only on request, because that is slow."""
+    """Action that prints the version, with a slow import only on request."""
 
     def __call__(self, parser: argparse.ArgumentParser, *_: object) -> None:
         from importlib.metadata import version
@@ -107,7 +107,7 @@ def main(
 
 
 def note_virtual_time(target: str) -> None:
-    """Print a note on stderr if the times of a command were not those of this machine."""
+    """Print a note on stderr if the command ran in virtual time."""
     if not target.startswith("virtual") and not target.endswith(".toml"):
         return  # avoids the import
     from catenary.target.parse import in_virtual_time
@@ -125,4 +125,4 @@ def run(arguments: Sequence[str], parser: argparse.ArgumentParser) -> int:
         note_virtual_time(getattr(parsed, "target", None) or "")
         return status
     finally:
-        sys.stdout.flush()  # here, where a closed reader can still be handled
+        sys.stdout.flush()  # `main` handles the BrokenPipeError of a closed reader

@@ -27,8 +27,8 @@ def add_command(
         commands: The group that receives the command.
         name: The name of the command.
         help: One line for the list of commands.
-        description: Text for the help. Long lines are wrapped; indented lines are kept.
-        example: Command lines for the end of the help.
+        description: Description in the help. Long lines are wrapped, except indented ones.
+        example: Command lines at the end of the help.
 
     Returns:
         The parser of the command.
@@ -52,18 +52,18 @@ def filled(text: str) -> str:
 
 
 def add_json(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--json", action="store_true", help="print JSON, for programs")
+    parser.add_argument("--json", action="store_true", help="print the result as JSON")
 
 
 def add_target(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
-        "target", metavar="TARGET", help="eth0, virtual, machine.toml ...: catenary --help"
+        "target", metavar="TARGET", help="eth0, virtual, machine.toml ... (see catenary --help)"
     )
 
 
 def add_force(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
-        "--force", action="store_true", help="even if another master uses the interface"
+        "--force", action="store_true", help="continue even if another master uses the interface"
     )
 
 
@@ -74,4 +74,6 @@ def note_other_masters(main: MainDevice) -> None:
 
 
 def add_position(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("position", metavar="POSITION", type=position, help="0 is the first device")
+    parser.add_argument(
+        "position", metavar="POSITION", type=position, help="position of the device, from 0"
+    )

@@ -17,11 +17,11 @@ def add_parser(commands: Commands) -> None:
     parser = add_command(
         commands,
         "plot",
-        help="draw a recording or a log as a picture or a page",
-        description="Draws a recording (.mcap), or the log of a loop that to_csv wrote (.csv): "
-        "position with its reference, tracking error and torque of every axis, histograms of the "
-        "timing, events as dashed lines. A page (.html) also lists the figures of every axis and "
-        "the events. Needs catenary[log].",
+        help="draw a recording or a log as a picture or an HTML page",
+        description="Draws a recording (.mcap) or a log that to_csv wrote (.csv). It shows "
+        "position, reference, tracking error and torque of every axis, histograms of the timing, "
+        "and events as dashed lines. An HTML page also lists the figures of every axis and the "
+        "events. Needs catenary[log].",
         example="catenary plot arm.mcap\n"
         "catenary plot arm.mcap -o arm.html --degrees\n"
         "catenary plot run.csv\n"
@@ -29,7 +29,11 @@ def add_parser(commands: Commands) -> None:
     )
     parser.add_argument("file", metavar="FILE", help="the recording (.mcap), or a log (.csv)")
     parser.add_argument(
-        "-o", "--output", metavar="FILE", type=Path, help=f"{', '.join(KINDS)} (FILE.png)"
+        "-o",
+        "--output",
+        metavar="FILE",
+        type=Path,
+        help=f"picture to write: {', '.join(KINDS)} (FILE.png)",
     )
     parser.add_argument(
         "--axis", metavar="NAME", action="append", help="draw only this axis; repeatable"
@@ -41,23 +45,27 @@ def add_parser(commands: Commands) -> None:
     parser.add_argument(
         "--reference",
         metavar="FIELD",
-        help="reference of the positions, such as target_position (in CSP: commanded_position)",
+        help="field of the reference, such as target_position (default in CSP: commanded_position)",
     )
-    parser.add_argument("--degrees", action="store_true", help="angles in degrees, not radians")
+    parser.add_argument(
+        "--degrees", action="store_true", help="show angles in degrees instead of radians"
+    )
     parser.set_defaults(run=run)
 
 
 def run(arguments: argparse.Namespace) -> int:
     output = arguments.output or Path(arguments.file).with_suffix(".png")
     if output.suffix.lower() not in KINDS:
-        raise UsageError(f"{output}: the name must end in {', '.join(KINDS)}", hint="-o x.png")
+        raise UsageError(
+            f"{output}: the name must end in {', '.join(KINDS)}", hint="for example: -o plot.png"
+        )
     from catenary.record import plot, read, read_csv
 
     open_file = read_csv if Path(arguments.file).suffix.lower() == ".csv" else read
     recording = open_file(arguments.file, start=arguments.start, end=arguments.end)
     if not len(recording):
         raise UsageError(
-            f"{arguments.file} has no cycles in that time", hint="change --start or --end"
+            f"{arguments.file} has no cycles in this time range", hint="change --start or --end"
         )
     plot(
         recording,

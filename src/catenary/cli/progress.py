@@ -1,4 +1,4 @@
-"""Progress of a long conversation, in one line of the terminal."""
+"""Progress of a long transfer, in one line of the terminal."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import Self
 
 
 class Progress:
-    """Owns one line of stderr. It prints nothing if stderr is not a terminal."""
+    """Owner of one line of stderr. It prints nothing if stderr is not a terminal."""
 
     def __init__(self, verb: str) -> None:
         self._verb = verb

@@ -1,4 +1,4 @@
-"""`catenary realtime analyse FILE.toml`: response-time analysis of tasks with fixed priorities."""
+"""`catenary realtime analyse FILE.toml`: analyse the response times of fixed-priority tasks."""
 
 from __future__ import annotations
 
@@ -38,14 +38,14 @@ def add_parser(commands: Commands) -> None:
     parser = add_command(
         group,
         "analyse",
-        help="check that all deadlines are met",
-        description="Response-time analysis for fixed priorities. Each [[task]] has name, period "
-        "and execution, and may have deadline, blocking, jitter (seconds), priority and cpu. "
-        "Without priorities, the shortest deadline has the highest one. Exit status 1 if a "
-        "deadline can be missed.",
+        help="check whether all deadlines are met",
+        description="Analyses the response times of tasks with fixed priorities. Each [[task]] has "
+        "name, period and execution, and may have deadline, blocking, jitter (seconds), priority "
+        "and cpu. Without priorities, a task with a shorter deadline has a higher priority. Exit "
+        "status 1 if a task can miss its deadline.",
         example=EXAMPLE,
     )
-    parser.add_argument("file", metavar="FILE.toml", help="file of the tasks")
+    parser.add_argument("file", metavar="FILE.toml", help="file with the tasks")
     add_json(parser)
     parser.set_defaults(run=run)
 
@@ -61,7 +61,7 @@ def run(arguments: argparse.Namespace) -> int:
 def as_json(verdict: Verdict) -> str:
     """Return the verdict as JSON, with times in seconds.
 
-    A response of null is unbounded. A hyperperiod of null is too long to compute.
+    The response is null if it is unbounded. The hyperperiod is null if it is too long to compute.
     """
     import json
     from math import isfinite

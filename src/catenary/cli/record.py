@@ -23,30 +23,30 @@ def add_parser(commands: Commands) -> None:
         commands,
         "record",
         help="record every cycle of a running loop",
-        description="Records the share of a loop (Loop(..., sink=cat.Share(NAME))): targets, "
-        "actuals, timing and events of every cycle, as MCAP, which PlotJuggler and Foxglove open. "
-        "Starts with the oldest stored cycle; ends with the loop or on Ctrl-C. Needs "
-        "catenary[log].",
+        description="Records the targets, actual values, timing and events of every cycle from the "
+        "share of a loop (Loop(..., sink=cat.Share(NAME))). PlotJuggler and Foxglove can open the "
+        "MCAP file. The recording starts with the oldest stored cycle, and ends with the loop or "
+        "on Ctrl-C. Needs catenary[log].",
         example="catenary record arm arm.mcap\n"
         "catenary record arm arm.mcap --seconds 60\n"
         "catenary record arm crash.mcap --stale\n"
         "catenary record --repair arm.mcap\n"
         "catenary plot arm.mcap",
     )
-    parser.add_argument("share", metavar="SHARE", nargs="?", help="the name of the loop's share")
-    parser.add_argument("file", metavar="FILE.mcap", help="the file to write")
+    parser.add_argument("share", metavar="SHARE", nargs="?", help="name of the loop's share")
+    parser.add_argument("file", metavar="FILE.mcap", help="file to write")
     parser.add_argument("--seconds", metavar="N", type=positive_seconds, help="end after N seconds")
     parser.add_argument("--force", action="store_true", help="replace an existing file")
     parser.add_argument(
         "--stale",
         action="store_true",
-        help="also accept a share whose process has died: record its last stored cycles",
+        help="record the last stored cycles of a share even if its process has died",
     )
     parser.add_argument("--uid", type=number, help="owner of the share (default: you, or root)")
     parser.add_argument(
         "--repair",
         action="store_true",
-        help="repair a file whose recorder was killed; without SHARE",
+        help="repair a file whose recorder was killed; give no SHARE",
     )
     add_json(parser)
     parser.set_defaults(run=run)
@@ -63,7 +63,7 @@ def run(arguments: argparse.Namespace) -> int:
         options = {"force": arguments.force, "stale": arguments.stale}
         with Recorder(arguments.share, arguments.file, uid=arguments.uid, **options) as recorder:
             if not arguments.json:
-                print(f"recording {recorder} to {arguments.file}; Ctrl-C ends", flush=True)
+                print(f"recording {recorder} to {arguments.file}; press Ctrl-C to stop", flush=True)
             recorder.run(seconds=arguments.seconds, stop=stop)
         print(as_json(recorder) if arguments.json else as_text(recorder))
     return 0
@@ -71,7 +71,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 @contextmanager
 def stopped_by_signals() -> Iterator[threading.Event]:
-    """Set an event on SIGINT and SIGTERM, so that the recorder completes its file."""
+    """Yield an event that SIGINT and SIGTERM set, so that the recorder completes its file."""
     stop = threading.Event()
     kinds = (signal.SIGINT, signal.SIGTERM)
     before = [signal.signal(kind, lambda *_: stop.set()) for kind in kinds]
@@ -101,7 +101,9 @@ def as_json(recorder: Recorder) -> str:
 
 def repair_file(arguments: argparse.Namespace) -> int:
     if arguments.share is not None:
-        raise UsageError("--repair takes a file but no share", hint="see --help")
+        raise UsageError(
+            "--repair needs a file without a share", hint="catenary record --repair FILE.mcap"
+        )
     from catenary.record import repair
 
     done = repair(arguments.file)

@@ -33,7 +33,8 @@ def add_parser(commands: Commands) -> None:
         commands,
         "reg",
         help="read or write registers of a device",
-        description="Reads or writes registers and memory of a device. Its state does not change.",
+        description="Reads or writes registers and memory of a device. The EtherCAT state does not "
+        "change.",
         example="catenary reg read eth0 2 AL_STATUS\ncatenary reg write eth0 2 0x0310 0 --size 4",
     ).add_subparsers(title="commands", metavar="COMMAND", required=True)
     reading = add_command(
@@ -48,14 +49,16 @@ def add_parser(commands: Commands) -> None:
         "catenary reg read virtual 2 fmmu0 --json",
     )
     _add_place(reading)
-    reading.add_argument("size", metavar="SIZE", nargs="?", type=positive_number, help="in bytes")
+    reading.add_argument(
+        "size", metavar="SIZE", nargs="?", type=positive_number, help="size in bytes"
+    )
     add_json(reading)
     reading.set_defaults(run=run_read)
     writing = add_command(
         group,
         "write",
         help="write a register",
-        description="Writes a register. VALUE is a number, as wide as the register or --size, "
+        description="Writes a register. VALUE is a number with the size of the register or --size, "
         "or bytes as pairs of hexadecimal digits with spaces ('01 02 0a').",
         example="catenary reg write eth0 2 watchdog-divider 2498\n"
         "catenary reg write eth0 2 0x0300 0 --size 1\n"
@@ -86,7 +89,7 @@ def run_read(arguments: argparse.Namespace) -> int:
             f"no known register starts at 0x{address:04X}", hint="give the number of bytes: SIZE"
         )
     _check(address, size)
-    with MainDevice(arguments.target, force=True) as main:  # it only reads
+    with MainDevice(arguments.target, force=True) as main:  # this command only reads
         note_other_masters(main)
         device = device_at(main.passive_scan(names=False), arguments.position)
         data = main.converse(read_register(device.station, address, size))
@@ -134,7 +137,7 @@ def place(text: str, size: int | None) -> tuple[int, int | None, AnyRegister | N
 
 
 def numbered(names: Iterable[str]) -> Iterator[str]:
-    """Yield the names in their order. Combine "FMMU 0" ... "FMMU 15" into "FMMU 0 to 15"."""
+    """Yield the names in order, with "FMMU 0" ... "FMMU 15" combined into "FMMU 0 to 15"."""
     families: dict[str, list[str]] = {}
     for name in names:
         families.setdefault(re.sub(r" \d+(?= |$)", " #", name), []).append(name)
@@ -152,7 +155,9 @@ def value_bytes(text: str, size: int | None, address: int) -> bytes:
         except ValueError:
             raise UsageError(f"{text!r} is not a list of pairs of hexadecimal digits") from None
         if size not in (None, len(data)):
-            raise UsageError(f"{len(data)} bytes given for {size} at 0x{address:04X}")
+            raise UsageError(
+                f"VALUE has {len(data)} bytes, but the size at 0x{address:04X} is {size} bytes"
+            )
         return data
     try:
         value = number(text)
@@ -160,7 +165,7 @@ def value_bytes(text: str, size: int | None, address: int) -> bytes:
         raise UsageError(str(error)) from error
     if size is None:
         raise UsageError(
-            f"no known register starts at 0x{address:04X}: the size of {text} is unknown",
+            f"no known register starts at 0x{address:04X}, so the size of {text} is unknown",
             hint="add --size BYTES, or give the bytes: '01 02'",
         )
     try:

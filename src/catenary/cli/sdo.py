@@ -24,7 +24,7 @@ def add_parser(commands: Commands) -> None:
         "sdo",
         help="read, write or list the objects of a device",
         description="Reads or writes one entry of a device's object dictionary (CoE SDO), or lists "
-        "them all.",
+        "all entries.",
         example="catenary sdo read eth0 2 0x1018:1 --type UDINT\n"
         "catenary sdo write eth0 2 0x6065 5000 --type UDINT\n"
         "catenary sdo list eth0 2 --values",
@@ -33,7 +33,7 @@ def add_parser(commands: Commands) -> None:
         group,
         "read",
         help="read an object",
-        description="Reads one entry. Without --type: prints its bytes and a likely meaning.",
+        description="Reads one entry. Without --type, prints its bytes and a likely meaning.",
         example="catenary sdo read eth0 2 0x1018:1 --type UDINT\n"
         "catenary sdo read virtual 2 0x1008 --type STRING --json",
     )
@@ -50,7 +50,9 @@ def add_parser(commands: Commands) -> None:
         "catenary sdo write eth0 2 0x1011:1 0x64616f6c --type UDINT",
     )
     _add_place(writing)
-    writing.add_argument("value", metavar="VALUE", help="decimal, 0x..., text, or bytes as hex")
+    writing.add_argument(
+        "value", metavar="VALUE", help="value: decimal or 0x... number, text, or hexadecimal bytes"
+    )
     _add_type(writing)
     add_json(writing)
     writing.set_defaults(run=run_write)
@@ -58,31 +60,39 @@ def add_parser(commands: Commands) -> None:
         group,
         "list",
         help="list all objects",
-        description="Lists the entries of a device's object dictionary as the device itself "
-        "describes them: index, type, access, name. Access: r and w, followed by the states if "
-        "it is limited to some (P: PRE-OP, S: SAFE-OP, O: OP); R, T: can be mapped into RxPDOs, "
-        "TxPDOs.",
+        description="Lists the index, type, access and name of all entries in the object "
+        "dictionary, as the device describes them. The access is r, w or both. States follow if it "
+        "is limited to them (P: PRE-OP, S: SAFE-OP, O: OP). R and T mark entries that can be "
+        "mapped into RxPDOs and TxPDOs.",
         example="catenary sdo list eth0 2\ncatenary sdo list virtual 2 --values --json",
     )
     _add_device(listing)
-    listing.add_argument("--values", action="store_true", help="read every entry that can be read")
+    listing.add_argument(
+        "--values", action="store_true", help="also read the values of all readable entries"
+    )
     add_json(listing)
     listing.set_defaults(run=run_list)
 
 
 def _add_device(parser: argparse.ArgumentParser) -> None:
     add_target(parser)
-    parser.add_argument("position", metavar="POSITION", type=position, help="0 is the first device")
+    parser.add_argument(
+        "position", metavar="POSITION", type=position, help="position of the device, from 0"
+    )
     add_force(parser)
 
 
 def _add_place(parser: argparse.ArgumentParser) -> None:
     _add_device(parser)
-    parser.add_argument("entry", metavar="INDEX[:SUB]", type=entry, help="0x6041, 0x1018:1")
+    parser.add_argument(
+        "entry", metavar="INDEX[:SUB]", type=entry, help="entry, such as 0x6041 or 0x1018:1"
+    )
 
 
 def _add_type(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--type", metavar="T", help="UDINT, INT, REAL, STRING, BYTES, ...")
+    parser.add_argument(
+        "--type", metavar="T", help="data type: UDINT, INT, REAL, STRING, BYTES, ..."
+    )
 
 
 def run_read(arguments: argparse.Namespace) -> int:
@@ -108,11 +118,13 @@ def run_write(arguments: argparse.Namespace) -> int:
 
     kind = _data_type(arguments.type)
     if kind is None:
-        raise UsageError("sdo write needs --type", hint="--type UDINT, or --type BYTES for hex")
+        raise UsageError(
+            "sdo write needs --type", hint="add --type UDINT, or --type BYTES for hexadecimal bytes"
+        )
     try:
         value = kind.parse(arguments.value)
     except ValueError as error:
-        raise UsageError(str(error), hint="numbers are decimal or 0x...") from error
+        raise UsageError(str(error), hint="write numbers as decimal or 0x...") from error
     at: Entry = arguments.entry
     data = kind.encode(value)
     with MainDevice(arguments.target, force=arguments.force) as main:
@@ -136,7 +148,8 @@ def run_list(arguments: argparse.Namespace) -> int:
         if arguments.json:
             print(as_json(rows))
         else:
-            for line in as_lines(rows):  # printed one by one: a large dictionary takes seconds
+            # Print each line immediately, because a large dictionary takes seconds.
+            for line in as_lines(rows):
                 print(line)
     for note in notes:
         print(f"note: {one_line(note)}", file=sys.stderr)
@@ -155,7 +168,7 @@ def _data_type(name: str | None) -> DataType[Value] | None:
     except ValueError as error:
         near = get_close_matches(name.upper(), [kind.name for kind in ALL], n=1, cutoff=0.5)
         guess = f"did you mean {near[0]}? " if near else ""
-        hint = f"{guess}known: BOOL, SINT, INT, DINT, USINT, UINT, UDINT, REAL, STRING, BYTES, ..."
+        hint = f"{guess}types: BOOL, SINT, INT, DINT, USINT, UINT, UDINT, REAL, STRING, BYTES, ..."
         raise UsageError(f"unknown data type {name!r}", hint=hint) from error
 
 

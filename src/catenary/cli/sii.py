@@ -28,8 +28,8 @@ def add_parser(commands: Commands) -> None:
         commands,
         "sii",
         help="read or write the EEPROM of a device",
-        description="Reads or writes the EEPROM (SII) of a device. It contains the identity, and "
-        "describes mailbox and process data.",
+        description="Reads or writes the EEPROM (SII) of a device, which contains its identity and "
+        "describes its mailbox and process data.",
         example="catenary sii read eth0 2 --text\ncatenary sii show drive.bin\n"
         "catenary sii write eth0 2 drive.bin --dry-run",
     ).add_subparsers(title="commands", metavar="COMMAND", required=True)
@@ -37,8 +37,8 @@ def add_parser(commands: Commands) -> None:
         group,
         "read",
         help="read the whole EEPROM",
-        description="Reads the whole EEPROM, even with invalid content, and checks it. Without "
-        "options, prints it in hexadecimal.",
+        description="Reads the whole EEPROM, even if its content is invalid, and checks it. "
+        "Without options, prints it in hexadecimal.",
         example="catenary sii read eth0 2 -o drive.bin\ncatenary sii read eth0 2 --text",
     )
     add_target(reading)
@@ -62,7 +62,7 @@ def add_parser(commands: Commands) -> None:
         "is needed. Exit status 1 if the image is invalid.",
         example="catenary sii show drive.bin",
     )
-    showing.add_argument("file", metavar="FILE", type=Path, help="the image, as its bytes")
+    showing.add_argument("file", metavar="FILE", type=Path, help="file with the binary image")
     showing.set_defaults(run=run_show)
     writing = add_command(
         group,
@@ -77,9 +77,9 @@ def add_parser(commands: Commands) -> None:
     )
     add_target(writing)
     add_position(writing)
-    writing.add_argument("file", metavar="FILE", type=Path, help="the image, as its bytes")
+    writing.add_argument("file", metavar="FILE", type=Path, help="file with the binary image")
     writing.add_argument(
-        "--dry-run", action="store_true", help="show the differences, write nothing"
+        "--dry-run", action="store_true", help="show the differences without writing"
     )
     writing.add_argument("--force", action="store_true", help="write despite a failed check")
     writing.set_defaults(run=run_write)
@@ -94,7 +94,7 @@ def run_read(arguments: argparse.Namespace) -> int:
     from catenary.target import MainDevice
     from catenary.wire.sii_check import objections
 
-    with MainDevice(arguments.target, force=True) as main:  # it only reads
+    with MainDevice(arguments.target, force=True) as main:  # this command only reads
         note_other_masters(main)
         station = device_at(main.passive_scan(names=False), arguments.position).station
         extent = main.converse(with_eeprom(station, read_extent(station)))
@@ -139,11 +139,11 @@ def as_text(image: bytes) -> list[str]:
     try:
         return text_lines(tolerant(image))
     except DecodeError as error:
-        return [f"cannot be read as an image: {error.message}"]
+        return [f"invalid image: {error.message}"]
 
 
 def dump(image: bytes) -> list[str]:
-    """Return a hexadecimal dump with text. Repeated lines become "*", like in hexdump."""
+    """Return a hexadecimal dump with text. Repeated lines become "*", as in hexdump."""
     lines: list[str] = []
     before = None
     for start in range(0, len(image), DUMP_WIDTH):
@@ -167,43 +167,46 @@ def run_write(arguments: argparse.Namespace) -> int:
     from catenary.target import MainDevice
 
     image = arguments.file.read_bytes()
-    refuse_bad(image, arguments)
+    check_image(image, arguments)
     with MainDevice(arguments.target) as main:
         device = device_at(main.passive_scan(), arguments.position)
         station = device.station
         extent = main.converse(with_eeprom(station, read_extent(station)))
-        refuse_unfit(image, device, extent, arguments.force)
+        check_fit(image, device, extent, arguments.force)
         with Progress("read") as progress:
             old = read_eeprom(main, station, len(image), progress=progress)
-        wanted = changes(old, image)
-        print("\n".join(report(device, old, image, len(wanted))))
-        if arguments.dry_run or not wanted:
+        needed = changes(old, image)
+        print("\n".join(report(device, old, image, len(needed))))
+        if arguments.dry_run or not needed:
             return 0
         with Progress("write") as progress:
-            write_eeprom(main, station, wanted, progress=progress)
+            write_eeprom(main, station, needed, progress=progress)
         verify(main, device, image)
-    print(f"{len(wanted)} words written and read back; switch the device off and on")
+    print(f"{len(needed)} words written and verified; power-cycle the device to use them")
     return 0
 
 
-def refuse_bad(image: bytes, arguments: argparse.Namespace) -> None:
+def check_image(image: bytes, arguments: argparse.Namespace) -> None:
     """Check that the image is valid.
 
     Raises:
-        EepromError: It is not a valid image.
+        EepromError: The image is not valid.
     """
     from catenary.errors import EepromError
     from catenary.wire.sii_check import objections
 
     for each in objections(image):
         if each.insist and arguments.force:
-            print(f"catenary: {arguments.file}: {each.text}: --force", file=sys.stderr)
+            print(
+                f"catenary: {arguments.file}: {each.text} (ignored because of --force)",
+                file=sys.stderr,
+            )
             continue
-        more = "; --force writes it nevertheless" if each.insist else ""
+        more = "; --force writes it anyway" if each.insist else ""
         raise EepromError(f"{arguments.file}: {each.text}", hint=each.hint + more)
 
 
-def refuse_unfit(image: bytes, device: SubDevice, extent: Extent, force: bool) -> None:
+def check_fit(image: bytes, device: SubDevice, extent: Extent, force: bool) -> None:
     """Check that the image fits the device.
 
     Raises:
@@ -222,13 +225,14 @@ def refuse_unfit(image: bytes, device: SubDevice, extent: Extent, force: bool) -
         return
     if len(image) > extent.size and not extent.note:
         raise EepromError(
-            f"{device.station}: the image has {len(image)} bytes, its EEPROM {extent.size}",
+            f"{device.station}: the image has {len(image)} bytes, but its EEPROM has only "
+            f"{extent.size}",
             hint="use an image for this device, or --force if the size in its EEPROM is wrong",
         )
     new, now = tolerant(image).header, device.identity
     if now.vendor and (new.vendor, new.product) != (now.vendor, now.product) and not extent.note:
         raise EepromError(
-            f"{device.station}: the image is of vendor 0x{new.vendor:08X} product "
+            f"{device.station}: the image is for vendor 0x{new.vendor:08X} product "
             f"0x{new.product:08X}, the device is vendor 0x{now.vendor:08X} product "
             f"0x{now.product:08X}",
             hint="check POSITION; --force changes the device's identity",
@@ -236,7 +240,7 @@ def refuse_unfit(image: bytes, device: SubDevice, extent: Extent, force: bool) -
 
 
 def report(device: SubDevice, old: bytes, new: bytes, words: int) -> list[str]:
-    """Return the differences between the present and the new content, as lines of text."""
+    """Return the differences between the current and the new content as lines of text."""
     from catenary.cli.sii_text import differences, word_differences
     from catenary.errors import DecodeError
 
@@ -245,8 +249,8 @@ def report(device: SubDevice, old: bytes, new: bytes, words: int) -> list[str]:
     lines = [f"{device.station}: {words} of {len(new) // 2} words differ"]
     try:
         return lines + differences(old, new)
-    except DecodeError as error:  # one of them is not an image
-        return [*lines, f"not comparable by fields: {error.message}", *word_differences(old, new)]
+    except DecodeError as error:  # one of the images is invalid
+        return [*lines, f"cannot compare fields: {error.message}", *word_differences(old, new)]
 
 
 def verify(main: MainDevice, device: SubDevice, image: bytes) -> None:
@@ -265,7 +269,7 @@ def verify(main: MainDevice, device: SubDevice, image: bytes) -> None:
     wrong = changes(found, image)
     if wrong:
         raise EepromError(
-            f"{device.station}: {len(wrong)} words read back differently, the first is "
+            f"{device.station}: {len(wrong)} words differ after writing, the first at "
             f"0x{wrong[0].word:04X}",
-            hint="write it again; if the error persists, the EEPROM is worn out",
+            hint="write the image again; if the error persists, the EEPROM may be worn out",
         )

@@ -1,7 +1,7 @@
-"""The image of an EEPROM as text, with one field per line.
+"""EEPROM images as text, with one field per line.
 
-Every field of ETG.2010 has a line. Data without a name is shown as bytes. Two images with the same
-text therefore differ only in padding.
+Every field of ETG.2010 has a line, and other data is shown as bytes. Two images with the same text
+therefore differ only in padding.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ _KNOWN = frozenset(
 
 
 def tolerant(image: bytes) -> Sii:
-    """Decode an image without a check of its checksum.
+    """Decode an image, but ignore its checksum.
 
     Raises:
         DecodeError: The image is invalid for another reason.
@@ -78,9 +78,10 @@ def text_lines(sii: Sii) -> list[str]:
 
 
 def differences(old: bytes, new: bytes) -> list[str]:
-    """Return the lines that differ, - the old ones, + the new ones.
+    """Return the lines that differ, with - before old lines and + before new lines.
 
-    If only filling differs, return its words. Raises DecodeError if an image is not one.
+    If only padding differs, return the words that differ. Raises DecodeError if an image is
+    invalid.
     """
     before, after = text_lines(tolerant(old)), text_lines(tolerant(new))
     lines = unified_diff(before, after, n=0, lineterm="")
@@ -216,7 +217,7 @@ def _other(category: Category) -> Iterator[str]:
 
 
 def _rows(title: str, data: bytes) -> Iterator[str]:
-    """Yield unnamed bytes; one line if all have the same value."""
+    """Yield lines of unnamed bytes; one line if all bytes have the same value."""
     if data and data == data[:1] * len(data):
         yield f"{title}: {len(data)} bytes of {data[:1].hex()}"
         return

@@ -31,9 +31,9 @@ def add_parser(commands: Commands) -> None:
         commands,
         "state",
         help="show or change the states of devices",
-        description="Shows the state and AL status code of each device, without changing it. With "
-        "STATE: brings the devices to this state and leaves them there. OP is requested without "
-        "process data, which devices with outputs refuse; use a Loop to bring them to OP.",
+        description="Shows the state and AL status code of each device without changing it. With "
+        "STATE, brings the devices to this state and leaves them there. The command requests OP "
+        "without process data, which devices with outputs refuse; use a Loop for them.",
         example="catenary state eth0\n"
         "catenary state eth0 PREOP\n"
         "catenary state eth0 SAFEOP --position 2",
@@ -77,7 +77,7 @@ def run(arguments: argparse.Namespace) -> int:
             errors = {p: each for p, each in outcomes.items() if isinstance(each, Exception)}
         rows = [(devices[p], devices[p].read_state()) for p in chosen]
     print(as_json(rows, errors) if arguments.json else as_table(rows))
-    return complain(rows, errors)
+    return report_errors(rows, errors)
 
 
 def as_table(rows: Iterable[tuple[SubDevice, DeviceState]]) -> str:
@@ -118,7 +118,7 @@ def as_json(rows: Iterable[tuple[SubDevice, DeviceState]], errors: dict[int, Cat
     )
 
 
-def complain(
+def report_errors(
     rows: Iterable[tuple[SubDevice, DeviceState]], errors: dict[int, CatenaryError]
 ) -> int:
     """Print errors to stderr. Return the exit status."""

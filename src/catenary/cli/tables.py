@@ -1,4 +1,4 @@
-"""Tables of words. Words may be text from devices and are escaped."""
+"""Tables of text cells. The cells are escaped, because they may contain text from devices."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ from catenary.cli.text import escaped
 
 def table(rows: Sequence[Sequence[str]]) -> str:
     """Return the rows as aligned text."""
-    rows = [[escaped(word) for word in row] for row in rows]
+    rows = [[escaped(cell) for cell in row] for row in rows]
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     return "\n".join(
-        "  ".join(word.ljust(width) for word, width in zip(row, widths, strict=True)).rstrip()
+        "  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip()
         for row in rows
     )

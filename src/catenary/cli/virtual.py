@@ -19,22 +19,24 @@ def add_parser(commands: Commands) -> None:
     parser = add_command(
         group,
         "serve",
-        help="answer on a network interface",
+        help="serve a segment on a network interface",
         description="Serves a virtual segment on a network interface until Ctrl-C. "
-        "Without --config: the segment of the demo (coupler, digital output, three servos, "
+        "Without --config, serves the segment of the demo (coupler, digital output, three servos, "
         "digital output).",
         example="ip link add veth0 type veth peer name veth1\n"
         "ip link set veth0 up && ip link set veth1 up\n"
         "catenary virtual serve veth1 --priority 80 &\n"
         "catenary scan veth0",
     )
-    parser.add_argument("interface", metavar="NIC", help="the interface to answer on")
+    parser.add_argument("interface", metavar="NIC", help="network interface of the segment")
     parser.add_argument(
         "--ring",
         metavar="NIC2",
-        help="close the ring at NIC2: second interface for the cable redundancy of a MainDevice",
+        help="second interface, which closes the ring for cable redundancy",
     )
-    parser.add_argument("--config", metavar="FILE.toml", help="the devices of the segment")
+    parser.add_argument(
+        "--config", metavar="FILE.toml", help="file with the devices of the segment"
+    )
     parser.add_argument(
         "--priority",
         type=fifo_priority,
@@ -46,7 +48,7 @@ def add_parser(commands: Commands) -> None:
         type=seconds,
         default=2e-3,
         metavar="S",
-        help="drop frames that waited longer: a cable does not store frames (0.002)",
+        help="drop frames that waited longer, because a cable does not store frames (0.002)",
     )
     parser.set_defaults(run=run)
 
@@ -64,7 +66,7 @@ def run(arguments: argparse.Namespace) -> int:
     interfaces = f"{arguments.interface} and {arguments.ring}" if ring else arguments.interface
 
     def say() -> None:
-        print(f"{len(segment)} devices answer on {interfaces}; Ctrl-C ends", flush=True)
+        print(f"serving {len(segment)} devices on {interfaces}; press Ctrl-C to stop", flush=True)
 
     def print_fault(event: FaultEvent) -> None:
         print(f"{event.time:.3f} s: {event.fault} {event.what}", flush=True)
@@ -97,5 +99,5 @@ def _raise_priority(interface: str, priority: int) -> None:
 
 def _report_expired(frames: int, max_age: float, priority: int | None) -> None:
     if frames:
-        advice = "" if priority else "; --priority 80 makes this rarer"
-        print(f"{frames} frames waited longer than {max_age * 1e3:g} ms and were lost{advice}")
+        advice = "" if priority else "; --priority 80 makes this less frequent"
+        print(f"{frames} frames waited longer than {max_age * 1e3:g} ms and were dropped{advice}")

@@ -1,8 +1,9 @@
 """Control blocks for laws and for plain Python, and trajectories (docs/how_to/control_blocks.md).
 
-A block is two things: a value that holds its numbers (`Cascade(...)`, with `.parameters` and
-`.memory` as flat rows of float64), and its step, a function of those rows and of an axis
-(`cascade(memory, parameters, i, ...)`). State is nowhere but in the memory; zeros begin anew.
+A block has two parts. A value holds its settings (`Cascade(...)`) and provides `.parameters` and
+`.memory` as flat rows of float64. A step function computes one step of one axis from these rows
+(`cascade(memory, parameters, i, ...)`). All state is in `memory`; fill it with zeros to reset the
+block.
 """
 
 from catenary.control.admittance import NaturalAdmittance, natural_admittance

@@ -1,4 +1,4 @@
-"""Natural admittance control: an axis yields to a measured torque with the inertia it has."""
+"""Natural admittance control: an axis yields to a measured torque with its natural inertia."""
 
 from __future__ import annotations
 
@@ -13,17 +13,26 @@ from catenary.control.pid import limited
 
 KIND = 8.0
 GAINS = 5  # inertia, damping, stiffness, velocity_gain, limit
-STATES = 2  # begun, velocity of the model
+STATES = 2  # initialised, velocity of the model
 
 
 @dataclass(frozen=True)
 class NaturalAdmittance:
-    """Each axis moves as its own `inertia` [kg·m²] on a spring (`stiffness` [N·m/rad]) and a damper
-    (`damping` [N·m·s/rad]) would, without friction: a velocity loop of `velocity_gain`
-    [N·m·s/rad] follows that model. `limit` of the torque [N·m].
+    """Settings of a natural admittance controller; each option is one value, or one per axis.
 
-    Since the inertia wanted is the one that is there, the axis stays passive towards any passive
-    surrounding, however large `velocity_gain` is. Needs the external torque measured.
+    The reference model is the inertia of the axis on a spring and a damper, without friction. A
+    velocity loop makes the axis follow this model. The controller needs a measured external torque.
+
+    The model has the physical inertia of the axis. The axis therefore stays passive in contact with
+    any passive environment, for any `velocity_gain`.
+
+    Args:
+        axes: number of axes.
+        inertia: inertia of the axis [kg·m²].
+        damping: damping of the model [N·m·s/rad].
+        stiffness: stiffness of the model [N·m/rad].
+        velocity_gain: gain of the velocity loop [N·m·s/rad].
+        limit: largest torque, in both directions [N·m].
 
     Source: Newman, Stability and performance limits of interaction controllers, ASME J. Dyn. Sys.
     Meas. Control 114(4), 1992; Newman and Zhang, Stable interaction control and Coulomb friction
@@ -51,7 +60,10 @@ class NaturalAdmittance:
 
     @property
     def memory(self) -> Row:
-        """Initial memory: zeros, shape (2 · axes,); the model begins at the axis' velocity."""
+        """Initial memory: zeros, shape (2 · axes,).
+
+        The first step sets the velocity of the model to that of the axis.
+        """
         return np.zeros(STATES * self.axes)
 
 
@@ -67,10 +79,30 @@ def natural_admittance(
     velocity: float,
     dt: float,
 ) -> float:
-    """One step of axis `i`: the torque [N·m]. The model: m v' = K (goal - q) + B (goal' - v) +
-    external; the torque: K (goal - q) + B (goal' - v) + G (v - measured)."""
+    """Compute one step of axis `i`.
+
+    The model is m v' = K (goal - q) + B (goal' - v) + external. The torque is K (goal - q) +
+    B (goal' - v) + G (v - velocity).
+
+    Args:
+        memory: of a `NaturalAdmittance`.
+        parameters: of a `NaturalAdmittance`.
+        i: number of the axis.
+        goal: target position [rad].
+        goal_velocity: velocity of the target [rad/s].
+        external: measured external torque [N·m].
+        position: measured position q [rad].
+        velocity: measured velocity [rad/s].
+        dt: time since the previous step [s].
+
+    Returns:
+        Torque [N·m].
+
+    Raises:
+        ValueError: The parameters are those of another block.
+    """
     if parameters[0] != KIND:
-        raise ValueError("natural_admittance: these are not a NaturalAdmittance's parameters")
+        raise ValueError("natural_admittance: not the parameters of a NaturalAdmittance")
     m, p = STATES * i, 1 + GAINS * i
     if memory[m] == 0.0:
         memory[m] = 1.0

@@ -15,11 +15,18 @@ KIND = 2.0
 
 @dataclass(frozen=True)
 class Cascade:
-    """Two PIDs for each axis, one in the other: `position` says a velocity [rad/s], its `limit` is
-    the joint's velocity limit, its `rate` the acceleration limit [rad/s²]; `velocity` says the
-    torque [N·m], its `limit` is the torque limit, its `rate` [N·m/s].
+    """Settings of a cascade: a position controller whose output is the input of a velocity loop.
 
         Cascade(Pid(6, 20.0, limit=2.6), Pid(6, 40.0, integral=200.0, limit=[430, 430, 200, ...]))
+
+    Args:
+        position: controller from position to velocity [rad/s]. Its `limit` is the velocity limit
+            of the joint, its `rate` the acceleration limit [rad/s²].
+        velocity: controller from velocity to torque [N·m]. Its `limit` is the torque limit, its
+            `rate` the largest change of the torque [N·m/s].
+
+    Raises:
+        ValueError: The two controllers differ in the number of axes.
     """
 
     position: Pid
@@ -28,11 +35,13 @@ class Cascade:
     def __post_init__(self) -> None:
         if self.position.axes != self.velocity.axes:
             raise ValueError(
-                f"position has {self.position.axes} axes, velocity has {self.velocity.axes}"
+                f"the position controller has {self.position.axes} axes, "
+                f"the velocity controller has {self.velocity.axes}"
             )
 
     @property
     def axes(self) -> int:
+        """Number of axes."""
         return self.position.axes
 
     @property
@@ -58,23 +67,40 @@ def cascade(
     velocity: float,
     dt: float,
 ) -> float:
-    """One step of axis `i`: the torque [N·m] towards `goal` [rad] that moves with `goal_velocity`
-    [rad/s], `feed_forward` [N·m] (gravity, friction, inertia) within the torque's limits.
+    """Compute one step of axis `i`.
 
-    The first step has no jump to limit: it begins at the present velocity and at `feed_forward`, so
-    that a brake opens onto the full gravity torque.
+    The rate limits of the first step start from the measured velocity and from `feed_forward`. The
+    torque is therefore at its full gravity part when the brake opens.
+
+    Args:
+        memory: of a `Cascade`.
+        parameters: of a `Cascade`.
+        i: number of the axis.
+        goal: target position [rad].
+        goal_velocity: velocity of the target [rad/s].
+        feed_forward: torque for gravity, friction and inertia [N·m]. The torque limit applies to
+            the sum.
+        position: measured position [rad].
+        velocity: measured velocity [rad/s].
+        dt: time since the previous step [s].
+
+    Returns:
+        Torque [N·m].
+
+    Raises:
+        ValueError: The parameters are those of another block.
     """
     if parameters[0] != KIND:
-        raise ValueError("cascade: these are not the parameters of a Cascade")
+        raise ValueError("cascade: not the parameters of a Cascade")
     m = 2 * STATES * i
     p = 1 + 2 * GAINS * i
-    wanted = pid_step(memory, m, parameters, p, goal, position, goal_velocity, velocity, dt)
+    reference = pid_step(memory, m, parameters, p, goal, position, goal_velocity, velocity, dt)
     return pid_step(
         memory,
         m + STATES,
         parameters,
         p + GAINS,
-        wanted,
+        reference,
         velocity,
         feed_forward,
         feed_forward,

@@ -1,4 +1,4 @@
-"""Collisions without a force sensor: the torque that the motion does not explain."""
+"""Collision detection without a force sensor: the external torque is estimated from the motion."""
 
 from __future__ import annotations
 
@@ -12,22 +12,29 @@ from catenary.control.parts import PerAxis, axis_count, checked, table
 
 RESIDUAL = 9.0
 RESIDUAL_GAINS = 2  # gain, inertia
-RESIDUAL_STATES = 3  # begun, residual, velocity before
+RESIDUAL_STATES = 3  # initialised, residual, previous velocity
 THRESHOLD = 10.0
 THRESHOLD_GAINS = 2  # limit, time
 
 
 @dataclass(frozen=True)
 class Residual:
-    """The generalized-momentum observer: an estimate of the torque that acts on each axis from
-    outside, first order with `gain` [1/s], from torque and velocity alone.
+    """Settings of a generalized-momentum observer, which estimates the external torque.
 
-    `inertia` [kg·m²] of each axis for `residual`; a model has its own for `model_residual`.
+    The estimate needs only torque and velocity. It follows the external torque as a first-order
+    low-pass.
 
-    r = K (p - ∫ (τ + Cᵀ q̇ - g + r) dt), p = M q̇: De Luca and Mattone, Sensorless robot collision
-    detection and hybrid force/motion control, ICRA 2005; Haddadin, De Luca and Albu-Schäffer, Robot
-    collisions: a survey, IEEE T-RO 33(6), 2017, §IV. Here p and the integral of Ṁ q̇ are one sum,
-    M(q_k) (q̇_k - q̇_k-1), which is the same by summation by parts and takes one call of the model.
+    Args:
+        axes: number of axes.
+        gain: bandwidth of the observer [1/s].
+        inertia: inertia of each axis [kg·m²], for `residual`. `model_residual` uses that of its
+            model instead.
+
+    Source: r = K (p - ∫ (τ + Cᵀ q̇ - g + r) dt) with p = M q̇. De Luca and Mattone, Sensorless robot
+    collision detection and hybrid force/motion control, ICRA 2005; Haddadin, De Luca and
+    Albu-Schäffer, Robot collisions: a survey, IEEE T-RO 33(6), 2017, §IV. This implementation
+    replaces p and the integral of Ṁ q̇ by one sum, M(q_k) (q̇_k - q̇_k-1). Summation by parts shows
+    that both are equal; the sum needs one evaluation of the model.
     """
 
     axes: int
@@ -39,7 +46,7 @@ class Residual:
 
     @property
     def parameters(self) -> Row:
-        """(1 + 2 · axes,)"""
+        """Row of parameters, shape (1 + 2 · axes,)."""
         n = axis_count(self.axes)
         gain = checked("gain", self.gain, n, above=True)
         return table(RESIDUAL, gain, checked("inertia", self.inertia, n))
@@ -54,8 +61,22 @@ class Residual:
 def residual(
     memory: Row, parameters: Row, i: int, torque: float, velocity: float, dt: float
 ) -> float:
-    """One step of axis `i`: the external torque [N·m]. `torque` [N·m]: all that is known to act on
-    the axis, the motor's less gravity and friction; `velocity` [rad/s]."""
+    """Compute one step of axis `i`.
+
+    Args:
+        memory: of a `Residual`.
+        parameters: of a `Residual`.
+        i: number of the axis.
+        torque: known torque on the axis [N·m]: motor torque minus gravity and friction.
+        velocity: measured velocity [rad/s].
+        dt: time since the previous step [s].
+
+    Returns:
+        Estimate of the external torque [N·m].
+
+    Raises:
+        ValueError: The parameters are those of another block.
+    """
     m = RESIDUAL_STATES * i
     moved = parameters[2 + RESIDUAL_GAINS * i] * (velocity - memory[m + 2])
     return observed(memory, m, parameters, i, moved - torque * dt, velocity, dt)
@@ -72,9 +93,22 @@ def model_residual(
     dt: float,
     external: Row,
 ) -> None:
-    """One step of all axes with a model, `model` the memory of a `Dynamics`: external (n,) := the
-    torques from outside [N·m]. `torque` (n,) [N·m]: the motors', less the friction that the model
-    does not have (it has its joints' `damping`); `position` (n,) [rad], `velocity` (n,) [rad/s]."""
+    """Compute one step of all axes, with the inertia and gravity of a model.
+
+    Args:
+        memory: of a `Residual`.
+        parameters: of a `Residual`.
+        model: memory of a `Dynamics`.
+        torque: motor torques (n,) [N·m], minus the friction that the model does not contain. The
+            model contains the `damping` of its joints.
+        position: measured positions (n,) [rad].
+        velocity: measured velocities (n,) [rad/s].
+        dt: time since the previous step [s].
+        external: output, estimates of the external torques (n,) [N·m].
+
+    Raises:
+        ValueError: The parameters or the model do not fit.
+    """
     n = len(position)
     for i in range(n):
         external[i] = (velocity[i] - memory[RESIDUAL_STATES * i + 2]) / dt
@@ -89,24 +123,29 @@ def model_residual(
 def observed(
     memory: Row, m: int, parameters: Row, i: int, impulse: float, velocity: float, dt: float
 ) -> float:
-    """r' = K (impulse / dt - r), implicitly, so that no gain is too large for the period."""
+    """Integrate r' = K (impulse / dt - r) implicitly, which is stable for any gain and period."""
     if parameters[0] != RESIDUAL:
-        raise ValueError("residual: these are not the parameters of a Residual")
+        raise ValueError("residual: not the parameters of a Residual")
     gain = parameters[1 + RESIDUAL_GAINS * i]
     if memory[m] == 0.0:
-        memory[m] = 1.0  # the velocity before is not known yet
+        memory[m] = 1.0  # there is no previous velocity yet
         memory[m + 1] = 0.0
     else:
         memory[m + 1] = (memory[m + 1] + gain * impulse) / (1.0 + gain * dt)
     memory[m + 2] = velocity
-    found: float = memory[m + 1]
-    return found
+    estimate: float = memory[m + 1]
+    return estimate
 
 
 @dataclass(frozen=True)
 class Threshold:
-    """Something beyond `limit` for longer than `time` [s], for each axis: a residual, or the torque
-    that a motor gives (its current) less the one expected, both [N·m]."""
+    """Settings of a threshold with a minimum duration, for a residual or another quantity.
+
+    Args:
+        axes: number of axes.
+        limit: largest accepted magnitude, in the unit of the value.
+        time: accepted duration beyond the limit [s].
+    """
 
     axes: int
     limit: PerAxis
@@ -117,22 +156,33 @@ class Threshold:
 
     @property
     def parameters(self) -> Row:
-        """(1 + 2 · axes,)"""
+        """Row of parameters, shape (1 + 2 · axes,)."""
         n = axis_count(self.axes)
         limit = checked("limit", self.limit, n, above=True)
         return table(THRESHOLD, limit, checked("time", self.time, n))
 
     @property
     def memory(self) -> Row:
-        """Initial memory: time beyond the limit [s], shape (axes,)."""
+        """Initial memory: zeros, shape (axes,). It holds the time beyond the limit [s]."""
         return np.zeros(self.axes)
 
 
 @compiles
 def threshold(memory: Row, parameters: Row, i: int, value: float, dt: float) -> bool:
-    """Return True if `value` of axis `i` is beyond its limit, either way, for its time."""
+    """Return True if a value has exceeded its limit for longer than the accepted time.
+
+    Args:
+        memory: of a `Threshold`.
+        parameters: of a `Threshold`.
+        i: number of the axis.
+        value: quantity to compare; its sign does not matter.
+        dt: time since the previous step [s].
+
+    Raises:
+        ValueError: The parameters are those of another block.
+    """
     if parameters[0] != THRESHOLD:
-        raise ValueError("threshold: these are not the parameters of a Threshold")
+        raise ValueError("threshold: not the parameters of a Threshold")
     p = 1 + THRESHOLD_GAINS * i
     if abs(value) <= parameters[p]:
         memory[i] = 0.0

@@ -1,8 +1,8 @@
-"""Functions of this package that Numba compiles inside a law, and their registration.
+"""Marker and registration of the functions that Numba compiles inside a law.
 
-Numba asks for them when it compiles for the first time in a process (its entry point
-`numba_extensions`, named in pyproject.toml): `import catenary.control` costs no Numba, and without
-Numba they are plain functions.
+Numba calls `register` when it compiles for the first time in a process (entry point
+`numba_extensions` in pyproject.toml). `import catenary.control` therefore does not import Numba.
+Without Numba, the functions are plain Python.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ P = ParamSpec("P")
 R = TypeVar("R")
 
 Row = npt.NDArray[np.float64]
-"""A flat row of float64: a law's memory, its parameters, or a part of them."""
+"""A flat row of float64: the memory or the parameters of a law, or a part of them."""
 
 MODULES = (
     *("parts", "pid", "cascade", "dynamics", "low_pass", "feed_forward", "impedance"),
@@ -28,13 +28,16 @@ MARK = "__catenary_compiles__"
 
 
 def compiles(function: Callable[P, R]) -> Callable[P, R]:
-    """Mark a function that laws may call: numbers and rows as input, no allocation, no state."""
+    """Mark a function that a law may call.
+
+    Its arguments are numbers and rows. It allocates nothing and keeps no state of its own.
+    """
     setattr(function, MARK, True)
     return function
 
 
 def register() -> None:
-    """Register the marked functions; Numba calls this once in a process."""
+    """Register the marked functions. Numba calls this once per process."""
     extending: Any = import_module("numba.extending")
     import_module("catenary.control.pointers_compiled")
     for name in MODULES:

@@ -1,4 +1,4 @@
-"""Gravity and inverse dynamics of an arm, by MuJoCo: in Python, and called natively from a law."""
+"""Gravity and inverse dynamics of an arm, computed by MuJoCo, for Python and for laws."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from catenary.control.parts import PerAxis
 from catenary.control.pointers import call, doubles
 
 KIND = 3.0
-# of a law's memory: kind, then addresses and counts, then two places for each axis
+# layout of the memory: kind, then addresses and counts, then two indices for each axis
 FUNCTION, MODEL, DATA, POSITION, VELOCITY, ACCELERATION, TORQUE = range(1, 8)
 POSITIONS, VELOCITIES, AXES, PLACES = range(8, 12)
 
@@ -24,15 +24,21 @@ Vector = npt.NDArray[np.float64] | Sequence[float]
 
 
 class Dynamics:
-    """Owns an arm's rigid-body model, M(q) q̈ + C(q, q̇) q̇ + g(q) = τ, read from an MJCF or URDF
-    file.
+    """Rigid-body model of an arm, M(q) q̈ + C(q, q̇) q̇ + g(q) = τ, from an MJCF or URDF file.
 
-    `joints`: the names of the axes' joints, in the axes' order; None: all joints of the model, in
-    its order. Joints that are not named stay where the model has them. `axes`: how many there must
-    be. The model's joint damping and armature (motor inertia seen through the gear) count, and
-    `armature` [kg·m²] is added, one value or one for each axis; its contacts, joint limits and dry
-    friction do not count. ConfigurationError: a file that is no model, a
-    joint that it does not have, or one that is neither hinge nor slide.
+    The model includes joint damping and armature (motor inertia reflected through the gear). It
+    ignores contacts, joint limits and dry friction.
+
+    Args:
+        path: MJCF or URDF file.
+        joints: names of the joints, in the order of the axes. None means all joints of the model,
+            in its order. The other joints stay at the positions of the model.
+        axes: required number of joints; None for any.
+        armature: inertia to add to each joint [kg·m²], one value or one per axis.
+
+    Raises:
+        ConfigurationError: MuJoCo is not installed, the file is not a valid model, or a joint is
+            missing or is neither a hinge nor a slide.
 
     Source: MuJoCo's `mj_inverse` (Featherstone's recursive Newton-Euler, computed in C).
     """
@@ -45,25 +51,28 @@ class Dynamics:
         axes: int | None = None,
         armature: PerAxis = 0.0,
     ) -> None:
-        # for another process: it reads the file itself (a task's, before it starts)
-        self._again = partial(Dynamics, path, joints=joints, axes=axes, armature=armature)
+        # Another process (that of a task) reads the file again when it unpickles this object.
+        self._rebuild = partial(Dynamics, path, joints=joints, axes=axes, armature=armature)
         self._model: Model = load_model(Path(path), joints, axes, armature)
         self._data = data = self._model.workspace()
-        self._rows = (data.qpos, data.qvel, data.qacc, data.qfrc_inverse)  # looked up once
+        self._rows = (data.qpos, data.qvel, data.qacc, data.qfrc_inverse)  # each look-up is slow
         self._coordinates, self._degrees = np.array(self._model.places).T
 
     def __reduce__(self) -> tuple[partial[Dynamics], tuple[()]]:
-        return self._again, ()
+        return self._rebuild, ()
 
     @property
     def joints(self) -> tuple[str, ...]:
-        """Names of the axes' joints."""
+        """Names of the joints, in the order of the axes."""
         return self._model.joints
 
     @property
     def memory(self) -> Row:
-        """A law's part of memory: where the model is, and a workspace of its own each time it is
-        asked for, which stays as long as the process (a law may run longer than this object)."""
+        """Row for the memory of a law: addresses of the model and of a new workspace.
+
+        Each access creates another workspace. It exists until the process ends, since a law may
+        outlive this object.
+        """
         model = self._model
         data = model.workspace()
         for lasting in (model.native, data):
@@ -79,7 +88,19 @@ class Dynamics:
         return self._solve(self._checked("position", position), 0.0, 0.0)
 
     def inverse(self, position: Vector, velocity: Vector, acceleration: Vector) -> Row:
-        """Return the torque (n,) [N·m] for a motion: (n,) [rad], [rad/s], [rad/s²]."""
+        """Compute the torques of a motion.
+
+        Args:
+            position: (n,) [rad].
+            velocity: (n,) [rad/s].
+            acceleration: (n,) [rad/s²].
+
+        Returns:
+            Torques (n,) [N·m].
+
+        Raises:
+            ValueError: An argument does not have one number per joint.
+        """
         named = {"position": position, "velocity": velocity, "acceleration": acceleration}
         return self._solve(*(self._checked(name, values) for name, values in named.items()))
 
@@ -96,16 +117,28 @@ class Dynamics:
         row = np.array(values, dtype=np.float64)
         if row.shape != (len(self.joints),):
             raise ValueError(
-                f"{name}: one number for each of {', '.join(self.joints)}, not {row.shape}"
+                f"{name} has shape {row.shape}; give one number for each of the "
+                f"{len(self.joints)} joints ({', '.join(self.joints)})"
             )
         return row
 
 
 @compiles
 def inverse(memory: Row, position: Row, velocity: Row, acceleration: Row, torque: Row) -> None:
-    """torque (n,) [N·m] := what this motion takes: (n,) [rad], [rad/s], [rad/s²]. `memory`: of
-    `Dynamics`. All inputs are written before the call: a trial step leaves nothing in the
-    model."""
+    """Compute the torques of a motion.
+
+    Each call writes all inputs, so that no result depends on an earlier call.
+
+    Args:
+        memory: of a `Dynamics`.
+        position: (n,) [rad].
+        velocity: (n,) [rad/s].
+        acceleration: (n,) [rad/s²].
+        torque: output, (n,) [N·m].
+
+    Raises:
+        ValueError: The memory is that of another block, or has another number of joints.
+    """
     check(memory, len(position))
     v = doubles(int(memory[VELOCITY]), int(memory[VELOCITIES]))
     a = doubles(int(memory[ACCELERATION]), int(memory[VELOCITIES]))
@@ -118,8 +151,16 @@ def inverse(memory: Row, position: Row, velocity: Row, acceleration: Row, torque
 
 @compiles
 def gravity(memory: Row, position: Row, torque: Row) -> None:
-    """torque (n,) [N·m] := what holds the arm still at `position` (n,) [rad]. `memory`: of
-    `Dynamics`."""
+    """Compute the torques that hold the arm still.
+
+    Args:
+        memory: of a `Dynamics`.
+        position: (n,) [rad].
+        torque: output, (n,) [N·m].
+
+    Raises:
+        ValueError: The memory is that of another block, or has another number of joints.
+    """
     check(memory, len(position))
     v = doubles(int(memory[VELOCITY]), int(memory[VELOCITIES]))
     a = doubles(int(memory[ACCELERATION]), int(memory[VELOCITIES]))
@@ -131,14 +172,16 @@ def gravity(memory: Row, position: Row, torque: Row) -> None:
 
 @compiles
 def check(memory: Row, n: int) -> None:
+    """Raise ValueError unless `memory` belongs to a `Dynamics` with `n` joints."""
     if memory[0] != KIND:
-        raise ValueError("this is not the memory of a Dynamics")
+        raise ValueError("not the memory of a Dynamics")
     if memory[AXES] != n:
-        raise ValueError("the model has another number of joints than there are axes")
+        raise ValueError("the number of joints of the model differs from the number of axes")
 
 
 @compiles
 def solve(memory: Row, position: Row, torque: Row) -> None:
+    """Call `mj_inverse` at `position`; velocities and accelerations are already written."""
     q = doubles(int(memory[POSITION]), int(memory[POSITIONS]))
     force = doubles(int(memory[TORQUE]), int(memory[VELOCITIES]))
     for i in range(len(position)):

@@ -1,4 +1,4 @@
-"""Feed-forward torques: of a motion, and of friction."""
+"""Feed-forward torques for inertia, damping and friction."""
 
 from __future__ import annotations
 
@@ -14,7 +14,13 @@ FRICTION = 6.0
 
 @dataclass(frozen=True)
 class FeedForward:
-    """Feed-forward torque of a motion: `inertia` [kg·m²], `damping` [N·m·s/rad]. Has no memory."""
+    """Settings of a feed-forward torque; the block has no memory.
+
+    Args:
+        axes: number of axes.
+        inertia: of each axis [kg·m²].
+        damping: of each axis [N·m·s/rad].
+    """
 
     axes: int
     inertia: PerAxis
@@ -34,21 +40,37 @@ class FeedForward:
 
 @compiles
 def feed_forward(parameters: Row, i: int, velocity: float, acceleration: float) -> float:
-    """Return the torque [N·m] of axis `i` for a motion [rad/s], [rad/s²]: J q̈ + b q̇."""
+    """Return the torque of axis `i` for a motion, J q̈ + b q̇ [N·m].
+
+    Args:
+        parameters: of a `FeedForward`.
+        i: number of the axis.
+        velocity: target velocity [rad/s].
+        acceleration: target acceleration [rad/s²].
+
+    Raises:
+        ValueError: The parameters are those of another block.
+    """
     if parameters[0] != FEED_FORWARD:
-        raise ValueError("feed_forward: these are not the parameters of a FeedForward")
+        raise ValueError("feed_forward: not the parameters of a FeedForward")
     torque: float = parameters[1 + 2 * i] * acceleration + parameters[2 + 2 * i] * velocity
     return torque
 
 
 @dataclass(frozen=True)
 class Friction:
-    """The friction of each axis: `viscous` [N·m·s/rad], `coulomb` [N·m], which turns its sign
-    within about ± `transition` [rad/s]. Has no memory.
+    """Settings of a friction model; the block has no memory.
+
+    Args:
+        axes: number of axes.
+        viscous: viscous friction [N·m·s/rad].
+        coulomb: dry friction [N·m].
+        transition: velocity range in which the dry friction changes its sign, about
+            ± `transition` [rad/s].
 
     Source: Armstrong-Hélouvry, Dupont and Canudas de Wit, A survey of models, analysis tools and
-    compensation methods for the control of machines with friction, Automatica 30(7), 1994; the sign
-    smoothed by tanh.
+    compensation methods for the control of machines with friction, Automatica 30(7), 1994; tanh
+    smooths the sign function.
     """
 
     axes: int
@@ -69,16 +91,19 @@ class Friction:
 
 @compiles
 def friction(parameters: Row, i: int, velocity: float) -> float:
-    """Return the torque [N·m] that axis `i` loses at a velocity: b q̇ + T_c tanh(q̇ / v_t).
+    """Return the friction torque of axis `i` at a velocity, b q̇ + T_c tanh(q̇ / v_t) [N·m].
 
     Args:
         parameters: of a `Friction`.
         i: number of the axis.
-        velocity: wanted velocity [rad/s]. Compensating the measured one makes an axis at rest
-            tremble.
+        velocity: target velocity [rad/s]. With the measured velocity, an axis at rest would
+            oscillate.
+
+    Raises:
+        ValueError: The parameters are those of another block.
     """
     if parameters[0] != FRICTION:
-        raise ValueError("friction: these are not the parameters of a Friction")
+        raise ValueError("friction: not the parameters of a Friction")
     p = 1 + 3 * i
     dry = parameters[p + 1] * math.tanh(velocity / parameters[p + 2])
     torque: float = parameters[p] * velocity + dry

@@ -1,4 +1,4 @@
-"""Homing of a gripper against its hard stops, the commanded torque as the indicator."""
+"""Homing of a gripper against its hard stops, which the commanded torque indicates."""
 
 from __future__ import annotations
 
@@ -12,16 +12,20 @@ from catenary.control.parts import PerAxis, axis_count, checked, table
 
 KIND = 12.0
 NUMBERS = 5  # opening velocity, torque, time, clearance, travel
-STATES = 6  # stage, time pressed [s], where the stage began [rad]; open, closed stop, meeting
+# stage, time at the torque [s], start position of the stage [rad]; positions [rad] of the open
+# stop, of the closed stop, and where the axes meet
+STATES = 6
 FRESH, OPENING, OPENED, CLOSING, RETURNING, RETURNED, MEETING, DONE = map(float, range(8))
 FAILED = -1.0
 
 
 @dataclass(frozen=True, slots=True)
 class Stops:
-    """Results of homing: (n,) [rad] of each axis, NaN before its result is known.
+    """Results of homing for each axis, each with shape (n,).
 
-    `failed`: (n,) True for an axis that reached no stop in its travel, or met one on its return.
+    `open` and `closed` are the positions of the stops, `meeting` is the position where the axes
+    meet [rad]; NaN while a result is not known. `failed` is True for an axis that found no stop
+    within its travel, or was blocked on its return.
     """
 
     open: Row
@@ -32,14 +36,23 @@ class Stops:
 
 @dataclass(frozen=True)
 class Homing:
-    """Three phases, as published for RDDA: all axes open until each has hit its stop; one after the
-    other they close to their stop and return; all close until they meet.
+    """Settings of homing in three phases, as published for RDDA.
 
-    `velocity` [rad/s] of opening (its sign is the way to open). A stop is a commanded torque of at
-    least `torque` [N·m] in the way of motion for `time` [s]. An axis has returned when it is within
-    `clearance` [rad] of its open stop. One that has gone `travel` [rad] without a stop, or is
-    stopped on its return, has failed, and all stand. Give the loop that follows a torque limit
-    above `torque`: else no stop is ever found.
+    1. All axes open until each is at its open stop.
+    2. One axis after the other closes to its closed stop and returns.
+    3. All axes close until they meet.
+
+    Homing fails if an axis finds no stop within its travel, or is blocked on its return. Then all
+    axes stop. The torque limit of the velocity loop must be above `torque`; otherwise no stop is
+    ever detected.
+
+    Args:
+        axes: number of axes.
+        velocity: opening velocity [rad/s]. Its sign is the opening direction.
+        torque: torque in the direction of motion that indicates a stop [N·m].
+        travel: longest travel without a stop [rad].
+        time: time for which the torque must last [s].
+        clearance: distance from the open stop at which an axis has returned [rad].
     """
 
     axes: int
@@ -58,7 +71,7 @@ class Homing:
         n = axis_count(self.axes)
         velocity = checked("velocity", self.velocity, n, least=-np.inf, above=True)
         for i in np.flatnonzero(velocity == 0).tolist():
-            raise ValueError(f"velocity of axis {i}: 0, it would never arrive")
+            raise ValueError(f"velocity of axis {i} is 0; it must not be 0")
         names = ("torque", "time", "clearance", "travel")
         others = [checked(name, getattr(self, name), n, above=name != "time") for name in names]
         return table(KIND, velocity, *others)
@@ -73,26 +86,40 @@ class Homing:
 def homing(
     memory: Row, parameters: Row, i: int, position: float, torque: float, dt: float
 ) -> float:
-    """One step of axis `i`: its velocity set-point [rad/s]. `torque` [N·m]: the one commanded
-    last, by the velocity loop that follows this set-point."""
+    """Compute one step of axis `i`.
+
+    Args:
+        memory: of a `Homing`.
+        parameters: of a `Homing`.
+        i: number of the axis.
+        position: measured position [rad].
+        torque: torque that the velocity loop commanded in the previous step [N·m].
+        dt: time since the previous step [s].
+
+    Returns:
+        Velocity set-point [rad/s].
+
+    Raises:
+        ValueError: The parameters are those of another block.
+    """
     if parameters[0] != KIND:
-        raise ValueError("homing: these are not the parameters of a Homing")
+        raise ValueError("homing: not the parameters of a Homing")
     n = len(memory) // STATES
     m, p = STATES * i, 1 + NUMBERS * i
     if lowest(memory, 0, n) == FAILED:
         return 0.0
-    stage = following(memory, parameters, i, n, position, torque, dt)
+    stage = next_stage(memory, parameters, i, n, position, torque, dt)
     if stage != memory[m]:
-        memory[m + 1] = memory[m] if stage == FAILED else 0.0  # where it failed
+        memory[m + 1] = memory[m] if stage == FAILED else 0.0  # keep the stage that failed
         memory[m + 2] = position
         memory[m] = stage
-    velocity: float = parameters[p] * way_of(stage)
+    velocity: float = parameters[p] * direction_of(stage)
     return velocity
 
 
 @compiles
 def homed(memory: Row) -> bool:
-    """Return True if homing has ended: all axes have met, or one has failed."""
+    """Return True if homing has ended: all axes have met, or an axis has failed."""
     least = lowest(memory, 0, len(memory) // STATES)
     return bool(least in (DONE, FAILED))
 
@@ -107,16 +134,16 @@ def stops(memory: Row) -> Stops:
 
 
 @compiles
-def following(
+def next_stage(
     memory: Row, parameters: Row, i: int, n: int, position: float, torque: float, dt: float
 ) -> float:
-    """Return the current stage of axis `i`."""
+    """Return the stage of axis `i` after this step."""
     m, p = STATES * i, 1 + NUMBERS * i
     stage: float = memory[m]
-    way = way_of(stage)
+    direction = direction_of(stage)
     if stage == FRESH:
         return OPENING
-    if way != 0.0 and abs(position - memory[m + 2]) > parameters[p + 4]:
+    if direction != 0.0 and abs(position - memory[m + 2]) > parameters[p + 4]:
         return FAILED
     if stage == RETURNING:
         near = abs(position - memory[m + 3]) <= parameters[p + 3]
@@ -124,7 +151,8 @@ def following(
             return RETURNED
         blocked = pressed(memory, m, parameters, p, parameters[p] * torque, dt)
         return FAILED if blocked else RETURNING
-    if way != 0.0 and pressed(memory, m, parameters, p, way * parameters[p] * torque, dt):
+    forward = direction * parameters[p] * torque
+    if direction != 0.0 and pressed(memory, m, parameters, p, forward, dt):
         memory[m + 3 + int(stage == CLOSING) + 2 * int(stage == MEETING)] = position
         return stage + 1.0
     if stage == OPENED and lowest(memory, 0, n) >= OPENED and lowest(memory, 0, i) >= RETURNED:
@@ -135,8 +163,8 @@ def following(
 
 
 @compiles
-def way_of(stage: float) -> float:
-    """Return the direction of a stage: 1 opening, -1 closing, 0 standing."""
+def direction_of(stage: float) -> float:
+    """Return the direction of motion in a stage: 1 opening, -1 closing, 0 at rest."""
     if stage in (OPENING, RETURNING):
         return 1.0
     return -1.0 if stage in (CLOSING, MEETING) else 0.0
@@ -144,7 +172,10 @@ def way_of(stage: float) -> float:
 
 @compiles
 def pressed(memory: Row, m: int, parameters: Row, p: int, forward: float, dt: float) -> bool:
-    """Return True if a torque in the direction of motion (`forward`) has lasted long enough."""
+    """Return True if the torque in the direction of motion indicates a stop.
+
+    `forward` is the torque times the signed opening velocity and the direction of motion.
+    """
     if forward < parameters[p + 1] * abs(parameters[p]):
         memory[m + 1] = 0.0
         return False
@@ -154,7 +185,7 @@ def pressed(memory: Row, m: int, parameters: Row, p: int, forward: float, dt: fl
 
 @compiles
 def lowest(memory: Row, first: int, last: int) -> float:
-    """Return the lowest stage of some axes; `DONE` for no axes."""
+    """Return the lowest stage of the axes `first` to `last` - 1; `DONE` for an empty range."""
     found = DONE
     for i in range(first, last):
         found = min(found, memory[STATES * i])

@@ -1,4 +1,4 @@
-"""Identification of an axis: a logarithmic chirp, and the frequency response from its record."""
+"""Identification of an axis: a logarithmic chirp, and the frequency response from a recording."""
 
 from __future__ import annotations
 
@@ -20,9 +20,14 @@ Vector = npt.NDArray[np.float64] | Sequence[float]
 
 @dataclass(frozen=True)
 class Chirp:
-    """Sine sweep from `first` to `last` [Hz] in `duration` [s], then zero. Has no memory.
+    """Settings of a sine sweep whose frequency changes exponentially; the block has no memory.
 
-    The frequency rises exponentially. `amplitude` has the unit of the quantity it is added to.
+    Args:
+        axes: number of axes.
+        amplitude: in the unit of the quantity that the sweep is added to.
+        first: frequency at the start [Hz].
+        last: frequency at the end [Hz].
+        duration: of the sweep [s]. The value is zero afterwards.
 
     Source: Farina, Simultaneous measurement of impulse response and distortion with a swept-sine
     technique, AES 108, 2000.
@@ -47,15 +52,26 @@ class Chirp:
             checked(name, getattr(self, name), n, above=True) for name in names
         )
         for i in np.flatnonzero(first == last).tolist():
-            raise ValueError(f"last of axis {i}: {last[i]:g} Hz, the same as first")
+            raise ValueError(
+                f"first and last of axis {i} are both {last[i]:g} Hz; a sweep needs two frequencies"
+            )
         return table(KIND, amplitude, first, last, duration)
 
 
 @compiles
 def chirp(parameters: Row, i: int, time: float) -> float:
-    """Return the value of axis `i` at `time`: A sin(2π f₀ T / ln(f₁/f₀) ((f₁/f₀)^(t/T) - 1))."""
+    """Return the value of the sweep, A sin(2π f₀ T / ln(f₁/f₀) ((f₁/f₀)^(t/T) - 1)).
+
+    Args:
+        parameters: of a `Chirp`.
+        i: number of the axis.
+        time: since the start of the sweep [s].
+
+    Raises:
+        ValueError: The parameters are those of another block.
+    """
     if parameters[0] != KIND:
-        raise ValueError("chirp: these are not the parameters of a Chirp")
+        raise ValueError("chirp: not the parameters of a Chirp")
     p = 1 + NUMBERS * i
     first, duration = parameters[p + 1], parameters[p + 3]
     if time < 0.0 or time > duration:
@@ -68,8 +84,12 @@ def chirp(parameters: Row, i: int, time: float) -> float:
 
 @dataclass(frozen=True, slots=True)
 class FrequencyResponse:
-    """`frequency` (k,) [Hz]; `response` (k,) complex, output over input; `coherence` (k,) 0 to 1:
-    the share of the output that the input explains. Trust what is near 1."""
+    """Frequency response of one axis at k frequencies.
+
+    `frequency` (k,) is in Hz. `response` (k,) is the complex ratio of output to input. `coherence`
+    (k,), 0 to 1, is the part of the output that depends linearly on the input: a response is
+    reliable where it is close to 1.
+    """
 
     frequency: Row
     response: npt.NDArray[np.complex128]
@@ -83,7 +103,7 @@ class FrequencyResponse:
 
     @property
     def phase_deg(self) -> Row:
-        """Phase [degrees], shape (k,), unwrapped."""
+        """Unwrapped phase [degrees], shape (k,)."""
         degrees: Row = np.degrees(np.unwrap(np.angle(self.response)))
         return degrees
 
@@ -91,30 +111,42 @@ class FrequencyResponse:
 def frequency_response(
     given: Vector, measured: Vector, period: float, *, segment: int | None = None
 ) -> FrequencyResponse:
-    """Estimate the frequency response of one axis from a record.
+    """Estimate the frequency response of one axis from a recording.
 
     Args:
         given: input (k,), in any unit.
         measured: output (k,), in any unit.
-        period: between two samples [s].
-        segment: samples of each of the half-overlapping pieces that are averaged. None: an eighth
-            of the record. The resolution is 1 / (segment · period) [Hz].
+        period: time between two samples [s].
+        segment: samples per segment; the segments overlap by half and are averaged. None means an
+            eighth of the recording. The resolution is 1 / (segment · period) [Hz].
 
-    Source: H₁ = S_xy / S_xx by Welch's averaged periodograms with Hann windows, each piece's mean
-    taken away; coherence `|S_xy|² / (S_xx S_yy)`. Bendat and Piersol, Random Data, ch. 6 and 9.
+    Returns:
+        Response and coherence at the frequencies above 0 Hz.
+
+    Raises:
+        ValueError: The input and output differ in length, the period is not positive, or the
+            segment does not fit at least twice.
+
+    Source: H₁ = S_xy / S_xx by Welch's method with Hann windows, the mean of each segment removed;
+    coherence `|S_xy|² / (S_xx S_yy)`. Bendat and Piersol, Random Data, ch. 6 and 9.
     """
     x, y = (np.asarray(row, dtype=np.float64) for row in (given, measured))
     if x.ndim != 1 or x.shape != y.shape:
-        raise ValueError(f"two records of one axis, equally long, not {x.shape} and {y.shape}")
+        raise ValueError(
+            f"the input has shape {x.shape}, the output {y.shape}; give two rows of equal length"
+        )
     if not period > 0:
-        raise ValueError(f"period={period} s: must be positive")
+        raise ValueError(f"period={period} s must be positive")
     length = len(x) // 8 if segment is None else segment
     if not 8 <= length <= len(x):
-        raise ValueError(f"segment={length} samples of {len(x)}: at least 8, at most all")
+        raise ValueError(f"segment={length} must be from 8 to {len(x)} samples (the recording)")
     begins = range(0, len(x) - length + 1, max(1, length // 2))
     if len(begins) < 2:
-        raise ValueError(f"segment={length} of {len(x)} samples: one piece has no coherence")
-    window = np.hanning(length + 1)[:-1]  # periodic
+        raise ValueError(
+            f"segment={length} fits only once into {len(x)} samples; the coherence needs at least "
+            "two segments"
+        )
+    window = np.hanning(length + 1)[:-1]  # periodic window
     pieces_x = [
         np.fft.rfft(window * (x[k : k + length] - x[k : k + length].mean())) for k in begins
     ]

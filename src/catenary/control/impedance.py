@@ -1,4 +1,4 @@
-"""Impedance control: spring and damper, with a disturbance observer for friction."""
+"""Impedance control: a spring and a damper, with a disturbance observer for friction."""
 
 from __future__ import annotations
 
@@ -13,26 +13,35 @@ from catenary.control.pid import limited
 
 KIND = 7.0
 GAINS = 7  # stiffness, damping, inertia, friction, bandwidth, compensation, limit
-STATES = 3  # begun, the filter's state, torque before
+STATES = 3  # initialised, state of the filter, previous torque
 
 
 @dataclass(frozen=True)
 class Impedance:
-    """A spring and a damper towards the goal for each axis, friction taken away by an observer.
+    """Settings of an impedance controller; each option is one value, or one per axis.
 
-    `stiffness` [N·m/rad], `damping` [N·m·s/rad]; `limit` of the torque [N·m]. The nominal plant is
-    1/(m s + b): `inertia` m [kg·m²], `friction` b [N·m·s/rad]. What acts on the axis beside the
-    torque given and the external one is the disturbance, dry friction lumped into it, as seen
-    through a low-pass of `bandwidth` [rad/s] (0: no observer); at most `compensation` [N·m] of it
-    is taken away.
+    A spring and a damper pull each axis to its target. A disturbance observer compensates friction.
+    The nominal plant is 1 / (m s + b). The disturbance is the torque on this plant other than the
+    commanded and the measured external torque; dry friction is part of it.
 
-    Without a torque sensor the observer cannot tell friction from what the outside does: keep
-    `compensation` at the dry friction's size, and beyond it the axis yields as the spring says.
-    With a sensor give `external` to the step, and all of friction goes.
+    Without a torque sensor, the observer cannot distinguish friction from a contact. Set
+    `compensation` to the size of the dry friction; the axis then yields to larger torques as the
+    spring does. With a sensor, pass `external` to the step; the observer then compensates the
+    friction completely.
+
+    Args:
+        axes: number of axes.
+        stiffness: of the spring [N·m/rad].
+        damping: of the damper [N·m·s/rad].
+        inertia: m of the nominal plant [kg·m²].
+        friction: b of the nominal plant [N·m·s/rad].
+        bandwidth: of the observer [rad/s]; 0 disables it.
+        compensation: largest torque that the observer compensates [N·m].
+        limit: largest torque, in both directions [N·m].
 
     Source: Ohnishi, Shibata and Murakami, Motion control for advanced mechatronics, IEEE/ASME
     Transactions on Mechatronics 1(1), 1996 (disturbance observer); Hogan, Impedance control, ASME
-    J. Dyn. Sys. Meas. Control 107, 1985. As in RDDA (a two-axis gripper at 2 kHz).
+    J. Dyn. Sys. Meas. Control 107, 1985. RDDA (a two-axis gripper at 2 kHz) uses the same law.
     """
 
     axes: int
@@ -49,17 +58,19 @@ class Impedance:
 
     @property
     def parameters(self) -> Row:
-        """(1 + 7 · axes,); the stiffness of axis i is number 1 + 7 i."""
+        """Row of parameters, shape (1 + 7 · axes,); the stiffness of axis i is at 1 + 7 i."""
         n = axis_count(self.axes)
         names = ("stiffness", "damping", "inertia", "friction", "bandwidth", "compensation")
         columns = [checked(name, getattr(self, name), n) for name in names]
         for i in np.flatnonzero((columns[4] > 0) & (columns[2] == 0)).tolist():
-            raise ValueError(f"inertia of axis {i}: 0.0, the observer needs the nominal plant's")
+            raise ValueError(
+                f"inertia of axis {i} is 0; the observer (bandwidth > 0) needs the nominal inertia"
+            )
         return table(KIND, *columns, checked("limit", self.limit, n, above=True))
 
     @property
     def memory(self) -> Row:
-        """Initial memory: zeros, shape (3 · axes,); no disturbance."""
+        """Initial memory: zeros (no disturbance), shape (3 · axes,)."""
         return np.zeros(STATES * self.axes)
 
 
@@ -76,16 +87,33 @@ def impedance(
     velocity: float,
     dt: float,
 ) -> float:
-    """One step of axis `i`: the torque [N·m]. `goal` [rad], `goal_velocity` [rad/s];
-    `feed_forward` [N·m], a model's gravity, which the nominal plant knows nothing of; `external`
-    [N·m], what a sensor says acts on the axis from outside (0: none)."""
+    """Compute one step of axis `i`.
+
+    Args:
+        memory: of an `Impedance`.
+        parameters: of an `Impedance`.
+        i: number of the axis.
+        goal: target position [rad].
+        goal_velocity: velocity of the target [rad/s].
+        feed_forward: torque that the nominal plant does not contain, such as gravity [N·m].
+        external: measured external torque [N·m]; 0 without a sensor.
+        position: measured position [rad].
+        velocity: measured velocity [rad/s].
+        dt: time since the previous step [s].
+
+    Returns:
+        Torque [N·m].
+
+    Raises:
+        ValueError: The parameters are those of another block.
+    """
     if parameters[0] != KIND:
-        raise ValueError("impedance: these are not the parameters of an Impedance")
+        raise ValueError("impedance: not the parameters of an Impedance")
     p = 1 + GAINS * i
     spring = parameters[p] * (goal - position) + parameters[p + 1] * (goal_velocity - velocity)
-    lost = disturbance(memory, STATES * i, parameters, p + 2, external, velocity, dt)
-    taken = limited(lost, parameters[p + 5])
-    torque = limited(spring + taken + feed_forward, parameters[p + 6])
+    estimate = disturbance(memory, STATES * i, parameters, p + 2, external, velocity, dt)
+    compensation = limited(estimate, parameters[p + 5])
+    torque = limited(spring + compensation + feed_forward, parameters[p + 6])
     memory[STATES * i + 2] = torque - feed_forward
     return torque
 
@@ -94,17 +122,19 @@ def impedance(
 def disturbance(
     memory: Row, m: int, parameters: Row, p: int, external: float, velocity: float, dt: float
 ) -> float:
-    """d = Q(s) (u + external - (m s + b) v), Q = w/(s + w), without differentiating:
-    z = Q (u + external + (m w - b) v), d = z - m w v."""
+    """Estimate the disturbance d = Q(s) (u + external - (m s + b) v) with Q = w / (s + w).
+
+    The equivalent form z = Q (u + external + (m w - b) v), d = z - m w v needs no derivative.
+    """
     inertia, viscous, bandwidth = parameters[p], parameters[p + 1], parameters[p + 2]
     if bandwidth == 0.0:
         return 0.0
-    share = 1.0 - math.exp(-bandwidth * dt)
+    weight = 1.0 - math.exp(-bandwidth * dt)
     if memory[m] == 0.0:
         memory[m] = 1.0
         memory[m + 1] = inertia * bandwidth * velocity
     else:
         known = memory[m + 2] + external + (inertia * bandwidth - viscous) * velocity
-        memory[m + 1] += share * (known - memory[m + 1])
-    found: float = memory[m + 1] - inertia * bandwidth * velocity
-    return found
+        memory[m + 1] += weight * (known - memory[m + 1])
+    estimate: float = memory[m + 1] - inertia * bandwidth * velocity
+    return estimate

@@ -12,17 +12,24 @@ from catenary.control.parts import PerAxis, axis_count, checked, table
 
 KIND = 4.0
 COEFFICIENTS = 5  # b0, b1, b2, a1, a2
-STATES = 3  # begun, and the two of the transposed direct form II
+STATES = 3  # initialised, two states of the transposed direct form II
 
 
 @dataclass(frozen=True)
 class LowPass:
-    """A low-pass of second order, maximally flat, for each axis: 3 dB down at `cutoff` [Hz], with
-    one step every `period` [s].
+    """Settings of a second-order Butterworth low-pass.
 
-    Source: the Butterworth polynomial s² + √2 s + 1 by the bilinear transform with its frequency
-    prewarped, K = tan(π cutoff period): Oppenheim and Schafer, Discrete-Time Signal Processing,
-    §7.2.
+    Args:
+        axes: number of axes.
+        cutoff: frequency at which the gain is -3 dB [Hz], one value or one per axis.
+        period: time between two steps [s].
+
+    Raises:
+        ValueError: A value is out of range, for example a cutoff of half the sample rate or more.
+
+    Source: the Butterworth polynomial s² + √2 s + 1, discretized by the bilinear transform with a
+    prewarped frequency, K = tan(π cutoff period). Oppenheim and Schafer, Discrete-Time Signal
+    Processing, §7.2.
     """
 
     axes: int
@@ -30,17 +37,17 @@ class LowPass:
     period: float
 
     def __post_init__(self) -> None:
-        _ = self.parameters  # wrong values are found where they are written
+        _ = self.parameters  # validates the values
 
     @property
     def parameters(self) -> Row:
         """Row of parameters, shape (1 + 5 · axes,)."""
         if not self.period > 0:
-            raise ValueError(f"period={self.period} s: must be positive")
+            raise ValueError(f"period={self.period} s must be positive")
         cutoff = checked("cutoff", self.cutoff, axis_count(self.axes), above=True)
         for i in np.flatnonzero(cutoff * self.period >= 0.5).tolist():
             raise ValueError(
-                f"cutoff of axis {i}: {cutoff[i]:g} Hz, must be below half the rate, "
+                f"cutoff of axis {i} is {cutoff[i]:g} Hz; it must be below half the sample rate, "
                 f"{0.5 / self.period:g} Hz"
             )
         k = np.tan(math.pi * cutoff * self.period)
@@ -51,15 +58,25 @@ class LowPass:
 
     @property
     def memory(self) -> Row:
-        """Initial memory: zeros, shape (3 · axes,); begins at rest at its first input."""
+        """Initial memory: zeros, shape (3 · axes,). The first step initialises the filter."""
         return np.zeros(STATES * self.axes)
 
 
 @compiles
 def low_pass(memory: Row, parameters: Row, i: int, value: float) -> float:
-    """Return the next output of axis `i`, in the unit of `value`."""
+    """Return the next output of axis `i`, in the unit of `value`.
+
+    Args:
+        memory: of a `LowPass`.
+        parameters: of a `LowPass`.
+        i: number of the axis.
+        value: input.
+
+    Raises:
+        ValueError: The parameters are those of another block.
+    """
     if parameters[0] != KIND:
-        raise ValueError("low_pass: these are not the parameters of a LowPass")
+        raise ValueError("low_pass: not the parameters of a LowPass")
     m, p = STATES * i, 1 + COEFFICIENTS * i
     if memory[m] == 0.0:
         memory[m] = 1.0

@@ -1,5 +1,4 @@
-"""An arm's model from a file, by MuJoCo (`pip install 'catenary[sim]'`): its joints checked against
-the axes."""
+"""Model of an arm, which MuJoCo (`pip install 'catenary[sim]'`) loads from a file."""
 
 from __future__ import annotations
 
@@ -14,13 +13,16 @@ from typing import Any
 from catenary.control.parts import PerAxis, checked
 from catenary.errors import ConfigurationError
 
-XACRO = "an MJCF or URDF file; xacro has to be expanded: xacro robot.urdf.xacro > robot.urdf"
+XACRO = "use an MJCF or URDF file; expand xacro first: xacro robot.urdf.xacro > robot.urdf"
 SLIDE, HINGE = 2, 3  # mjtJoint
 
 
 @dataclass(frozen=True, slots=True)
 class Model:
-    """`places`: of each joint its position's and its velocity's place in MuJoCo's vectors."""
+    """Loaded model and the joints of the axes.
+
+    `places` has, for each joint, the indices of its position and velocity in MuJoCo's vectors.
+    """
 
     mujoco: Any
     native: Any
@@ -29,7 +31,7 @@ class Model:
     function: int  # address of mj_inverse
 
     def workspace(self) -> Any:
-        """Return a new mjData with all joints at the positions of the model."""
+        """Return a new mjData with all joints at the initial positions of the model."""
         data = self.mujoco.MjData(self.native)
         self.mujoco.mj_inverse(self.native, data)
         return data
@@ -38,7 +40,17 @@ class Model:
 def load_model(
     path: Path, joints: Sequence[str] | None, axes: int | None, armature: PerAxis
 ) -> Model:
-    """Load a model. Raises ConfigurationError if MuJoCo, the file or a joint is missing."""
+    """Load a model and select its joints.
+
+    Args:
+        path: MJCF or URDF file.
+        joints: names of the joints, in the order of the axes; None for all.
+        axes: required number of joints; None for any.
+        armature: inertia to add to each joint [kg·m²].
+
+    Raises:
+        ConfigurationError: MuJoCo, the file or a joint is missing, or a joint is not usable.
+    """
     mujoco = _mujoco()
     native = _native(mujoco, path)
     flags = mujoco.mjtDisableBit
@@ -56,7 +68,7 @@ def _mujoco() -> Any:
         return import_module("mujoco")
     except ImportError as error:
         raise ConfigurationError(
-            "the dynamics of a model are computed by MuJoCo, which is not installed",
+            "MuJoCo, which computes the dynamics of a model, is not installed",
             hint="pip install 'catenary[sim]'",
         ) from error
 
@@ -64,15 +76,15 @@ def _mujoco() -> Any:
 def _native(mujoco: Any, path: Path) -> Any:
     """Return the mjModel of a file.
 
-    The shapes of a URDF are left out, so that its meshes need not be there. Masses and inertias
-    determine the motion.
+    The shapes of a URDF are removed, so that its mesh files need not exist. The dynamics depend
+    only on masses and inertias.
     """
     try:
         root = ElementTree.fromstring(path.read_bytes())
     except OSError as error:
         raise ConfigurationError(f"{path}: {error.strerror}") from error
     except ElementTree.ParseError as error:
-        raise ConfigurationError(f"{path} is not XML: {error}", hint=XACRO) from error
+        raise ConfigurationError(f"{path} is not valid XML: {error}", hint=XACRO) from error
     try:
         if root.tag != "robot":
             return mujoco.MjModel.from_xml_path(str(path))
@@ -81,41 +93,47 @@ def _native(mujoco: Any, path: Path) -> Any:
                 link.remove(shape)
         return mujoco.MjModel.from_xml_string(ElementTree.tostring(root, "unicode"))
     except ValueError as error:
-        raise ConfigurationError(f"{path}: MuJoCo refuses it: {error}", hint=XACRO) from error
+        raise ConfigurationError(f"{path}: MuJoCo rejects it: {error}", hint=XACRO) from error
 
 
 def _chosen(
     native: Any, path: Path, joints: Sequence[str] | None, axes: int | None
 ) -> tuple[str, ...]:
-    there = [native.joint(k).name for k in range(native.njnt)]
-    chosen = tuple(there if joints is None else joints)
-    known = f"it has {', '.join(there) or 'none'}"
+    existing = [native.joint(k).name for k in range(native.njnt)]
+    chosen = tuple(existing if joints is None else joints)
+    known = f"the model has the joints {', '.join(existing)}" if existing else "it has no joints"
     for name in chosen:
-        if name not in there:
+        if name not in existing:
             raise ConfigurationError(f"{path}: no joint {name!r}", hint=known)
         if chosen.count(name) > 1:
-            raise ConfigurationError(f"{path}: joint {name!r} is named twice", hint=known)
+            raise ConfigurationError(f"{path}: joint {name!r} is given twice", hint=known)
         kind = int(native.joint(name).type[0])
         if kind not in (SLIDE, HINGE):
             raise ConfigurationError(
-                f"{path}: joint {name!r} is neither hinge nor slide: no single axis moves it",
+                f"{path}: joint {name!r} is neither hinge nor slide, so a single axis cannot "
+                "move it",
                 hint=f"name the joints of the axes, Dynamics(..., joints=[...]); {known}",
             )
     if axes is not None and len(chosen) != axes:
         raise ConfigurationError(
             f"{path}: {len(chosen)} joints ({', '.join(chosen)}) for {axes} axes",
-            hint=f"name them in the order of the axes, Dynamics(..., joints=[...]); {known}",
+            hint=f"name one joint per axis, in their order, Dynamics(..., joints=[...]); {known}",
         )
     if not chosen:
-        raise ConfigurationError(f"{path}: no joints", hint="an arm has at least one")
+        raise ConfigurationError(
+            f"{path}: the model has no joints", hint="use a model with at least one joint"
+        )
     return chosen
 
 
 def _address(mujoco: Any) -> int:
-    """Of mj_inverse, in the library that the Python module uses."""
+    """Return the address of mj_inverse in the library that the Python module uses."""
     folder = Path(mujoco.__file__).parent
     libraries = sorted(folder.glob("libmujoco.so*")) + sorted(folder.glob("libmujoco*.dylib"))
     if not libraries:
-        raise ConfigurationError(f"{folder}: no libmujoco beside MuJoCo's module")
+        raise ConfigurationError(
+            f"{folder}: no libmujoco next to the Python module of MuJoCo",
+            hint="pip install --force-reinstall mujoco",
+        )
     library = ctypes.CDLL(str(libraries[0]))
     return ctypes.cast(library.mj_inverse, ctypes.c_void_p).value or 0

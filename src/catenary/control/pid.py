@@ -1,4 +1,4 @@
-"""PID with anti-windup, limit and rate limit: the block that a cascade is made of."""
+"""PID controller with anti-windup, output limit and rate limit."""
 
 from __future__ import annotations
 
@@ -12,22 +12,32 @@ from catenary.control.parts import PerAxis, axis_count, checked, table
 
 KIND = 1.0
 GAINS = 7  # proportional, integral, derivative, derivative_time, limit, rate, 1/tracking_time
-STATES = 5  # begun, integral part, measured before, derivative part, output before
+STATES = 5  # initialised, integral part, previous measured value, derivative part, previous output
 
 
 @dataclass(frozen=True)
 class Pid:
-    """A PID controller for each of `axes` axes; every option is one value, or one for each.
+    """Settings of a PID controller; each option is one value, or one per axis.
 
-    Units are the output's over the input's: from position to velocity `proportional` is [1/s];
-    from velocity to torque `proportional` is [N·m·s/rad], `integral` [N·m/rad], `derivative`
-    [N·m·s²/rad]. `limit`: of the output, both ways; `rate`: of its change a second;
-    `derivative_time` [s]: of the derivative's low-pass; `tracking_time` [s]: in which the integral
-    gives way while the output is limited (None: proportional / integral).
+    The unit of `proportional` is that of the output divided by that of the input. From position to
+    velocity it is 1/s. From velocity to torque, `proportional` has N·m·s/rad, `integral` N·m/rad
+    and `derivative` N·m·s²/rad.
+
+    Args:
+        axes: number of axes.
+        proportional: proportional gain.
+        integral: integral gain.
+        derivative: derivative gain, applied to the measured value.
+        limit: largest output, in both directions.
+        rate: largest change of the output per second.
+        derivative_time: time constant of the low-pass of the derivative [s].
+        tracking_time: time constant of the anti-windup [s]; None for proportional / integral.
+
+    Raises:
+        ValueError: A value is NaN or out of range, or the number of values is wrong.
 
     Source: Åström and Murray, Feedback Systems, ch. 11 (PID control, anti-windup by
-    back-calculation, computer implementation); the derivative is of the measured value, by
-    backward differences.
+    back-calculation, computer implementation). The derivative uses backward differences.
     """
 
     axes: int
@@ -40,7 +50,7 @@ class Pid:
     tracking_time: PerAxis | None = None
 
     def __post_init__(self) -> None:
-        _ = self.parameters  # wrong values are found where they are written
+        _ = self.parameters  # validates the values
 
     @property
     def parameters(self) -> Row:
@@ -53,7 +63,7 @@ class Pid:
         return np.zeros(STATES * self.axes)
 
     def columns(self) -> list[Row]:
-        """Return the gains, each (axes,)."""
+        """Return the gains and limits, each (axes,), in the order of the parameters."""
         n = axis_count(self.axes)
         names = ("proportional", "integral", "derivative", "derivative_time")
         first = [checked(name, getattr(self, name), n) for name in names]
@@ -76,9 +86,25 @@ def pid(
     feed_forward: float,
     dt: float,
 ) -> float:
-    """Compute one step of axis `i`; the output includes `feed_forward`. `dt` [s]."""
+    """Compute one step of axis `i`.
+
+    Args:
+        memory: of a `Pid`.
+        parameters: of a `Pid`.
+        i: number of the axis.
+        reference: target value.
+        measured: measured value.
+        feed_forward: value to add to the output. The limits apply to the sum.
+        dt: time since the previous step [s].
+
+    Returns:
+        Output.
+
+    Raises:
+        ValueError: The parameters are those of another block.
+    """
     if parameters[0] != KIND:
-        raise ValueError("pid: these are not the parameters of a Pid")
+        raise ValueError("pid: not the parameters of a Pid")
     return pid_step(
         memory,
         STATES * i,
@@ -104,11 +130,11 @@ def pid_step(
     begin: float,
     dt: float,
 ) -> float:
-    """Run one step with the state from `memory[m]` on and the gains from `parameters[p]` on.
+    """Compute one step with the state that starts at `memory[m]` and the gains at `parameters[p]`.
 
-    `begin` is the output before the first step.
+    `begin` is the output before the first step; the rate limit starts from it.
     """
-    # float(): Python's own numbers are several times faster than NumPy's; compiled it is nothing
+    # Python's own floats are several times faster than NumPy's; float() is free in compiled code.
     measured, limit = float(measured), float(parameters[p + 4])
     if memory[m] == 0.0:
         memory[m] = 1.0
@@ -117,14 +143,14 @@ def pid_step(
         memory[m + 3] = 0.0
         memory[m + 4] = limited(float(begin), limit)
     error, before = float(reference) - measured, float(memory[m + 4])
-    integral, slowness = float(memory[m + 1]), float(parameters[p + 3])
+    integral, low_pass_time = float(memory[m + 1]), float(parameters[p + 3])
     change = float(parameters[p + 2]) * (measured - float(memory[m + 2]))
-    derivative = (slowness * float(memory[m + 3]) - change) / (slowness + dt)
-    wanted = float(feed_forward) + float(parameters[p]) * error + integral + derivative
+    derivative = (low_pass_time * float(memory[m + 3]) - change) / (low_pass_time + dt)
+    unlimited = float(feed_forward) + float(parameters[p]) * error + integral + derivative
     step = float(parameters[p + 5]) * dt
-    output = min(max(limited(wanted, limit), before - step), before + step)
+    output = min(max(limited(unlimited, limit), before - step), before + step)
     tracking = min(float(parameters[p + 6]) * dt, 1.0)
-    integral += float(parameters[p + 1]) * error * dt + (output - wanted) * tracking
+    integral += float(parameters[p + 1]) * error * dt + (output - unlimited) * tracking
     memory[m + 1] = integral
     memory[m + 2] = measured
     memory[m + 3] = derivative
@@ -134,4 +160,5 @@ def pid_step(
 
 @compiles
 def limited(value: float, limit: float) -> float:
+    """Return `value`, clamped to ± `limit`."""
     return min(max(value, -limit), limit)

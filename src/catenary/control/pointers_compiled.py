@@ -1,5 +1,7 @@
-"""What `pointers` does, as Numba compiles it: two casts, no call into Python. Importing this tells
-Numba of it."""
+"""The functions of `pointers` for compiled laws: casts without a call into Python.
+
+Importing this module registers them with Numba.
+"""
 
 from __future__ import annotations
 

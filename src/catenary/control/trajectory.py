@@ -1,4 +1,4 @@
-"""Trajectories within limits of velocity, acceleration and jerk, by ruckig."""
+"""Trajectories with limited velocity, acceleration and jerk, computed by ruckig."""
 
 from __future__ import annotations
 
@@ -21,12 +21,15 @@ from catenary.errors import ConfigurationError
 Rows = npt.NDArray[np.float64]
 Vector = Sequence[float] | Row
 
-SLACK = 1e-9  # of a limit: what rounding may take
+SLACK = 1e-9  # relative tolerance of a limit, for rounding errors
 
 
 @dataclass(frozen=True, slots=True)
 class MotionLimits:
-    """Limits of a motion, one value or one per axis: [rad/s], [rad/s²], [rad/s³], [rad]."""
+    """Limits of a motion; each is one value, or one per axis.
+
+    The units are rad/s, rad/s², rad/s³, and rad for the positions.
+    """
 
     velocity: PerAxis
     acceleration: PerAxis
@@ -37,7 +40,10 @@ class MotionLimits:
 
 @dataclass(frozen=True, slots=True)
 class MotionState:
-    """Start of a motion from axes that move: (n,) [rad], [rad/s], [rad/s²]."""
+    """Initial state of a motion: position [rad], velocity [rad/s], acceleration [rad/s²].
+
+    Each has the shape (n,). An acceleration of None means zero.
+    """
 
     position: Vector
     velocity: Vector
@@ -45,12 +51,12 @@ class MotionState:
 
 
 class Trajectory:
-    """A motion as rows, one a period: `time` (k,) [s], from one period on; `position`, `velocity`,
-    `acceleration` (k, n) [rad], [rad/s], [rad/s²]. The last row is the goal, at rest. `duration`
-    [s] is that of the motion, which ends within the last period.
+    """Motion with one row per period. The last row is the goal, at rest.
 
-    All rows are made when one of these is first asked for, some 10 us each. A task with a deadline
-    takes them one at a time: `row`.
+    `duration` [s] is that of the motion, which ends within the last period.
+
+    The first access to `position`, `velocity` or `acceleration` computes all rows; each row takes
+    about 10 us. A task with a deadline calls `row` to compute one row at a time.
     """
 
     def __init__(self, pieces: Sequence[Any], goal: Row, period: float) -> None:
@@ -63,10 +69,16 @@ class Trajectory:
         return self._count
 
     def row(self, number: int) -> Rows:
-        """(3, n): position, velocity, acceleration of one row, the first is 0. IndexError: beyond
-        the last."""
+        """Return position, velocity and acceleration of one row, shape (3, n).
+
+        Args:
+            number: of the row, from 0.
+
+        Raises:
+            IndexError: The trajectory has no such row.
+        """
         if not 0 <= number < self._count:
-            raise IndexError(f"row {number} of a trajectory of {self._count}")
+            raise IndexError(f"row {number} is outside the trajectory of {self._count} rows")
         if number == self._count - 1:
             rest = np.zeros(len(self._goal))
             return np.stack([self._goal, rest, rest])
@@ -77,18 +89,22 @@ class Trajectory:
 
     @property
     def time(self) -> Row:
+        """Time of each row since the start [s], shape (k,). The first row is at one period."""
         return self._period * np.arange(1, self._count + 1, dtype=np.float64)
 
     @property
     def position(self) -> Rows:
+        """Positions [rad], shape (k, n)."""
         return self._rows[:, 0]
 
     @property
     def velocity(self) -> Rows:
+        """Velocities [rad/s], shape (k, n)."""
         return self._rows[:, 1]
 
     @property
     def acceleration(self) -> Rows:
+        """Accelerations [rad/s²], shape (k, n)."""
         return self._rows[:, 2]
 
     @cached_property
@@ -107,20 +123,25 @@ def trajectory(
     Needs ruckig: pip install 'catenary[traj]'.
 
     Args:
-        start: positions (n,) [rad], or a `MotionState`.
-        goal: positions (n,) [rad]. Several goals (m, n): one after the other, at rest in each.
-        limits: of the motion.
-        period: between two rows [s].
+        start: positions (n,) [rad] of axes at rest, or a `MotionState`.
+        goal: positions (n,) [rad]. Several goals (m, n) are reached in turn; the motion comes to
+            rest at each.
+        limits: limits of the motion.
+        period: time between two rows [s].
+
+    Returns:
+        Motion from the start to the last goal.
 
     Raises:
-        ValueError: A goal is outside the limits, or the start cannot stop within them, or a number
-            is NaN. The message names the axis and the limit.
+        ValueError: A goal is outside the limits, the axes cannot stop within them, or a number is
+            NaN. The message names the axis and the limit.
+        ConfigurationError: ruckig is not installed.
 
     Source: Berscheid and Kröger, Jerk-limited real-time trajectory generation with arbitrary target
     states, RSS 2021.
     """
     if not period > 0 or math.isinf(period):
-        raise ValueError(f"period={period} s: must be positive")
+        raise ValueError(f"period={period} s must be positive and finite")
     ruckig = _ruckig()
     first = start if isinstance(start, MotionState) else MotionState(start, np.zeros(len(start)))
     q, v, a = _begin(first)
@@ -129,7 +150,9 @@ def trajectory(
     goals = np.array(goal, dtype=np.float64)
     goals = goals[None] if goals.ndim == 1 else goals
     if goals.ndim != 2 or goals.shape[1] != len(q) or not len(goals):
-        raise ValueError(f"goal: {len(q)} numbers, or rows of them, not the shape {goals.shape}")
+        raise ValueError(
+            f"goal has shape {goals.shape}; give {len(q)} numbers, or rows of {len(q)} numbers"
+        )
     for row in goals:
         bounds.check_goal(row)
     rest = np.zeros(len(q))
@@ -158,28 +181,28 @@ class _Bounds:
             checked(name, getattr(limits, name), n, least=-math.inf)
             for name in ("position_min", "position_max")
         )
-        _raise_first("position_min", low, low >= high, "is not below position_max")
+        _raise_first("position_min", low, low >= high, "must be below position_max")
         velocity, acceleration, jerk = rates
         return cls(velocity, acceleration, jerk, low, high)
 
     def check_start(self, q: Row, v: Row, a: Row) -> None:
         self._check_position("start", q)
-        _raise_first("start: velocity", v, abs(v) > self.velocity * (1 + SLACK), self.velocity)
+        _raise_first("start velocity", v, abs(v) > self.velocity * (1 + SLACK), self.velocity)
         most = self.acceleration
-        _raise_first("start: acceleration", a, abs(a) > most * (1 + SLACK), most)
-        # while the acceleration goes to zero the velocity goes on: v + a |a| / (2 j)
+        _raise_first("start acceleration", a, abs(a) > most * (1 + SLACK), most)
+        # The velocity still changes while the acceleration decreases to zero: v + a |a| / (2 j).
         ahead = v + a * abs(a) / (2 * self.jerk)
-        what = "start: velocity once its acceleration has ended"
+        what = "velocity after the start acceleration has decreased to zero"
         _raise_first(what, ahead, abs(ahead) > self.velocity * (1 + SLACK), self.velocity)
 
     def check_goal(self, q: Row) -> None:
         _raise_first("goal", q, ~np.isfinite(q), "must be finite")
         self._check_position("goal", q)
 
-    def check_way(self, lowest: Row, highest: Row) -> None:
+    def check_path(self, lowest: Row, highest: Row) -> None:
         """Raise ValueError if the motion exceeds a position limit."""
-        self._check_position("the way there: its lowest position", lowest)
-        self._check_position("the way there: its highest position", highest)
+        self._check_position("lowest position of the motion", lowest)
+        self._check_position("highest position of the motion", highest)
 
     def _check_position(self, what: str, q: Row) -> None:
         for name, row, sign in (
@@ -193,24 +216,24 @@ class _Bounds:
 def _raise_first(what: str, row: Row, wrong: npt.NDArray[np.bool_], *why: object) -> None:
     """Raise ValueError for the first axis with an invalid value."""
     for i in np.flatnonzero(wrong).tolist():
-        limit, name = why[0], why[1] if len(why) > 1 else "limit"
-        said = limit if isinstance(limit, str) else f"beyond its {name} {np.asarray(limit)[i]:g}"
-        raise ValueError(f"{what} of axis {i}: {row[i]:g} {said}")
+        limit, name = why[0], why[1] if len(why) > 1 else "the limit"
+        reason = limit if isinstance(limit, str) else f"is beyond {name} {np.asarray(limit)[i]:g}"
+        raise ValueError(f"{what} of axis {i} is {row[i]:g}; it {reason}")
 
 
 def _begin(state: MotionState) -> tuple[Row, Row, Row]:
     q = np.array(state.position, dtype=np.float64)
     if q.ndim != 1 or not q.size:
-        raise ValueError(f"start: one number for each axis, not the shape {q.shape}")
+        raise ValueError(f"start has shape {q.shape}; give one number per axis")
     rows = [q]
     for name in ("velocity", "acceleration"):
         given = getattr(state, name)
         row = np.zeros(len(q)) if given is None else np.array(given, dtype=np.float64)
         if row.shape != q.shape:
-            raise ValueError(f"start: {name}: {len(q)} numbers, not the shape {row.shape}")
+            raise ValueError(f"start {name} has shape {row.shape}; give {len(q)} numbers")
         rows.append(row)
     for name, row in zip(("position", "velocity", "acceleration"), rows, strict=True):
-        _raise_first(f"start: {name}", row, ~np.isfinite(row), "must be finite")
+        _raise_first(f"start {name}", row, ~np.isfinite(row), "must be finite")
     return rows[0], rows[1], rows[2]
 
 
@@ -219,7 +242,7 @@ def _ruckig() -> Any:
         return import_module("ruckig")
     except ImportError as error:
         raise ConfigurationError(
-            "trajectories are made by ruckig, which is not installed",
+            "ruckig, which computes trajectories, is not installed",
             hint="pip install 'catenary[traj]'",
         ) from error
 
@@ -227,20 +250,20 @@ def _ruckig() -> Any:
 def _piece(ruckig: Any, begin: tuple[Row, Row, Row], goal: Row, bounds: _Bounds) -> Any:
     """Return ruckig's trajectory from one state to rest."""
     n = len(goal)
-    wanted = ruckig.InputParameter(n)
+    task = ruckig.InputParameter(n)
     q, v, a = begin
-    wanted.current_position, wanted.current_velocity = q.tolist(), v.tolist()
-    wanted.current_acceleration = a.tolist()
-    wanted.target_position = goal.tolist()
-    wanted.max_velocity = bounds.velocity.tolist()
-    wanted.max_acceleration = bounds.acceleration.tolist()
-    wanted.max_jerk = bounds.jerk.tolist()
+    task.current_position, task.current_velocity = q.tolist(), v.tolist()
+    task.current_acceleration = a.tolist()
+    task.target_position = goal.tolist()
+    task.max_velocity = bounds.velocity.tolist()
+    task.max_acceleration = bounds.acceleration.tolist()
+    task.max_jerk = bounds.jerk.tolist()
     piece = ruckig.Trajectory(n)
-    result = ruckig.Ruckig(n).calculate(wanted, piece)
+    result = ruckig.Ruckig(n).calculate(task, piece)
     if result not in (ruckig.Result.Working, ruckig.Result.Finished):
-        raise ValueError(f"no motion from {q} to {goal}: ruckig says {result}")
+        raise ValueError(f"no motion from {q} to {goal}: ruckig returns {result}")
     extremes = piece.position_extrema
-    bounds.check_way(
+    bounds.check_path(
         np.array([axis.min for axis in extremes]), np.array([axis.max for axis in extremes])
     )
     return piece

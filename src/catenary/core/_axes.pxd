@@ -170,7 +170,7 @@ cdef struct axes_t:
     uint32_t moving
 
 cdef class Axes:
-    """Owns the axis records and the tables of columns and areas."""
+    """Owner of the axis records and column tables."""
     cdef axes_t c
     cdef cat_memory memory
 

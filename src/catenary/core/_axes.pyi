@@ -12,6 +12,6 @@ AXIS_FALLBACK: Final[int]  # without a valid set-point, or returning to the set-
 AXIS_MODE_REFUSED: Final[int]  # the drive did not show the last requested mode
 
 class Axes:
-    """Owns the axis records and column tables."""
+    """Owner of the axis records and column tables."""
 
     def __init__(self, plan: object) -> None: ...

@@ -67,7 +67,7 @@ cdef struct clock_t:
     uint64_t missed
 
 cdef class Clock:
-    """Owns the state of distributed clocks in a cycle."""
+    """Owner of the distributed clocks of a cycle: `Engine.clock`."""
     cdef clock_t c
     cdef cat_memory memory
 

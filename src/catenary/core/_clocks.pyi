@@ -35,9 +35,8 @@ class Clock:
         reference; time_sent: when the frame that read it left, on the link's clock. error,
         mean_error, worst_error: phase error of the cycle starts, or of the reference if it follows.
         rate: of the reference relative to the link's clock, as a ratio. samples. missed, silent:
-            cycles without the reference,
-        in total and in a row. holding: the core continues its time. ignored: samples larger than
-        any drift. jumps.
+        cycles without the reference, in total and in a row. holding: the core continues its time.
+        ignored: samples larger than any drift. jumps.
         """
 
     def differences(self) -> list[tuple[float, int, int, int]]:

@@ -320,14 +320,19 @@ cdef set_phase(phase_t *p, plan, int64_t period_ns):
 
 
 cdef class PhaseController:
-    """The phase controller alone, for tests against its twin."""
+    """Phase controller: phase errors in, corrections of the cycle start out."""
     cdef phase_t c
 
     def __cinit__(self, plan, int64_t period_ns):
         set_phase(&self.c, plan, period_ns)
 
     def step(self, error_ns):
-        """Return the shift of the next cycle start [ns]; None: a cycle without an answer."""
+        """Return the shift of the next cycle start [ns].
+
+        Args:
+            error_ns: Phase error of the last cycle start [ns], within half a period of 0; positive:
+                late. None: no answer in this cycle.
+        """
         return phase_coast(&self.c) if error_ns is None else phase_step(&self.c, error_ns)
 
     @property
@@ -365,7 +370,15 @@ cdef class Clock:
         self.c.outside = self.c.follower_count
 
     def figures(self):
-        """Return the figures as numbers; times in ns."""
+        """Return the figures of the clocks; times in ns.
+
+        locked; bound (in force); following (True: in phase). time: last system time of the
+        reference; time_sent: when the frame that read it left, on the link's clock. error,
+        mean_error, worst_error: phase error of the cycle starts, or of the reference if it follows.
+        rate: of the reference relative to the link's clock, as a ratio. samples. missed, silent:
+        cycles without the reference, in total and in a row. holding: the core continues its time.
+        ignored: samples larger than any drift. jumps.
+        """
         cdef clock_t *k = &self.c
         return {
             "locked": bool(k.locked),
@@ -386,7 +399,10 @@ cdef class Clock:
         }
 
     def differences(self):
-        """Return (mean, last, largest magnitude, reads) of every follower [ns]."""
+        """Return (mean, last, largest magnitude, reads) of each follower [ns].
+
+        The difference is 0x092C, local minus reference.
+        """
         cdef uint32_t i
         return [
             (self.c.followers[i].mean, self.c.followers[i].last, self.c.followers[i].worst,
@@ -410,7 +426,7 @@ cdef class Clock:
 
     @property
     def changes(self):
-        """Number of times the clocks were locked or unlocked; reading it acknowledges them."""
+        """Number of times the clocks were locked or unlocked. Reading it clears CYCLE_CLOCKS."""
         self.c.acknowledged = self.c.changes
         return self.c.changes
 

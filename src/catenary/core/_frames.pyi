@@ -1,6 +1,6 @@
 """The frame engine; owned by Engine."""
 
 class Frames:
-    """Owns the templates, images and tables of one cyclic exchange."""
+    """Owner of the templates, images and tables of one cyclic exchange."""
 
     def __init__(self, plan: object, link: object) -> None: ...

@@ -42,7 +42,24 @@ cdef struct law_t:
     uint32_t given             # last request that was answered; futex word
 
 cdef class Law:
-    """Owns a law's numbers while it runs."""
+    """A compiled function of native/law.h at `address`, with its numbers.
+
+    A step that computes for 20 ms (twice the budget, if that is more) is aborted by a monitor
+    thread. The laws of an engine share this thread; the first one sets its priority. The caller
+    keeps the owner of `address` alive.
+
+    Args:
+        address: Address of the function.
+        memory: Initial memory of the law, at most 4096 numbers.
+        parameters: Parameters set by the application, at most 4096 numbers.
+        budget_ns: Budget of one step [ns]; 0: none.
+        overrun_limit: Number of steps in a row over the budget that stop the drives.
+        priority: SCHED_FIFO priority of the monitor; 0: that of the caller.
+
+    Raises:
+        ValueError: A number is out of range.
+        OSError: The monitor thread cannot be started.
+    """
     cdef law_t c
     cdef cat_law_monitor rehearsal
     cdef int priority              # priority of the monitor

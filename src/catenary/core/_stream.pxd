@@ -13,7 +13,17 @@ cdef struct stream_t:
     uint64_t dry               # cycle starts without a row, since the first one
 
 cdef class Stream:
-    """Owns the rows of set-points that wait for their cycle starts."""
+    """Ring of set-points: one row per cycle start. One thread writes.
+
+    A row contains position [rad], velocity [rad/s] and torque [N·m] of all axes, in this order.
+
+    Args:
+        axes: Number of axes.
+        capacity: Maximum number of rows.
+
+    Raises:
+        ValueError: A number is out of range.
+    """
     cdef stream_t c
     cdef cat_memory memory
 

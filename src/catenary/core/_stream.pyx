@@ -49,7 +49,16 @@ cdef class Stream:
         self.c.seen = <uint64_t *>memory_take(&self.memory, capacity, sizeof(uint64_t))
 
     def write(self, bytes rows not None, uint64_t seen):
-        """Append rows of 3·axes float64; return the number of rows for which there was room."""
+        """Append rows; return the number of rows for which there was room.
+
+        Args:
+            rows: Rows of 3·axes float64.
+            seen: The cycle whose actual values the writer had read. A position is valid only for
+                axes that were followed in that cycle.
+
+        Raises:
+            ValueError: The size is not a multiple of a row.
+        """
         cdef stream_t *s = &self.c
         cdef size_t size = s.axes * QUANTITIES * sizeof(double)
         cdef const char *source = rows

@@ -1,4 +1,4 @@
-"""The demo: three virtual drives follow a sine at 1 kHz over real EtherCAT frames."""
+"""Demo: three virtual drives follow a sine at 1 kHz, with real EtherCAT frames."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ from pathlib import Path
 def run_demo(seconds: float, folder: Path, *, in_process: bool = False) -> None:
     """Run the demo, print its results, and write `demo.json` and `demo.html`.
 
-    Unless `in_process`, the program may first be restarted in its own network namespace. Modules
-    that start threads (NumPy) must not be imported before that.
+    Unless `in_process`, this may restart the program in its own network namespace. Do not import
+    modules that start threads (NumPy) before this call.
 
     Args:
         seconds: Duration of the motion [s].
@@ -18,7 +18,7 @@ def run_demo(seconds: float, folder: Path, *, in_process: bool = False) -> None:
     """
     from catenary.realtime import private_network
 
-    refused = "asked for" if in_process else None
+    refused = "--in-process" if in_process else None
     if not in_process:
         state = private_network.enter()
         if isinstance(state, private_network.Refused):

@@ -1,7 +1,7 @@
-"""The demo's segment: on a network interface, or in this process.
+"""Segment of the demo, on a network interface or in this process.
 
-`python -m catenary.demo.ground NIC` is the process that serves it on an interface. The segment runs
-in this process if the machine does not permit a private network.
+`python -m catenary.demo.ground NIC` is the process that serves it on an interface. If the machine
+does not permit a private network, the segment runs in this process.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from catenary.realtime.private_network import veth_pair
 from catenary.virtual import demo_segment
 
 START_SECONDS = 20.0
-PRIORITY = 80  # same as the loop: real devices do not wait for their MainDevice
+PRIORITY = 80  # same as the loop, because real devices do not wait for their MainDevice
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,7 +39,11 @@ def ground(refused: str | None) -> Iterator[Ground]:
         start_python(["-m", "catenary.demo.ground", theirs]) as server,
     ):
         if server.read_line(START_SECONDS) is None:
-            raise LinkError("the virtual segment did not start", hint="see its message above")
+            raise LinkError(
+                "the virtual segment did not start: its process ended, or did not answer within "
+                f"{START_SECONDS:g} s",
+                hint="see the message of the process above, if there is one",
+            )
         yield Ground(Interface(ours), "veth")
 
 

@@ -1,4 +1,4 @@
-"""The motion of the demo: three sines of 0.5 Hz, a third of a turn apart, and their recording."""
+"""Motion of the demo: sines of 0.5 Hz with equal phase differences, and their recording."""
 
 from __future__ import annotations
 
@@ -13,15 +13,15 @@ from catenary.demo.text import ProgressBar
 
 PERIOD = 1e-3  # [s]
 COUNTS_PER_TURN = 2**20
-# The demo uses generous limits so that it runs on any machine: the virtual devices share the
-# processors. Their pauses appear as lost and late cycles in the figures. Real machines keep the
-# defaults.
+# The demo uses generous limits so that it runs on any machine, because the virtual devices share
+# the processors. Their pauses appear as lost and late cycles in the figures. Keep the defaults for
+# real devices.
 LOST_LIMIT = 800  # cycles
 WATCHDOG = 1.0  # [s], of the devices
 LATE_LIMIT = 0.5  # [s]
 AMPLITUDE = math.pi  # [rad]
-PULSATION = math.pi  # [rad/s]
-VELOCITY_LIMIT = 20.0  # [rad/s]: the sines reach 10
+ANGULAR_FREQUENCY = math.pi  # [rad/s]
+VELOCITY_LIMIT = 20.0  # [rad/s]; the sines reach 10 rad/s
 FADE_IN = 1.0  # [s]; the amplitude grows during this time, so that the drives start from rest
 
 
@@ -41,7 +41,7 @@ def follow(loop: cat.Loop, arm: cat.Drives, recording: Recording, progress: Prog
     for cycle in loop:
         t = cycle.time
         growth = AMPLITUDE * min(t / FADE_IN, 1.0) ** 2
-        reference = home + growth * np.sin(PULSATION * t + phases)
+        reference = home + growth * np.sin(ANGULAR_FREQUENCY * t + phases)
         arm.target.position[:] = reference
         if not recording.add(t, reference, arm.actual.position):
             return
@@ -49,9 +49,9 @@ def follow(loop: cat.Loop, arm: cat.Drives, recording: Recording, progress: Prog
 
 
 class Recording:
-    """Owns reference and actual positions [rad], one row per cycle.
+    """Owner of reference and actual positions [rad], one row per cycle.
 
-    The arrays are allocated in advance, so that recording a cycle takes only two small copies.
+    The arrays are allocated in advance, so that each cycle needs only two small copies.
     """
 
     def __init__(self, seconds: float, drives: int) -> None:
@@ -62,7 +62,7 @@ class Recording:
         self._used = 0
 
     def add(self, time: float, reference: np.ndarray, actual: np.ndarray) -> bool:
-        """Add a row. Return False if it was the last free one.
+        """Add a row. Return False if it was the last free row.
 
         Args:
             time: Time of the cycle [s].

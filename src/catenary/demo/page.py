@@ -17,18 +17,18 @@ from catenary.loop.timing import COUNTED
 
 STYLE = Path(__file__).with_name("page.css")
 STYLES = ("a", "b", "c")
-SHOWN_SECONDS = 4.0  # of the motion, at its end
-SHOWN_POINTS = 400  # of each line
+SHOWN_SECONDS = 4.0  # drawn time at the end of the motion
+SHOWN_POINTS = 400  # points per line
 HEADINGS = {"in_controller": "in controller", "round_trip": "round trip"}
 MEANING = {
     "period": "wake-up → next wake-up",
     "lateness": "cycle start → wake-up",
-    "receive": "woken → inputs usable",
+    "receive": "wake-up → inputs usable",
     "process": "the Python body of the loop",
-    "send": "body done → frame sent",
+    "send": "end of the body → frame sent",
     "in_controller": "receive + process + send",
-    "tail": "sent → the next wait",
-    "round_trip": "frame sent → frame back",
+    "tail": "frame sent → start of the next wait",
+    "round_trip": "frame sent → frame received",
 }
 
 
@@ -71,7 +71,7 @@ def drives(result: Result) -> range:
 
 def summary(result: Result) -> str:
     where = (
-        "over real EtherCAT frames on a pair of virtual network interfaces"
+        "with real EtherCAT frames on a pair of virtual network interfaces"
         if result.link == "veth"
         else "with the virtual segment in the same process"
     )
@@ -82,7 +82,7 @@ def summary(result: Result) -> str:
 
 
 def ground(result: Result) -> str:
-    return f"Scheduling obtained: {result.scheduling}. Link: {result.link}."
+    return f"Scheduling: {result.scheduling}. Link: {result.link}."
 
 
 def tiles(result: Result) -> str:
@@ -108,13 +108,13 @@ def tile(value: str, unit: str, name: str, *, good: bool | None = None) -> str:
 def motion(result: Result) -> str:
     time = result.motion.time
     if len(time) < 2:
-        return '<p class="note">Too short a run to draw.</p>'
+        return '<p class="note">The run was too short for a plot.</p>'
     first = int((time >= time[-1] - SHOWN_SECONDS).argmax())
     every = max((len(time) - first) // SHOWN_POINTS, 1)
     part = slice(first, None, every)
     seconds = time[part].tolist()
     reference, actual = result.motion.reference[part], result.motion.actual[part]
-    error = np.nan_to_num(result.error[part]) * 1e3  # 0 until the first set-point arrived
+    error = np.nan_to_num(result.error[part]) * 1e3  # 0 until the first set-point arrives
     positions = [
         Line(f"reference {n + 1}", "reference", seconds, reference[:, n].tolist())
         for n in drives(result)
@@ -175,7 +175,7 @@ def phase_figure(result: Result, phase: str) -> str:
 def drawn_range(buckets: Sequence[Bucket]) -> tuple[float, float]:
     """Return the drawn range of a histogram, with a margin.
 
-    It omits 0.1 % of the cycles at each end: a single outlier would compress the other bars.
+    It omits 0.1 % of the cycles at each end, because a single outlier would compress the bars.
     """
     total = sum(count for *_, count in buckets)
     ranks = list(accumulate(count for *_, count in buckets))

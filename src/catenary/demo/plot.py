@@ -1,6 +1,6 @@
 """Plots as inline SVG, without scripts or external files.
 
-Colours come from classes of the page's style sheet, so that one drawing serves light and dark mode.
+Colours come from classes of the page's style sheet, so that a plot suits light and dark mode.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ LEFT, RIGHT, TOP, BOTTOM = 44.0, 14.0, 24.0, 22.0  # margins [px]
 
 @dataclass(frozen=True, slots=True)
 class Frame:
-    """Size of a drawing [px]. The page shows it at about this size."""
+    """Approximate size of a plot on the page [px]."""
 
     width: float
     height: float
@@ -45,7 +45,7 @@ class Line:
 
 @dataclass(frozen=True, slots=True)
 class Axis:
-    """One axis of a plot, which maps values to pixels. `decades`: True for a logarithmic axis."""
+    """Axis of a plot, which maps values to pixels. `decades` is True for a logarithmic axis."""
 
     low: float
     high: float
@@ -72,7 +72,7 @@ class Axis:
 
 
 def nice_step(span: float) -> float:
-    """Return the largest 1, 2 or 5 times a power of ten that fits three times into the span."""
+    """Return the largest step of 1, 2 or 5 times a power of ten that fits three times in `span`."""
     power = 10.0 ** math.floor(math.log10(span / 3.0))
     return next(power * factor for factor in (10, 5, 2, 1) if power * factor <= span / 3.0)
 
@@ -97,8 +97,8 @@ def polyline(line: Line, x: Axis, y: Axis) -> str:
 def histogram(buckets: Sequence[Bucket], *, low: float, high: float, title: str) -> str:
     """Draw counts over time [us].
 
-    The counts are logarithmic, so that a single late cycle is visible. Buckets outside of `low` to
-    `high` are not drawn; the caption reports them.
+    The axis of the counts is logarithmic, so that a single late cycle is visible. Buckets outside
+    of `low` to `high` are not drawn.
     """
     bars = rebin(inside(buckets, low, high), low, high, 48)
     x = Axis(low, high, LEFT, SMALL.right)

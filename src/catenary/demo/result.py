@@ -18,8 +18,8 @@ Figures = Mapping[str, float]
 Bucket = tuple[float, float, int]  # lower, upper [s], count
 
 PHASES = ("period", "lateness", "receive", "process", "send", "in_controller", "tail")
-# A set-point that is written in one cycle is sent in the next one. Its first effect on the position
-# is received one cycle later.
+# A set-point written in one cycle is sent in the next cycle. The first position that it affects is
+# received one cycle later.
 TRANSPORT_CYCLES = 2
 
 
@@ -82,12 +82,12 @@ class Result:
 
     @property
     def timing_us(self) -> Mapping[str, Figures]:
-        """The figures of each phase in microseconds."""
+        """Figures of each phase [us]."""
         return {p: {name: self.timing[p][name] * 1e6 for name in FIGURES} for p in PHASES}
 
 
 def as_json(result: Result) -> str:
-    """`demo.json`: its form is public, programs read it."""
+    """Return the text of `demo.json`. Its format is public, because programs read it."""
     return json.dumps(
         {
             "devices": [

@@ -1,4 +1,4 @@
-"""The process that serves a segment for a demo or a benchmark, in real time if permitted."""
+"""Process that serves a segment for a demo or a benchmark, in real time if permitted."""
 
 from __future__ import annotations
 
@@ -17,17 +17,17 @@ def serve_at_priority(
     second: str | None = None,
     cpu: int | None = None,
 ) -> None:
-    """Serve the segment at SCHED_FIFO, and print "ready" when it answers.
+    """Serve the segment at a SCHED_FIFO priority, and print "ready" when it answers.
 
-    If the machine refuses the priority, late frames are answered, too. The machine causes the
-    delay, and a demo must run on any machine.
+    If the machine refuses the priority, the segment also answers late frames, because a demo must
+    run on any machine.
 
     Args:
         segment: The segment to serve.
-        interface: The network interface on which it answers.
-        priority: SCHED_FIFO 1 to 99, for all threads of this process.
-        second: The interface of a ring's other end.
-        cpu: The processor of this process; None: any.
+        interface: Network interface of the segment.
+        priority: SCHED_FIFO priority of all threads of this process, 1 to 99.
+        second: Second interface, for a ring.
+        cpu: Processor of this process; None for any.
     """
     real_time = request_scheduling(priority=priority, cpu=cpu).real_time
     ready = partial(print, "ready", flush=True)

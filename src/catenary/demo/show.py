@@ -1,4 +1,4 @@
-"""The complete run of the demo, with its output."""
+"""Complete run of the demo, with its output."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def show(seconds: float, folder: Path, *, refused: str | None) -> None:
     Args:
         seconds: Duration of the motion [s].
         folder: Folder of `demo.json` and `demo.html`.
-        refused: Reason for running without real frames; None with real frames.
+        refused: Reason for a run without real frames; None for a run with real frames.
     """
     folder.mkdir(parents=True, exist_ok=True)
     result = run(seconds, refused=refused)
@@ -41,7 +41,7 @@ def show(seconds: float, folder: Path, *, refused: str | None) -> None:
 def run(seconds: float, *, refused: str | None) -> Result:
     with ground(refused) as here, cat.MainDevice(here.source) as main:
         if refused is not None:
-            print(f"no real frames here ({refused}): the segment runs in this process")
+            print(f"no real frames ({refused}): the segment runs in this process")
         arm = drives_of(main.scan())
         recording = Recording(seconds, len(arm))
         progress = ProgressBar(seconds)

@@ -12,14 +12,14 @@ from contextlib import contextmanager
 
 @contextmanager
 def on_enter(action: Callable[[], object], *, source: int | None = None) -> Iterator[bool]:
-    """Call `action()` in a thread whenever Enter is pressed within the block.
+    """Call `action()` in a thread whenever the user presses Enter during the block.
 
     Args:
         action: The function to call.
-        source: A file descriptor to read lines from; None: standard input, if it is a terminal.
+        source: File descriptor to read; None for standard input if it is a terminal.
 
     Yields:
-        True if Enter is read; False without a terminal.
+        True if Enter is detected; False without a terminal.
     """
     descriptor = terminal() if source is None else source
     if descriptor is None:

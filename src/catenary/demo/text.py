@@ -38,7 +38,7 @@ def longer(result: Result) -> str:
 
 
 class ProgressBar:
-    """Owns the last line of a terminal. Without a terminal it prints nothing."""
+    """Owner of the last line of a terminal. It prints nothing without a terminal."""
 
     def __init__(self, seconds: float, stream: TextIO | None = None) -> None:
         self._seconds = seconds
@@ -46,7 +46,7 @@ class ProgressBar:
         self._next = 0.0 if self._stream.isatty() else float("inf")
 
     def show(self, elapsed: float) -> None:
-        """Update the bar if `REDRAW_SECONDS` have passed. Cheap enough for every cycle."""
+        """Update the bar if `REDRAW_SECONDS` have passed, so that every cycle may call this."""
         if elapsed < self._next:
             return
         self._next = elapsed + REDRAW_SECONDS

@@ -1,6 +1,6 @@
-"""A segment from a file, served by another process on one end of a pair of interfaces.
+"""Virtual segment from a file, served by another process on one end of an interface pair.
 
-`python -m catenary.demo.wire NIC FILE` is that process.
+`python -m catenary.demo.wire NIC FILE` is this process.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from catenary.realtime.private_network import Private, state, veth_pair
 from catenary.virtual import read_segment
 
 START_SECONDS = 20.0
-PRIORITY = 80  # same as a loop: real devices do not wait for their MainDevice
+PRIORITY = 80  # same as a loop, because real devices do not wait for their MainDevice
 
 
 @contextmanager
@@ -36,7 +36,11 @@ def on_a_wire(path: str | Path) -> Iterator[LinkSource]:
         start_python(["-m", "catenary.demo.wire", theirs, str(path)]) as server,
     ):
         if server.read_line(START_SECONDS) is None:
-            raise LinkError("the virtual segment did not start", hint="see its message above")
+            raise LinkError(
+                "the virtual segment did not start: its process ended, or did not answer within "
+                f"{START_SECONDS:g} s",
+                hint="see the message of the process above, if there is one",
+            )
         yield Interface(ours)
 
 
@@ -47,10 +51,10 @@ def program_target(
     """Yield the target of a program.
 
     Args:
-        segment: File of a virtual segment, used without an interface.
-        interface: A network interface.
-        realtime: True to run the virtual segment on the machine's clock, see `on_a_wire`. False
-            yields the path of the file, for virtual time.
+        segment: File of a virtual segment, used if there is no interface.
+        interface: Network interface; None to use the virtual segment.
+        realtime: True to run the virtual segment on the machine's clock (see `on_a_wire`). False to
+            yield the path of the file, for virtual time.
     """
     if interface or not realtime:
         yield interface or str(segment)

@@ -1,11 +1,11 @@
 """Checks of a machine for a real-time loop: `catenary doctor`, docs/how_to/doctor.md.
 
-    machine = this_machine("eth0")              # asks the kernel and the driver, changes nothing
+    machine = this_machine("eth0")              # reads the kernel's and the driver's settings
     machine, latency = watch(machine, 3.0, cpu=None)
-    examination = examine(machine, latency)     # pure: from a Machine to verdicts
+    examination = examine(machine, latency)     # evaluates the settings; no I/O
     print(as_text(examination))
 
-It sends no frame and changes nothing; only `apply` and `undo` change settings.
+The checks send no frames. Only `apply` and `undo` change settings.
 """
 
 from catenary.doctor.change import (

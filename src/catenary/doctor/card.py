@@ -1,4 +1,4 @@
-"""Card: the settings that a network driver reports. A value; `ethtool.read_card` makes it."""
+"""Card: the settings that a network driver reports; `ethtool.read_card` reads them."""
 
 from __future__ import annotations
 
@@ -22,12 +22,12 @@ class Eee:
     """Energy-efficient Ethernet: `ethtool --show-eee`."""
 
     enabled: bool
-    active: bool  # agreed with the other end
+    active: bool  # negotiated with the other end
 
 
 @dataclass(frozen=True, slots=True)
 class Link:
-    """speed: [Mbit/s], or SPEED_UNKNOWN. full_duplex: None where it is not known."""
+    """Speed of a link [Mbit/s] or SPEED_UNKNOWN, and its duplex mode; None if unknown."""
 
     speed: int
     full_duplex: bool | None
@@ -35,10 +35,10 @@ class Link:
 
 @dataclass(frozen=True, slots=True)
 class Card:
-    """A network card. None: the driver does not report the value; `refusals` has its error.
+    """A network card. A value is None if the driver does not report it; `refusals` has the error.
 
-    index, hardware_type (ARPHRD_...), up, running: from the interface's own network namespace,
-    which /sys may not show. running: there is a carrier.
+    index, hardware_type (ARPHRD_...), up and running (there is a carrier) come from the network
+    namespace of the interface, which /sys may not show.
     """
 
     name: str

@@ -1,8 +1,8 @@
-"""Changes of `--apply`, and how `--undo` takes them back.
+"""Changes by `doctor --apply`, and their reversal by `--undo`.
 
-All changes are reversible: values of /proc or /sys, settings of the card's driver, and the folder
-of shares. The old values are saved on disk before anything is changed. A reboot undoes everything,
-too. Only `TARGETS` are written, whatever the state file contains.
+All changes are reversible: values in /proc or /sys, settings of the card's driver, and the folder
+of shares. Each old value is saved on disk before the change. A reboot also undoes all changes.
+Only `TARGETS` are ever written, whatever the state file contains.
 """
 
 from __future__ import annotations
@@ -23,8 +23,8 @@ from catenary.doctor.share_folder import read_folder, write_folder
 from catenary.errors import CatenaryError
 
 BOOT_ID = "/proc/sys/kernel/random/boot_id"
-ETHTOOL = "ethtool:"  # before NIC/SETTING, which is not a file
-FOLDER = "folder:"  # before the path of a folder
+ETHTOOL = "ethtool:"  # prefix of NIC/SETTING, which is not a file
+FOLDER = "folder:"  # prefix of the path of a folder
 CPU = r"/sys/devices/system/cpu/cpu\d+"
 NIC = r"[A-Za-z0-9][\w.:@-]*"
 TARGETS = (
@@ -45,7 +45,10 @@ class StateError(CatenaryError):
 
 @dataclass(frozen=True, slots=True)
 class Change:
-    """target: a file, `ethtool:eth0/rx-usecs` or `folder:/run/catenary`. after: the new value."""
+    """Change of a target to the value `after`.
+
+    The target is a file, `ethtool:NIC/SETTING` or `folder:/run/catenary`.
+    """
 
     target: str
     after: str
@@ -70,7 +73,7 @@ class Noted(msgspec.Struct, frozen=True):
 
 
 class Ground(Protocol):
-    """The target of changes: this machine, or a simulated one."""
+    """Machine to change: this machine or a simulated one."""
 
     def read(self, target: str) -> str: ...
     def write(self, target: str, value: str) -> None: ...
@@ -78,7 +81,7 @@ class Ground(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class MachineGround:
-    """This machine; `root` is the folder of its files. Raises OSError if refused."""
+    """This machine; `root` is the root folder of its files. Raises OSError if refused."""
 
     root: Path = Path("/")
 
@@ -112,27 +115,27 @@ def split(target: str) -> tuple[str, str]:
 
 
 def whole_number(value: str, target: str) -> int:
-    """Return the number. Raises OSError, as a driver that refuses a value."""
+    """Return the number. Raises OSError if the value is invalid, as a driver would."""
     if not re.fullmatch(r"\d{1,10}", value, re.ASCII):
         raise OSError(errno.EINVAL, f"{value!r} is not a number", target)
     return int(value)
 
 
 def chosen(text: str) -> str:
-    """Return the word in brackets if a file lists all possible values, else the text."""
+    """Return the word in brackets if the text lists all possible values, else the text."""
     words = [word for word in text.split() if word.startswith("[") and word.endswith("]")]
     return words[0][1:-1] if words else text
 
 
 class HostState:
-    """Owner of the state file: the changes since the machine was started."""
+    """Owner of the state file, which contains the changes since the machine was started."""
 
     def __init__(self, path: Path, boot: str) -> None:
         self.path = path
         self.boot = boot
 
     def load(self) -> list[Made]:
-        """Return the changes, oldest first; none if the machine was started again since.
+        """Return the changes, oldest first; none if the machine was rebooted since.
 
         Raises StateError if the file is damaged, or if another user could have written it.
         """
@@ -144,7 +147,7 @@ class HostState:
         except (OSError, msgspec.MsgspecError, UnicodeDecodeError, RecursionError) as error:
             raise StateError(
                 f"{self.path} cannot be read: {error}",
-                hint="a reboot undoes everything that --apply did; then delete the file",
+                hint="reboot to undo all changes by --apply, then delete the file",
             ) from error
         return noted.made if noted.boot == self.boot else []
 
@@ -155,8 +158,8 @@ class HostState:
             if status.st_uid != os.geteuid() or status.st_mode & 0o022:
                 raise StateError(
                     f"{self.path} belongs to user {status.st_uid} (mode "
-                    f"{status.st_mode & 0o7777:o}): its content is not written to this machine",
-                    hint="run --undo as the user who ran --apply; a reboot undoes everything, too",
+                    f"{status.st_mode & 0o7777:o}); its content is not trusted",
+                    hint="run --undo as the user who ran --apply, or reboot to undo all changes",
                 )
             return file.read()
 
@@ -168,7 +171,7 @@ class HostState:
             self.path.parent.mkdir(parents=True, exist_ok=True)
             with suppress(FileNotFoundError):
                 new.unlink()
-            # O_EXCL follows no link that another user has left there.
+            # O_EXCL does not follow a link that another user may have created.
             flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC
             with open(os.open(new, flags, 0o600), "wb") as file:
                 file.write(text + b"\n")
@@ -177,9 +180,9 @@ class HostState:
             new.replace(self.path)
         except OSError as error:
             raise StateError(
-                f"{self.path} cannot be written ({error.strerror}), so nothing is changed that "
-                "could not be undone",
-                hint="$XDG_STATE_HOME names another folder",
+                f"{self.path} cannot be written ({error.strerror}); no setting is changed if its "
+                "old value cannot be saved",
+                hint="set $XDG_STATE_HOME to a writable folder",
             ) from error
 
     def forget(self) -> None:
@@ -187,10 +190,9 @@ class HostState:
 
 
 def open_state() -> HostState:
-    """Return the state below $XDG_STATE_HOME if that is set, else in /run for root and in
-    ~/.local/state for others.
+    """Return the state file: in $XDG_STATE_HOME if set, else in /run for root or ~/.local/state.
 
-    /run/catenary is not used: a group may create files there.
+    It is not in /run/catenary, where a group of users may create files.
     """
     boot = Path(BOOT_ID).read_text().strip()
     folder = os.environ.get("XDG_STATE_HOME")
@@ -221,15 +223,15 @@ def apply(changes: Sequence[Change], ground: Ground, state: HostState) -> Iterat
 
 
 def undo(ground: Ground, state: HostState) -> Iterator[str]:
-    """Undo all changes, the last first, and yield a line with the result of each.
+    """Undo all changes in reverse order, and yield a line with the result of each.
 
-    Keep values that were changed since. Refused changes stay in the state file.
+    Keep values that were changed again since. Refused changes stay in the state file.
     """
     left: list[Made] = []
     for made in reversed(state.load()):
         try:
             if ground.read(made.target) != made.after:
-                yield f"not undone, because it was changed since: {made.target}"
+                yield f"not undone, because its value was changed again: {made.target}"
                 continue
             ground.write(made.target, made.before)
         except OSError as error:

@@ -1,4 +1,4 @@
-"""Check: one property of this machine, its verdict, and the commands that improve it."""
+"""Check: the verdict on one property of this machine, and the commands that improve it."""
 
 from __future__ import annotations
 
@@ -14,12 +14,11 @@ Status: TypeAlias = Literal["PASS", "WARN", "FAIL", "SKIP"]
 class Check:
     """Result of one check.
 
-    PASS: good. WARN: cycles may be late. FAIL: cycles will be late, or nothing runs at all.
+    PASS: good. WARN: cycles may be late. FAIL: cycles will be late, or the loop cannot run.
     SKIP: unknown on this machine; `found` has the reason.
 
-    id: its heading in docs/how_to/doctor.md.
-    advice: commands to type; empty if there is nothing to do.
-    changes: what `--apply` would change; all of them can be undone.
+    id: heading in docs/how_to/doctor.md. found: the result.
+    advice: commands to type; may be empty. changes: reversible changes that `--apply` makes.
     """
 
     id: str

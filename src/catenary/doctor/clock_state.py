@@ -6,7 +6,7 @@ import ctypes
 import time
 from dataclasses import dataclass
 
-NOMINAL_TICK_US = 10_000  # USER_HZ is 100 on all that Linux runs on
+NOMINAL_TICK_US = 10_000  # USER_HZ is 100 on the supported architectures
 FREQUENCY_UNIT = 65_536.0  # ppm in 16.16 bits
 STA_NANO = 0x2000  # linux/timex.h: offset in ns
 
@@ -15,8 +15,8 @@ STA_NANO = 0x2000  # linux/timex.h: offset in ns
 class ClockState:
     """Adjustment of the clock.
 
-    slew_ppm: present rate of CLOCK_MONOTONIC relative to the crystal; positive: fast.
-    offset: time still to be slewed [s]. resolution: resolution of timers [s].
+    slew_ppm: current rate deviation of CLOCK_MONOTONIC from the crystal; positive if fast.
+    offset: remaining time to slew [s]. resolution: resolution of timers [s].
     """
 
     slew_ppm: float
@@ -25,7 +25,7 @@ class ClockState:
 
 
 class Timex(ctypes.Structure):
-    """The used part of `struct timex` of linux/timex.h."""
+    """`struct timex` of linux/timex.h; `rest` covers the unused fields."""
 
     _fields_ = (
         ("modes", ctypes.c_uint),

@@ -1,7 +1,7 @@
-"""Checks of the machine's clocks: the cost of reading them, and the daemons that slew them.
+"""Checks of the machine's clocks: the cost of a reading, and daemons that change their rate.
 
-A loop keeps its period by CLOCK_MONOTONIC. Steps of the time of day do not affect this clock, but
-a daemon that corrects the time of day slews its rate.
+A loop uses CLOCK_MONOTONIC for its period. Steps of the time of day do not affect this clock, but
+a daemon that corrects the time of day changes its rate.
 """
 
 from __future__ import annotations
@@ -13,14 +13,14 @@ from catenary.doctor.machine import Machine
 
 SOURCE = "/sys/devices/system/clocksource/clocksource0/current_clocksource"
 FAST_SOURCES = {"tsc", "arch_sys_counter", "kvm-clock", "hyperv_clocksource_tsc_page", "riscv"}
-HARMLESS_PPM = 500.0  # maximum of the kernel's own correction: 0.5 us in 1 ms
+HARMLESS_PPM = 500.0  # maximum correction by the kernel itself: 0.5 us in 1 ms
 LARGEST_SLEW = {  # [ppm] default maximum of each daemon
     "chronyd": 83_333.333,  # maxslewrate, chrony.conf(5)
     "ptp4l": 900_000.0,  # max_frequency, ptp4l(8)
     "phc2sys": 900_000.0,
     "ntpd": HARMLESS_PPM,  # ntpd(8)
     "openntpd": HARMLESS_PPM,
-    "systemd-timesyn": HARMLESS_PPM,  # comm has 15 letters: systemd-timesyncd
+    "systemd-timesyn": HARMLESS_PPM,  # comm has 15 characters of systemd-timesyncd
 }
 CHRONY_FILES = ("/etc/chrony/chrony.conf", "/etc/chrony.conf", "/etc/chrony/conf.d/*.conf")
 
@@ -32,12 +32,12 @@ def source(machine: Machine) -> Check:
         return skipped(id, machine.lack(SOURCE))
     if name in FAST_SOURCES or name.startswith("riscv"):
         return passed(id, name)
-    reading = f"{name}: reading the time takes a system call, and up to microseconds"
+    reading = f"{name}: reading the time needs a system call, which can take microseconds"
     available = (machine.text(SOURCE.replace("current", "available")) or "").split()
-    better = [one for one in available if one in FAST_SOURCES]
+    better = [candidate for candidate in available if candidate in FAST_SOURCES]
     if better:
-        return failed(id, reading, f"echo {better[0]} | sudo tee {SOURCE}; see dmesg for why not")
-    return failed(id, reading, "the kernel found no better one: `dmesg | grep -i clocksource`")
+        return failed(id, reading, f"echo {better[0]} | sudo tee {SOURCE}; dmesg shows the cause")
+    return failed(id, reading, "no faster clock is available: `dmesg | grep -i clocksource`")
 
 
 def slewing(machine: Machine) -> Check:
@@ -46,9 +46,9 @@ def slewing(machine: Machine) -> Check:
     if now is not None and abs(now.slew_ppm) > HARMLESS_PPM:
         return warned(
             id,
-            f"the clock is being slewed by {now.slew_ppm:+.0f} ppm now: a period of 1 ms "
-            f"is {1.0 + now.slew_ppm * 1e-6:.6f} ms of the crystal",
-            "wait until it has settled, or correct the time before the loop starts",
+            f"the clock currently slews by {now.slew_ppm:+.0f} ppm: a period of 1 ms is "
+            f"{1.0 + now.slew_ppm * 1e-6:.6f} ms of the crystal",
+            "wait until the clock has settled, or correct the time before the loop starts",
         )
     daemons = {name: ppm for name, ppm in LARGEST_SLEW.items() if name in machine.processes}
     if "chronyd" in daemons:
@@ -60,14 +60,16 @@ def slewing(machine: Machine) -> Check:
             f"{' and '.join(strong)} may slew the clock by up to {daemons[strong[0]]:.0f} ppm",
             "chrony: `maxslewrate 100` in /etc/chrony/chrony.conf; sudo systemctl restart chrony"
             if "chronyd" in strong
-            else "`max_frequency 500000` (ppb) in its configuration file",
+            else f"`max_frequency 500000` (ppb) in the configuration of {strong[0]}",
         )
     if now is None:
-        return skipped(id, "the kernel does not report how its clock is adjusted")
-    who = (
-        f"{' and '.join(daemons)}, at most {HARMLESS_PPM:.0f} ppm" if daemons else "no daemon seen"
+        return skipped(id, "the kernel does not report the adjustment of its clock")
+    daemon_text = (
+        f"{' and '.join(daemons)}, at most {HARMLESS_PPM:.0f} ppm"
+        if daemons
+        else "no time daemon detected"
     )
-    return passed(id, f"{who}; {now.slew_ppm:+.1f} ppm now")
+    return passed(id, f"{daemon_text}; currently {now.slew_ppm:+.1f} ppm")
 
 
 def chrony_limit(machine: Machine) -> float:

@@ -1,7 +1,7 @@
-"""The ethtool requests of a network driver (linux/ethtool.h), without the ethtool program.
+"""Requests to a network driver (linux/ethtool.h), without the ethtool program.
 
-Reading needs no privilege. The two changes (coalescing, EEE) read the whole structure, change one
-field and write it back, as ethtool does.
+Reading needs no privilege. To change coalescing or EEE, read the whole structure, change one field
+and write it back, as ethtool does.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ MODE_WORDS_AT = 15  # link_mode_masks_nwords, a signed byte
 FLAG_LRO = 1 << 15
 DUPLEX = {0: False, 1: True}  # 0xFF: unknown
 
-SETTINGS = {  # of changes: (how to read, how to write, size, byte of the field)
+SETTINGS = {  # (command to read, command to write, size of the structure, offset of the field)
     "rx-usecs": (GCOALESCE, SCOALESCE, COALESCE_SIZE, 4),
     "adaptive-rx": (GCOALESCE, SCOALESCE, COALESCE_SIZE, 40),
     "eee": (GEEE, SEEE, EEE_SIZE, 20),
@@ -49,23 +49,23 @@ def request(name: str, command: int, size: int, start: bytes = b"") -> bytes:
     """
     buffer = array.array("B", (struct.pack("=I", command) + start).ljust(size, b"\0"))
     interface = struct.pack("16sP16x", name.encode(), buffer.buffer_info()[0])  # struct ifreq
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as asking:
-        fcntl.ioctl(asking, SIOCETHTOOL, interface)
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as control:
+        fcntl.ioctl(control, SIOCETHTOOL, interface)
     return buffer.tobytes()
 
 
 def read_card(name: str) -> Card:
-    """Return all settings that the driver of an interface reports; `refusals` has the errors."""
+    """Return all settings that the driver of an interface reports, and its errors."""
     refusals: dict[str, str] = {}
 
-    def ask(what: str, question: Callable[[str], Answer]) -> Answer | None:
+    def attempt(what: str, read: Callable[[str], Answer]) -> Answer | None:
         try:
-            return question(name)
+            return read(name)
         except OSError as error:
             refusals[what] = refusal(error)
             return None
 
-    driver, bus = ask("driver", read_driver) or ("", "")
+    driver, bus = attempt("driver", read_driver) or ("", "")
     flags = interface_word(name, SIOCGIFFLAGS)
     return Card(
         name,
@@ -75,19 +75,19 @@ def read_card(name: str) -> Card:
         running=bool(flags & IFF_RUNNING),
         driver=driver,
         bus=bus,
-        link=ask("link", read_link),
-        coalescing=ask("coalescing", read_coalescing),
-        eee=ask("eee", read_eee),
-        gro=ask("gro", lambda name: flag(request(name, GGRO, 8), 1)),
-        lro=ask("lro", lambda name: flag(request(name, GFLAGS, 8), FLAG_LRO)),
+        link=attempt("link", read_link),
+        coalescing=attempt("coalescing", read_coalescing),
+        eee=attempt("eee", read_eee),
+        gro=attempt("gro", lambda name: flag(request(name, GGRO, 8), 1)),
+        lro=attempt("lro", lambda name: flag(request(name, GFLAGS, 8), FLAG_LRO)),
         refusals=refusals,
     )
 
 
 def interface_word(name: str, command: int) -> int:
     """Return the first 16 bits of the answer to a SIOCGIF* request (`struct ifreq`)."""
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as asking:
-        answer = fcntl.ioctl(asking, command, struct.pack("16s24x", name.encode()))
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as control:
+        answer = fcntl.ioctl(control, command, struct.pack("16s24x", name.encode()))
     return int(struct.unpack_from("=H", answer, 16)[0])
 
 
@@ -138,7 +138,7 @@ def decode_eee(answer: bytes) -> Eee:
 
 
 def flag(answer: bytes, mask: int) -> bool:
-    """Return a flag of `struct ethtool_value`."""
+    """Return True if a flag of `struct ethtool_value` is set."""
     return bool(struct.unpack_from("=2I", answer)[1] & mask)
 
 

@@ -1,4 +1,4 @@
-"""All checks, in the order of the report: machine first, measurement last."""
+"""Examination: all checks in the order of the report, from the kernel to the measured latency."""
 
 from __future__ import annotations
 
@@ -24,12 +24,12 @@ GROUPS: tuple[tuple[str, Sequence[Callable[[Machine], Check]]], ...] = (
     ("permissions", permissions.CHECKS),
 )
 CARD_CHECKS = (*network.CHECKS, *interrupts.CHECKS)
-CHANGES_THE_PORT = "nic-"  # ids whose changes touch the card
+CARD_PREFIX = "nic-"  # of the checks whose changes affect the card
 
 
 @dataclass(frozen=True, slots=True)
 class Examination:
-    """Results of all checks. groups: titles and checks, in order. latency: None if not measured."""
+    """Results of all checks, in titled groups. `latency` is None if it was not measured."""
 
     groups: tuple[tuple[str, tuple[Check, ...]], ...]
     latency: Latency | None = None
@@ -44,18 +44,18 @@ class Examination:
 
     @property
     def changes(self) -> tuple[Change, ...]:
-        """Changes that `--apply` may make; none to a port that carries this machine's network."""
+        """Changes that `--apply` may make; none to a port with the default route."""
         in_use = any(check.id == "nic-use" and check.status == "FAIL" for check in self.checks)
         return tuple(
             change
             for check in self.checks
             for change in check.changes
-            if not (in_use and check.id.startswith(CHANGES_THE_PORT))
+            if not (in_use and check.id.startswith(CARD_PREFIX))
         )
 
 
 def examine(machine: Machine, latency: Latency | None = None) -> Examination:
-    """Run all checks on a machine. `latency`: as measured on it; None: not measured."""
+    """Run all checks on a machine. `latency` is None if it was not measured."""
     groups = [(title, tuple(check(machine) for check in checks)) for title, checks in GROUPS]
     card = machine.card
     if card is None:
@@ -70,17 +70,17 @@ def examine(machine: Machine, latency: Latency | None = None) -> Examination:
 def no_card(machine: Machine) -> Check:
     names = [path.rpartition("/")[2] for path in machine.matching("/sys/class/net/*")]
     cards = [name for name in names if machine.exists(f"/sys/class/net/{name}/device")]
-    there = f"there is {', '.join(cards)}" if cards else "there is no card here"
-    return skipped("nic", f"none was named; {there}", "catenary doctor NIC")
+    found = f"this machine has {', '.join(cards)}" if cards else "this machine has no card"
+    return skipped("nic", f"no card was given; {found}", "catenary doctor NIC")
 
 
 def watch(machine: Machine, seconds: float, *, cpu: int | None) -> tuple[Machine, Latency]:
-    """Measure how late threads wake, and count the frames sent on the port meanwhile.
+    """Measure the wake-up latency, and count the frames that the card sends during this time.
 
     Args:
         machine: the machine to measure.
         seconds: duration [s].
-        cpu: processor of the measuring thread; None: any.
+        cpu: processor of the measuring thread; None for any.
 
     Returns:
         The machine with `watched` and `sent`, and the latency.
@@ -95,11 +95,11 @@ def watch(machine: Machine, seconds: float, *, cpu: int | None) -> tuple[Machine
 def this_machine(
     nic: str | None, *, cpu: int | None = None, period: float = 1e-3, priority: int = 80
 ) -> Machine:
-    """Return this machine as the checks need it.
+    """Return this machine, with the settings that the checks need.
 
     Args:
-        nic: network interface; None: no card is checked.
-        cpu: processor of the loop; None: chosen by the doctor.
+        nic: network interface; None to check no card.
+        cpu: processor of the loop; None for an isolated CPU, else the last one.
         period: period of the loop [s].
         priority: SCHED_FIFO priority of the loop's thread.
 
@@ -117,8 +117,8 @@ def this_machine(
         priority=priority,
     )
     if cpu is not None and cpu not in machine.cpus:
-        there = ", ".join(map(str, sorted(machine.cpus)))
-        raise ValueError(f"CPU {cpu} does not exist or is switched off; there are: {there}")
+        online = ", ".join(map(str, sorted(machine.cpus)))
+        raise ValueError(f"CPU {cpu} does not exist or is offline; online CPUs: {online}")
     return machine
 
 
@@ -126,6 +126,6 @@ def known_card(nic: str) -> Card:
     names = [name for _, name in socket.if_nameindex()]
     if nic not in names:
         raise LinkError(
-            f"there is no network interface {nic!r}", hint=f"there are: {', '.join(names)}"
+            f"there is no network interface {nic!r}", hint=f"use one of {', '.join(names)}"
         )
     return read_card(nic)

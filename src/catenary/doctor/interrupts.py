@@ -1,4 +1,4 @@
-"""Checks of the CPUs that handle the card's interrupts, and whether a loop may busy-wait."""
+"""Checks of the CPUs that handle the card's interrupts, and of busy-waiting in a loop."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from catenary.doctor.machine import Machine, as_list, cpu_list
 
 
 def card_interrupts(machine: Machine, card: Card) -> list[int]:
-    """Return its interrupt numbers in /proc/interrupts, by name or device; else the MSI ones."""
+    """Return the card's interrupts in /proc/interrupts, or its MSI interrupts if there are none."""
     place = f"/sys/class/net/{card.name}"
     names = [card.name, *filter(None, [device_name(machine, place)])]
     known = "|".join(map(re.escape, names))
@@ -23,13 +23,13 @@ def card_interrupts(machine: Machine, card: Card) -> list[int]:
 
 
 def device_name(machine: Machine, place: str) -> str:
-    """Return the device name of a paravirtual card, such as virtio3: its interrupts have it."""
+    """Return the device name, such as virtio3, which interrupts of paravirtual cards have."""
     device = machine.path(f"{place}/device")
     return device.resolve().name if device.exists() else ""
 
 
-def carriers(machine: Machine, numbers: list[int]) -> dict[int, frozenset[int]]:
-    """Return the CPUs that each interrupt may go to, without interrupts of unknown affinity."""
+def handling_cpus(machine: Machine, numbers: list[int]) -> dict[int, frozenset[int]]:
+    """Return the CPUs that handle each interrupt, without interrupts of unknown affinity."""
     lists = {
         number: machine.text(f"/proc/irq/{number}/effective_affinity_list")
         or machine.text(f"/proc/irq/{number}/smp_affinity_list")
@@ -41,16 +41,16 @@ def carriers(machine: Machine, numbers: list[int]) -> dict[int, frozenset[int]]:
 def interrupts(machine: Machine, card: Card) -> Check:
     """Check the affinity of interrupts: Documentation/core-api/irq/irq-affinity.rst."""
     id = "nic-interrupts"
-    affinities = carriers(machine, card_interrupts(machine, card))
+    affinities = handling_cpus(machine, card_interrupts(machine, card))
     if not affinities:
-        return skipped(id, f"/proc/interrupts names none of {card.name}")
+        return skipped(id, f"/proc/interrupts lists no interrupt of {card.name}")
     allowed = {n: cpu_list(machine.text(f"/proc/irq/{n}/smp_affinity_list")) for n in affinities}
     wide = [n for n, cpus in allowed.items() if len(cpus) > 1 and len(machine.cpus) > 1]
     where = as_list(frozenset().union(*affinities.values()))
     if "irqbalance" in machine.processes:
         return warned(
             id,
-            f"irqbalance moves them about (now on CPU {where})",
+            f"irqbalance moves the interrupts between CPUs (now on CPU {where})",
             "sudo systemctl disable --now irqbalance",
         )
     if wide:
@@ -58,37 +58,42 @@ def interrupts(machine: Machine, card: Card) -> Check:
         paths = [f"/proc/irq/{number}/smp_affinity_list" for number in wide]
         return warned(
             id,
-            f"{as_list(wide)}: on CPU {where} now, free to move",
+            f"interrupts {as_list(wide)} are on CPU {where} now, but not bound to one CPU",
             f"echo {home} | sudo tee {' '.join(paths)}",
             tuple(Change(path, str(home)) for path in paths),
         )
-    return passed(id, f"{as_list(affinities)}: bound to CPU {where}")
+    return passed(id, f"interrupts {as_list(affinities)} are bound to CPU {where}")
 
 
 def spinning(machine: Machine, card: Card) -> Check:
     """Check whether a loop may busy-wait (`receive="busy"`).
 
-    On the CPU that handles the answers it would lose every frame: the interrupt's work never runs.
+    On the CPU that handles the card's interrupts, it would lose every frame, because the deferred
+    interrupt work would never run.
     """
     id, cpu = "spin", machine.loop_cpu
     if len(machine.cpus) < 2:
-        return warned(id, "unsafe: one CPU", 'the default, receive="wait"')
-    affinities = carriers(machine, card_interrupts(machine, card))
+        return warned(id, "unsafe: there is only one CPU", 'use receive="wait" (the default)')
+    affinities = handling_cpus(machine, card_interrupts(machine, card))
     if not affinities:
-        return warned(id, "unsafe: the CPU that handles answers is unknown", 'receive="wait"')
+        return warned(
+            id,
+            "unsafe: the CPU that handles the card's interrupts is unknown",
+            'use receive="wait" (the default)',
+        )
     if any(cpu in cpus for cpus in affinities.values()):
         return warned(
             id,
-            f"unsafe: CPU {cpu}, the loop's, also carries the card's answers",
-            'receive="wait" (the default), or the interrupts elsewhere (nic-interrupts)',
+            f"unsafe: CPU {cpu} runs the loop and also handles the card's interrupts",
+            'use receive="wait" (the default), or move the interrupts (nic-interrupts)',
         )
     if cpu not in machine.isolated_cpus:
         return warned(
             id,
             f"unsafe: other programs also use CPU {cpu} (cpu-isolated)",
-            'receive="wait" (the default)',
+            'use receive="wait" (the default)',
         )
-    return passed(id, f"safe on CPU {cpu}: the answers come by CPU {others(affinities)}")
+    return passed(id, f"safe on CPU {cpu}: CPU {others(affinities)} handles the interrupts")
 
 
 def others(affinities: dict[int, frozenset[int]]) -> str:

@@ -7,7 +7,7 @@ import re
 from catenary.doctor.check import Check, failed, passed, skipped, warned
 from catenary.doctor.machine import Machine
 
-CONFIGURED = {  # the default of the kernel's configuration: kernel/Kconfig.preempt
+CONFIGURED = {  # default model by configuration option, kernel/Kconfig.preempt
     "CONFIG_PREEMPT_RT": "rt",
     "CONFIG_PREEMPT": "full",
     "CONFIG_PREEMPT_LAZY": "lazy",
@@ -42,14 +42,16 @@ def preemption(machine: Machine) -> Check:
     if model == "full":
         return warned(id, f"full preemption, not PREEMPT_RT ({release})", realtime_kernel(machine))
     if model:
-        return failed(id, f"preemption {model} ({release})", realtime_kernel(machine))
-    return warned(id, f"not PREEMPT_RT, model not told ({release})", realtime_kernel(machine))
+        return failed(id, f"preemption model: {model} ({release})", realtime_kernel(machine))
+    return warned(
+        id, f"not PREEMPT_RT, preemption model unknown ({release})", realtime_kernel(machine)
+    )
 
 
 def realtime_kernel(machine: Machine) -> str:
-    """Return how to get a real-time kernel on this distribution."""
+    """Return the advice for a real-time kernel on this distribution."""
     if machine.virtual or machine.container:
-        return "a PREEMPT_RT kernel on the host; figures of a guest or container follow its host's"
+        return "use a PREEMPT_RT kernel on the host; its latency limits all guests and containers"
     found = re.search(r'^ID="?(\w+)', machine.text("/etc/os-release") or "", re.MULTILINE)
     distribution = found[1] if found else ""
     if distribution == "debian":
@@ -57,11 +59,11 @@ def realtime_kernel(machine: Machine) -> str:
         return f"sudo apt install linux-image-rt-{architecture}; then reboot into it"
     if distribution == "ubuntu":
         return "sudo pro enable realtime-kernel; then reboot (Ubuntu Pro, free for personal use)"
-    return "a kernel with CONFIG_PREEMPT_RT=y: your distribution's, or mainline from 6.12"
+    return "use a kernel with CONFIG_PREEMPT_RT=y: your distribution's, or mainline from 6.12"
 
 
 def throttling(machine: Machine) -> Check:
-    """Check throttling: real-time threads together get `runtime` of each `period`, sched(7)."""
+    """Check throttling: the share of each period for all real-time threads together, sched(7)."""
     id, path = "kernel-rt-throttling", "/proc/sys/kernel/sched_rt_runtime_us"
     runtime = machine.number(path)
     if runtime is None:
@@ -73,12 +75,12 @@ def throttling(machine: Machine) -> Check:
     if share >= 90:
         return passed(
             id,
-            f"real-time threads get up to {share:.0f} % of {period / 1e6:g} s: enough for a loop, "
-            "which sleeps in every cycle",
+            f"real-time threads may use {share:.0f} % of every {period / 1e6:g} s; this is enough, "
+            "because a loop sleeps in every cycle",
         )
     return failed(
         id,
-        f"real-time threads are stopped after {share:.0f} % of {period / 1e6:g} s",
+        f"the kernel stops real-time threads after {share:.0f} % of every {period / 1e6:g} s",
         "sudo sysctl kernel.sched_rt_runtime_us=950000",
     )
 
@@ -86,25 +88,25 @@ def throttling(machine: Machine) -> Check:
 def timers(machine: Machine) -> Check:
     id = "kernel-timers"
     if machine.clock is None:
-        return skipped(id, "the kernel does not report its timers' resolution")
+        return skipped(id, "the kernel does not report the resolution of its timers")
     resolution = machine.clock.resolution
     if resolution <= SHARP_TIMERS:
         return passed(id, f"high resolution ({resolution * 1e9:.0f} ns)")
     return failed(
         id,
-        f"timers are {resolution * 1e3:g} ms coarse: no period shorter than that is kept",
-        "a kernel with CONFIG_HIGH_RES_TIMERS=y, started without highres=off",
+        f"timers have a resolution of {resolution * 1e3:g} ms, so shorter periods are impossible",
+        "use a kernel with CONFIG_HIGH_RES_TIMERS=y, and do not start it with highres=off",
     )
 
 
 def virtual_machine(machine: Machine) -> Check:
     id = "virtual-machine"
     if not machine.virtual:
-        return passed(id, "none seen")
+        return passed(id, "none detected")
     return warned(
         id,
-        f"this is a virtual machine: {machine.virtual}; its host may stop it for milliseconds",
-        "run the loop on real hardware; a guest is good for programs on virtual segments "
+        f"virtual machine ({machine.virtual}): its host may stop it for milliseconds",
+        "run motors from real hardware; use a virtual machine for virtual segments "
         '(cat.MainDevice("virtual"))',
     )
 

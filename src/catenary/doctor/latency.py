@@ -1,7 +1,7 @@
-"""Wake-up latency of this machine, measured as cyclictest does: absolute times, a histogram.
+"""Wake-up latency of this machine, measured with absolute times as cyclictest does.
 
 The thread is a `realtime.Task` in a `realtime.session()`, as in a user's program: SCHED_FIFO,
-locked memory, processors kept awake. `scheduling` lists the settings that were refused.
+locked memory, no deep sleep. `scheduling` lists the settings that were refused.
 """
 
 from __future__ import annotations
@@ -21,16 +21,16 @@ GOOD_SHARE, BAD_SHARE = 0.1, 0.5  # of the period
 
 @dataclass(frozen=True, slots=True)
 class Latency:
-    """Latency of all wake-ups: time from the planned wake-up until the thread ran, Python included.
+    """Latency of all wake-ups: time from the planned wake-up until the thread runs in Python.
 
-    Times in [s]. histogram: (from, to, wake-ups) of all buckets that are not empty.
+    Times in [s]. histogram: (lower edge, upper edge, wake-ups) of all non-empty buckets.
     """
 
     seconds: float
     period: float
     cpu: int | None
     lateness: Figure
-    missed: int  # wake-ups that came a whole period late
+    missed: int  # wake-ups that were late by a whole period or more
     scheduling: str
     histogram: tuple[tuple[float, float, int], ...]
 
@@ -41,13 +41,13 @@ def wake_up(task: Running) -> None:
 
 
 def measure(seconds: float, *, period: float, priority: int, cpu: int | None) -> Latency:
-    """Wake a thread periodically, and measure how late it runs.
+    """Wake a thread periodically, and measure its latency.
 
     Args:
         seconds: duration [s].
         period: period of the wake-ups [s].
         priority: SCHED_FIFO priority of the thread.
-        cpu: processor of the thread; None: any.
+        cpu: processor of the thread; None for any.
 
     Raises:
         ValueError: the CPU does not exist.
@@ -72,9 +72,9 @@ def measure(seconds: float, *, period: float, priority: int, cpu: int | None) ->
 
 
 def obtainable_cpu(machine: Machine) -> int | None:
-    """Return the loop's CPU; None if this container may not use it."""
-    cpu, ours = machine.loop_cpu, os.sched_getaffinity(0)
-    return cpu if cpu in ours or may_have(cpu, ours) else None
+    """Return the loop's CPU; None if this process may not use it."""
+    cpu, allowed = machine.loop_cpu, os.sched_getaffinity(0)
+    return cpu if cpu in allowed or may_have(cpu, allowed) else None
 
 
 def judge(latency: Latency | None, machine: Machine) -> Check:
@@ -84,18 +84,18 @@ def judge(latency: Latency | None, machine: Machine) -> Check:
         return skipped(id, "not measured", "catenary doctor --seconds 3")
     figure, period = latency.lateness, latency.period
     found = (
-        f"{figure.count} wake-ups of {period * 1e6:g} us: median {figure.p50 * 1e6:.1f}, "
-        f"p99.9 {figure.p999 * 1e6:.1f}, worst {figure.max * 1e6:.1f} us late "
-        f"({latency.scheduling})"
+        f"{figure.count} wake-ups with a period of {period * 1e6:g} us: median "
+        f"{figure.p50 * 1e6:.1f}, p99.9 {figure.p999 * 1e6:.1f}, worst {figure.max * 1e6:.1f} us "
+        f"late ({latency.scheduling})"
     )
     if figure.max <= GOOD_SHARE * period:
         return passed(id, found)
     advice = (
-        "first what failed above; then again for longer and under load: "
-        "`catenary doctor --seconds 600` beside `stress-ng --cpu 0 --vm 2 --hdd 1`"
+        "fix the failed checks above, then measure longer and under load: "
+        "`catenary doctor --seconds 600` while `stress-ng --cpu 0 --vm 2 --hdd 1` runs"
     )
     if "SCHED_FIFO" not in latency.scheduling or "refused" in latency.scheduling:
-        advice = "first the permissions (limit-rtprio, limit-memlock), then again"
+        advice = "fix the permissions first (limit-rtprio, limit-memlock), then measure again"
     elif machine.virtual:
-        advice = "a virtual machine is late whenever its host is; measure on the real one"
+        advice = "the host can delay a virtual machine at any time; measure on real hardware"
     return (warned if figure.max <= BAD_SHARE * period else failed)(id, found, advice)

@@ -1,4 +1,4 @@
-"""Machine: properties that the kernel reports in files, below a root that a test can create."""
+"""Machine: properties that the kernel reports in files, below a root folder that tests replace."""
 
 from __future__ import annotations
 
@@ -22,11 +22,11 @@ CAP_NET_RAW, CAP_IPC_LOCK, CAP_SYS_NICE = 13, 14, 23  # linux/capability.h
 class Machine:
     """A read-only view of a machine.
 
-    card: the settings of the network card; None: no card was named.
-    clock: adjustment of the kernel's clock; None: not reported.
-    wanted_cpu: the CPU of the loop, if the user named one.
+    card: settings of the network card; None if no card was given.
+    clock: adjustment of the kernel's clock; None if the kernel does not report it.
+    wanted_cpu: CPU of the loop; None if the user gave none.
     period: period of the loop [s]. priority: SCHED_FIFO priority of its thread.
-    watched: time for which the card's port was watched [s]. sent: frames sent meanwhile.
+    watched: time for which the card's frames were counted [s]. sent: frames sent in this time.
     """
 
     root: Path = Path("/")
@@ -57,19 +57,19 @@ class Machine:
         return int(text) if text is not None and re.fullmatch(r"-?\d+", text) else None
 
     def lack(self, path: str) -> str:
-        """Return why a file has no usable text."""
+        """Return the reason why a file has no usable text."""
         try:
             self.path(path).read_bytes()
         except PermissionError:
-            return f"{path} may not be read by this user"
+            return f"this user may not read {path}"
         except FileNotFoundError:
             return f"this kernel has no {path}"
         except OSError as error:
             return f"{path}: {error.strerror}"
-        return f"{path} holds {self.text(path)!r}"
+        return f"{path} contains {self.text(path)!r}"
 
     def matching(self, pattern: str) -> list[str]:
-        """Return the matching paths, as the kernel names them, in natural order."""
+        """Return the matching paths, without the root folder, in natural order."""
         found = (f"/{path.relative_to(self.root)}" for path in self.root.glob(pattern.lstrip("/")))
         return sorted(found, key=natural)
 
@@ -119,7 +119,7 @@ class Machine:
 
     @cached_property
     def allowed_cpus(self) -> frozenset[int]:
-        """CPUs that this process is scheduled on; isolated CPUs must be requested by number."""
+        """CPUs that this process may use by default; isolated CPUs are usually not among them."""
         return cpu_list(self.status_field("Cpus_allowed_list"))
 
     @cached_property
@@ -129,7 +129,7 @@ class Machine:
 
     @cached_property
     def loop_cpu(self) -> int:
-        """Best CPU for the loop: the one named, else the last isolated CPU, else the last CPU."""
+        """CPU of the loop: the one given, else the last isolated CPU, else the last CPU."""
         if self.wanted_cpu is not None:
             return self.wanted_cpu
         return max(self.isolated_cpus or self.allowed_cpus or self.cpus)
@@ -144,7 +144,7 @@ class Machine:
         return found[1].strip() if found else None
 
     def limit(self, name: str) -> str | None:
-        """Return the soft limit of /proc/self/limits as text."""
+        """Return a soft limit of /proc/self/limits as text."""
         text = self.text("/proc/self/limits") or ""
         found = re.search(rf"^{re.escape(name)}\s+(\S+)", text, re.MULTILINE)
         return found[1] if found else None
@@ -154,7 +154,7 @@ class Machine:
 
     @cached_property
     def in_user_namespace(self) -> bool:
-        """True in a user namespace: its capabilities do not cover processors and memory."""
+        """True in a user namespace, whose capabilities do not extend to scheduling and memory."""
         text = self.text("/proc/self/uid_map")
         return text is not None and tuple(map(int, text.split())) != INITIAL_USER_NAMESPACE
 
@@ -164,10 +164,10 @@ class Machine:
         if kind := self.text("/sys/hypervisor/type"):
             return kind
         if self.exists("/proc/device-tree/hypervisor"):
-            return "a hypervisor (device tree)"
+            return "unknown hypervisor, device tree"
         if re.search(r"^flags\s*:.*\bhypervisor\b", self.text("/proc/cpuinfo") or "", re.MULTILINE):
             names = (self.text(f"/sys/class/dmi/id/{name}") for name in DMI_NAMES)
-            return " ".join(filter(None, names)) or "a hypervisor (/proc/cpuinfo)"
+            return " ".join(filter(None, names)) or "unknown hypervisor, /proc/cpuinfo"
         return ""
 
     @cached_property
@@ -181,7 +181,7 @@ class Machine:
 
 
 DMI_NAMES = ("sys_vendor", "product_name")
-CONTAINER_FILES = {  # as in systemd-detect-virt; "": the file's text names the kind
+CONTAINER_FILES = {  # as in systemd-detect-virt; "" if the file's text is the kind
     "/run/systemd/container": "",
     "/run/.containerenv": "podman",
     "/.dockerenv": "docker",
@@ -194,7 +194,7 @@ def natural(text: str) -> list[tuple[int, str]]:
 
 
 def cpu_list(text: str | None) -> frozenset[int]:
-    """Parse `0-3,8` of cpuset(7). Return an empty set for no text and for nohz_full's `(null)`."""
+    """Parse a list such as `0-3,8`, cpuset(7). No text and `(null)` give an empty set."""
     cpus: set[int] = set()
     for part in (text or "").split(","):
         if found := re.fullmatch(r"\s*(\d+)(?:-(\d+))?\s*", part):
@@ -203,7 +203,7 @@ def cpu_list(text: str | None) -> frozenset[int]:
 
 
 def as_list(cpus: Iterable[int]) -> str:
-    """Return the shortest list for the kernel: `0-3,8`."""
+    """Format CPUs as the shortest list that the kernel accepts, such as `0-3,8`."""
     runs: list[list[int]] = []
     for cpu in sorted(cpus):
         if runs and cpu == runs[-1][1] + 1:

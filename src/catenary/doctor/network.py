@@ -21,12 +21,12 @@ GOOD_DRIVERS = {
     "fec": "NXP",
 }
 DOUBTFUL_DRIVERS = {
-    "e1000e": "good with the 82574L; with the I219 of many laptops users report late answers",
-    "r8169": "works, with late answers now and then; its EEE and interrupt moderation off",
-    "tg3": "not much is known of it with EtherCAT",
-    "virtio_net": "the host's software stands between it and any cable",
-    "vmxnet3": "the host's software stands between it and any cable",
-    "xen_netfront": "the host's software stands between it and any cable",
+    "e1000e": "good with the 82574L; users report late frames with the I219 of many laptops",
+    "r8169": "works with occasional late frames; disable EEE and interrupt moderation",
+    "tg3": "little is known about its use with EtherCAT",
+    "virtio_net": "a virtual card: all frames pass through the host's software",
+    "vmxnet3": "a virtual card: all frames pass through the host's software",
+    "xen_netfront": "a virtual card: all frames pass through the host's software",
 }
 VIRTUAL_DRIVERS = {"veth", "tun", "dummy", "bridge", "bonding", "macvlan", "macvtap", "team"}
 NEIGHBOURS = ("lldpd", "avahi-daemon", "dhcpcd", "dhclient", "snmpd", "ladvd")
@@ -37,9 +37,9 @@ def directory(card: Card) -> str:
 
 
 def is_virtual(machine: Machine, card: Card) -> bool:
-    """Return True if no hardware is behind the interface.
+    """Return True if the interface has no hardware.
 
-    /sys may belong to another network namespace and lack the interface.
+    Return False if /sys lacks the interface, because it may show another network namespace.
     """
     if card.driver in VIRTUAL_DRIVERS:
         return True
@@ -48,27 +48,31 @@ def is_virtual(machine: Machine, card: Card) -> bool:
 
 def driver(machine: Machine, card: Card) -> Check:
     id, place = "nic-driver", directory(card)
-    name = card.driver or "no driver named"
+    name = card.driver or "unknown driver"
     if card.hardware_type != ARPHRD_ETHER:
-        words = f"{card.name} is not an Ethernet card (ARPHRD type {card.hardware_type})"
-        return failed(id, words, "a wired card")
+        text = f"{card.name} is not an Ethernet card (ARPHRD type {card.hardware_type})"
+        return failed(id, text, "use a wired card")
     if machine.exists(f"{place}/wireless") or machine.exists(f"{place}/phy80211"):
-        return failed(id, f"{card.name} is wireless ({name})", "a wired card: Intel i210 or i226")
+        return failed(
+            id, f"{card.name} is wireless ({name})", "use a wired card: Intel i210 or i226"
+        )
     if is_virtual(machine, card):
         return warned(
-            id, f"{name}: not a card but software", "good for virtual segments; else a real card"
+            id,
+            f"{name}: a software interface without a card",
+            "use it for virtual segments only; real devices need a wired card",
         )
     if card.bus.startswith("usb"):
         return warned(
             id,
-            f"{name}, on USB: frames wait for the bus, 125 us and more",
-            "a PCI Express card: Intel i210 or i226",
+            f"{name}, on USB: the bus delays frames by 125 us or more",
+            "use a PCI Express card: Intel i210 or i226",
         )
     if name in GOOD_DRIVERS:
         return passed(id, f"{name} ({GOOD_DRIVERS[name]}) at {card.bus}")
-    why = DOUBTFUL_DRIVERS.get(name, "not known to this list")
+    why = DOUBTFUL_DRIVERS.get(name, "not in the list of tested drivers")
     return warned(
-        id, f"{name}: {why}", "measure it; known to be good: Intel i210 (igb), i226 (igc)"
+        id, f"{name}: {why}", "measure it; good cards are Intel i210 (igb) and i226 (igc)"
     )
 
 
@@ -77,88 +81,90 @@ def link(machine: Machine, card: Card) -> Check:
     if not card.up:
         return failed(id, f"{card.name} is down", f"sudo ip link set {card.name} up")
     if not card.running:
-        return failed(id, "no link", "cable plugged in, first device powered?")
+        return failed(id, "no link", "check the cable and the power of the first device")
     if is_virtual(machine, card):
         return passed(id, "up, without a cable")
     if card.link is None or card.link.speed == SPEED_UNKNOWN:
         return skipped(id, f"up; {card.refusals.get('link', 'speed unknown')}")
     speed, full = card.link.speed, card.link.full_duplex
-    words = f"{speed} Mbit/s, {'full' if full else 'unknown' if full is None else 'half'} duplex"
+    text = f"{speed} Mbit/s, {'full' if full else 'unknown' if full is None else 'half'} duplex"
     if speed < ETHERCAT_SPEED or full is False:
         return failed(
             id,
-            f"{words}: EtherCAT needs {ETHERCAT_SPEED} Mbit/s full duplex",
-            f"another cable; sudo ethtool -s {card.name} autoneg on",
+            f"{text}, but EtherCAT needs {ETHERCAT_SPEED} Mbit/s full duplex",
+            f"replace the cable; sudo ethtool -s {card.name} autoneg on",
         )
     if speed > ETHERCAT_SPEED:
         return warned(
             id,
-            f"{words}: EtherCAT devices have {ETHERCAT_SPEED}, so the other end is not one",
-            "plug the cable into IN of the first device, without a switch",
+            f"{text}: the other end is not an EtherCAT device, which has {ETHERCAT_SPEED} Mbit/s",
+            "connect the cable to IN of the first device, without a switch",
         )
-    return passed(id, words)
+    return passed(id, text)
 
 
 def use(machine: Machine, card: Card) -> Check:
-    """Check for other use: /proc/net/route has a line for each IPv4 route, in hexadecimal."""
+    """Check for other use of the port: /proc/net/route lists the IPv4 routes in hexadecimal."""
     id = "nic-use"
     lines = (machine.text("/proc/net/route") or "").splitlines()[1:]
     routes = [words[1] for line in lines if (words := line.split()) and words[0] == card.name]
     if "00000000" in routes:
         return failed(
             id,
-            f"{card.name} is this machine's way to the network (default route)",
-            "EtherCAT needs a port of its own",
+            f"{card.name} has the default route of this machine",
+            "use a separate port for EtherCAT",
         )
     if machine.exists(f"{directory(card)}/master"):
-        return warned(id, "part of a bridge or bond", f"sudo ip link set {card.name} nomaster")
+        return warned(
+            id, "the port is part of a bridge or bond", f"sudo ip link set {card.name} nomaster"
+        )
     if routes:
         return warned(
             id,
-            "has an IPv4 address, so ARP and more go out between the frames",
+            "the port has an IPv4 address, so the kernel sends ARP and other frames",
             f"sudo ip address flush dev {card.name}",
         )
-    return passed(id, "no route leads through it")
+    return passed(id, "no route uses the port")
 
 
 def managed(machine: Machine, card: Card) -> Check:
     id = "nic-managed"
-    who = []
+    managers = []
     manager = machine.text(f"/run/NetworkManager/devices/{card.index}") or ""
     if "NetworkManager" in machine.processes and not re.search(r"managed=(false|0)", manager):
-        who.append("NetworkManager")
+        managers.append("NetworkManager")
     networkd = machine.text(f"/run/systemd/netif/links/{card.index}") or "ADMIN_STATE=unmanaged"
     if "systemd-network" in machine.processes and "ADMIN_STATE=unmanaged" not in networkd:
-        who.append("systemd-networkd")
+        managers.append("systemd-networkd")
     neighbours = [name for name in NEIGHBOURS if name in machine.processes]
-    if not who and not neighbours:
-        return passed(id, "no program seen that would send on it")
+    if not managers and not neighbours:
+        return passed(id, "no running program is known to send on the port")
     advice = {
-        "NetworkManager": f"sudo nmcli device set {card.name} managed no # until the next start",
+        "NetworkManager": f"sudo nmcli device set {card.name} managed no # until the next reboot",
         "systemd-networkd": f"`[Match] Name={card.name} [Link] Unmanaged=yes` in "
         "/etc/systemd/network/10-ethercat.network",
     }
-    commands = [advice[name] for name in who]
+    commands = [advice[name] for name in managers]
     if neighbours:
-        commands.append(f"have {' and '.join(neighbours)} leave {card.name} alone")
+        commands.append(f"exclude {card.name} from {' and '.join(neighbours)}")
     return warned(
         id,
-        f"{', '.join([*who, *neighbours])} may send on it: DHCP, mDNS, LLDP",
+        f"{', '.join([*managers, *neighbours])} may send DHCP, mDNS or LLDP frames on the port",
         "; ".join(commands),
     )
 
 
 def traffic(machine: Machine, card: Card) -> Check:
-    """Check the frames that were sent while the doctor sent none."""
+    """Check for frames that other programs sent during the measurement."""
     id = "nic-traffic"
     if machine.sent is None or not machine.watched:
-        return skipped(id, "not watched", f"catenary doctor {card.name} --seconds 60")
+        return skipped(id, "not measured", f"catenary doctor {card.name} --seconds 60")
     if machine.sent == 0:
-        return passed(id, f"no frame went out in {machine.watched:g} s")
+        return passed(id, f"no frame was sent in {machine.watched:g} s")
     return warned(
         id,
-        f"{machine.sent} frames went out in {machine.watched:g} s, and none was the doctor's",
-        f"sudo tcpdump -eni {card.name} -Q out # tells whose they are",
+        f"other programs sent {machine.sent} frames in {machine.watched:g} s",
+        f"sudo tcpdump -eni {card.name} -Q out # shows the frames",
     )
 
 
@@ -167,15 +173,15 @@ def ipv6(machine: Machine, card: Card) -> Check:
     path = f"/proc/sys/net/ipv6/conf/{card.name}/disable_ipv6"
     off = machine.number(path)
     if off is None:
-        return passed(id, "the kernel has no IPv6 on it")
+        return passed(id, "the kernel has no IPv6 on the port")
     if off == 1:
         return passed(id, "off")
     lines = (machine.text("/proc/net/if_inet6") or "").splitlines()
     scopes = [words[3] for line in lines if (words := line.split())[-1] == card.name]
-    own = all(scope == "20" for scope in scopes)  # link-local: comes back by itself
+    own = all(scope == "20" for scope in scopes)  # link-local addresses return by themselves
     return warned(
         id,
-        "on: the kernel itself sends router solicitations and multicast reports",
+        "on: the kernel sends router solicitations and multicast reports",
         f"sudo sysctl net.ipv6.conf.{card.name}.disable_ipv6=1",
         (Change(path, "1"),) if own else (),
     )
@@ -184,13 +190,13 @@ def ipv6(machine: Machine, card: Card) -> Check:
 def eee(machine: Machine, card: Card) -> Check:
     id = "nic-eee"
     if card.eee is None:
-        return passed(id, f"the driver has none ({card.refusals.get('eee', 'not asked')})")
+        return passed(id, f"the driver does not support it ({card.refusals.get('eee', 'unknown')})")
     if not card.eee.enabled:
         return passed(id, "off")
     return warned(
         id,
         "energy-efficient Ethernet is on"
-        + (" and agreed: waking the link takes about 20 us" * card.eee.active),
+        + (" and active: waking the link takes about 20 us" * card.eee.active),
         f"sudo ethtool --set-eee {card.name} eee off",
         (Change(f"{ETHTOOL}{card.name}/eee", "0"),),
     )
@@ -201,42 +207,45 @@ def coalescing(machine: Machine, card: Card) -> Check:
     if now is None:
         return skipped(id, f"the driver does not report it ({card.refusals.get('coalescing', '')})")
     if now.rx_usecs == 0 and not now.adaptive_rx:
-        return passed(id, "every frame interrupts at once")
+        return passed(id, "the card raises an interrupt for each frame without delay")
     place = f"{ETHTOOL}{card.name}"
     changes = [Change(f"{place}/adaptive-rx", "0")] * now.adaptive_rx
     changes += [Change(f"{place}/rx-usecs", "0")] * (now.rx_usecs != 0)
     adaptive = " adaptive-rx off" * now.adaptive_rx
     return warned(
         id,
-        f"the card holds answers back: rx-usecs {now.rx_usecs}" + ", adaptive" * now.adaptive_rx,
+        f"the card delays received frames: rx-usecs {now.rx_usecs}"
+        + ", adaptive" * now.adaptive_rx,
         f"sudo ethtool -C {card.name}{adaptive} rx-usecs 0",
         tuple(changes),
     )
 
 
 def offloads(machine: Machine, card: Card) -> Check:
-    """Check Documentation/networking/napi.rst, "IRQ suspension", "Software IRQ coalescing"."""
+    """Check software interrupt coalescing and LRO, Documentation/networking/napi.rst."""
     id, place = "nic-offloads", directory(card)
-    waits = {
+    timers = {
         path: value
         for name in ("gro_flush_timeout", "napi_defer_hard_irqs")
         if (value := machine.number(path := f"{place}/{name}") or 0) > 0
     }
-    if waits:
-        words = ", ".join(f"{path.rpartition('/')[2]} {value}" for path, value in waits.items())
+    if timers:
+        text = ", ".join(f"{path.rpartition('/')[2]} {value}" for path, value in timers.items())
         return warned(
             id,
-            f"the kernel looks for frames by a timer rather than at once: {words}",
-            "; ".join(f"echo 0 | sudo tee {path}" for path in waits),
-            tuple(Change(path, "0") for path in waits),
+            f"the kernel polls for received frames by a timer: {text}",
+            "; ".join(f"echo 0 | sudo tee {path}" for path in timers),
+            tuple(Change(path, "0") for path in timers),
         )
     if card.lro:
         return warned(
             id,
-            "the card joins frames before it hands them over",
+            "the card merges received frames (LRO)",
             f"sudo ethtool -K {card.name} lro off",
         )
-    return passed(id, "GRO is on, and leaves EtherCAT frames alone" if card.gro else "none matters")
+    return passed(
+        id, "GRO is on, but does not affect EtherCAT frames" if card.gro else "none is active"
+    )
 
 
 CHECKS = (driver, link, use, managed, traffic, ipv6, eee, coalescing, offloads)

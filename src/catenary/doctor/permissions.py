@@ -1,4 +1,4 @@
-"""Checks of permissions: locked memory, priorities, raw frames; and limits of a container."""
+"""Checks of permissions (locked memory, priorities, raw frames) and of limits in a container."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from catenary.doctor.machine import (
     Machine,
     as_list,
 )
-from catenary.doctor.share_folder import ABSENT, MODE, read_folder, wanted
+from catenary.doctor.share_folder import ABSENT, MODE, expected, read_folder
 
 ENOUGH_LOCKED = 2**30  # [bytes] a Python with NumPy and Numba maps several hundred MiB
 HUGE_PAGES = "/sys/kernel/mm/transparent_hugepage/enabled"
@@ -22,7 +22,10 @@ SHARE_GROUPS = ("catenary", "realtime")
 
 
 def limits_line(what: str) -> str:
-    return f"`@realtime - {what}` in {LIMITS} (your user in that group; log in again)"
+    return (
+        f"add `@realtime - {what}` to {LIMITS}, add your user to the group realtime and log in "
+        "again"
+    )
 
 
 def memory_lock(machine: Machine) -> Check:
@@ -30,16 +33,16 @@ def memory_lock(machine: Machine) -> Check:
     if machine.in_user_namespace:
         return namespace(machine, id, "Max locked memory", ENOUGH_LOCKED)
     if machine.capable(CAP_IPC_LOCK):
-        return passed(id, "all memory may be locked (CAP_IPC_LOCK)")
+        return passed(id, "this process may lock all memory (CAP_IPC_LOCK)")
     limit = machine.limit("Max locked memory")
     if limit is None:
         return skipped(id, machine.lack("/proc/self/limits"))
     if limit == UNLIMITED or int(limit) >= ENOUGH_LOCKED:
-        return passed(id, f"{limit} may be locked")
+        return passed(id, f"limit of locked memory [bytes]: {limit}")
     return failed(
         id,
-        f"{int(limit) // 1024} KiB may be locked: page faults will stop the loop",
-        f"once: {machine.permission_command}; or {limits_line('memlock unlimited')}",
+        f"this process may lock only {int(limit) // 1024} KiB; page faults will delay the loop",
+        f"run once: {machine.permission_command}; or {limits_line('memlock unlimited')}",
     )
 
 
@@ -50,37 +53,39 @@ def priority(machine: Machine) -> Check:
         return namespace(machine, id, "Max realtime priority", machine.priority)
     timeout = machine.limit("Max realtime timeout") or UNLIMITED
     if machine.capable(CAP_SYS_NICE):
-        return passed(id, "any real-time priority (CAP_SYS_NICE)")
+        return passed(id, "all real-time priorities are permitted (CAP_SYS_NICE)")
     limit = machine.limit("Max realtime priority")
     if limit is None:
         return skipped(id, machine.lack("/proc/self/limits"))
     if limit != UNLIMITED and int(limit) < machine.priority:
         return failed(
             id,
-            f"priorities up to {limit}, but the loop needs SCHED_FIFO {machine.priority}",
-            f"once: {machine.permission_command}; or {limits_line('rtprio 95')}",
+            f"priorities up to {limit} are permitted, but the loop needs SCHED_FIFO "
+            f"{machine.priority}",
+            f"run once: {machine.permission_command}; or {limits_line('rtprio 95')}",
         )
     if timeout != UNLIMITED:
         return warned(
             id,
-            f"the kernel ends a real-time thread that runs {timeout} us without sleeping",
+            f"the kernel stops a real-time thread that runs for {timeout} us without sleeping",
             "ulimit -R unlimited",
         )
-    return passed(id, f"real-time priorities up to {limit}")
+    return passed(id, f"maximum real-time priority: {limit}")
 
 
-def namespace(machine: Machine, id: str, limit: str, wanted: int) -> Check:
-    """Check a limit in a user namespace: its root has no capability over the machine.
+def namespace(machine: Machine, id: str, limit: str, expected: int) -> Check:
+    """Check a limit in a user namespace, where capabilities do not extend to the machine.
 
-    Only the limits apply: user_namespaces(7).
+    Only the limit applies, user_namespaces(7).
     """
     value = machine.limit(limit) or "0"
-    if value == UNLIMITED or int(value) >= wanted:
-        return passed(id, f"{value}, by a limit (user namespace)")
+    if value == UNLIMITED or int(value) >= expected:
+        return passed(id, f"{limit.lower()}: {value} (user namespace)")
     return failed(
         id,
-        f"this is a user namespace: its root lacks the permission ({limit.lower()}: {value})",
-        "run outside of it; rootful containers: --cap-add SYS_NICE --cap-add IPC_LOCK",
+        f"root of this user namespace lacks the permission ({limit.lower()}: {value})",
+        "run outside of the namespace, or in a rootful container with --cap-add SYS_NICE "
+        "--cap-add IPC_LOCK",
     )
 
 
@@ -90,8 +95,8 @@ def raw_frames(machine: Machine) -> Check:
         return passed(id, "raw Ethernet frames are permitted (CAP_NET_RAW)")
     return failed(
         id,
-        "no raw Ethernet frames: a network interface cannot be opened",
-        f"without root, once: {machine.permission_command}",
+        "raw Ethernet frames are not permitted, so network interfaces cannot be opened",
+        f"run as root, or run once: {machine.permission_command}",
     )
 
 
@@ -102,10 +107,10 @@ def huge_pages(machine: Machine) -> Check:
     if text is None:
         return skipped(id, machine.lack(HUGE_PAGES))
     if "[always]" not in text:
-        return passed(id, "only where a program asks for them")
+        return passed(id, "only programs that request them get transparent huge pages")
     return warned(
         id,
-        "transparent huge pages everywhere: the kernel moves memory about while programs run",
+        "all programs get transparent huge pages: the kernel moves their memory while they run",
         f"echo madvise | sudo tee {HUGE_PAGES}",
         (Change(HUGE_PAGES, "madvise"),),
     )
@@ -117,27 +122,27 @@ def container(machine: Machine) -> Check:
     if quota := processor_quota(machine):
         return failed(
             id,
-            f"{quota}: the loop stands still for the rest",
-            "no CPU limit for it: docker run without --cpus, Kubernetes: no limits.cpu; "
-            "systemd: CPUQuota=",
+            f"the CPU limit is {quota}; the loop stops for the rest of each period",
+            "remove the limit: `--cpus` of docker, `limits.cpu` of Kubernetes, or `CPUQuota=` of "
+            "systemd",
         )
     if realtime_runtime(machine) == 0:
         return failed(
             id,
             "this control group has no real-time runtime (CONFIG_RT_GROUP_SCHED), so SCHED_FIFO is "
             "refused even to root",
-            "docker run --cpu-rt-runtime=950000 --ulimit rtprio=95, or "
-            "rt_group_sched=0 on the kernel's command line (from 6.13)",
+            "docker run --cpu-rt-runtime=950000 --ulimit rtprio=95; or add rt_group_sched=0 to the "
+            "kernel's command line (Linux 6.13 or later)",
         )
-    where = f"in a container ({machine.container})" if machine.container else "none seen"
+    where = f"in a container ({machine.container})" if machine.container else "none detected"
     few = machine.cpus - machine.allowed_cpus - machine.isolated_cpus
     if few and machine.allowed_cpus:
-        where += f"; this process runs on CPU {as_list(machine.allowed_cpus)} only"
+        where += f"; this process may use only CPU {as_list(machine.allowed_cpus)}"
     return passed(id, where)
 
 
 def groups(machine: Machine, controller: str) -> list[str]:
-    """Return the folders of this process's control group and its parents, cgroups(7)."""
+    """Return the folders of this process's control group and of its parents, cgroups(7)."""
     folders = []
     for line in (machine.text("/proc/self/cgroup") or "").splitlines():
         number, controllers, path = line.split(":", 2)
@@ -157,16 +162,16 @@ def processor_quota(machine: Machine) -> str:
     for folder in groups(machine, "cpu"):
         quota, _, period = (machine.text(f"{folder}/cpu.max") or "max").partition(" ")
         if quota != "max":
-            return f"{int(quota) / 1e3:g} ms of processor in every {int(period) / 1e3:g} ms"
+            return f"{int(quota) / 1e3:g} ms in every {int(period) / 1e3:g} ms"
         old = machine.number(f"{folder}/cpu.cfs_quota_us") or -1
         if old > 0:
             length = machine.number(f"{folder}/cpu.cfs_period_us") or 100_000
-            return f"{old / 1e3:g} ms of processor in every {length / 1e3:g} ms"
+            return f"{old / 1e3:g} ms in every {length / 1e3:g} ms"
     return ""
 
 
 def realtime_runtime(machine: Machine) -> int | None:
-    """Return the real-time runtime of the group [us], cgroups version 1; None if unknown."""
+    """Return the real-time runtime of the control group [us] (version 1); None if unknown."""
     for folder in groups(machine, "cpu"):
         runtime = machine.number(f"{folder}/cpu.rt_runtime_us")
         if runtime is not None:
@@ -175,7 +180,7 @@ def realtime_runtime(machine: Machine) -> int | None:
 
 
 def share_folder(machine: Machine) -> Check:
-    """Check the folder in which several users share memory: docs/how_to/share.md."""
+    """Check the folder in which several users share memory, docs/how_to/share.md."""
     id = "share-folder"
     here = machine.path(SHARES)
     known = machine.text("/etc/group")
@@ -185,9 +190,9 @@ def share_folder(machine: Machine) -> Check:
     group = next((name for name in SHARE_GROUPS if name in groups), None)
     try:
         now = read_folder(here)
-    except OSError as error:  # a file or a link
+    except OSError as error:  # not a folder
         now = error.strerror or str(error)
-    if now in [wanted(name) for name in SHARE_GROUPS]:
+    if now in [expected(name) for name in SHARE_GROUPS]:
         return passed(id, f"group {now.rpartition(':')[2]} shares memory in {SHARES}")
     if group is None or not in_memory(machine, "/run"):
         return passed(
@@ -195,14 +200,14 @@ def share_folder(machine: Machine) -> Check:
             "each user shares memory in /dev/shm/catenary-UID",
             ""
             if group
-            else "to share it among users: `sudo groupadd --system catenary`, `sudo usermod -aG "
-            "catenary USER`, then --apply",
+            else "to share it among users: sudo groupadd --system catenary; sudo usermod -aG "
+            "catenary USER; then run with --apply",
         )
-    change = (Change(f"{FOLDER}{SHARES}", wanted(group)),)
+    change = (Change(f"{FOLDER}{SHARES}", expected(group)),)
     if now != ABSENT:
         return warned(
             id,
-            f"{SHARES} is {now}; expected {wanted(group)}: it is not used",
+            f"{SHARES} is {now}, expected {expected(group)}; programs do not use it",
             f"sudo chown root:{group} {SHARES}; sudo chmod {MODE:o} {SHARES}",
             change,
         )
@@ -210,7 +215,7 @@ def share_folder(machine: Machine) -> Check:
 
 
 def in_memory(machine: Machine, folder: str) -> bool:
-    """Return True if the folder is a tmpfs: a cycle must not wait for a disk."""
+    """Return True if the folder is a tmpfs, so that a cycle does not wait for a disk."""
     mounts = (line.split() for line in (machine.text("/proc/mounts") or "").splitlines())
     return any(words[1:3] == [folder, "tmpfs"] for words in mounts)
 

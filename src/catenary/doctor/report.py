@@ -1,4 +1,4 @@
-"""Report of an examination: as text, one line for each check with its advice below, or as JSON."""
+"""Report of an examination, as text with advice for each check, or as JSON."""
 
 from __future__ import annotations
 
@@ -23,12 +23,12 @@ BAR = 40  # characters
 STEPS_US = (2, 5, 10, 20, 50, 100, 200, 500, 1000, 2000, 5000, 10_000, 50_000)
 COMMAND = re.compile(r"`[^`]*`|(?:\bsudo|\becho) [^;]*")
 UNBROKEN = "\0"
-BEYOND = 10**9  # the step of all values above the last
+BEYOND = 10**9  # step of all values above the last one
 NOUNS: dict[Status, str] = {
     "PASS": "passed",
     "WARN": "warnings",
     "FAIL": "failed",
-    "SKIP": "not known",
+    "SKIP": "unknown",
 }
 
 
@@ -55,22 +55,22 @@ def check_lines(check: Check, colour: bool, width: int) -> Iterator[str]:
 
 
 def wrap(text: str, width: int) -> list[str]:
-    """Wrap a text, but keep commands and quoted parts on one line, so that they can be copied."""
+    """Wrap a text, but keep each command and quoted part on one line so that it can be copied."""
     kept = COMMAND.sub(lambda found: found[0].replace(" ", UNBROKEN), text)
     lines = textwrap.wrap(kept, width, break_long_words=False, break_on_hyphens=False) or [""]
     return [line.replace(UNBROKEN, " ") for line in lines]
 
 
 def histogram_lines(latency: Latency) -> Iterator[str]:
-    """Yield a histogram of latencies, in steps of 1, 2, 5."""
+    """Yield the lines of a histogram of latencies, with steps of 2, 5, 10, ... us."""
     counts = by_steps(latency)
     most = max(counts.values(), default=0)
     for step in sorted(counts):
         bar = "#" * max(1, round(counts[step] / most * BAR))
-        yield f"{INDENT}{step_words(step):>18}  {counts[step]:8d}  {bar}"
+        yield f"{INDENT}{step_text(step):>18}  {counts[step]:8d}  {bar}"
 
 
-def step_words(step: int) -> str:
+def step_text(step: int) -> str:
     if step == BEYOND:
         return f"more than {STEPS_US[-1]} us"
     lower = max((below for below in STEPS_US if below < step), default=0)
@@ -91,20 +91,20 @@ def summary_lines(examination: Examination, width: int) -> Iterator[str]:
     counts = ", ".join(f"{counted[status]} {noun}" for status, noun in NOUNS.items())
     yield f"{len(examination.checks)} checks: {counts}"
     if failed := [check.id for check in examination.checks if check.status == "FAIL"]:
-        words = f"Not fit for a real-time loop yet; fix first: {', '.join(failed)}"
+        words = f"This machine is not ready for a real-time loop. Fix first: {', '.join(failed)}"
         yield from wrap(words, width)
     elif counted["WARN"]:
-        yield "A loop will run here; the warnings show possible causes of late cycles."
+        yield "A loop can run here. The warnings show possible causes of late cycles."
     elif examination.latency is None:
-        yield "No obstacle to a real-time loop found; the wake-up latency was not measured."
+        yield "No check failed or warned, but the wake-up latency was not measured."
     else:
-        yield "Fit for a real-time loop: no check failed or warned."
+        yield "This machine is ready for a real-time loop: no check failed or warned."
     if examination.changes:
         settings = (
             "1 setting" if len(examination.changes) == 1 else f"{len(examination.changes)} settings"
         )
-        yield f"--apply can change {settings}, until the next start"
-    yield "What each check means, and why: docs/how_to/doctor.md"
+        yield f"--apply can change {settings}; the changes last until the next reboot."
+    yield "docs/how_to/doctor.md explains each check."
 
 
 def change_lines(changes: Sequence[Change], ground: Ground) -> Iterator[str]:
@@ -113,14 +113,14 @@ def change_lines(changes: Sequence[Change], ground: Ground) -> Iterator[str]:
         try:
             now = ground.read(change.target)
         except OSError as error:
-            now = f"({error.strerror})"
+            now = f"(unknown: {error.strerror})"
         yield f"  {change.target}: {now} -> {change.after}"
 
 
 def as_json(examination: Examination) -> str:
     """Return the examination as JSON.
 
-    `latency_us` is empty if nothing was measured. Its times are in us, except `seconds`.
+    `latency_us` is empty if the latency was not measured. Its times are in us, except `seconds`.
     """
     return json.dumps(
         {

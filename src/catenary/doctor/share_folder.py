@@ -1,6 +1,6 @@
-"""The folder in which a group of users shares memory, as a value that can be read and written.
+"""State of the folder in which a group of users shares memory, as text to read and write.
 
-"absent"                    it does not exist
+"absent"                    the folder does not exist
 "3771 root:catenary"        permissions, owner, group
 """
 
@@ -16,10 +16,10 @@ from contextlib import suppress
 from pathlib import Path
 
 ABSENT = "absent"
-MODE = 0o3771  # setgid: files get the folder's group; sticky: only owners remove them
+MODE = 0o3771  # setgid: files get the folder's group; sticky: only owners can remove files
 
 
-def wanted(group: str) -> str:
+def expected(group: str) -> str:
     return f"{MODE:o} root:{group}"
 
 
@@ -41,14 +41,14 @@ def read_folder(path: Path) -> str:
 def write_folder(path: Path, value: str) -> None:
     """Create, change or remove the folder. Raises OSError if the value is invalid or refused."""
     if value == ABSENT:
-        path.rmdir()  # refused while shares are there
+        path.rmdir()  # fails while the folder contains shares
         return
     try:
         mode, names = value.split(" ")
         owner, group = names.split(":")
         permissions = int(mode, 8)
     except ValueError:
-        raise OSError(errno.EINVAL, f"{value!r} is not a folder's state", str(path)) from None
+        raise OSError(errno.EINVAL, f"invalid folder state {value!r}", str(path)) from None
     with suppress(FileExistsError):
         path.mkdir(0o700)
     try:

@@ -1,4 +1,4 @@
-"""CiA 402 axes and I/O as process-data requests: objects, units, arrays."""
+"""Process-data requests for CiA 402 axes, inputs and outputs, with SI units and arrays."""
 
 from catenary.drive.channel import Channel
 from catenary.drive.drives import Drives

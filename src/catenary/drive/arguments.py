@@ -24,16 +24,21 @@ ColumnSpec: TypeAlias = ChannelSpec | AxisObject
 Columns: TypeAlias = Sequence[str | tuple[str, ColumnSpec]] | Mapping[str, ColumnSpec]
 
 STATUSWORD = 0x6041
-DIVIDER_MAX = 10_000  # cycles: use SDO for slower exchanges
+DIVIDER_MAX = 10_000  # cycles; use SDO for slower exchanges
 MODES: dict[str, Mode] = {
     **{"csp": Mode.CSP, "csv": Mode.CSV, "cst": Mode.CST},
-    **{"pp": Mode.PP, "pv": Mode.PV},  # the drive makes the trajectory
-    "hm": Mode.HM,  # homing: no target, `Drives.home` runs it
+    **{"pp": Mode.PP, "pv": Mode.PV},  # the drive computes the trajectory
+    "hm": Mode.HM,  # homing by `Drives.home`; this mode has no target
 }
 
 
 def axis_sources(subs: Iterable[AxisSource]) -> list[tuple[SubDevice, int]]:
-    """(SubDevice, slot) of every axis; a SubDevice alone stands for all of its slots."""
+    """Return (SubDevice, slot) of every axis. A SubDevice without a slot means all of its slots.
+
+    Raises:
+        TypeError: `subs` is not a list, or an element is neither a SubDevice nor a tuple.
+        ValueError: The list is empty, an axis is given twice, or a device is not a drive.
+    """
     if not isinstance(subs, Iterable):
         raise TypeError(f"Drives takes a list of SubDevices, such as subs.drives; not {subs!r}")
     sources: list[tuple[SubDevice, int]] = []
@@ -55,9 +60,9 @@ def axis_sources(subs: Iterable[AxisSource]) -> list[tuple[SubDevice, int]]:
 
 
 def check_drive(sub: SubDevice) -> None:
-    """Raise ValueError if a device cannot be a drive: it has no dictionary and no statusword.
+    """Raise ValueError if a device has neither an object dictionary nor a mapped statusword.
 
-    A drive that does not show its profile in 0x1000 is accepted.
+    A drive that does not state its profile in 0x1000 is accepted.
     """
     if sub.is_drive or sub.description.coe:
         return
@@ -65,52 +70,58 @@ def check_drive(sub: SubDevice) -> None:
     if not any(entry.index == STATUSWORD for entry in mapped_entries(assignments)):
         raise ValueError(
             f"device {sub.position} ({sub.name}) is not a drive: it has no CiA 402 objects; use "
-            "Inputs or Outputs for its process data, and main.subs.drives for the drives"
+            "Inputs or Outputs for its process data; main.subs.drives are the drives"
         )
 
 
 def axis_name(sub: SubDevice, slot: int) -> str:
+    """Return the default name of an axis."""
     return f"{sub.position} {sub.name}" + (f" slot {slot}" if slot else "")
 
 
 def axis_names(
     sources: Sequence[tuple[SubDevice, int]], names: Sequence[str] | None
 ) -> tuple[str, ...]:
-    """Return a name for each axis.
+    """Return the names of the axes.
+
+    Args:
+        sources: SubDevice and slot of each axis.
+        names: names from the application; None for the default names.
 
     Raises:
-        ValueError: `names` has not one name per axis, or has one twice.
+        ValueError: The number of names is wrong, or a name is used twice.
     """
     if names is None:
         return tuple(axis_name(sub, slot) for sub, slot in sources)
     if isinstance(names, str) or len(names) != len(sources):
-        raise ValueError(f"names={names!r}: write a list of {len(sources)}, one name per axis")
+        raise ValueError(f"names={names!r}: give a list of {len(sources)} names, one per axis")
     if len(set(names)) < len(names):
         raise ValueError(f"names={list(names)}: every axis needs its own name")
     return tuple(names)
 
 
 def axis_modes(first: str, others: Sequence[str]) -> tuple[Mode, ...]:
+    """Return the modes of an axis without duplicates, starting with `first`."""
     return tuple(dict.fromkeys(mode_of(name) for name in (first, *others)))
 
 
 def warn_of_default_velocity(axes: Sequence[Axis]) -> None:
-    """Warn once for all axes in CSP or PP without a velocity limit, by kind of axis."""
+    """Warn of axes in CSP or PP without a velocity limit, once for each kind of axis."""
     lacking = [axis for axis in axes if axis.options.lacks_velocity(axis.modes)]
     for units in dict.fromkeys(axis.units.names for axis in lacking):
         alike = [axis for axis in lacking if axis.units.names == units]
         names = ", ".join(axis.name for axis in alike)
         default = alike[0].units.defaults.velocity_limit
         warnings.warn(
-            f"no velocity_limit for {names}: {default:.3g} {units.velocity} at the joint "
-            f"is used; write Drives(velocity_limit=...) [{units.velocity}]",
+            f"no velocity_limit for {names}: the default of {default:.3g} {units.velocity} at the "
+            f"joint is used; write Drives(velocity_limit=...) [{units.velocity}]",
             UserWarning,
             stacklevel=3,
         )
 
 
 def clock_request(dc: DistributedClock | bool) -> DistributedClock | None:
-    """Return the clock request of `dc=`."""
+    """Return the clock request of the option `dc`; None without one."""
     if isinstance(dc, bool):
         return DistributedClock() if dc else None
     return dc
@@ -119,19 +130,19 @@ def clock_request(dc: DistributedClock | bool) -> DistributedClock | None:
 def written_pdos(
     pdos: PdoList, named: Mapping[str, Channel] | Mapping[str, AxisObject]
 ) -> tuple[WrittenPdo, ...]:
-    """Return the PDOs of `pdos=`, with their entries if they are given.
+    """Return the PDOs of the option `pdos`, with their entries if they are given.
 
     Args:
-        pdos: The option.
-        named: What its entries may name.
+        pdos: value of the option.
+        named: objects that the entries may refer to by name.
 
     Raises:
-        TypeError: It is neither a list of numbers, nor a mapping of numbers to entries.
-        ValueError: An index is not one of a PDO, or a name is unknown.
+        TypeError: The option is neither a list of numbers nor a mapping of numbers to entries.
+        ValueError: An index is not that of a PDO, or a name is unknown.
     """
     if not isinstance(pdos, Iterable) or not all(isinstance(index, int) for index in pdos):
         raise TypeError(
-            f"pdos: PDOs by their numbers, [0x1A00], or {{0x1A00: entries}}, not {pdos!r}"
+            f"pdos={pdos!r}: give PDO numbers, [0x1A00], or PDOs with entries, {{0x1A00: entries}}"
         )
     for index in pdos:
         if not 0x1600 <= index < 0x1C00:
@@ -155,50 +166,64 @@ def _written_entry(
     if entry not in named:
         near = get_close_matches(entry, named, n=1)
         guess = f"; did you mean {near[0]!r}?" if near else ""
-        known = ", ".join(named) or "none"
-        raise ValueError(f"pdos: 0x{pdo:04X} names {entry!r}; names here: {known}{guess}")
+        known = f"known names are {', '.join(named)}" if named else "this request has no names"
+        raise ValueError(f"pdos: unknown name {entry!r} in 0x{pdo:04X}; {known}{guess}")
     found = named[entry]
     return ObjectReference(found.index, found.subindex, found.bit_length)
 
 
 def start_up_list(objects: Sequence[StartUp]) -> tuple[StartUp, ...]:
-    """Return the start-up objects of `start_up=`.
+    """Return the start-up objects of the option `start_up`.
 
     Raises:
-        TypeError: It is not a list of StartUp objects.
+        TypeError: The option is not a list of StartUp objects.
     """
     if isinstance(objects, StartUp) or not all(isinstance(each, StartUp) for each in objects):
-        raise TypeError(f"start_up: a list, [StartUp(index, subindex, value)], not {objects!r}")
+        raise TypeError(f"start_up={objects!r}: give a list, [StartUp(index, subindex, value)]")
     return tuple(objects)
 
 
 def mode_of(name: str) -> Mode:
+    """Return the mode of a name such as "csp". Raises ValueError if the name is unknown."""
     try:
         return MODES[name.lower()]
     except KeyError:
-        raise ValueError(f"mode {name!r}; known: {', '.join(MODES)}") from None
+        raise ValueError(f"unknown mode {name!r}; known modes are {', '.join(MODES)}") from None
 
 
 def cycles_between(name: str, divider: int) -> int:
-    """Return `divider` as a number of cycles."""
+    """Return a divider after a check of its range.
+
+    Args:
+        name: name of the option, for the message.
+        divider: number of cycles.
+
+    Raises:
+        ValueError: The divider is not a whole number in the valid range.
+    """
     if not isinstance(divider, int) or not 1 <= divider <= DIVIDER_MAX:
-        raise ValueError(f"{name}={divider!r}: a whole number of cycles, 1 to {DIVIDER_MAX}")
+        raise ValueError(
+            f"{name}={divider!r} must be a whole number of cycles from 1 to {DIVIDER_MAX}"
+        )
     return divider
 
 
 def known(measured: Sequence[str]) -> tuple[str, ...]:
+    """Return the names of measured quantities. Raises ValueError if one is unknown."""
     for name in measured:
         if name not in MEASURED:
-            raise ValueError(f"measured {name!r}; known: {', '.join(MEASURED)}")
+            raise ValueError(
+                f"measured: unknown quantity {name!r}; known quantities are {', '.join(MEASURED)}"
+            )
     return tuple(measured)
 
 
 def named_columns(columns: Columns) -> dict[str, AxisObject]:
-    """Return the objects of `columns=` by name.
+    """Return the objects of the option `columns` by name.
 
     Raises:
         TypeError: An object is neither a Channel nor (index, subindex, type).
-        ValueError: A name without an object is unknown.
+        ValueError: A column without an object has an unknown name.
     """
     named: dict[str, AxisObject] = {}
     for column in columns.items() if isinstance(columns, Mapping) else columns:
@@ -208,7 +233,9 @@ def named_columns(columns: Columns) -> dict[str, AxisObject]:
         elif column in NAMED_COLUMNS:
             named[column] = NAMED_COLUMNS[column]
         else:
-            raise ValueError(f"columns {column!r}; known: {', '.join(NAMED_COLUMNS)}")
+            raise ValueError(
+                f"columns: unknown name {column!r}; known names are {', '.join(NAMED_COLUMNS)}"
+            )
     return named
 
 
@@ -217,10 +244,15 @@ def force_and_torque(
     torques: Sequence[float | None],
     metres_per_turn: Sequence[float | None],
 ) -> tuple[float | None, ...]:
-    """Return the limit of each axis [N] or [N·m], from the option that fits its kind.
+    """Return the force limit [N] of each linear axis, the torque limit [N·m] of each rotary axis.
+
+    Args:
+        forces: option `force_limit` of each axis.
+        torques: option `torque_limit` of each axis.
+        metres_per_turn: option `metres_per_turn` of each axis; None for a rotary axis.
 
     Raises:
-        ValueError: An option was given to an axis of the other kind.
+        ValueError: A rotary axis has a force limit, or a linear axis has a torque limit.
     """
     chosen: list[float | None] = []
     for axis, (force, torque, metres) in enumerate(
@@ -228,17 +260,19 @@ def force_and_torque(
     ):
         if metres is None and force is not None:
             raise ValueError(
-                f"force_limit for axis {axis}: it is rotary; use torque_limit= [N·m], or give "
-                "metres_per_turn= for a linear axis"
+                f"force_limit is given for axis {axis}, which is rotary; use torque_limit= [N·m], "
+                "or give metres_per_turn= for a linear axis"
             )
         if metres is not None and torque is not None:
-            raise ValueError(f"torque_limit for axis {axis}: it is linear; use force_limit= [N]")
+            raise ValueError(
+                f"torque_limit is given for axis {axis}, which is linear; use force_limit= [N]"
+            )
         chosen.append(torque if metres is None else force)
     return tuple(chosen)
 
 
 def _axis_object(name: str, spec: ColumnSpec) -> AxisObject:
-    """Return a column's object. Objects that CiA 402 defines as outputs are written."""
+    """Return the object of a column. It is an output if CiA 402 or the Channel says so."""
     if isinstance(spec, AxisObject):
         return spec
     channel = make_channel("columns", name, spec)

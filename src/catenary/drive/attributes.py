@@ -1,4 +1,4 @@
-"""Errors for attributes that do not exist: a misspelt name must fail."""
+"""Errors for unknown attributes, so that a misspelt name cannot fail silently."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ def unknown_attribute(owner: object, name: str, label: str = "") -> AttributeErr
     """Return the error for an attribute that does not exist, with the nearest public name.
 
     Args:
-        owner: The object.
-        name: The attribute.
-        label: What users call the object; its class by default.
+        owner: object without the attribute.
+        name: name of the attribute.
+        label: name of the object for users; that of its class by default.
     """
     kind = type(owner)
     known = [each for each in dir(kind) if not each.startswith("_")]
@@ -23,7 +23,12 @@ def unknown_attribute(owner: object, name: str, label: str = "") -> AttributeErr
 
 
 def check_writable(owner: object, name: str) -> None:
-    """Raise AttributeError unless the attribute is private, or can be assigned to."""
+    """Raise AttributeError unless an attribute is private or assignable.
+
+    Args:
+        owner: object with the attribute.
+        name: name of the attribute.
+    """
     if name.startswith("_"):
         return
     found = getattr(type(owner), name, None)

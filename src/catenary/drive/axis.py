@@ -1,4 +1,4 @@
-"""Process-data request of one CiA 402 axis: its objects, and their places as an AxisPlan."""
+"""Process-data request of one CiA 402 axis, and its AxisPlan for the core."""
 
 from __future__ import annotations
 
@@ -37,31 +37,31 @@ MEASURED: dict[str, AxisObject] = {
 
 @dataclass(frozen=True, slots=True)
 class Axis:
-    """Slot `slot` of the device at `device`. `modes[0]` is the mode at the start."""
+    """One axis of a drive, with the options of the application and the settings of the drive."""
 
     name: str
-    device: int
+    device: int  # position of the device
     slot: int
-    modes: tuple[Mode, ...]
+    modes: tuple[Mode, ...]  # the first one is the mode at the start
     units: AxisUnits
     options: LimitOptions
     measured: tuple[str, ...] = tuple(MEASURED)
-    measured_required: bool = False  # else a quantity that the drive cannot map reads NaN
+    measured_required: bool = False  # if False, a quantity that the drive cannot map reads NaN
     columns: Mapping[str, AxisObject] = field(default_factory=dict)
     divider: int = 1  # cycles between two exchanges
-    required: bool = True  # the cycle is not good without its device
+    required: bool = True  # if True, a cycle without its device is an error
     homing: HomingMethod | None = None
-    pdos: tuple[WrittenPdo, ...] = ()  # as the application wrote them down
+    pdos: tuple[WrittenPdo, ...] = ()  # PDOs from the application
     objects: tuple[StartUp, ...] = ()  # start-up objects of its device
-    settings: DriveSettings = field(default_factory=DriveSettings)  # of the drive; read in PRE-OP
+    settings: DriveSettings = field(default_factory=DriveSettings)  # read in PRE-OP
 
     def index(self, base: int) -> int:
-        """Return the index of slot 0's object `base` in this slot."""
+        """Return the index in this slot of the object that has the index `base` in slot 0."""
         return base + SLOT_OFFSET * self.slot
 
     @property
     def uses_torque(self) -> bool:
-        """True if a requested object is a torque."""
+        """True if the request includes a torque."""
         return "torque" in self.measured or self.needs_torque
 
     @property
@@ -76,13 +76,21 @@ class Axis:
 
     @property
     def bounds(self) -> AxisBounds:
-        """Limits and reactions in force. ConfigurationError if a required one is not known."""
+        """Limits and reactions in force.
+
+        Raises:
+            ConfigurationError: A required limit is unknown.
+        """
         homing_offset = None if self.homing is None else self.homing.offset_counts(self.units)
         own = own_limits(self.settings, self.units, homing_offset)
         return make_bounds(self.name, self.options, self.modes, own, self.units)
 
     def report(self, period_ns: int) -> AxisReport:
-        """Describe the axis for the plan. `period_ns`: of the loop."""
+        """Return the description of the axis for the plan.
+
+        Args:
+            period_ns: period of the loop [ns].
+        """
         return axis_report(
             self.name,
             self.modes,
@@ -93,27 +101,31 @@ class Axis:
         )
 
     def device_request(self, start_up: tuple[tuple[int, int, bytes], ...] = ()) -> DeviceRequest:
-        """Objects that the axis exchanges in every cycle."""
-        wanted = [
+        """Return the request of the axis to its device.
+
+        Args:
+            start_up: (index, subindex, data) of the objects to write at the start-up.
+        """
+        outputs = [
             objects.CONTROLWORD,
             objects.MODE_TARGET,
             *(TARGETS[m] for m in self.modes if m in TARGETS),
         ]
-        given = [objects.STATUSWORD, objects.MODE_ACTUAL, *(MEASURED[m] for m in self.measured)]
+        inputs = [objects.STATUSWORD, objects.MODE_ACTUAL, *(MEASURED[m] for m in self.measured)]
         if self.holds_on_loss:
-            wanted.append(objects.TARGET_POSITION)
-            given.append(objects.ACTUAL_POSITION)
+            outputs.append(objects.TARGET_POSITION)
+            inputs.append(objects.ACTUAL_POSITION)
         if self.uses_profile:
-            wanted += objects.PROFILE_OBJECTS.values()
+            outputs += objects.PROFILE_OBJECTS.values()
         for column in self.columns.values():
-            (wanted if column.output else given).append(column)
+            (outputs if column.output else inputs).append(column)
         optional = self._optional()
         return DeviceRequest(
             outputs=tuple(
-                o.reference(self.slot, required=o not in optional) for o in dict.fromkeys(wanted)
+                o.reference(self.slot, required=o not in optional) for o in dict.fromkeys(outputs)
             ),
             inputs=tuple(
-                o.reference(self.slot, required=o not in optional) for o in dict.fromkeys(given)
+                o.reference(self.slot, required=o not in optional) for o in dict.fromkeys(inputs)
             ),
             start_up=start_up,
             divider=self.divider,
@@ -133,10 +145,11 @@ class Axis:
         return self.options.on_loss == "csp_hold"
 
     def _optional(self) -> set[AxisObject]:
-        """Objects that a drive may lack.
+        """Return the objects that the process data may lack.
 
-        These are: velocity and torque, unless requested by name; the mode, if it never changes,
-        because the start-up list sets it; the rates of profiles, which are then written by SDO.
+        These are velocity and torque, unless the application requests them by name. The mode is
+        optional if it never changes, because the start-up list sets it. The rates of profiles are
+        optional, because an SDO can write them.
         """
         optional = set() if self.measured_required else {MEASURED["velocity"], MEASURED["torque"]}
         if len(self.modes) == 1 and not self.holds_on_loss:
@@ -145,7 +158,7 @@ class Axis:
         return optional - set(self.columns.values())
 
     def plan(self, layout: ImageLayout) -> AxisPlan:
-        """Return the axis as numbers. Objects that are mapped without a request are used too."""
+        """Return the axis for the core. It also uses objects that are mapped without a request."""
         bounds = self.bounds
         assert bounds.acceleration.value is not None
         assert bounds.deceleration.value is not None
@@ -179,26 +192,41 @@ class Axis:
         )
 
     def _demand(self, layout: ImageLayout, mode: Mode, wanted: AxisObject) -> Number | None:
-        """Return the place of a demand value that is mapped anyway, if the axis uses `mode`.
+        """Return the place of a demand value; None if it is not mapped or the mode is not used.
 
-        It is never requested: an addition to the process data could change a mapping that fits.
+        The axis never requests a demand value, because the request could change a mapping that is
+        sufficient without it.
         """
         used = mode in self.modes or (mode is Mode.CSP and self.holds_on_loss)
         return self._place(layout, wanted) if used else None
 
     def _column_place(self, layout: ImageLayout, wanted: AxisObject) -> Number | None:
-        """Return the place of an object that the application has as a column."""
+        """Return the place of an object; None unless the application requested it as a column."""
         written = ((column.index, column.subindex) for column in self.columns.values())
         if (wanted.index, wanted.subindex) not in written:
             return None
         return self._place(layout, wanted)
 
     def maps(self, wanted: AxisObject, layout: ImageLayout) -> bool:
-        """Return True if an object is in the process data."""
+        """Return True if an object is in the process data.
+
+        Args:
+            wanted: object of the axis.
+            layout: layout of the process image.
+        """
         return self._place(layout, wanted) is not None
 
     def column(self, name: str, wanted: AxisObject, layout: ImageLayout) -> Column:
-        """Return the named column with its place."""
+        """Return the column of an object.
+
+        Args:
+            name: name of the column.
+            wanted: object of the axis.
+            layout: layout of the process image.
+
+        Raises:
+            MappingError: The object is not in the process data.
+        """
         return Column(
             name=f"{self.name}.{name}",
             number=self._required(layout, wanted),
@@ -225,7 +253,7 @@ class Axis:
         place = find(self.device, self.index(wanted.index), wanted.subindex, which)
         if place is None or (wanted.unit in TORQUES and self.units.rated_torque is None):
             return None
-        # The layout knows places and widths; signs are the standard's, unless the device says REAL.
+        # The layout has places and widths. CiA 402 defines the sign, unless the device states REAL.
         kind = NumberKind.SIGNED if wanted.signed else NumberKind.UNSIGNED
         if wanted.real or wanted.scale is not None:
             kind = NumberKind.REAL if wanted.real else kind
@@ -236,18 +264,18 @@ class Axis:
 
 
 def column_bank(wanted: AxisObject) -> Bank:
-    """Return the bank of an object's column: float64 for SI values, int64 for raw ones."""
+    """Return the bank of the column of an object: float64 for SI values, int64 for raw values."""
     is_float = wanted.unit is not Unit.RAW or wanted.real or wanted.scale is not None
     return Bank.REAL if is_float else Bank.INTEGER
 
 
-EXPONENTS = (-3, -6, -4, -5, -2, -1, 0, -7, -8, -9)  # ms and us first: some drives need them
+EXPONENTS = (-3, -6, -4, -5, -2, -1, 0, -7, -8, -9)  # some drives accept only ms and us
 
 
 def interpolation_time(period_ns: int) -> tuple[int, int] | None:
-    """Return 0x60C2 for a period: (value, exponent) with value · 10^exponent s; None: impossible.
+    """Return 0x60C2 for a period as (value, exponent); None if it cannot represent the period.
 
-    1 ms is 1·10⁻³, 250 us is 250·10⁻⁶.
+    The period is value · 10^exponent s: 1 ms is 1·10⁻³ s, 250 us is 250·10⁻⁶ s.
     """
     for exponent in EXPONENTS:
         value, rest = divmod(period_ns, 10 ** (9 + exponent))

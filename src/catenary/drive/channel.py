@@ -1,4 +1,4 @@
-"""Channel: one object of a device's process data, as an application names it."""
+"""Channel, which describes one object in the process data of a device."""
 
 from __future__ import annotations
 
@@ -19,20 +19,23 @@ BITS_MAX = 64
 
 @dataclass(frozen=True, slots=True)
 class Channel:
-    """One number of a device's process data. A tuple (index, subindex, type[, scale]) is the same.
+    """One number in the process data of a device.
 
         Channel(0x6000, 0x11, types.INT, 1.196e-3, unit="m/s2")
 
+    Where an option accepts a Channel, it also accepts a tuple (index, subindex, type[, scale]).
+
     Args:
-        index: Of the object, 1 to 0xFFFF.
-        subindex: 0 to 0xFF.
-        type: Of `catenary.types`: BOOL, an integer or a REAL of 1 to 64 bits.
-        scale: Value = raw number · scale, a float. None: the raw number.
-        unit: Unit of the value, for display.
-        output: For `Drives(columns=...)` only: True if the column is written.
+        index: index of the object, 1 to 0xFFFF.
+        subindex: subindex of the object, 0 to 0xFF.
+        type: numeric type of `catenary.types`: BOOL, an integer or a REAL, 1 to 64 bits.
+        scale: factor from the raw number to the value, which is then a float; None for the raw
+            number.
+        unit: unit of the value, for display.
+        output: True if the column is written. Used only by `Drives(columns=...)`.
 
     Raises:
-        TypeError: The type is not one of numbers.
+        TypeError: The type is not numeric.
         ValueError: A number is out of range.
     """
 
@@ -46,12 +49,14 @@ class Channel:
 
     def __post_init__(self) -> None:
         if not 0 < self.index <= 0xFFFF or not 0 <= self.subindex <= 0xFF:
-            raise ValueError(f"{self.place}: an index has 16 bits, a subindex 8")
+            raise ValueError(
+                f"{self.place}: the index must be from 1 to 0xFFFF, the subindex from 0 to 0xFF"
+            )
         if not isinstance(self.type, Boolean | Integer | Real):
             shown = str(self.type) if isinstance(self.type, DataType) else repr(self.type)
             raise TypeError(
-                f"{self.place}: {shown} is not a type of numbers; use BOOL, an integer or a "
-                "REAL of catenary.types"
+                f"{self.place}: {shown} is not a numeric type; use BOOL, an integer or a REAL of "
+                "catenary.types"
             )
         if self.scale is not None and not (math.isfinite(self.scale) and self.scale != 0):
             raise ValueError(f"{self.place}: scale {self.scale} must be finite and not 0")
@@ -63,10 +68,12 @@ class Channel:
 
     @property
     def bit_length(self) -> int:
+        """Length in the process data [bits]."""
         return self.type.bit_length
 
     @property
     def kind(self) -> NumberKind:
+        """Kind of the raw number: signed, unsigned or real."""
         if isinstance(self.type, Real):
             return NumberKind.REAL
         signed = isinstance(self.type, Integer) and self.type.signed
@@ -74,12 +81,13 @@ class Channel:
 
     @property
     def bank(self) -> Bank:
-        """The array that has its values while a loop is open."""
+        """Array that contains the value while a loop is open."""
         if self.scale is not None or self.kind is NumberKind.REAL:
             return Bank.REAL
         return Bank.BIT if self.bit_length == 1 else Bank.INTEGER
 
     def reference(self) -> ObjectReference:
+        """Return the object for a process-data request."""
         return ObjectReference(self.index, self.subindex, self.bit_length)
 
     def decode(self, raw: int) -> float | int:
@@ -97,8 +105,8 @@ class Channel:
         """Return the raw bits of a value.
 
         Raises:
-            TypeError: An integer is needed.
-            ValueError: The type cannot hold the value.
+            TypeError: The type needs an integer.
+            ValueError: The value is out of the range of the type, or is not finite.
         """
         number = value if self.scale is None else value / self.scale
         if isinstance(self.type, Boolean):
@@ -107,7 +115,7 @@ class Channel:
             if not math.isfinite(number):
                 raise ValueError(f"{value} is not finite")
             return int.from_bytes(self.type.encode(number), "little")
-        assert isinstance(self.type, Integer)  # __post_init__ allows nothing else
+        assert isinstance(self.type, Integer)  # __post_init__ rejects other types
         whole = operator.index(cast(SupportsIndex, number)) if self.scale is None else round(number)
         data = self.type.encode(whole)
         return int.from_bytes(data, "little") & ((1 << self.bit_length) - 1)
@@ -117,16 +125,23 @@ ChannelSpec: TypeAlias = Channel | tuple[int, int, NumberType] | tuple[int, int,
 
 
 def make_channel(option: str, name: str, spec: ChannelSpec) -> Channel:
-    """Return the channel of an option such as `inputs={name: spec}`.
+    """Return one channel of an option such as `inputs={name: spec}`.
+
+    Args:
+        option: name of the option, for messages.
+        name: name of the channel.
+        spec: Channel, or (index, subindex, type[, scale]).
 
     Raises:
-        TypeError: It is neither a Channel nor (index, subindex, type).
-        ValueError: A number of it is out of range.
+        TypeError: `spec` is neither a Channel nor such a tuple, or its type is not numeric.
+        ValueError: A number is out of range.
     """
     if isinstance(spec, Channel):
         return spec
     if not isinstance(spec, tuple) or len(spec) not in (3, 4):
-        raise TypeError(f"{option}[{name!r}]: (index, subindex, type[, scale]), not {spec!r}")
+        raise TypeError(
+            f"{option}[{name!r}] is {spec!r}; give a Channel or (index, subindex, type[, scale])"
+        )
     try:
         return Channel(*spec)
     except (TypeError, ValueError) as error:
@@ -136,17 +151,26 @@ def make_channel(option: str, name: str, spec: ChannelSpec) -> Channel:
 def make_channels(option: str, specs: Mapping[str, ChannelSpec]) -> dict[str, Channel]:
     """Return the channels of an option by name.
 
+    Args:
+        option: name of the option, for messages.
+        specs: Channel, or (index, subindex, type[, scale]), by name.
+
     Raises:
         TypeError: The option is not a mapping, or one of its values is not a channel.
         ValueError: A number is out of range.
     """
     if not isinstance(specs, Mapping):
-        raise TypeError(f"{option}: {{name: (index, subindex, type)}}, not {specs!r}")
+        raise TypeError(f"{option}={specs!r}: give {{name: (index, subindex, type)}}")
     return {name: make_channel(option, name, spec) for name, spec in specs.items()}
 
 
 def channel_of(entry: Entry, scale: float | None = None) -> Channel:
-    """Return the channel of a mapped entry. An entry of unknown type is an unsigned integer."""
+    """Return the channel of a mapped entry. An entry of unknown type becomes an unsigned integer.
+
+    Args:
+        entry: mapped entry.
+        scale: factor from the raw number to the value; None for the raw number.
+    """
     return Channel(entry.index, entry.subindex, _entry_type(entry), scale)
 
 

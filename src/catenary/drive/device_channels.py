@@ -1,4 +1,4 @@
-"""Channels of devices: mapped ones with their names, and chosen ones."""
+"""Channels of devices: those that are mapped, and those that the application chooses."""
 
 from __future__ import annotations
 
@@ -22,13 +22,18 @@ class NamedChannel(NamedTuple):
     """Channel of one device, and its name."""
 
     name: str
-    device: int
+    device: int  # position of the device
     channel: Channel
     which: Which = ANY  # selects one place if the device maps the object several times
 
 
 def chosen_channels(sub: SubDevice, named: Mapping[str, Channel]) -> tuple[NamedChannel, ...]:
-    """Return the channels that the application chose."""
+    """Return the channels that the application chose for a device.
+
+    Args:
+        sub: the device.
+        named: channels by name.
+    """
     return tuple(
         NamedChannel(name, sub.position, channel, Which(bit_length=channel.bit_length))
         for name, channel in named.items()
@@ -38,16 +43,21 @@ def chosen_channels(sub: SubDevice, named: Mapping[str, Channel]) -> tuple[Named
 def mapped_channels(
     devices: Iterable[DeviceDescription], direction: Direction, scale: Mapping[str, float]
 ) -> tuple[NamedChannel, ...]:
-    """Return all channels of the devices with unique names.
+    """Return all mapped channels of some devices, with unique names.
+
+    Args:
+        devices: the devices.
+        direction: direction of the process data.
+        scale: factor of each channel by name; a channel without one has raw numbers.
 
     Raises:
-        ValueError: The devices have no channels.
+        ValueError: No device is given, the devices have no channels, or a name is unknown.
     """
     devices = list(devices)
     if not devices:
         raise ValueError(
-            f"{direction.noun}: no device given; main.subs shows those that were found. A group is "
-            "empty if no device has its alias"
+            f"{direction.noun}: no device given; main.subs contains the devices that were found. A "
+            "group is empty if no device has its alias"
         )
     found = [
         (device, pdo, entry)
@@ -57,13 +67,15 @@ def mapped_channels(
     ]
     if not found:
         raise ValueError(
-            f"no {direction.name.lower()} process data in the devices given"
+            f"the given devices have no {direction.name.lower()} process data"
             f"{_choice(devices, direction)}"
         )
     names = unique_names([(e.name, pdo.name, str(device.position)) for device, pdo, e in found])
     for name in scale:
         if name not in names:
-            raise ValueError(f"scale: no channel {name!r}; there are: {', '.join(names)}")
+            raise ValueError(
+                f"scale: unknown channel {name!r}; the channels are {', '.join(names)}"
+            )
     return place_entries(names, found, scale)
 
 
@@ -72,7 +84,13 @@ def place_entries(
     found: Sequence[tuple[DeviceDescription, Pdo, Entry]],
     scale: Mapping[str, float],
 ) -> tuple[NamedChannel, ...]:
-    """Return mapped entries as channels. An entry that is mapped twice keeps its own place."""
+    """Return the channels of mapped entries. Each mapping of an object has its own channel.
+
+    Args:
+        names: name of each channel.
+        found: device, PDO and entry of each channel.
+        scale: factor of each channel by name.
+    """
     alike: Counter[tuple[int, int, int, int, int]] = Counter()
     made = []
     for name, (device, pdo, entry) in zip(names, found, strict=True):
@@ -85,22 +103,30 @@ def place_entries(
 
 
 def _choice(devices: Sequence[DeviceDescription], direction: Direction) -> str:
-    """Return the PDOs that could be assigned, if there are any."""
+    """Return a hint with the PDOs that could be assigned; empty if the devices have none."""
     offered = [pdo for device in devices for pdo in device.pdos(direction)]
-    return f": none is assigned; choose with pdos= from {pdo_names(offered)}" if offered else ""
+    if not offered:
+        return ""
+    return f": no PDO is assigned; choose with pdos= from {pdo_names(offered)}"
 
 
 def with_written(
     device: DeviceDescription, direction: Direction, pdos: Sequence[WrittenPdo]
 ) -> DeviceDescription:
-    """Return the device as if it had these PDOs; unchanged without PDOs."""
+    """Return the description of a device with other PDOs assigned; unchanged without PDOs.
+
+    Args:
+        device: the device.
+        direction: direction of the PDOs.
+        pdos: PDOs to assign, with their entries if these are to be written.
+    """
     if not pdos:
         return device
     return device.with_process_data(direction, write_down(device, direction, pdos).assignments)
 
 
 def number_entries(assignment: Assignment) -> list[tuple[Pdo, Entry]]:
-    """Return all entries with their PDOs, without gaps and entries that no number can hold."""
+    """Return the entries of up to 64 bits with their PDOs, without padding."""
     return [
         (pdo, entry)
         for pdo in assignment.pdos
@@ -110,9 +136,10 @@ def number_entries(assignment: Assignment) -> list[tuple[Pdo, Entry]]:
 
 
 def unique_names(parts: list[tuple[str, str, str]]) -> list[str]:
-    """Return a short unique name for each (entry, PDO, position), numbered if necessary.
+    """Return a unique name for each (entry, PDO, position), as short as possible.
 
-    Terminals call every channel's entry "Output" and tell them apart by their PDO, "Channel 3".
+    Many terminals name the entry of every channel "Output"; only the PDO names, such as
+    "Channel 3", differ. Names that are still equal are numbered.
     """
     for spelling in (short_name, pdo_name, full_name):
         names = [spelling(*part) for part in parts]
@@ -122,19 +149,31 @@ def unique_names(parts: list[tuple[str, str, str]]) -> list[str]:
 
 
 def short_name(entry: str, pdo: str, position: str) -> str:
+    """Return the name of the entry, such as "Output"."""
     return entry or pdo or "value"
 
 
 def pdo_name(entry: str, pdo: str, position: str) -> str:
+    """Return the names of the PDO and the entry, such as "Channel 3 Output"."""
     return f"{pdo} {entry}".strip() or "value"
 
 
 def full_name(entry: str, pdo: str, position: str) -> str:
+    """Return the position of the device and both names, such as "2 Channel 3 Output"."""
     return f"{position} {pdo_name(entry, pdo, position)}"
 
 
 def column(named: NamedChannel, layout: ImageLayout, direction: Direction) -> Column:
-    """Return the channel with its place."""
+    """Return the column of a channel.
+
+    Args:
+        named: channel of a device.
+        layout: layout of the process image.
+        direction: direction of the channel.
+
+    Raises:
+        MappingError: The channel is not in the process data.
+    """
     channel = named.channel
     find = layout.output if direction is Direction.OUTPUT else layout.input
     number = find(named.device, channel.index, channel.subindex, named.which)

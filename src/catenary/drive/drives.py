@@ -1,4 +1,4 @@
-"""Drives: n CiA 402 axes over any mix of devices and slots, as one set of arrays in SI units."""
+"""Drives: the CiA 402 axes of any devices and slots, as one set of arrays in SI units."""
 
 from __future__ import annotations
 
@@ -61,70 +61,75 @@ Axes: TypeAlias = int | Sequence[int] | slice
 
 STATES = {int(state): state for state in AxisState}
 ALL = slice(None)
-HOMING_PATIENCE = 60.0  # [s] default timeout of a wait
+HOMING_TIMEOUT = 60.0  # [s] default of `loop.wait` for a homing
 
 
 class Drives(Request):
     """Process-data request for n axes.
 
-    `subs`: SubDevices with all of their axes, or `(SubDevice, slot)` for single axes.
+    `subs` is a list of SubDevices with all of their axes, or of `(SubDevice, slot)` for single
+    axes.
 
     Options for all axes:
 
-    - `names`: one per axis, for errors, events and logs. None: position, device and slot.
-    - `other_modes`: modes that the axes may change to while the loop runs ("hm": see `home`).
-    - `measured`: position, velocity, torque that the drives must supply. None: all three; a
-      velocity that the drive lacks is estimated, a torque reads NaN.
-    - `columns`: further objects: names of `NAMED_COLUMNS`, or `{name: (index, subindex, type)}` as
-      for `ProcessData`; the index is that of slot 0. Read them as `arm.actual["following_error"]`,
-      write them as `arm.target["torque_offset"] = 0.5`. Objects that CiA 402 does not define are
-      read; to write one, give `Channel(index, subindex, type, output=True)`.
-    - `required`: False: the loop continues without a lost drive. Its axes hold their last values;
-      enable them again when it is `present`.
+    - `names`: one name per axis, for errors, events and logs. The default is position, device and
+      slot.
+    - `other_modes`: modes to which the axes may change while the loop runs ("hm": see `home`).
+    - `measured`: which of position, velocity and torque the drives must supply. By default, all
+      three are requested; a missing velocity is estimated, a missing torque reads NaN.
+    - `columns`: additional objects, as names of `NAMED_COLUMNS` or as
+      `{name: (index, subindex, type)}`, with the index for slot 0. Read a column as
+      `arm.actual["following_error"]`; write it as `arm.target["torque_offset"] = 0.5`. Objects that
+      CiA 402 does not define are inputs, except `Channel(index, subindex, type, output=True)`.
+    - `required`: if False, the loop continues without a lost drive. Its axes keep their last
+      values; enable them again when they are `present`.
     - `divider`: cycles of the loop between two exchanges.
-    - `dc`: distributed clocks. True: as each device's SII states; or a `DistributedClock` for all
-      of them.
-    - `pdos`: PDOs of each device, instead of a search: `[0x1701, 0x1B01]`, or with their entries
-      `{0x1600: [(0x6040, 0, 16), (0x607A, 0, 32)]}` (index, subindex, bits). They are written even
-      if the SII says that this is impossible. A direction without PDOs here is searched.
-    - `start_up`: `StartUp` objects that are written to each device before SAFE-OP.
+    - `dc`: distributed clocks. True uses the settings in the SII of each device; a
+      `DistributedClock` applies to all devices.
+    - `pdos`: PDOs to assign on each device, `[0x1701, 0x1B01]`, or with their entries (index,
+      subindex, bits), `{0x1600: [(0x6040, 0, 16), (0x607A, 0, 32)]}`. They are written even if the
+      SII declares them fixed. For a direction without PDOs here, suitable PDOs are searched.
+    - `start_up`: `StartUp` objects to write to each device before SAFE-OP.
 
-    Options with one value for all axes, or a sequence of one per axis:
+    Options with one value for all axes, or a sequence with one value per axis:
 
-    - `mode`: "csp", "csv", "cst", "pp" or "pv" at the start.
-    - `counts_per_turn`: counts of the motor's encoder per turn.
+    - `mode`: mode at the start: "csp", "csv", "cst", "pp" or "pv".
+    - `counts_per_turn`: encoder counts per turn of the motor.
     - `gear_ratio`: motor turns per joint turn.
-    - `metres_per_turn` [m]: travel of a linear axis per turn of the gear's output side. The axis
-      then has m, m/s and N where rad, rad/s and N·m are stated here. None: a rotary axis.
-    - `direction`: 1, or -1 if the joint turns against the motor.
+    - `metres_per_turn` [m]: travel of a linear axis per turn of the gear output. The units of the
+      axis are then m, m/s and N instead of rad, rad/s and N·m. None means a rotary axis.
+    - `direction`: 1, or -1 if the joint turns opposite to the motor.
     - `offset` [rad]: position of the joint where the drive reads 0.
-    - `velocity_unit` [rad/s of the motor]: one raw velocity count. None: one position count per s.
-    - `rated_torque` [N·m of the motor]. None: read from 0x6076.
+    - `velocity_unit` [rad/s of the motor]: one raw velocity count. The default is one position
+      count per second.
+    - `rated_torque` [N·m of the motor]: by default, it is read from 0x6076.
     - `homing`: a `HomingMethod`.
 
-    Limits at the joint. The core enforces them; plausible limits of the drive only tighten them:
+    Limits at the joint, which the core enforces. Plausible limits of the drive can only tighten
+    them:
 
     - `position_min`, `position_max` [rad].
-    - `velocity_limit` [rad/s]: required for CSV, CST and PV. CSP and PP without it: 2π rad/s
-      (0.1 m/s) and a warning. `math.inf`: none.
-    - `torque_limit` [N·m]; `force_limit` [N] of a linear axis.
-    - `step_limit` [rad]: largest difference between two CSP set-points; a larger one is refused.
-      None: max(0.1 rad (5 mm), twice the way at `velocity_limit`). Required if `velocity_limit`
-      is infinite.
+    - `velocity_limit` [rad/s]: required for CSV, CST and PV. For CSP and PP, the default is 2π
+      rad/s (0.1 m/s), with a warning. `math.inf` means no limit.
+    - `torque_limit` [N·m], or `force_limit` [N] for a linear axis.
+    - `step_limit` [rad]: largest difference between two CSP set-points; a larger step is refused.
+      The default is twice the distance at `velocity_limit`, and at least 0.1 rad (5 mm). It is
+      required if `velocity_limit` is infinite.
 
-    Fallback and return after a loss of set-points; they never shape your set-points:
+    Reactions to a loss of set-points. They do not change the set-points that you write:
 
-    - `deceleration_limit` [rad/s²]. None: a plausible 0x6085 of the drive, else
+    - `deceleration_limit` [rad/s²]: the default is a plausible 0x6085 of the drive, otherwise
       `velocity_limit` / 0.25 s.
-    - `acceleration_limit` [rad/s²]. None: the deceleration. It limits moves, too; their default is
-      this option, else `velocity_limit` / 0.25 s.
-    - `torque_slope` [N·m/s] in CST. None: at once.
-    - `on_loss`: reaction when the core stops an axis: "quick_stop" (None), "disable", or
-      "csp_hold" (change to CSP and hold). Required in CST if the drive's quick stop (0x605A) does
-      not brake.
+    - `acceleration_limit` [rad/s²]: the default is the deceleration. It also limits the moves,
+      whose default is this option, otherwise `velocity_limit` / 0.25 s.
+    - `torque_slope` [N·m/s]: slope to zero torque in CST. By default, the torque is zero at once.
+    - `on_loss`: reaction when the core stops an axis: "quick_stop" (default), "disable", or
+      "csp_hold" (change to CSP and hold the position). It is required in CST if the quick stop of
+      the drive (0x605A) does not brake.
 
     Raises:
-        ValueError: An option is impossible, or a required one is missing.
+        TypeError: An option has the wrong type.
+        ValueError: An option is not valid, or a required option is missing.
     """
 
     def __init__(
@@ -245,48 +250,53 @@ class Drives(Request):
 
     @property
     def actual(self) -> AxisValues:
-        """Actual values of the axes, as of the last `next(loop)`."""
+        """Actual values of the axes at the last `next(loop)`."""
         return self._actual
 
     @property
     def target(self) -> AxisValues:
-        """Targets of the axes: write into the arrays, `arm.target.position[:] = ...`."""
+        """Targets of the axes. Write into the arrays: `arm.target.position[:] = ...`."""
         return self._target
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Name of each axis: in errors, events and logs."""
+        """Name of each axis, for errors, events and logs."""
         return tuple(axis.name for axis in self._axes)
 
     @property
     def state(self) -> tuple[AxisState | None, ...]:
-        """The CiA 402 state of every axis, as of the last `next(loop)`; None: its statusword codes
-        none."""
+        """CiA 402 state of each axis at the last `next(loop)`.
+
+        None if the statusword does not encode a valid state.
+        """
         return tuple(STATES.get(value) for value in self._bound().axis_state.tolist())
 
     @property
     def enabled(self) -> npt.NDArray[np.bool_]:
-        """(n,) True for each axis that follows its set-points now and is `present`.
+        """Array (n,) with True for each axis that follows its set-points and is `present`.
 
-        One lost exchange makes it False for that cycle, because `present` includes it. The axis
-        goes on following; to act on stopped axes, use `stopped`.
+        A single lost exchange makes it False for that cycle, although the axis continues to follow
+        its set-points. Use `stopped` to react to axes that were stopped.
         """
         return (self._bound().axis_flags & 1).astype(np.bool_) & self.present
 
     @property
     def limited(self) -> npt.NDArray[np.bool_]:
-        """(n,) True for each axis whose set-points the core limited in the last cycle."""
+        """Array (n,) with True for each axis whose set-points were limited in the last cycle."""
         return (self._bound().axis_flags & 2).astype(np.bool_)
 
     @property
     def stopped(self) -> tuple[StopReason | None, ...]:
-        """Reason of each axis that the core stopped, until your next request; else None."""
+        """For each axis, the reason why the core stopped it; None if it did not.
+
+        The next request for the axis clears the reason.
+        """
         reasons = self._bound().stop_reason.tolist()
         return tuple(StopReason(reason) if reason else None for reason in reasons)
 
     @property
     def present(self) -> npt.NDArray[np.bool_]:
-        """(n,) True for each axis whose device answered in its last exchange."""
+        """Array (n,) with True for each axis whose device replied in its last exchange."""
         return self._bound().unit_valid[self._units].astype(np.bool_)
 
     @property
@@ -295,10 +305,10 @@ class Drives(Request):
         states = self._bound().axis_state.tolist()
         return tuple(i for i, state in enumerate(states) if state in IN_FAULT)
 
-    # The next `next(loop)` commits the following requests together with the targets.
+    # The next call of `next(loop)` commits these requests together with the targets.
 
     def enable(self, axes: Axes = ALL) -> None:
-        """Request that axes be enabled. Each starts from its actual position."""
+        """Request that axes be enabled. Each axis starts from its actual position."""
         self._request("enable", RequestedState.ENABLED, axes)
 
     def disable(self, axes: Axes = ALL) -> None:
@@ -306,29 +316,40 @@ class Drives(Request):
         self._request("disable", RequestedState.DISABLED, axes)
 
     def quick_stop(self, axes: Axes = ALL) -> None:
-        """Request a quick stop. The ramp and the final state are the drive's (0x605A)."""
+        """Request a quick stop. The drive determines the ramp and the final state (0x605A)."""
         self._request("quick_stop", RequestedState.QUICK_STOP, axes)
 
     def reset_faults(self, axes: Axes = ALL) -> None:
-        """Request a fault reset of those axes that are in fault. Nothing moves before `enable`."""
+        """Request a fault reset for the axes in fault. No axis moves before `enable`."""
         chosen = set(self._numbers(axes))
         self._request("reset_faults", RequestedState.RESET, sorted(chosen & set(self.faults)))
 
     def switch(self, mode: str, axes: Axes = ALL) -> None:
-        """Request a change to `mode`, one of those that the Drives were made with.
+        """Request a change of the mode of operation.
 
-        Until the drive shows the new mode, the old one continues without fresh set-points.
+        Until the drive reports the new mode, it continues in the old mode without fresh set-points.
+
+        Args:
+            mode: the start mode or one of `other_modes`.
+            axes: numbers of the axes.
+
+        Raises:
+            ValueError: The mode is unknown, or the axis was made without it.
+            RuntimeError: The loop is not open.
         """
-        wanted = mode_of(mode)
+        new_mode = mode_of(mode)
         for axis in self._numbers(axes):
-            if wanted not in self._axes[axis].modes:
-                raise ValueError(f"{self.names[axis]}: make Drives with other_modes=[{mode!r}]")
+            if new_mode not in self._axes[axis].modes:
+                raise ValueError(
+                    f"{self.names[axis]} was made without mode {mode!r}; add "
+                    f"Drives(other_modes=[{mode!r}])"
+                )
         views = self._of_open_loop("switch()")
         chosen = self._numbers(axes)
-        views.mode_target[chosen] = wanted
+        views.mode_target[chosen] = new_mode
         views.controlword_bits[chosen] &= ~HALT & 0xFFFF
 
-    # Moves: iterate the loop meanwhile, by loop.wait(move) or by your own `for`.
+    # Moves: the loop must be iterated, by loop.wait(move) or by a `for` statement.
 
     def move_to(
         self,
@@ -339,23 +360,24 @@ class Drives(Request):
         jerk: Values | None = None,
         axes: Axes = ALL,
     ) -> Move:
-        """Start to move axes to a position, each as fast as the limits allow; they rest there.
+        """Start to move axes to a position, where they come to rest.
 
-        In CSP the loop computes the motion and writes `target.position` of these axes: a trapezoid
-        of the velocity, or with limited jerk. In PP the drive computes it. A move replaces the
-        present move of an axis, and continues from its velocity. The axes do not arrive together.
+        Each axis moves as fast as its limits allow, so the axes do not arrive together. In CSP, the
+        loop computes the motion and writes `target.position`; the velocity profile is a trapezoid,
+        or has limited jerk. In PP, the drive computes the motion. If an axis is already moving, the
+        new move replaces the present one and continues from its velocity.
 
         Args:
-            position: Goal, one or one for each of `axes` [rad], [m].
-            velocity: Largest velocity [rad/s], [m/s]; None: `velocity_limit`.
-            acceleration: Acceleration and deceleration [rad/s²], [m/s²]; None:
-                `acceleration_limit`, else `velocity_limit` / 0.25 s.
-            jerk: Largest jerk [rad/s³], [m/s³]; None: a trapezoid. Needs
+            position: goal [rad], [m]; one value, or one for each of `axes`.
+            velocity: largest velocity [rad/s], [m/s]; None for `velocity_limit`.
+            acceleration: acceleration and deceleration [rad/s²], [m/s²]; None for
+                `acceleration_limit`, otherwise `velocity_limit` / 0.25 s.
+            jerk: largest jerk [rad/s³], [m/s³]; None for a trapezoid. A value needs
                 `pip install 'catenary[traj]'`.
-            axes: Numbers of the axes.
+            axes: numbers of the axes.
 
         Returns:
-            A handle for `loop.wait`, or to poll its `done`.
+            Handle of the move: pass it to `loop.wait`, or poll its `done`.
 
         Raises:
             ValueError: A goal or rate is beyond a limit, or the mode is neither CSP nor PP.
@@ -375,17 +397,24 @@ class Drives(Request):
         jerk: Values | None = None,
         axes: Axes = ALL,
     ) -> Move:
-        """Start to move axes by a distance from their goals, or from their targets at rest.
+        """Start to move axes by a distance from the goal of their present move.
+
+        An axis at rest starts from its target.
 
         Args:
-            distance: Distance, one or one for each of `axes` [rad], [m].
-            velocity: Largest velocity: see `move_to`.
-            acceleration: Acceleration and deceleration: see `move_to`.
-            jerk: Largest jerk: see `move_to`.
-            axes: Numbers of the axes.
+            distance: distance [rad], [m]; one value, or one for each of `axes`.
+            velocity: largest velocity, as for `move_to`.
+            acceleration: acceleration and deceleration, as for `move_to`.
+            jerk: largest jerk, as for `move_to`.
+            axes: numbers of the axes.
 
         Returns:
-            A handle, and errors, as of `move_to`.
+            Handle of the move, as for `move_to`.
+
+        Raises:
+            ValueError: A goal or rate is beyond a limit, or the mode is neither CSP nor PP.
+            DriveError: An axis is not enabled.
+            ConfigurationError: `jerk` is given and ruckig is not installed.
         """
         chosen = self._movable(axes)
         moves = self._moving()
@@ -399,46 +428,47 @@ class Drives(Request):
         return self._move(chosen, goals, RateOptions(velocity, acceleration, jerk))
 
     def home(self, axes: Axes = ALL) -> Move:
-        """Let enabled axes find their homes by themselves (mode 6, "hm" in `other_modes`).
+        """Start the homing of enabled axes by their drives (mode 6, "hm" in `other_modes`).
 
-        Afterwards they hold in their former mode, with positions counted from the new zero.
+        Afterwards, the axes hold their position in their previous mode, and positions count from
+        the new zero.
 
         Returns:
-            A handle, as of `move_to`. Its error names an axis that reports a homing error or is
-            no longer enabled.
+            Handle of the move, as for `move_to`. Its error names an axis that reports a homing
+            error or is no longer enabled.
 
         Raises:
-            ValueError: The drives were made without "hm", or an axis is homing already.
+            ValueError: The drives were made without "hm", or an axis is already homing.
             DriveError: An axis is not enabled.
         """
         chosen = self._movable(axes)
         moves = self._moving()
         parts = {i: make_homing_part(self._axes[i], self._ports[i]) for i in chosen}
-        return moves.begin(parts, HOMING_PATIENCE)
+        return moves.begin(parts, HOMING_TIMEOUT)
 
     def _move(self, chosen: Sequence[int], goals: Sequence[float], rates: RateOptions) -> Move:
         moves = self._moving()
         axes, ports = [self._axes[i] for i in chosen], [self._ports[i] for i in chosen]
-        parts, patience = make_parts(axes, ports, goals, rates)
-        return moves.begin(dict(zip(chosen, parts, strict=True)), patience)
+        parts, timeout = make_parts(axes, ports, goals, rates)
+        return moves.begin(dict(zip(chosen, parts, strict=True)), timeout)
 
     def _numbers(self, axes: Axes) -> list[int]:
-        """Return the numbers of chosen axes. IndexError for a number without an axis."""
-        wanted = axes if isinstance(axes, slice) else np.asarray(axes)
-        if not isinstance(wanted, slice) and wanted.size == 0:
+        """Return the numbers of the chosen axes. Raises IndexError if an axis does not exist."""
+        choice = axes if isinstance(axes, slice) else np.asarray(axes)
+        if not isinstance(choice, slice) and choice.size == 0:
             return []
         try:
-            numbers: list[int] = np.atleast_1d(np.arange(len(self))[wanted]).tolist()
+            numbers: list[int] = np.atleast_1d(np.arange(len(self))[choice]).tolist()
         except IndexError:
             known = ", ".join(f"{i}: {name}" for i, name in enumerate(self.names))
-            raise IndexError(f"axes={axes!r}: give numbers of the axes: {known}") from None
+            raise IndexError(f"axes={axes!r}: no such axis; the axes are {known}") from None
         return numbers
 
     def _movable(self, axes: Axes) -> list[int]:
-        """Return the numbers of chosen axes. ValueError if the choice is empty."""
+        """Return the numbers of the chosen axes. Raises ValueError if the choice is empty."""
         chosen = self._numbers(axes)
         if not chosen:
-            raise ValueError(f"axes={axes!r}: no axis to move")
+            raise ValueError(f"axes={axes!r} selects no axis; give at least one")
         return chosen
 
     def _moving(self) -> Moves:
@@ -468,7 +498,7 @@ class Drives(Request):
         return requests
 
     def _read_drives(self) -> None:
-        """Read rated torque and settings once per plan: `pdos` is called twice for each."""
+        """Read rated torque and settings once per plan, although the plan calls `pdos` twice."""
         if self._is_read:
             return
         rated = [
@@ -479,7 +509,10 @@ class Drives(Request):
         self._is_read = True
 
     def tables(self, layout: ImageLayout) -> RequestTables:
-        """Return the axes in their order; columns by name, then by axis: a name is one array."""
+        """Return the axes and columns for the core.
+
+        Columns are sorted by name, then by axis, so that each name is one array.
+        """
         self._is_read = False  # the next plan reads the settings again
         self._units = np.array([layout.sync_unit(axis.device) for axis in self._axes], np.intp)
         self._rates = RateColumns(self._axes, self._columns, layout)
@@ -488,24 +521,24 @@ class Drives(Request):
             axes=tuple(axis.plan(layout) for axis in self._axes),
             output_columns=(
                 *(
-                    axis.column(name, wanted, layout)
-                    for name, wanted in self._columns.items()
-                    if wanted.output
+                    axis.column(name, column, layout)
+                    for name, column in self._columns.items()
+                    if column.output
                     for axis in self._axes
                 ),
                 *self._rates.columns,
             ),
             input_columns=tuple(
-                axis.column(name, wanted, layout)
-                for name, wanted in self._columns.items()
-                if not wanted.output
+                axis.column(name, column, layout)
+                for name, column in self._columns.items()
+                if not column.output
                 for axis in self._axes
             ),
             axis_reports=tuple(axis.report(self._period_ns) for axis in self._axes),
         )
 
     def bind(self, views: Views) -> None:
-        """Receive the arrays of the loop that opens."""
+        """Connect the request to the arrays of the loop that opens."""
         self._views = views
         self.actual.bind(
             views.actual_position,
@@ -522,7 +555,7 @@ class Drives(Request):
             self._slices(views.output_reals, views.output_integers, output=True),
         )
         rates = self._rates
-        assert rates is not None  # the tables are made before they are bound
+        assert rates is not None  # `tables` runs before `bind`
         rates.bind(self.target, views.output_reals)
         self._moves = Moves(views.movers)
         self._ports = tuple(
@@ -530,7 +563,7 @@ class Drives(Request):
         )
 
     def _port(self, views: Views, index: int, axis: Axis, put_rate: PutRate) -> AxisPort:
-        """Return the interface of an axis that moves use."""
+        """Return the interface of moves to an axis."""
         sdo, period = self._subs[index].sdo, self._period_ns * 1e-9
 
         def write(place: int, value: int) -> Pending[None]:
@@ -549,13 +582,13 @@ class Drives(Request):
         )
 
     def _slices(self, reals: Array, integers: Array, *, output: bool) -> dict[str, Array]:
-        """Return each column's part of its bank's array."""
+        """Return the part of the bank array that belongs to each column."""
         used = {Bank.REAL: 0, Bank.INTEGER: 0}
         slices: dict[str, Array] = {}
-        for name, wanted in self._columns.items():
-            if wanted.output is not output:
+        for name, column in self._columns.items():
+            if column.output is not output:
                 continue
-            bank = column_bank(wanted)
+            bank = column_bank(column)
             array = reals if bank is Bank.REAL else integers
             slices[name] = array[used[bank] : used[bank] + len(self)]
             used[bank] += len(self)
@@ -565,10 +598,10 @@ class Drives(Request):
         views = self._of_open_loop(f"{call}()")
         chosen = self._numbers(axes)
         views.requested_state[chosen] = state
-        views.request[chosen] += 1  # a dropped requested state returns only by a new request
+        views.request[chosen] += 1  # only a new request clears a stop of the core
 
     def _of_open_loop(self, call: str) -> Views:
-        """Return the views for a request; RuntimeError if no cycle would send it."""
+        """Return the views for a request. Raises RuntimeError if the loop is not open."""
         views = self._bound()
         if not views.is_open():
             raise RuntimeError(

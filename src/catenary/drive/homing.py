@@ -1,4 +1,4 @@
-"""Homing by the drives themselves: mode 6, CiA 402-2 / IEC 61800-7-201 §13."""
+"""Homing that the drive performs in mode 6, CiA 402-2 / IEC 61800-7-201 §13."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import itertools
 import math
 from dataclasses import dataclass
 
-from catenary.drive.port import AxisPort, Complaint, Steps, await_condition, mode_is
+from catenary.drive.port import AxisPort, Failure, Steps, await_condition, mode_is
 from catenary.drive.units import AxisUnits
 from catenary.types import DINT, SINT, UDINT
 from catenary.wire.cia402 import Control, Mode, Object, Status
@@ -15,19 +15,28 @@ START = int(Control.MODE_4)
 HALT = int(Control.HALT)
 ATTAINED = int(Status.MODE_12 | Status.TARGET_REACHED)
 FAILED = int(Status.MODE_13)
-ANSWER_CYCLES = 10  # until the statusword can reflect a controlword
+ANSWER_CYCLES = 10  # until the statusword reflects a new controlword
 MODE_TIMEOUT = 5.0  # [s] to change the mode
 
 
 @dataclass(frozen=True, slots=True)
 class HomingMethod:
-    """Homing settings of an axis, written to the drive when the loop opens; None: unchanged.
+    """Homing settings of an axis, which the loop writes to the drive when it opens.
 
-    `method`: 0x6098 by the drive's manual. 37: the present position is home. 1 to 34: by switches
-    and index pulses. Negative: specific to the manufacturer, for example hard stops. `speed`
-    [rad/s] at the joint towards the switch or stop (0x6099:01), `slow` [rad/s] towards zero
-    (0x6099:02), `acceleration` [rad/s²] (0x609A). `offset` [rad] from home to zero (0x607C): by
-    the profile, the axis shows -offset at home; some drives show +offset.
+    None leaves a setting of the drive unchanged. All values are at the joint.
+
+    Args:
+        method: homing method (0x6098), see the manual of the drive. 37 makes the present position
+            home. 1 to 34 use switches and index pulses. Negative methods are manufacturer-specific,
+            for example against a hard stop.
+        speed: speed during the search for the switch or stop (0x6099:01) [rad/s].
+        slow: speed during the search for zero (0x6099:02) [rad/s].
+        acceleration: acceleration and deceleration (0x609A) [rad/s²].
+        offset: distance from home to zero (0x607C) [rad]. By the standard, the axis reads -offset
+            at home; some drives read +offset.
+
+    Raises:
+        ValueError: A value is out of range.
     """
 
     method: int | None = None
@@ -38,20 +47,25 @@ class HomingMethod:
 
     def __post_init__(self) -> None:
         if self.method is not None and not -128 <= self.method <= 127:
-            raise ValueError(f"method={self.method}: -128 to 127")
+            raise ValueError(f"method={self.method} must be from -128 to 127")
         for name in ("speed", "slow", "acceleration"):
             value = getattr(self, name)
             if value is not None and not 0 < value < math.inf:
-                raise ValueError(f"{name}={value}: must be positive")
+                raise ValueError(f"{name}={value} must be positive and finite")
         if self.offset is not None and not math.isfinite(self.offset):
-            raise ValueError(f"offset={self.offset}: must be finite")
+            raise ValueError(f"offset={self.offset} must be finite")
 
     def offset_counts(self, units: AxisUnits) -> int | None:
-        """Return 0x607C [counts]; None if it is not given."""
+        """Return 0x607C [counts]; None if no offset is given."""
         return None if self.offset is None else round(self.offset / units.position_scale)
 
     def downloads(self, units: AxisUnits, base: int) -> tuple[tuple[int, int, bytes], ...]:
-        """Return (index, subindex, data) of the given settings; `base`: of the axis' slot."""
+        """Return (index, subindex, data) of the given settings.
+
+        Args:
+            units: units of the axis.
+            base: index offset of the slot.
+        """
         found: list[tuple[int, int, bytes]] = []
         if self.method is not None:
             found.append((Object.HOMING_METHOD + base, 0, SINT.encode(self.method)))
@@ -70,7 +84,11 @@ class HomingMethod:
 
 
 def home_axis(port: AxisPort, before: int) -> Steps:
-    """Search in mode 6, then return to the mode `before`.
+    """Run a homing in mode 6, then return to the previous mode.
+
+    Args:
+        port: the axis.
+        before: previous mode.
 
     Raises:
         MoveError: The drive reports an error, or does not change its mode.
@@ -78,7 +96,7 @@ def home_axis(port: AxisPort, before: int) -> Steps:
     port.request_mode(Mode.HM)
     try:
         yield from _await_mode(port, Mode.HM)
-        port.clear_bits(HALT)  # set by a failed move in PP
+        port.clear_bits(HALT)  # a failed move in PP leaves it set
         port.set_bits(START)
         for count in itertools.count():
             yield
@@ -86,8 +104,8 @@ def home_axis(port: AxisPort, before: int) -> Steps:
                 continue
             if port.status & FAILED:
                 what = f"reports a homing error (statusword 0x{port.status:04X}, bit 13)"
-                hint = "the method (0x6098) may be none of the drive's: see its manual"
-                raise port.error(Complaint(what, hint))
+                hint = "check in the manual that the drive supports the method (0x6098)"
+                raise port.error(Failure(what, hint))
             if port.has_bits(ATTAINED):
                 break
     finally:
@@ -96,21 +114,21 @@ def home_axis(port: AxisPort, before: int) -> Steps:
 
 
 def leave_homing(port: AxisPort, mode: int) -> None:
-    """End a search and request another mode."""
+    """End the homing and request another mode."""
     port.clear_bits(START)
     port.request_mode(mode)
 
 
 def stop_homing(port: AxisPort, mode: int) -> Steps:
-    """Wait until the drive works in its former mode."""
+    """End the homing and wait until the drive is in another mode."""
     leave_homing(port, mode)
     yield
     yield from _await_mode(port, mode)
 
 
 def _await_mode(port: AxisPort, mode: int) -> Steps:
-    complaint = Complaint(
+    failure = Failure(
         f"does not show mode {mode} (0x6061) within {MODE_TIMEOUT:g} s",
-        "check that the drive supports it (0x6502, its manual)",
+        "check that the drive supports this mode (0x6502, manual)",
     )
-    yield from await_condition(port, mode_is(port, mode), MODE_TIMEOUT, complaint)
+    yield from await_condition(port, mode_is(port, mode), MODE_TIMEOUT, failure)

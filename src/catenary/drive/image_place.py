@@ -1,4 +1,4 @@
-"""Place: a channel in the bytes of its device, read and written in Python."""
+"""Place of a channel in the bytes of its device, for access in Python."""
 
 from __future__ import annotations
 
@@ -12,18 +12,20 @@ from catenary.plan.request import ImageLayout
 
 
 class Place(NamedTuple):
-    """Bits of a channel in the bytes of its device."""
+    """Place of a channel in the bytes of its device."""
 
     channel: Channel
-    first: int  # byte
-    end: int
-    shift: int  # of its lowest bit
+    first: int  # first byte
+    end: int  # after the last byte
+    shift: int  # position of the lowest bit in the first byte
 
     def read(self, image: memoryview | bytearray) -> float | int:
+        """Return the value of the channel in the bytes of the device."""
         raw = int.from_bytes(image[self.first : self.end], "little") >> self.shift
         return self.channel.decode(raw & ((1 << self.channel.bit_length) - 1))
 
     def write(self, image: memoryview | bytearray, value: float | int) -> None:
+        """Write a value of the channel into the bytes of the device."""
         mask = (1 << self.channel.bit_length) - 1 << self.shift
         raw = int.from_bytes(image[self.first : self.end], "little") & ~mask
         raw |= self.channel.encode(value) << self.shift
@@ -31,7 +33,16 @@ class Place(NamedTuple):
 
 
 def make_place(each: NamedChannel, layout: ImageLayout, direction: Direction) -> Place:
-    """Return the place of a channel. MappingError if it is not mapped with its length."""
+    """Return the place of a channel.
+
+    Args:
+        each: channel of a device.
+        layout: layout of the process image.
+        direction: direction of the channel.
+
+    Raises:
+        MappingError: The channel is not mapped, or has another length.
+    """
     find = layout.output if direction is Direction.OUTPUT else layout.input
     channel = each.channel
     number = find(each.device, channel.index, channel.subindex, each.which)

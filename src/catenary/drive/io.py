@@ -1,4 +1,4 @@
-"""Inputs and Outputs: process data of any SubDevice as named columns, including single bits."""
+"""Inputs and Outputs, the process data of SubDevices as arrays and by name."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ A = TypeVar("A", Reals, Integers, Bytes)
 
 
 class BankArray(Generic[A]):
-    """Array of a bank, as an attribute of Inputs and Outputs. Assigning writes its elements."""
+    """Attribute of Inputs and Outputs that is the array of a bank. An assignment writes into it."""
 
     def __init__(self, bank: Bank) -> None:
         self._bank = bank
@@ -63,16 +63,16 @@ class BankArray(Generic[A]):
 
 
 class Channels(Request):
-    """Process data of some devices in one direction, as a request."""
+    """Process-data request for some devices in one direction."""
 
     direction: Direction
 
     bits: BankArray[Bytes] = BankArray(Bank.BIT)
-    """(k,) channels of one bit, 0 or 1, in the order of the process data."""
+    """Channels of one bit, 0 or 1, in the order of the process data (k,)."""
     integers: BankArray[Integers] = BankArray(Bank.INTEGER)
-    """(k,) raw integers, in the order of the process data."""
+    """Channels with raw integers, in the order of the process data (k,)."""
     reals: BankArray[Reals] = BankArray(Bank.REAL)
-    """(k,) channels with a scale and REAL numbers, in the order of the process data."""
+    """Channels with a scale or of type REAL, in the order of the process data (k,)."""
 
     def __init__(
         self,
@@ -98,9 +98,15 @@ class Channels(Request):
         self._unit_valid: Bytes | None = None
         if named:
             if len(subs) != 1:
-                raise ValueError(f"channels= needs one device, not {len(subs)}: one request each")
+                raise ValueError(
+                    f"channels= needs exactly one device, not {len(subs)}; make one request per "
+                    "device"
+                )
             if scale is not None:
-                raise ValueError("scale= is for mapped channels; use channels= (..., type, scale)")
+                raise ValueError(
+                    "scale= cannot be combined with channels=; give the scale of each channel, "
+                    "(index, subindex, type, scale)"
+                )
             self._channels = chosen_channels(subs[0], named)
         else:
             devices = [with_written(sub.description, self.direction, self._pdos) for sub in subs]
@@ -108,7 +114,7 @@ class Channels(Request):
         self._places: dict[str, tuple[Reals | Integers | Bytes, int]] = {}
 
     def array(self, bank: Bank) -> Reals | Integers | Bytes:
-        """Return the array of a bank. RuntimeError before a loop is open."""
+        """Return the array of a bank. Raises RuntimeError before a loop is open."""
         if self._arrays is None:
             raise RuntimeError(f"{type(self).__name__} have no values before a Loop is open")
         return self._arrays[bank]
@@ -123,13 +129,21 @@ class Channels(Request):
         return iter(self.names)
 
     def __getitem__(self, name: str) -> float | int:
-        """Return the channel's value: 0 or 1, the raw integer, or a float if it has a scale."""
+        """Return the value of a channel: 0 or 1, a raw integer, or a float.
+
+        Raises:
+            KeyError: The name is unknown.
+            RuntimeError: No loop has been opened yet.
+        """
         array, place = self._place(name)
         value: float | int = array.item(place)
         return value
 
     def pdos(self, period_ns: int) -> Mapping[int, DeviceRequest]:
-        """Request the channels, or `pdos`; without both, the mapping of the device is unchanged."""
+        """Return the process-data request of each device, by position.
+
+        Without chosen channels and PDOs, the mapping of the devices does not change.
+        """
         requests: dict[int, DeviceRequest] = {}
         for sub in self.subs:
             mine = tuple(c.channel.reference() for c in self._channels if c.device == sub.position)
@@ -155,9 +169,9 @@ class Channels(Request):
 
     @property
     def present(self) -> tuple[bool, ...]:
-        """True for each SubDevice that answered in its last exchange."""
+        """Tuple with True for each SubDevice that replied in its last exchange."""
         if self._unit_valid is None:
-            raise RuntimeError("nothing is exchanged before a Loop is open")
+            raise RuntimeError("no process data is exchanged before a Loop is open")
         return tuple(bool(self._unit_valid[unit]) for unit in self._units)
 
     def _bind(self, reals: Reals, integers: Integers, bits: Bytes, unit_valid: Bytes) -> None:
@@ -177,24 +191,37 @@ class Channels(Request):
         except KeyError:
             if name in self.names:
                 raise RuntimeError(f"{name!r} has no value before a Loop is open") from None
-            raise KeyError(f"no channel {name!r}; there are: {', '.join(self.names)}") from None
+            raise KeyError(
+                f"unknown channel {name!r}; the channels are {', '.join(self.names)}"
+            ) from None
 
 
 class Inputs(Channels):
-    """Inputs of SubDevices: `.bits` (uint8), `.integers` (int64) and `.reals` (float64).
+    """Inputs of SubDevices as arrays: `.bits` (uint8), `.integers` (int64), `.reals` (float64).
 
-    Each array is in the order of the process data. Single channels have names:
+        buttons = Inputs(subs[1])
+        gauge = Inputs(subs[2], scale={"Value": 10 / 0x7FFF})
+        sensor = Inputs(subs[3], channels={"force": (0x6000, 1, types.REAL)})
+
+    Each array has the order of the process data. A channel is also accessible by name:
     `buttons["Input 1"]`.
 
-    Without `channels`, these are the mapped channels, with names from the SII or the dictionary.
-    With it, they are chosen objects of one device:
-    `Inputs(sub, channels={"force": (0x6000, 1, types.REAL)})`, each a `Channel` or
-    (index, subindex, type[, scale]); they are mapped if necessary.
-    `scale` turns raw numbers into floats: `Inputs(sub, scale={"Value": 10 / 0x7FFF})`.
-    `required=False`: the loop continues without a lost device; its channels keep their last
-    values, see `present`. `divider`: cycles of the loop between two exchanges.
-    `dc`: distributed clocks, as for `Drives`. `pdos`: PDOs instead of the assigned ones.
-    `start_up`: objects that are written to each device before SAFE-OP.
+    Args:
+        *subs: devices.
+        channels: objects of one device, `{name: Channel}` or `{name: (index, subindex, type[,
+            scale])}`; they are mapped if necessary. None for all mapped channels, with names from
+            the SII or the object dictionary.
+        scale: factor of each mapped channel by name; the channel is then a float.
+        required: if False, the loop continues without a lost device, and its channels keep their
+            last values; see `present`.
+        divider: cycles of the loop between two exchanges.
+        dc: distributed clocks, as for `Drives`.
+        pdos: PDOs to assign instead of those that are assigned.
+        start_up: objects to write to each device before SAFE-OP.
+
+    Raises:
+        TypeError: An option has the wrong type.
+        ValueError: The devices have no channels, or an option is not valid.
     """
 
     direction = Direction.INPUT
@@ -205,15 +232,17 @@ class Inputs(Channels):
 
 
 class Outputs(Channels):
-    """Outputs of SubDevices, all 0 at the start: write `.bits[:]`, `.integers[:]`, `.reals[:]`.
+    """Outputs of SubDevices as arrays: write `.bits[:]`, `.integers[:]` and `.reals[:]`.
 
-    Single channels have names: `lamps["Output 1"] = 1`. The options are those of `Inputs`. A value
-    out of range is clamped, and `cycle.limited` is True.
+    All outputs are 0 at the start. A channel is also accessible by name: `lamps["Output 1"] = 1`.
+    The options are those of `Inputs`. A value out of range is clamped; `cycle.limited` is then
+    True.
     """
 
     direction = Direction.OUTPUT
 
     def __setitem__(self, name: str, value: float | int) -> None:
+        """Write a channel by name. Raises KeyError if the name is unknown."""
         array, place = self._place(name)
         array[place] = value
 

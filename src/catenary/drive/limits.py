@@ -1,4 +1,4 @@
-"""Limits and reactions of an axis: the application's options, the drive's own limits, defaults."""
+"""Limits and reactions of an axis, from options, from limits of the drive and from defaults."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from catenary.errors import ConfigurationError
 from catenary.plan.cycle import AxisLimits, OnLoss
 from catenary.wire.cia402 import Mode
 
-BRAKE_TIME = 0.25  # [s] from velocity_limit to standstill, without a known deceleration
-BRAKE_TIMES = (1e-3, 2.5)  # [s]: outside of it, 0x6085 probably has another unit
+BRAKE_TIME = 0.25  # [s] from velocity_limit to standstill, if no deceleration is known
+BRAKE_TIMES = (1e-3, 2.5)  # [s] outside this range, 0x6085 probably has another unit
 REACTIONS: tuple[OnLoss, ...] = ("quick_stop", "disable", "csp_hold")
 POSITIVE = (
     "velocity_limit",
@@ -24,14 +24,14 @@ POSITIVE = (
     "step_limit",
 )
 NEEDS_VELOCITY = (Mode.CSV, Mode.CST, Mode.PV)
-INFINITE = ("velocity_limit", "torque_limit")  # the others must be finite
+INFINITE = ("velocity_limit", "torque_limit")  # options that may be infinite
 
 
 @dataclass(frozen=True, slots=True)
 class LimitOptions:
-    """Options of `Drives` about the limits and reactions of one axis; None: not given.
+    """Options of `Drives` for the limits and reactions of one axis; None if not given.
 
-    Units are those of a rotary axis; a linear one has m and N.
+    The units below are those of a rotary axis; a linear axis has m and N instead.
     """
 
     position_min: float | None = None  # [rad]
@@ -45,7 +45,16 @@ class LimitOptions:
     on_loss: OnLoss | None = None
 
     def check(self, name: str, modes: Sequence[Mode], units: UnitNames = ROTARY) -> None:
-        """Raise ValueError for an impossible or missing option of the axis `name`."""
+        """Check the options of one axis.
+
+        Args:
+            name: name of the axis, for messages.
+            modes: modes that the axis may use.
+            units: names of its units, for messages.
+
+        Raises:
+            ValueError: An option is not valid, or a required option is missing.
+        """
         self._check_positions(name, units)
         for option in POSITIVE:
             value = getattr(self, option)
@@ -55,17 +64,19 @@ class LimitOptions:
                 raise ValueError(f"{name}: {_shown(option, units)} must be finite, not {value}")
         if self.on_loss is not None and self.on_loss not in REACTIONS:
             known = ", ".join(map(repr, REACTIONS))
-            raise ValueError(f"{name}: on_loss={self.on_loss!r}; known: {known}")
+            raise ValueError(f"{name}: unknown on_loss={self.on_loss!r}; use one of {known}")
         unlimited = [mode.name for mode in modes if mode in NEEDS_VELOCITY]
         if self.velocity_limit is None and unlimited:
             raise ValueError(
                 f"{name}: velocity_limit= [{units.velocity}] at the joint is required in "
-                f"{' and '.join(unlimited)}; write Drives(velocity_limit=...), or math.inf for none"
+                f"{' and '.join(unlimited)}; write Drives(velocity_limit=...), or math.inf for no "
+                "limit"
             )
         if self.velocity_limit == math.inf and Mode.CSP in modes and self.step_limit is None:
             raise ValueError(
                 f"{name}: velocity_limit=inf in CSP needs step_limit= [{units.position}], the "
-                "largest difference between two set-points; without it a wrong target is accepted"
+                "largest difference between two set-points; without it, wrong targets are not "
+                "detected"
             )
 
     def _check_positions(self, name: str, units: UnitNames) -> None:
@@ -77,7 +88,7 @@ class LimitOptions:
                 )
         low, high = self.position_min, self.position_max
         if low is not None and high is not None and low >= high:
-            raise ValueError(f"{name}: position_min {low} is not below position_max {high}")
+            raise ValueError(f"{name}: position_min {low} must be below position_max {high}")
 
     def lacks_velocity(self, modes: Sequence[Mode]) -> bool:
         """Return True if the default velocity limit of CSP and PP applies."""
@@ -86,9 +97,9 @@ class LimitOptions:
 
 @dataclass(frozen=True, slots=True)
 class Chosen:
-    """Value and its source, for the plan report. None: no limit."""
+    """Limit in force and its source, for the plan report."""
 
-    value: float | None
+    value: float | None  # None for no limit
     source: str = "none"
 
 
@@ -100,7 +111,7 @@ class AxisBounds:
     position_max: Chosen  # [rad]
     velocity: Chosen  # [rad/s]
     torque: Chosen  # [N·m]
-    step: Chosen  # [rad]; None: computed by the core from the velocity limit
+    step: Chosen  # [rad]; if None, the core computes it from the velocity limit
     acceleration: Chosen  # [rad/s²]
     deceleration: Chosen  # [rad/s²]
     torque_slope: Chosen  # [N·m/s]
@@ -125,17 +136,19 @@ def make_bounds(
     own: OwnLimits,
     units: AxisUnits,
 ) -> AxisBounds:
-    """Combine options, the drive's own limits and defaults. The drive's limits only tighten.
+    """Combine options, limits of the drive and defaults.
+
+    Limits of the drive can only tighten the options.
 
     Args:
-        name: Name of the axis, for errors.
-        options: Options of the application.
-        modes: Modes that the axis may use.
-        own: Plausible limits of the drive.
-        units: Units of the axis, with their defaults.
+        name: name of the axis, for messages.
+        options: options of the application.
+        modes: modes that the axis may use.
+        own: plausible limits of the drive.
+        units: units of the axis, with their defaults.
 
     Raises:
-        ConfigurationError: Nothing states a deceleration and velocity_limit is infinite.
+        ConfigurationError: velocity_limit is infinite and no deceleration is known.
     """
     position_min, position_max = _positions(options, own)
     velocity = _tightest(options.velocity_limit, own.velocity, own.velocity_source, min)
@@ -159,7 +172,7 @@ def make_bounds(
 
 
 def _shown(option: str, units: UnitNames) -> str:
-    """Return the name under which the application wrote an option."""
+    """Return the name of an option for the application (force_limit for a linear axis)."""
     return units.torque_limit if option == "torque_limit" else option
 
 
@@ -170,7 +183,7 @@ def _given(value: float | None) -> Chosen:
 def _tightest(
     option: float | None, own: float | None, source: str, pick: Callable[[float, float], float]
 ) -> Chosen:
-    """Return the tighter of an option and the drive's own limit; None for an infinite one."""
+    """Return the tighter of an option and a limit of the drive. Infinity sets no limit."""
     if option is not None and not math.isfinite(option):
         option = None
     if own is None or (option is not None and pick(option, own) == option):
@@ -179,7 +192,10 @@ def _tightest(
 
 
 def _positions(options: LimitOptions, own: OwnLimits) -> tuple[Chosen, Chosen]:
-    """Return the tighter ends. Limits of the drive that contradict the options are ignored."""
+    """Return the tighter position limits.
+
+    Limits of the drive are ignored if they contradict the options.
+    """
     low = _tightest(options.position_min, own.position_min, "0x607D of the drive", max)
     high = _tightest(options.position_max, own.position_max, "0x607D of the drive", min)
     if low.value is None or high.value is None or low.value < high.value:
@@ -191,7 +207,7 @@ def _positions(options: LimitOptions, own: OwnLimits) -> tuple[Chosen, Chosen]:
 def _deceleration(
     name: str, options: LimitOptions, velocity: float | None, own: OwnLimits, units: AxisUnits
 ) -> Chosen:
-    """Return the option, else a plausible 0x6085, else a stop within BRAKE_TIME."""
+    """Return the deceleration from the option, from a plausible 0x6085, or for BRAKE_TIME."""
     if options.deceleration_limit is not None:
         return _given(options.deceleration_limit)
     if own.deceleration is not None and _is_plausible(own.deceleration, velocity):
@@ -201,7 +217,7 @@ def _deceleration(
     if options.velocity_limit is None:
         return Chosen(units.defaults.deceleration, "default")
     raise ConfigurationError(
-        f"{name}: velocity_limit=inf, and the drive states no plausible deceleration (0x6085)",
+        f"{name}: velocity_limit is infinite, and the drive has no plausible deceleration (0x6085)",
         hint=f"write Drives(deceleration_limit=...) in {units.names.acceleration} at the joint",
     )
 

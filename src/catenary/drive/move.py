@@ -1,4 +1,4 @@
-"""Moves: requested motions of some axes, stepped before each commit of the loop."""
+"""Moves: requested motions of axes, which run one step before each commit of the loop."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from catenary.drive.motions import HALT, OWN_BITS
-from catenary.drive.port import AxisPort, Complaint, Steps
+from catenary.drive.port import AxisPort, Failure, Steps
 from catenary.errors import CatenaryError, MoveError
 from catenary.plan.request import Mover
 from catenary.wire.cia402 import Mode
@@ -23,13 +23,13 @@ WORST: tuple[Outcome, ...] = ("failed", "replaced", "stopped", "reached")
 
 @dataclass(slots=True)
 class Part:
-    """Owns the motion of one axis in a move."""
+    """Owner of the motion of one axis in a move."""
 
     port: AxisPort
-    goal: float  # NaN in homing
+    goal: float  # NaN for a homing
     steps: Steps
     stop: Callable[[], Steps]  # brings the axis to rest
-    mode: int | None = None  # the axis must keep it; None: the motion changes it
+    mode: int | None = None  # mode that the axis must keep; None if the motion changes it
     stop_requested: bool = False
     is_stopping: bool = False
     outcome: Outcome | None = None
@@ -37,27 +37,29 @@ class Part:
 
 
 class Move:
-    """Handle of a requested motion: `arm.move_to(...)`, `arm.move_by(...)`, `arm.home()`.
+    """Handle of a motion from `arm.move_to(...)`, `arm.move_by(...)` or `arm.home()`.
 
-    The loop must be iterated while it moves: `loop.wait(move)` does it, or your own `for`.
+    The loop must be iterated during the motion: call `loop.wait(move)`, or use a `for` statement.
     """
 
     def __init__(self, parts: Sequence[Part], patience: float) -> None:
         self._parts = tuple(parts)
         self._done = False
-        self.patience = patience  # [s] default of `loop.wait(move)`
+        self.patience = patience  # [s] default timeout of `loop.wait(move)`
 
     @property
     def done(self) -> bool:
-        """True once every axis has arrived, or has ended otherwise: see `outcome`."""
+        """True when no axis of the move is moving any more; see `outcome`."""
         return self._done
 
     @property
     def outcome(self) -> Outcome | None:
-        """End of the move; None while it is not done. The worst end of its axes counts.
+        """Result of the move; None while it is not done. The worst result of its axes counts.
 
-        "reached": its goal. "stopped": by `stop`. "replaced": by another move of one of its axes.
-        "failed": see `error`.
+        - "reached": all axes are at their goals.
+        - "stopped": `stop` ended the move.
+        - "replaced": another move of one of its axes ended the move.
+        - "failed": an axis could not continue; see `error`.
         """
         if not self.done:
             return None
@@ -65,7 +67,7 @@ class Move:
 
     @property
     def error(self) -> CatenaryError | None:
-        """Error of a move that failed or was replaced; else None."""
+        """Error of a move that failed or was replaced; otherwise None."""
         errors = [part.error for part in self._parts if part.error is not None]
         return errors[0] if self.done and errors else None
 
@@ -76,26 +78,26 @@ class Move:
 
     @property
     def remaining(self) -> npt.NDArray[np.float64]:
-        """(k,) goal minus actual position of the moving axes [rad], [m]; NaN in homing."""
+        """Goal minus actual position of each moving axis, (k,) [rad], [m]; NaN for a homing."""
         return np.array([part.goal - part.port.position for part in self._parts])
 
     def stop(self) -> None:
-        """Decelerate and hold; the move is done when its axes are at rest.
+        """Request a stop. The move is done when its axes are at rest.
 
-        In CSP by the acceleration of the move, in PP by the drive's halt (0x605D), in homing the
-        search ends.
+        In CSP, the axes decelerate with the acceleration of the move. In PP, the drive performs a
+        halt (0x605D). A homing is ended.
         """
-        for part in self._parts:  # without a lock, so that a signal handler may call it
+        for part in self._parts:  # without a lock, so that a signal handler can call it
             part.stop_requested = True
 
     def timeout_error(self, timeout: float) -> MoveError:
         """Return the error of a move that is not done after `timeout` [s]."""
         part = next((part for part in self._parts if part.outcome is None), self._parts[0])
-        hint = "give loop.wait(timeout=) more time, or look at what keeps the axis: Drives.state"
-        return part.port.error(Complaint(f"was still moving after {timeout:g} s", hint, part.goal))
+        hint = "increase loop.wait(timeout=), or check Drives.state of the axis"
+        return part.port.error(Failure(f"was still moving after {timeout:g} s", hint, part.goal))
 
     def finish_if_over(self) -> None:
-        """Become done if no axis moves any more."""
+        """Mark the move as done if no axis is moving any more."""
         if all(part.outcome is not None for part in self._parts):
             self._done = True
 
@@ -104,9 +106,9 @@ class Move:
 
 
 class Moves:
-    """Owns the active moves of some drives: at most one of each axis. A `Mover` of the loop.
+    """Owner of the active moves of some drives, at most one per axis. It is a `Mover` of the loop.
 
-    Moves are requested by any thread; the thread that iterates the loop steps them.
+    Any thread can request a move. The thread that iterates the loop runs the steps.
     """
 
     def __init__(self, movers: list[Mover]) -> None:
@@ -115,37 +117,41 @@ class Moves:
         self._active: dict[int, tuple[Part, Move]] = {}
 
     def begin(self, parts: Mapping[int, Part], patience: float) -> Move:
-        """Start a move. It replaces the motion of axes that move already.
+        """Start a move. It replaces the present moves of its axes.
 
         Args:
-            parts: Motion of each axis, by its number.
-            patience: Default timeout of a wait [s].
+            parts: motion of each axis, by its number.
+            patience: default timeout of a wait [s].
         """
         with self._lock:
             move = Move(tuple(parts.values()), patience)
             replaced = {axis: self._active[axis] for axis in parts if axis in self._active}
             if self not in self._movers:
                 self._movers.append(self)
-            # At once: an interrupt must leave neither half a move nor a motion without a move.
+            # A single update: an interrupt must not leave a part of the move.
             self._active.update({axis: (part, move) for axis, part in parts.items()})
             for part, old in replaced.values():
                 _replace(part, old)
         return move
 
     def goal(self, axis: int) -> float | None:
-        """Return the position from which `move_by` counts while an axis moves; None: its target."""
+        """Return the position from which `move_by` counts; None for the target of the axis."""
         with self._lock:
             part, _ = self._active.get(axis, (None, None))
         if part is None:
             return None
-        if part.stop_requested:  # in PP the target is still the abandoned goal
+        if part.stop_requested:  # in PP, the target is still the previous goal
             return part.port.position if part.mode == Mode.PP else None
         return part.goal
 
     # plan.request.Mover
 
     def step(self, now: float) -> None:
-        """Compute one step of each moving axis, at the time of the cycle [s]."""
+        """Run one step of each moving axis.
+
+        Args:
+            now: time of the cycle [s].
+        """
         with self._lock:
             for axis, (part, _) in list(self._active.items()):
                 part.port.now = now
@@ -161,28 +167,28 @@ class Moves:
             self._leave_if_idle()
 
     def end(self) -> None:
-        """End all moves: the loop is left."""
+        """End all moves because the loop ends."""
         with self._lock:
             for axis, (part, _) in list(self._active.items()):
-                hint = "wait for a move before the loop is left: loop.wait(move)"
-                self._fail(axis, part, Complaint("was moving when the loop ended", hint, part.goal))
+                hint = "wait for the move before you leave the loop: loop.wait(move)"
+                self._fail(axis, part, Failure("was moving when the loop ended", hint, part.goal))
             self._leave_if_idle()
 
     # One axis
 
     def _check(self, axis: int, part: Part) -> bool:
-        """End the motion of an axis that cannot continue it. Return True if so."""
+        """End the motion of an axis if it cannot continue. Return True in this case."""
         cause = part.port.stop_cause()
         if cause is not None:
-            hint = "see Drives.state and Drives.stopped; reset and enable the axis, then move again"
+            hint = "check Drives.state and Drives.stopped, enable the axis, then move again"
         elif part.mode is not None and part.port.requested_mode != part.mode:
-            cause, hint = "its mode was changed", "wait for a move before Drives.switch()"
+            cause, hint = "its mode was changed", "wait for the move before Drives.switch()"
         elif part.port.is_led:
-            cause = "a law or a stream sets its targets now"
-            hint = "wait for a move before you start a law"
+            cause = "a law or a stream now sets its targets"
+            hint = "wait for the move before you start a law or a stream"
         else:
             return False
-        self._fail(axis, part, Complaint(f"ended its move: {cause}", hint, part.goal))
+        self._fail(axis, part, Failure(f"ended its move: {cause}", hint, part.goal))
         return True
 
     def _advance(self, axis: int, part: Part) -> None:
@@ -196,19 +202,19 @@ class Moves:
             self._finish(axis, "stopped" if part.is_stopping else "reached", None)
         except CatenaryError as error:
             self._finish(axis, "failed", error)
-        except BaseException:  # an interrupt: the motion has ended in the middle
-            self._fail(axis, part, Complaint("was interrupted", "start the move again", part.goal))
+        except BaseException:  # an interrupt has ended the generator
+            self._fail(axis, part, Failure("was interrupted", "start the move again", part.goal))
             raise
 
-    def _fail(self, axis: int, part: Part, complaint: Complaint) -> None:
-        error = part.port.error(complaint)
+    def _fail(self, axis: int, part: Part, failure: Failure) -> None:
+        error = part.port.error(failure)
         part.steps.close()
         part.port.clear_bits(OWN_BITS)
         part.port.handshake = False
         self._finish(axis, "failed", error)
 
     def _finish(self, axis: int, outcome: Outcome, error: CatenaryError | None) -> None:
-        """End the move of the axis. After a handshake error it stays halted."""
+        """End the motion of an axis. After an error of the handshake, halt stays set."""
         part, move = self._active.pop(axis)
         part.outcome, part.error = outcome, error
         part.port.motion = None
@@ -221,10 +227,10 @@ class Moves:
 
 
 def _replace(part: Part, move: Move) -> None:
-    """End a motion whose successor continues from it."""
+    """End a motion that another move of the axis continues."""
     part.steps.close()
     part.port.clear_bits(OWN_BITS & ~HALT)
     part.outcome = "replaced"
-    hint = "wait for a move before the next one, or look at move.outcome"
-    part.error = part.port.error(Complaint("got another move", hint, part.goal))
+    hint = "wait for a move before you start the next one, or check move.outcome"
+    part.error = part.port.error(Failure("received another move", hint, part.goal))
     move.finish_if_over()

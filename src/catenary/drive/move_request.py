@@ -1,4 +1,4 @@
-"""Requests of `move_to` and `move_by`, checked against the limits before anything moves."""
+"""Requests of `move_to` and `move_by`, with all checks before the motion starts."""
 
 from __future__ import annotations
 
@@ -28,13 +28,13 @@ from catenary.wire.cia402 import Mode
 
 Values: TypeAlias = float | Sequence[float] | npt.NDArray[np.float64]
 
-SLACK = 1e-9  # of a limit: rounding
-PATIENCE = (2.0, 10.0)  # times the expected duration, and seconds: default timeout of a wait
+SLACK = 1e-9  # relative tolerance of a limit, for rounding errors
+WAIT_TIMEOUT = (2.0, 10.0)  # default: factor of the expected duration, and additional seconds
 
 
 @dataclass(frozen=True, slots=True)
 class RateOptions:
-    """Options of a move, scalars or one value for each axis that moves; None: the axis' own."""
+    """Options of a move: one value, or one per moving axis; None for the default of each axis."""
 
     velocity: Values | None = None
     acceleration: Values | None = None
@@ -44,26 +44,42 @@ class RateOptions:
 def values_of(name: str, value: Values, count: int) -> list[float]:
     """Return one finite number per axis.
 
+    Args:
+        name: name of the option, for messages.
+        value: one number, or one per axis.
+        count: number of axes.
+
     Raises:
-        ValueError: A wrong number of values, NaN or infinity.
+        ValueError: The number of values is wrong, or a value is not finite.
     """
     row = np.asarray(value, dtype=np.float64)
     if row.ndim == 0:
         row = np.full(count, float(row))
     if row.shape != (count,):
-        raise ValueError(f"{name}: one number, or {count} for the axes that move, not {value!r}")
+        raise ValueError(
+            f"{name}={value!r}: give one number, or {count} numbers, one per moving axis"
+        )
     if not np.isfinite(row).all():
-        raise ValueError(f"{name}: must be finite, not {value!r}")
+        raise ValueError(f"{name}={value!r} must be finite")
     return [float(each) for each in row]
 
 
 def make_parts(
     axes: Sequence[Axis], ports: Sequence[AxisPort], goals: Sequence[float], options: RateOptions
 ) -> tuple[list[Part], float]:
-    """Return the motion of each axis, and the default timeout of a wait [s].
+    """Check a move and make the motion of each axis.
+
+    Args:
+        axes: axes that move.
+        ports: interface to each axis.
+        goals: goal of each axis.
+        options: rates of the move.
+
+    Returns:
+        Motion of each axis, and the default timeout of a wait [s].
 
     Raises:
-        ValueError: A goal or rate is outside the limits, or the mode has no positions.
+        ValueError: A goal or rate is beyond a limit, or the mode is neither CSP nor PP.
         DriveError: An axis is not enabled.
         ConfigurationError: The jerk is limited and ruckig is not installed.
     """
@@ -78,41 +94,45 @@ def make_parts(
         make_profile(Motion(port.position), goal, rate._replace(jerk=None)).duration
         for port, goal, rate in zip(ports, goals, rates, strict=True)
     )
-    return parts, PATIENCE[0] * longest + PATIENCE[1]
+    return parts, WAIT_TIMEOUT[0] * longest + WAIT_TIMEOUT[1]
 
 
 def make_homing_part(axis: Axis, port: AxisPort) -> Part:
-    """Return the search of an axis for its home.
+    """Check a homing and make the motion of its axis.
+
+    Args:
+        axis: axis to home.
+        port: interface to the axis.
 
     Raises:
-        ValueError: The axis was made without "hm", or is homing already.
+        ValueError: The axis was made without "hm", or is already homing.
         DriveError: The axis is not enabled.
     """
     if Mode.HM not in axis.modes:
-        raise ValueError(f"{axis.name}: make Drives with other_modes=['hm']")
+        raise ValueError(f"{axis.name} was made without mode 'hm'; add Drives(other_modes=['hm'])")
     before = port.requested_mode
     if before == Mode.HM:
-        raise ValueError(f"{axis.name}: is homing already; wait, or use move.stop()")
+        raise ValueError(f"{axis.name} is already homing; wait for the end, or use move.stop()")
     require_enabled(port)
     return Part(port, math.nan, home_axis(port, before), lambda: stop_homing(port, before))
 
 
 def require_enabled(port: AxisPort) -> None:
-    """Raise DriveError if an axis does not follow its targets, or those of a law."""
+    """Raise DriveError if an axis does not follow its targets, or if a law or stream sets them."""
     if port.is_led:
         raise DriveError(
             f"{port.name} cannot move: a law or a stream sets its targets",
-            hint="end it first: run.stop() of what loop.start() returned, stream.close()",
+            hint="end it first: stop() of the run that loop.start() returned, or stream.close()",
         )
     if not port.followed or port.stop_cause() is not None:
         raise DriveError(
             f"{port.name} cannot move: it is not enabled ({port.state_text()})",
-            hint="arm.enable(), then iterate the loop until arm.enabled.all()",
+            hint="call arm.enable(), then iterate the loop until arm.enabled.all()",
         )
 
 
 def default_acceleration(axis: Axis) -> float | None:
-    """Return `acceleration_limit`, else the default velocity divided by 0.25 s; None: not known."""
+    """Return `acceleration_limit`, or else the velocity limit / 0.25 s; None without both."""
     if axis.options.acceleration_limit is not None:
         return axis.options.acceleration_limit
     velocity = default_velocity(axis)
@@ -120,7 +140,7 @@ def default_acceleration(axis: Axis) -> float | None:
 
 
 def default_velocity(axis: Axis) -> float | None:
-    """Return the velocity limit; None if the application asked for none (`math.inf`)."""
+    """Return the velocity limit; None if the application disabled it with `math.inf`."""
     return None if axis.options.velocity_limit == math.inf else axis.bounds.velocity.value
 
 
@@ -128,16 +148,16 @@ def _part(axis: Axis, port: AxisPort, goal: float, rates: Rates) -> Part:
     mode = port.requested_mode
     if mode not in (Mode.CSP, Mode.PP):
         raise ValueError(
-            f"{axis.name}: moves to a position need mode csp or pp, its mode is "
-            f'{Mode(mode).name.lower()}: use Drives(mode="csp"), or arm.switch("csp") before'
+            f"{axis.name} is in mode {Mode(mode).name.lower()}, but a move needs csp or pp; use "
+            'Drives(mode="csp"), or call arm.switch("csp") first'
         )
     require_enabled(port)
     _check_goal(axis, goal)
     if mode == Mode.PP:
         if rates.jerk is not None:
             raise ValueError(
-                f"{axis.name}: jerk= in mode pp: the drive makes the motion (0x6081, 0x6083, "
-                "0x6084); leave jerk= out, or use mode csp"
+                f"{axis.name}: jerk= is not possible in mode pp, where the drive computes the "
+                "motion (0x6081, 0x6083, 0x6084); omit jerk=, or use mode csp"
             )
         steps = move_profile(port, goal, rates)
         return Part(port, goal, steps, lambda: stop_profile(port), mode=mode)
@@ -153,20 +173,21 @@ def _check_goal(axis: Axis, goal: float) -> None:
 
 
 def _check_rest(axis: Axis, port: AxisPort, rates: Rates) -> None:
-    """Raise ValueError if an axis in motion cannot stop before a position limit."""
+    """Raise ValueError if a moving axis cannot stop before a position limit."""
     motion = first_motion(port)
     rest = make_stop(motion, rates).goal
     beyond = _beyond(axis, rest)
     if beyond is not None and (rest - motion.position) * motion.velocity > 0:
         names = axis.units.names
         raise ValueError(
-            f"{axis.name}: acceleration {rates.acceleration:.6g} {names.acceleration} stops it "
-            f"from {motion.velocity:.4g} {names.velocity} at {rest:.6g} {names.position}, {beyond}"
+            f"{axis.name}: with acceleration {rates.acceleration:.6g} {names.acceleration}, the "
+            f"axis stops from {motion.velocity:.4g} {names.velocity} at {rest:.6g} "
+            f"{names.position}, {beyond}"
         )
 
 
 def _beyond(axis: Axis, position: float) -> str | None:
-    """Return the position limit that is exceeded, as text; None if there is none."""
+    """Return the position limit that a position exceeds, as text; None if it exceeds neither."""
     bounds, unit = axis.bounds, axis.units.names.position
     for name, limit, sign in (
         ("position_min", bounds.position_min.value, -1.0),
@@ -199,7 +220,7 @@ def _rate(axis: Axis, name: str, value: float | None, known: float | None) -> fl
     if value is None:
         if known is None:
             raise ValueError(
-                f"{axis.name}: no {name} for the move: give {name}= [{unit}], or "
+                f"{axis.name}: the move has no {name}; give {name}= [{unit}], or "
                 f"Drives({name}_limit=...)"
             )
         return known

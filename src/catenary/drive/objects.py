@@ -1,6 +1,6 @@
-"""CiA 402-2 objects that an axis exchanges: index, width and scale.
+"""CiA 402-2 objects in the process data of an axis, with their width and unit.
 
-Slot k of a device has them at index + SLOT_OFFSET · k (ETG.6010 §5.1).
+In slot k of a device, their index is higher by SLOT_OFFSET · k (ETG.6010 §5.1).
 """
 
 from __future__ import annotations
@@ -13,32 +13,37 @@ from catenary.wire.cia402 import SLOT_OFFSET, Object
 
 
 class Unit(Enum):
-    """Scale of the axis that an object uses; RAW: none, an integer column."""
+    """Unit of an object, which determines its scale."""
 
     POSITION = "position"
-    DISTANCE = "distance"  # a difference of positions: without the axis' offset
+    DISTANCE = "distance"  # difference of positions, without the offset of the axis
     VELOCITY = "velocity"
-    SPEED = "speed"  # a velocity or its ramp without a direction
+    SPEED = "speed"  # magnitude of a velocity, or its ramp
     TORQUE = "torque"
-    EFFORT = "effort"  # a torque without a direction
-    RAW = "raw"
+    EFFORT = "effort"  # magnitude of a torque
+    RAW = "raw"  # raw number without a unit
 
 
 @dataclass(frozen=True, slots=True)
 class AxisObject:
-    """One object of an axis. `output`: MainDevice → drive. `scale`: of a RAW object that is read or
-    written as a float; None: as an integer."""
+    """One object of an axis."""
 
-    index: int  # of slot 0
+    index: int  # in slot 0
     subindex: int
     bit_length: int
     signed: bool = False
     unit: Unit = Unit.RAW
-    output: bool = False
-    real: bool = False
-    scale: float | None = None
+    output: bool = False  # True if the MainDevice sends it
+    real: bool = False  # True for an IEEE 754 number
+    scale: float | None = None  # factor of a RAW object with float values; None for integers
 
     def reference(self, slot: int, *, required: bool = True) -> ObjectReference:
+        """Return the object of a slot for a process-data request.
+
+        Args:
+            slot: number of the slot.
+            required: False if the device may lack the object.
+        """
         index = self.index + SLOT_OFFSET * slot
         return ObjectReference(index, self.subindex, self.bit_length, required)
 
@@ -59,14 +64,14 @@ TARGET_VELOCITY = AxisObject(Object.TARGET_VELOCITY, 0, 32, True, Unit.VELOCITY,
 
 MAX_TORQUE = AxisObject(Object.MAX_TORQUE, 0, 16, False, Unit.EFFORT, True)
 
-# Of the profile modes: one count of the ramps is a velocity count per second.
+# Objects of the profile modes. One count of a ramp is one velocity count per second.
 PROFILE_OBJECTS: dict[str, AxisObject] = {
     "profile_velocity": AxisObject(Object.PROFILE_VELOCITY, 0, 32, False, Unit.SPEED, True),
     "profile_acceleration": AxisObject(Object.PROFILE_ACCELERATION, 0, 32, False, Unit.SPEED, True),
     "profile_deceleration": AxisObject(Object.PROFILE_DECELERATION, 0, 32, False, Unit.SPEED, True),
 }
 
-# Columns that can be requested by name, in the order of their numbers.
+# Columns that can be requested by name, in the order of their indexes.
 NAMED_COLUMNS: dict[str, AxisObject] = {
     "error_code": AxisObject(Object.ERROR_CODE, 0, 16, False, Unit.RAW, False),
     "position_demand": POSITION_DEMAND,
@@ -84,7 +89,7 @@ NAMED_COLUMNS: dict[str, AxisObject] = {
     "digital_outputs": AxisObject(Object.DIGITAL_OUTPUTS, 1, 32, False, Unit.RAW, True),
 }
 
-# Objects of a drive that the MainDevice writes, (index, subindex) of slot 0.
+# Objects that the MainDevice writes, as (index, subindex) in slot 0.
 WRITTEN_OBJECTS = frozenset(
     (each.index, each.subindex)
     for each in (

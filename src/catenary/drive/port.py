@@ -1,4 +1,4 @@
-"""Interface of moves to one axis: its values of this cycle, and the data of the next commit."""
+"""Interface of moves to one axis: values of the present cycle, and data for the next commit."""
 
 from __future__ import annotations
 
@@ -17,17 +17,17 @@ from catenary.wire.cia402 import IN_FAULT, AxisState, Mode
 if TYPE_CHECKING:
     from catenary.bus import Pending
 
-Steps: TypeAlias = Generator[None, None, None]  # one step before each commit
-WriteObject: TypeAlias = "Callable[[int, int], Pending[None]]"  # (object of slot 0, value)
-PutRate: TypeAlias = Callable[[str, float], bool]  # False: not in the process data
+Steps: TypeAlias = Generator[None, None, None]  # runs one step before each commit
+WriteObject: TypeAlias = "Callable[[int, int], Pending[None]]"  # (index in slot 0, value)
+PutRate: TypeAlias = Callable[[str, float], bool]  # returns False if the rate is not mapped
 
-FOLLOWED = 1  # axis_flags
-REQUESTED_SHIFT = 6
-JUMPS = 3  # counts per exchange of an estimated velocity that are not motion
+FOLLOWED = 1  # bit of axis_flags
+REQUESTED_SHIFT = 6  # position of the requested state in axis_flags
+JUMPS = 3  # noise of an estimated velocity at standstill [counts per exchange]
 
 
 class AxisPort:
-    """Owns the data that a move writes to one axis: target, mode, and bits of the controlword."""
+    """Owner of the data that a move writes to one axis: target, mode, bits of the controlword."""
 
     def __init__(
         self,
@@ -61,33 +61,39 @@ class AxisPort:
 
     @property
     def status(self) -> int:
+        """Statusword of the drive."""
         return self._views.statusword.item(self._index)
 
     @property
     def mode(self) -> int:
+        """Mode that the drive reports (0x6061)."""
         return self._views.mode_actual.item(self._index)
 
     @property
     def requested_mode(self) -> int:
+        """Mode that the drive shall use (0x6060)."""
         return self._views.mode_target.item(self._index)
 
     @property
     def position(self) -> float:
+        """Actual position."""
         return self._views.actual_position.item(self._index)
 
     @property
     def velocity(self) -> float:
+        """Actual velocity."""
         return self._views.actual_velocity.item(self._index)
 
     @property
     def target(self) -> float:
+        """Target position."""
         return self._views.target_position.item(self._index)
 
     @property
     def rest(self) -> float:
-        """Position from which the axis moves on: its target.
+        """Position from which the next move starts, normally the target.
 
-        In PP, a target that the drive has not received is ignored: then the actual position.
+        In PP, it is the actual position if the drive has not received the target.
         """
         if self.requested_mode == Mode.PP and self.target != self.handed_over:
             return self.position
@@ -100,28 +106,32 @@ class AxisPort:
 
     @property
     def at_rest(self) -> bool:
-        """True if the velocity is below the standstill, or too small to be measured."""
+        """True if the velocity is below that of a standstill, or too small to be measured."""
         return not abs(self.velocity) > self._standstill
 
     def set_target(self, position: float) -> None:
+        """Write the target position."""
         self._views.target_position[self._index] = position
 
     def command(self, motion: Motion) -> None:
-        """Send a motion as the set-point of CSP."""
+        """Write a motion as the CSP set-point."""
         self.motion = motion
         self.set_target(motion.position)
 
     def request_mode(self, mode: int) -> None:
+        """Request a mode of operation."""
         self._views.mode_target[self._index] = mode
 
     def set_bits(self, bits: int) -> None:
+        """Set bits of the controlword."""
         self._views.controlword_bits[self._index] |= bits
 
     def clear_bits(self, bits: int) -> None:
+        """Clear bits of the controlword."""
         self._views.controlword_bits[self._index] &= ~bits & 0xFFFF
 
     def has_bits(self, bits: int) -> bool:
-        """Return True if the statusword of the drive has all of these bits."""
+        """Return True if all of these bits are set in the statusword."""
         return self.status & bits == bits
 
     @property
@@ -140,48 +150,54 @@ class AxisPort:
         return reason.text if reason else "it was disabled or stopped on request"
 
     def state_text(self) -> str:
-        """Return the CiA 402 state, for messages."""
+        """Return the name of the CiA 402 state, for messages."""
         try:
             return AxisState(self._views.axis_state.item(self._index)).name
         except ValueError:
-            return "no CiA 402 state"
+            return "unknown CiA 402 state"
 
-    def error(self, complaint: Complaint) -> MoveError:
-        """Return the error of a move of this axis that does not reach its goal."""
-        remaining = complaint.goal - self.position
+    def error(self, failure: Failure) -> MoveError:
+        """Return the error of a move that does not reach its goal."""
+        remaining = failure.goal - self.position
         unit = self.units.names.position
         left = "" if math.isnan(remaining) else f", {remaining:.4g} {unit} before its goal"
         return MoveError(
-            f"{self.name} {complaint.what}{left}",
+            f"{self.name} {failure.what}{left}",
             axis=self.name,
             remaining=remaining,
-            hint=complaint.hint,
+            hint=failure.hint,
         )
 
 
-class Complaint(NamedTuple):
-    """Text of a MoveError: what the axis did, and what to do."""
+class Failure(NamedTuple):
+    """Text of a MoveError."""
 
-    what: str
+    what: str  # what the axis did or did not do, as a predicate
     hint: str
-    goal: float = math.nan
+    goal: float = math.nan  # NaN for a homing
 
 
 def await_condition(
-    port: AxisPort, met: Callable[[], bool], timeout: float, complaint: Complaint
+    port: AxisPort, met: Callable[[], bool], timeout: float, failure: Failure
 ) -> Steps:
-    """Step until a condition is met.
+    """Wait until a condition is met.
+
+    Args:
+        port: the axis.
+        met: the condition.
+        timeout: longest wait [s].
+        failure: text of the error.
 
     Raises:
-        MoveError: It is not met after `timeout` [s].
+        MoveError: The condition is not met in time.
     """
     begun = port.now
     while not met():
         if port.now - begun > timeout:
-            raise port.error(complaint)
+            raise port.error(failure)
         yield
 
 
 def mode_is(port: AxisPort, mode: int) -> Callable[[], bool]:
-    """Return the condition that the drive works in a mode."""
+    """Return the condition that the drive is in a mode and follows its targets."""
     return lambda: port.mode == Mode(mode) and port.followed

@@ -1,4 +1,4 @@
-"""ProcessData: inputs and outputs of one device of any kind, as bytes and by name."""
+"""ProcessData, the inputs and outputs of one device of any kind, as bytes and by name."""
 
 from __future__ import annotations
 
@@ -43,33 +43,33 @@ from catenary.plan.start_up_object import StartUp
 class ProcessData(Request):
     """Process-data request for one device of any kind.
 
-        raw = ProcessData(sub)  # as mapped now: nothing is written to the device
+        raw = ProcessData(sub)  # with the present mapping; nothing is written to the device
         sensor = ProcessData(sub, inputs={"force": (0x6000, 1, types.REAL)})
 
-    While a loop is open, `inputs` and `outputs` are memoryviews of the device's bytes, and
-    `sensor["force"]` is an object by name. Both change only at `next(loop)`, where outputs are sent
-    as they stand. They start as 0.
+    While a loop is open, `inputs` and `outputs` are memoryviews of the bytes of the device, and
+    `sensor["force"]` is the value of one object. `next(loop)` sends the present outputs and updates
+    the inputs. All outputs are 0 at the start.
 
     Args:
-        sub: Device.
-        inputs: `{name: (index, subindex, type[, scale])}`, or a `Channel` for each name. They are
-            mapped if they are not yet. None: as mapped, with the names of the SII or the
-            dictionary. `{}`: none.
-        outputs: The same for outputs. The request writes all bytes of the outputs; `{}`: it writes
-            none, so that another request can.
-        pdos: PDOs instead of a search: `[0x1A01]`, or with their entries, by name or as (index,
-            subindex, bits): `{0x1A00: ["force", "status"]}`.
-        safe: Values of outputs by name, or the bytes of all outputs. They are sent when the loop
-            ends, for whatever reason. Outputs without a safe value become 0. Then the device leaves
-            OP, and decides by itself what its outputs do.
-        start_up: Objects that are written to the device before SAFE-OP.
-        divider: Cycles of the loop between two exchanges.
-        required: False: the loop continues without the device; see `present`.
-        dc: Distributed clocks. True: as the SII of the device states.
+        sub: the device.
+        inputs: `{name: (index, subindex, type[, scale])}`, or a `Channel` for each name. The
+            objects are mapped if necessary. None for all mapped inputs, with names from the SII or
+            the object dictionary. `{}` for no inputs.
+        outputs: the same for outputs. The request writes all output bytes of the device, except
+            with `{}`: another request can then write them.
+        pdos: PDOs to assign, `[0x1A01]`, or with their entries by name or as (index, subindex,
+            bits), `{0x1A00: ["force", "status"]}`. None to search suitable PDOs.
+        safe: values of outputs by name, or the bytes of all outputs. The loop sends them when it
+            ends for any reason; outputs without a safe value become 0. The device then leaves OP
+            and determines its outputs itself.
+        start_up: objects to write to the device before SAFE-OP.
+        divider: cycles of the loop between two exchanges.
+        required: if False, the loop continues without the device; see `present`.
+        dc: distributed clocks. True uses the settings in the SII of the device.
 
     Raises:
-        TypeError: An object is neither a Channel nor (index, subindex, type).
-        ValueError: A name is unknown or used twice, or a value does not fit.
+        TypeError: An object is neither a Channel nor (index, subindex, type[, scale]).
+        ValueError: A name is unknown or used twice, or a value is out of range.
     """
 
     def __init__(
@@ -113,27 +113,27 @@ class ProcessData(Request):
 
     @property
     def inputs(self) -> memoryview:
-        """Bytes of the device's inputs, read-only; the same object while the loop is open."""
+        """Input bytes of the device, read-only; the same object while the loop is open."""
         return self._image(Direction.INPUT)
 
     @property
     def outputs(self) -> memoryview:
-        """Bytes of the device's outputs, to be written; the same object while the loop is open."""
+        """Output bytes of the device, writable; the same object while the loop is open."""
         if not self._writes:
-            raise RuntimeError(f"{self!r} writes no outputs: it was made with outputs={{}}")
+            raise RuntimeError(f"{self!r} cannot write outputs: it was made with outputs={{}}")
         return self._image(Direction.OUTPUT)
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Names of inputs, then of outputs."""
+        """Names of the inputs, followed by those of the outputs."""
         each = (*self._channels[Direction.INPUT], *self._channels[Direction.OUTPUT])
         return tuple(channel.name for channel in each)
 
     @property
     def present(self) -> bool:
-        """True if the device answered in its last exchange."""
+        """True if the device replied in its last exchange."""
         if self._unit_valid is None:
-            raise RuntimeError("nothing is exchanged before a Loop is open")
+            raise RuntimeError("no process data is exchanged before a Loop is open")
         return bool(self._unit_valid[self._unit])
 
     def __iter__(self) -> Iterator[str]:
@@ -141,10 +141,10 @@ class ProcessData(Request):
         return iter(self.names)
 
     def __getitem__(self, name: str) -> float | int:
-        """Return a value by name: a bool, an integer, or a float where it is REAL or has a scale.
+        """Return a value by name: a bool, an integer, or a float if it is REAL or has a scale.
 
         Raises:
-            KeyError: There is no such name.
+            KeyError: The name is unknown.
         """
         direction, place = self._place(name)
         return place.read(self._image(direction))
@@ -153,13 +153,13 @@ class ProcessData(Request):
         """Write an output by name.
 
         Raises:
-            KeyError: There is no such name.
-            TypeError: It is an input, or an integer is needed.
-            ValueError: The type of the object cannot hold the value.
+            KeyError: The name is unknown.
+            TypeError: The name is that of an input, or the object needs an integer.
+            ValueError: The value is out of the range of the type.
         """
         direction, place = self._place(name)
         if direction is Direction.INPUT:
-            raise TypeError(f"{self!r}: {name!r} is an input: it is read-only")
+            raise TypeError(f"{self!r}: {name!r} is an input and therefore read-only")
         try:
             place.write(self._image(direction), value)
         except (TypeError, ValueError) as error:
@@ -168,7 +168,7 @@ class ProcessData(Request):
     # plan.request.ProcessDataRequest
 
     def pdos(self, period_ns: int) -> Mapping[int, DeviceRequest]:
-        """Request the objects, or what is mapped already."""
+        """Return the request for the chosen objects, or for those that are mapped."""
         references = {
             direction: tuple(each.channel.reference() for each in channels)
             for direction, channels in self._channels.items()
@@ -185,7 +185,7 @@ class ProcessData(Request):
         return {self._subs[0].position: request}
 
     def tables(self, layout: ImageLayout) -> RequestTables:
-        """Return the bytes as areas. Named inputs are columns too, for laws and recordings."""
+        """Return the bytes as areas, and named inputs also as columns for laws and recordings."""
         device = self._subs[0].position
         self._unit = layout.sync_unit(device)
         self._places = {
@@ -204,7 +204,7 @@ class ProcessData(Request):
         )
 
     def bind(self, views: Views) -> None:
-        """Receive the bytes of the loop that opens."""
+        """Connect the request to the bytes of the loop that opens."""
         self._images = {
             Direction.INPUT: views.input_bytes.data,
             Direction.OUTPUT: views.output_bytes.data,
@@ -214,12 +214,12 @@ class ProcessData(Request):
     def _check_safe(self) -> None:
         """Raise ValueError for safe values that cannot be sent."""
         if self._safe and not self._writes:
-            raise ValueError("safe: this request writes no outputs (outputs={})")
+            raise ValueError("safe= is given, but this request writes no outputs (outputs={})")
         if isinstance(self._safe, bytes):
             return
         if not isinstance(self._safe, Mapping):
             raise TypeError(
-                f"safe: {{name: value}}, or the bytes of all outputs, not {self._safe!r}"
+                f"safe={self._safe!r}: give {{name: value}}, or the bytes of all outputs"
             )
         channels = {each.name: each.channel for each in self._channels[Direction.OUTPUT]}
         for name, value in self._safe.items():
@@ -238,9 +238,9 @@ class ProcessData(Request):
             return bytes(image)
         if self._safe and len(self._safe) != size:
             raise ConfigurationError(
-                f"{self!r}: safe has {len(self._safe)} bytes, the outputs of the device have "
+                f"{self!r}: safe has {len(self._safe)} bytes, but the outputs of the device have "
                 f"{size}",
-                hint="give a value for each byte, or values by name",
+                hint="give one value per byte, or values by name",
             )
         return self._safe or bytes(size)
 
@@ -264,7 +264,7 @@ class ProcessData(Request):
             raise RuntimeError(f"{name!r} has no value before a Loop is open")
         if not isinstance(name, str):
             raise TypeError(
-                f"{self!r}: a name is text, not {name!r}; `inputs` and `outputs` are bytes"
+                f"{self!r}: {name!r} is not a name; use `inputs` or `outputs` to access bytes"
             )
         raise KeyError(f"{self!r}: {_unknown(name, self.names)}")
 
@@ -275,7 +275,7 @@ def _mapped_channels(
     pdos: Sequence[WrittenPdo],
     taken: Mapping[str, Channel],
 ) -> dict[Direction, tuple[NamedChannel, ...]]:
-    """Return what is mapped in these directions. No name is given twice."""
+    """Return the mapped channels of these directions, with names that are not in `taken`."""
     found = []
     for direction in directions:
         written = [pdo for pdo in pdos if pdo.direction is direction]
@@ -300,10 +300,11 @@ def _mapped_channels(
 def _check_names(inputs: Mapping[str, object], outputs: Mapping[str, object]) -> None:
     twice = [name for name in inputs if name in outputs]
     if twice:
-        raise ValueError(f"{twice[0]!r} names an input and an output: each needs its own name")
+        raise ValueError(f"{twice[0]!r} names an input and an output; each needs its own name")
 
 
 def _unknown(name: str, known: Sequence[str] | Mapping[str, object]) -> str:
     near = get_close_matches(name, known, n=1)
     guess = f"; did you mean {near[0]!r}?" if near else ""
-    return f"no name {name!r}; there are: {', '.join(known) or 'none'}{guess}"
+    names = f"the names are {', '.join(known)}" if known else "there are no names"
+    return f"unknown name {name!r}; {names}{guess}"

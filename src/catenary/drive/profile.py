@@ -1,4 +1,4 @@
-"""Motion profiles of one axis: trapezoids of its velocity, or with limited jerk by ruckig.
+"""Motion profiles of one axis: trapezoidal velocity, or limited jerk by ruckig.
 
 Source of the jerk-limited profile: Berscheid and Kröger, Jerk-limited real-time trajectory
 generation with arbitrary target states, RSS 2021.
@@ -23,15 +23,15 @@ class Motion(NamedTuple):
 
 
 class Rates(NamedTuple):
-    """Limits of a profile, in the units of the axis. `jerk`: None: a trapezoid."""
+    """Limits of a profile, in the units of the axis."""
 
     velocity: float
     acceleration: float
-    jerk: float | None = None
+    jerk: float | None = None  # None for a trapezoidal velocity
 
 
 class Profile(Protocol):
-    """A motion that ends at rest."""
+    """Motion that ends at rest."""
 
     @property
     def duration(self) -> float:
@@ -47,7 +47,7 @@ class Profile(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class Trapezoid:
-    """Phases of constant acceleration, one after the other."""
+    """Profile that consists of phases with constant acceleration."""
 
     start: Motion
     goal: float
@@ -72,9 +72,14 @@ class Trapezoid:
 
 
 def make_profile(start: Motion, goal: float, rates: Rates) -> Profile:
-    """Return the fastest profile from `start` to rest at `goal`.
+    """Return the fastest profile to rest at a goal.
 
-    A start that is faster than `rates.velocity` slows down to it first.
+    If the start is faster than the velocity limit, the profile first decelerates to this limit.
+
+    Args:
+        start: motion at the start.
+        goal: position at the end.
+        rates: limits of the profile.
 
     Raises:
         ConfigurationError: The jerk is limited and ruckig is not installed.
@@ -85,7 +90,15 @@ def make_profile(start: Motion, goal: float, rates: Rates) -> Profile:
 
 
 def make_stop(start: Motion, rates: Rates) -> Profile:
-    """Return the profile that decelerates from `start` to rest. The goal follows from it."""
+    """Return the profile that decelerates to rest as soon as possible.
+
+    Args:
+        start: motion at the start.
+        rates: limits of the profile.
+
+    Raises:
+        ConfigurationError: The jerk is limited and ruckig is not installed.
+    """
     if rates.jerk is None:
         speed, acceleration = abs(start.velocity), rates.acceleration
         goal = start.position + start.velocity * speed / (2 * acceleration)
@@ -97,22 +110,22 @@ def make_stop(start: Motion, rates: Rates) -> Profile:
 def _trapezoid(start: Motion, goal: float, velocity: float, acceleration: float) -> Trapezoid:
     rest = start.position + start.velocity * abs(start.velocity) / (2 * acceleration)
     sign = 1.0 if goal >= rest else -1.0
-    way, first = sign * (goal - start.position), sign * start.velocity
+    distance, first = sign * (goal - start.position), sign * start.velocity
     if first > velocity:
         begin, peak = -acceleration, velocity
     else:
         begin = acceleration
-        peak = min(velocity, math.sqrt(max(acceleration * way + first * first / 2, 0.0)))
+        peak = min(velocity, math.sqrt(max(acceleration * distance + first * first / 2, 0.0)))
     reach = (peak - first) / begin
     ramps = (peak + first) / 2 * reach + peak * peak / (2 * acceleration)
-    cruise = max(way - ramps, 0.0) / peak if peak > 0 else 0.0
+    cruise = max(distance - ramps, 0.0) / peak if peak > 0 else 0.0
     phases = ((sign * begin, reach), (0.0, cruise), (-sign * acceleration, peak / acceleration))
     return Trapezoid(start, goal, phases)
 
 
 @dataclass(frozen=True, slots=True)
 class JerkLimited:
-    """A profile of ruckig."""
+    """Profile with limited jerk, computed by ruckig."""
 
     goal: float
     duration: float  # [s]
@@ -126,37 +139,37 @@ class JerkLimited:
 
 
 def load_ruckig() -> Any:
-    """Return the module.
+    """Return the module ruckig.
 
     Raises:
-        ConfigurationError: It is not installed.
+        ConfigurationError: ruckig is not installed.
     """
     try:
         return import_module("ruckig")
     except ImportError as error:
         raise ConfigurationError(
             "jerk= needs ruckig, which is not installed",
-            hint="pip install 'catenary[traj]', or leave jerk= out for a trapezoid of the velocity",
+            hint="pip install 'catenary[traj]', or omit jerk= for a trapezoidal velocity",
         ) from error
 
 
 def _jerk_limited(start: Motion, goal: float | None, rates: Rates) -> JerkLimited:
-    """Return ruckig's profile to rest at `goal`; None: to rest as soon as possible."""
+    """Return the profile to rest at `goal`, or to rest as soon as possible if it is None."""
     ruckig = load_ruckig()
-    wanted = ruckig.InputParameter(1)
-    wanted.current_position = [start.position]
-    wanted.current_velocity = [start.velocity]
-    wanted.current_acceleration = [start.acceleration]
+    task = ruckig.InputParameter(1)
+    task.current_position = [start.position]
+    task.current_velocity = [start.velocity]
+    task.current_acceleration = [start.acceleration]
     if goal is None:
-        wanted.control_interface = ruckig.ControlInterface.Velocity
-        wanted.target_velocity = [0.0]
+        task.control_interface = ruckig.ControlInterface.Velocity
+        task.target_velocity = [0.0]
     else:
-        wanted.target_position = [goal]
-        wanted.max_velocity = [rates.velocity]
-    wanted.max_acceleration = [rates.acceleration]
-    wanted.max_jerk = [rates.jerk]
+        task.target_position = [goal]
+        task.max_velocity = [rates.velocity]
+    task.max_acceleration = [rates.acceleration]
+    task.max_jerk = [rates.jerk]
     trajectory = ruckig.Trajectory(1)
-    result = ruckig.Ruckig(1).calculate(wanted, trajectory)
+    result = ruckig.Ruckig(1).calculate(task, trajectory)
     if result not in (ruckig.Result.Working, ruckig.Result.Finished):
         raise ConfigurationError(
             f"no jerk-limited motion from {start} to {goal}: ruckig returned {result}",

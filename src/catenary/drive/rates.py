@@ -1,6 +1,7 @@
-"""Rates and torque limit of drives in the process data: columns that begin with the limits.
+"""Profile rates and torque limit in the process data, as columns whose initial values are limits.
 
-A rate that is mapped without a request is written, too: at 0 the drive would not move.
+A rate that is mapped without a request is also written, since a drive with a rate of 0 would not
+move.
 """
 
 from __future__ import annotations
@@ -18,7 +19,10 @@ PRESET = {**PROFILE_OBJECTS, "max_torque": MAX_TORQUE}
 
 
 class RateColumns:
-    """Owns the places of rates: in columns that the application asked for, and after them."""
+    """Owner of the columns of rates.
+
+    Some are columns that the application requested; additional columns follow these.
+    """
 
     def __init__(
         self, axes: Sequence[Axis], columns: Mapping[str, AxisObject], layout: ImageLayout
@@ -28,24 +32,38 @@ class RateColumns:
         self._named = {name for name, known in PRESET.items() if columns.get(name) == known}
         self._mapped = tuple(
             (name, i)
-            for name, wanted in PROFILE_OBJECTS.items()
-            if (wanted.index, wanted.subindex) not in taken
+            for name, rate in PROFILE_OBJECTS.items()
+            if (rate.index, rate.subindex) not in taken
             for i, axis in enumerate(axes)
-            if axis.uses_profile and axis.maps(wanted, layout)
+            if axis.uses_profile and axis.maps(rate, layout)
         )
         self.columns: tuple[Column, ...] = tuple(
             axes[i].column(name, PROFILE_OBJECTS[name], layout) for name, i in self._mapped
         )
 
     def bind(self, target: AxisValues, reals: Reals) -> None:
-        """Receive the columns by name and all real output columns, and preset them."""
+        """Connect the columns to the arrays of the loop that opens, and write the initial values.
+
+        Args:
+            target: columns by name.
+            reals: all real output columns.
+        """
         self._target = target
         self._rates = reals[len(reals) - len(self._mapped) :]
         for index, axis in enumerate(self._axes):
             self._preset(index, axis)
 
     def put(self, axis: int, name: str, value: float) -> bool:
-        """Write the rate of an axis. Return False if it is not in the process data."""
+        """Write a rate of an axis.
+
+        Args:
+            axis: number of the axis.
+            name: name of the rate, such as "profile_velocity".
+            value: rate in the units of the axis.
+
+        Returns:
+            False if the rate is not in the process data.
+        """
         if name in self._named:
             self._target[name][axis] = value
         elif (name, axis) in self._mapped:

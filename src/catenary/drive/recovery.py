@@ -9,19 +9,19 @@ from typing import Protocol
 from catenary.drive.drives import Drives
 from catenary.errors import DriveError
 
-RESET_PERIOD = 0.1  # [s]: a reset is an edge of the controlword, so it is cleared in between
+RESET_PERIOD = 0.1  # [s] between two changes of the reset bit, whose rising edge resets a fault
 
 
 class Phase(IntEnum):
     """Phase of the drives between one stop and the next."""
 
-    STARTING = 0  # not all are enabled yet
-    RUNNING = 1
-    STOPPED = 2
+    STARTING = 0  # not all drives are enabled yet
+    RUNNING = 1  # all drives are enabled
+    STOPPED = 2  # the drives are stopped, and must not move yet
 
 
 class CycleNow(Protocol):
-    """A cycle of a loop."""
+    """Number and time of a cycle."""
 
     @property
     def number(self) -> int: ...
@@ -32,7 +32,7 @@ class CycleNow(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class Stop:
-    """Reason of a stop, and the number and time [s] of the cycle that sent it."""
+    """Reason for a stop, and the number and time [s] of the cycle that sent it."""
 
     number: int
     time: float
@@ -40,7 +40,7 @@ class Stop:
 
 
 class Recovery:
-    """Owns the recovery of some drives from a stop: call `step` once in every cycle.
+    """Owner of the recovery of some drives from a stop. Call `step` once in every cycle.
 
         recovery = cat.drive.Recovery(arm)
         with cat.Loop(arm, stop=cat.StopPolicy(raise_faults=False)) as loop:
@@ -48,18 +48,27 @@ class Recovery:
                 if recovery.step(cycle, why_stop(arm)) == cat.drive.Phase.RUNNING:
                     arm.target.position[:] = ...
 
-    With a reason, all drives are stopped quickly in this cycle's frame, and faults are reset while
-    the reason holds. After `after` seconds without one, all are enabled again. `DriveError` if this
-    takes longer than `patience` [s]. `stops`: all stops so far; `just_stopped`: True if the last
-    step was one.
+    With a reason, the frame of this cycle requests a quick stop of all drives. Faults are reset
+    while the reason holds. When there has been no reason for some time, all drives are enabled
+    again. `stops` lists all stops so far. `just_stopped` is True if the last step was a stop.
+
+    Args:
+        drives: the drives.
+        after: time without a reason, after which the drives are enabled [s].
+        patience: longest time until all drives are enabled [s].
+
+    Raises:
+        ValueError: `after` is negative, or `patience` is not positive.
     """
 
     def __init__(self, drives: Drives, *, after: float = 1.0, patience: float = 5.0) -> None:
         if after < 0 or patience <= 0:
-            raise ValueError(f"after={after} s, patience={patience} s: how long must be positive")
+            raise ValueError(
+                f"after={after} s must not be negative, patience={patience} s must be positive"
+            )
         self.phase = Phase.STARTING
         self.stops: list[Stop] = []
-        self.just_stopped = False  # in the last step
+        self.just_stopped = False
         self._drives = drives
         self._after = after
         self._patience = patience
@@ -68,12 +77,18 @@ class Recovery:
         self._resetting = False
 
     def step(self, cycle: CycleNow, reason: str | None = None, *, ready: bool = True) -> Phase:
-        """Stop or recover the drives, and return the new phase.
+        """Stop or recover the drives.
 
         Args:
-            cycle: The cycle.
-            reason: Reason why the drives must not move; None if they may.
-            ready: False: keep the drives in STARTING although they are enabled.
+            cycle: present cycle of the loop.
+            reason: reason why the drives must not move; None if they may move.
+            ready: False to stay in STARTING although the drives are enabled.
+
+        Returns:
+            New phase.
+
+        Raises:
+            DriveError: The drives are not enabled and ready within `patience`.
         """
         now, self.just_stopped = cycle.time, False
         since = self._since = now if self._since is None else self._since
@@ -111,8 +126,10 @@ class Recovery:
         elif waited > self._patience:
             names = zip(self._drives.names, self._drives.enabled, strict=True)
             missing = [name for name, enabled in names if not enabled]
+            if missing:
+                what = f"not enabled within {self._patience:g} s: {', '.join(missing)}"
+            else:
+                what = f"all drives are enabled, but not ready within {self._patience:g} s"
             raise DriveError(
-                f"not enabled within {self._patience:g} s: {', '.join(missing) or 'all are'}"
-                + ("" if missing else ", but what they wait for is not ready"),
-                hint="safe torque off, main supply, a fault? See Drives.state",
+                what, hint="check Drives.state, safe torque off, the main supply and faults"
             )

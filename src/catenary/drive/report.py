@@ -1,4 +1,4 @@
-"""Text about the limits and reactions of an axis, for `print(loop.plan)`."""
+"""Text that describes the limits and reactions of an axis, for `print(loop.plan)`."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from catenary.drive.units import AxisUnits, UnitNames
 from catenary.plan.axis_report import AxisReport
 from catenary.wire.cia402 import Mode
 
-STEP_SHARE = 2.0  # of the velocity limit · time between two set-points
+STEP_SHARE = 2.0  # default step limit, as a factor of the distance at the velocity limit
 
 
 def axis_report(
@@ -21,15 +21,15 @@ def axis_report(
     exchange_ns: int,
     units: AxisUnits,
 ) -> AxisReport:
-    """Describe one axis.
+    """Return the description of one axis.
 
     Args:
-        name: Name of the axis.
-        modes: Modes that the axis may use, the first one at the start.
-        bounds: Limits in force.
-        settings: Raw settings of the drive.
-        exchange_ns: Time between two exchanges of the device.
-        units: Units of the axis.
+        name: name of the axis.
+        modes: modes that the axis may use, starting with the one at the start.
+        bounds: limits in force.
+        settings: raw settings of the drive.
+        exchange_ns: time between two exchanges of the device [ns].
+        units: units of the axis.
     """
     lines = (
         *_limits(bounds, units.names),
@@ -65,7 +65,7 @@ def _fallback(
 
 
 def _step(bounds: AxisBounds, exchange_ns: int, units: AxisUnits) -> Chosen:
-    """Return the step limit between two set-points of neighbouring exchanges."""
+    """Return the step limit between the set-points of two consecutive exchanges."""
     if bounds.step.value is not None or bounds.velocity.value is None:
         return bounds.step
     step = max(units.defaults.step_limit, STEP_SHARE * bounds.velocity.value * exchange_ns * 1e-9)

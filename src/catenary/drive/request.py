@@ -1,4 +1,4 @@
-"""Request: base of all process-data requests; it owns their devices and checks attributes."""
+"""Base class of the process-data requests."""
 
 from __future__ import annotations
 
@@ -10,7 +10,10 @@ from catenary.drive.attributes import check_writable, unknown_attribute
 
 
 class Request:
-    """Owns the devices of a process-data request. Unknown attributes fail with the nearest name."""
+    """Owner of the devices of a process-data request.
+
+    Access to an unknown attribute raises AttributeError with the nearest name.
+    """
 
     def __init__(self, subs: Sequence[SubDevice]) -> None:
         for sub in subs:
@@ -20,7 +23,7 @@ class Request:
         self._subs = tuple(subs)
 
     def __getattr__(self, name: str) -> NoReturn:
-        raise unknown_attribute(self, name)  # reached only if the attribute does not exist
+        raise unknown_attribute(self, name)  # Python calls this only for an unknown attribute
 
     def __setattr__(self, name: str, value: object) -> None:
         check_writable(self, name)
@@ -32,5 +35,5 @@ class Request:
 
     @property
     def subs(self) -> tuple[SubDevice, ...]:
-        """Devices of the request; of `Drives`, the device of each axis."""
+        """Devices of the request. For `Drives`, the device of each axis."""
         return self._subs

@@ -1,7 +1,7 @@
-"""Reactions and limits that a drive has by itself, read once in PRE-OP.
+"""Reactions and limits in the object dictionary of a drive, read in PRE-OP.
 
-IEC 61800-7-201 / CiA 402-2: option codes 0x605A, 0x605C, 0x605E, 0x6007; quick stop deceleration
-0x6085; limits 0x607D (with 0x607C), 0x607F, 0x6080 and 0x6072.
+These are objects of IEC 61800-7-201 / CiA 402-2: option codes 0x605A, 0x605C, 0x605E, 0x6007; quick
+stop deceleration 0x6085; limits 0x607D (with 0x607C), 0x607F, 0x6080 and 0x6072.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from catenary.bus import SubDevice
     from catenary.bus.sub_device import DeviceOwner
 
-MOTOR_SPEED_RANGE = (60, 200_000)  # [rpm]: outside of it, 0x6080 probably has another unit
+MOTOR_SPEED_RANGE = (60, 200_000)  # [rpm] outside this range, 0x6080 probably has another unit
 POSITION_EXTREMES = (-(2**31), 2**31 - 1)
 
 ABORT_CONNECTION = {
@@ -50,7 +50,7 @@ QUICK_STOP = {
 
 @dataclass(frozen=True, slots=True)
 class DriveSettings:
-    """Raw values of one axis of a drive; None if the drive lacks the object or refuses it."""
+    """Raw values of one axis of a drive; None if an object is missing or cannot be read."""
 
     quick_stop: int | None = None  # 0x605A
     disable_operation: int | None = None  # 0x605C
@@ -91,7 +91,7 @@ class DriveSettings:
 
 @dataclass(frozen=True, slots=True)
 class OwnLimits:
-    """Limits of the drive at the joint, in SI units; None without a plausible one."""
+    """Limits of the drive at the joint, in SI units; None without a plausible value."""
 
     position_min: float | None = None  # [rad]
     position_max: float | None = None  # [rad]
@@ -117,20 +117,19 @@ OBJECTS: tuple[tuple[str, int, int, DataType[int]], ...] = (
 
 
 def read_settings(places: Sequence[tuple[SubDevice, int]]) -> list[DriveSettings]:
-    """Read the settings of axes by SDO, all devices at the same time.
+    """Read the settings of axes by SDO, from all devices in parallel.
 
     Args:
         places: SubDevice and slot of each axis.
 
     Returns:
-        The settings in this order. An object that the device refuses, or that has another size,
-        is None.
+        Settings of each axis. An object is None if the device refuses it, or if its size is wrong.
     """
-    wanted: dict[DeviceOwner, dict[int, list[tuple[int, int]]]] = {}
+    requests: dict[DeviceOwner, dict[int, list[tuple[int, int]]]] = {}
     for sub, slot in places:
         objects = [(index + SLOT_OFFSET * slot, subindex) for _, index, subindex, _ in OBJECTS]
-        wanted.setdefault(sub.main, {}).setdefault(sub.position, []).extend(objects)
-    found = {main: main.read_objects(its) for main, its in wanted.items()}
+        requests.setdefault(sub.main, {}).setdefault(sub.position, []).extend(objects)
+    found = {main: main.read_objects(its) for main, its in requests.items()}
     return [_settings(found[sub.main][sub.position], SLOT_OFFSET * slot) for sub, slot in places]
 
 
@@ -147,15 +146,15 @@ def _settings(found: Mapping[tuple[int, int], bytes], base: int) -> DriveSetting
 def own_limits(
     settings: DriveSettings, units: AxisUnits, home_offset: int | None = None
 ) -> OwnLimits:
-    """Convert the drive's limits to SI units at the joint.
+    """Convert the limits of the drive to SI units at the joint.
 
     Args:
-        settings: Raw values of the drive.
-        units: Units of the axis.
-        home_offset: 0x607C [counts] that the start-up list writes; None if it writes none.
+        settings: raw values of the drive.
+        units: units of the axis.
+        home_offset: 0x607C that the start-up list writes [counts]; None if it does not write it.
 
     Returns:
-        The limits with a known unit and a plausible value.
+        Limits with a known unit and a plausible value.
     """
     low, high = _position_limits(settings, units, home_offset)
     velocity, source = _velocity_limit(settings, units)
@@ -171,7 +170,7 @@ def own_limits(
 def _position_limits(
     settings: DriveSettings, units: AxisUnits, home_offset: int | None
 ) -> tuple[float | None, float | None]:
-    """Return 0x607D less the home offset 0x607C (IEC 61800-7-201, software position limit)."""
+    """Return 0x607D minus the home offset 0x607C (IEC 61800-7-201, software position limit)."""
     low, high = settings.position_min, settings.position_max
     if low is None or high is None or low >= high:
         return None, None
@@ -187,9 +186,9 @@ def _position_limits(
 
 
 def _velocity_limit(settings: DriveSettings, units: AxisUnits) -> tuple[float | None, str]:
-    """Return the smaller of 0x6080 (rpm of the motor) and 0x607F, and the object it is from.
+    """Return the smaller of 0x6080 (rpm of the motor) and 0x607F, and its source.
 
-    0x607F has the unit of velocities: it counts only if the application states `velocity_unit`.
+    0x607F has the velocity unit of the drive, so it is used only if `velocity_unit` is given.
     """
     found: list[tuple[float, str]] = []
     speed = settings.max_motor_speed
@@ -202,7 +201,7 @@ def _velocity_limit(settings: DriveSettings, units: AxisUnits) -> tuple[float | 
 
 
 def _is_plausible(raw: int | None, bits: int) -> TypeGuard[int]:
-    """Return True if a raw limit is set: neither 0 nor all ones."""
+    """Return True if a raw limit is neither 0 nor the largest signed or unsigned number."""
     return raw is not None and raw not in (0, 2**bits - 1, 2 ** (bits - 1) - 1)
 
 

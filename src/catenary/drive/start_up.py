@@ -12,12 +12,20 @@ from catenary.errors import ConfigurationError, SdoAbort
 from catenary.types import SINT, UDINT, USINT
 from catenary.wire.cia402 import Mode, Object
 
-# SDO abort codes of an object a drive does not have: no object, no subindex.
+# SDO abort codes for a missing object: no object, no subindex.
 OBJECT_MISSING = (0x06020000, 0x06090011)
 
 
 def with_rated_torque(axis: Axis, sub: SubDevice) -> Axis:
-    """Return the axis with the rated torque of 0x6076, unless the application gave it."""
+    """Return the axis with the rated torque from 0x6076, unless the application gave one.
+
+    Args:
+        axis: the axis.
+        sub: its device.
+
+    Raises:
+        ConfigurationError: The axis needs its torque, but the drive does not have a rated torque.
+    """
     if axis.units.rated_torque is not None or not axis.uses_torque:
         return axis
     index = axis.index(Object.MOTOR_RATED_TORQUE)
@@ -31,17 +39,21 @@ def with_rated_torque(axis: Axis, sub: SubDevice) -> Axis:
         return axis  # its torque reads NaN
     if rated <= 0:
         raise ConfigurationError(
-            f"{axis.name} does not know its rated torque (0x{index:04X})",
-            hint="give Drives(rated_torque=...) in N·m, or leave torque out of measured=",
+            f"{axis.name}: the drive has no rated torque (0x{index:04X})",
+            hint="give Drives(rated_torque=...) in N·m, or omit torque from measured=",
         )
     return replace(axis, units=replace(axis.units, rated_torque=rated * 1e-3))
 
 
 def with_settings(axes: Sequence[Axis], subs: Sequence[SubDevice]) -> tuple[Axis, ...]:
-    """Return the axes with their drives' reactions and limits.
+    """Return the axes with the reactions and limits of their drives.
+
+    Args:
+        axes: the axes.
+        subs: device of each axis.
 
     Raises:
-        ConfigurationError: CST without `on_loss=` on a drive whose quick stop does not brake, or
+        ConfigurationError: An axis in CST has no `on_loss=` and a quick stop that may not brake, or
             no deceleration is known.
     """
     places = [(sub, axis.slot) for axis, sub in zip(axes, subs, strict=True)]
@@ -51,12 +63,12 @@ def with_settings(axes: Sequence[Axis], subs: Sequence[SubDevice]) -> tuple[Axis
     )
     for axis in read:
         _check_quick_stop(axis)
-        _ = axis.bounds  # raises here, before anything is written
+        _ = axis.bounds  # an error must be raised before anything is written
     return read
 
 
 def _check_quick_stop(axis: Axis) -> None:
-    """Raise for CST if the quick stop may not decelerate, unless `on_loss=` is given."""
+    """Raise ConfigurationError in CST if the quick stop may not brake and `on_loss=` is missing."""
     if Mode.CST not in axis.modes or axis.options.on_loss is not None or axis.settings.brakes:
         return
     index, code = axis.index(Object.QUICK_STOP_OPTION), axis.settings.quick_stop
@@ -71,13 +83,25 @@ def _check_quick_stop(axis: Axis) -> None:
 
 
 def downloads(axis: Axis, sub: SubDevice, period_ns: int) -> tuple[tuple[int, int, bytes], ...]:
-    """Return the start-up objects: 0x6060 if the mode is not mapped, 0x60C2, homing settings."""
+    """Return the objects to write at the start-up: mode, 0x60C2, ramps and homing settings.
+
+    Args:
+        axis: the axis.
+        sub: its device.
+        period_ns: time between two exchanges [ns].
+
+    Returns:
+        (index, subindex, data) of each object.
+
+    Raises:
+        ConfigurationError: 0x60C2 cannot represent the period.
+    """
     found = _mode(axis, sub) + _interpolation(axis, sub, period_ns) + _ramps(axis)
     return found + (axis.homing.downloads(axis.units, axis.index(0)) if axis.homing else ())
 
 
 def _mode(axis: Axis, sub: SubDevice) -> tuple[tuple[int, int, bytes], ...]:
-    """Return the first mode; empty if the drive has no such object or has the mode already."""
+    """Return 0x6060 with the first mode; empty if the drive lacks it or is in this mode."""
     index = axis.index(Object.MODE_OF_OPERATION)
     try:
         found = sub.sdo.read(index, 0, type=SINT)
@@ -109,7 +133,7 @@ def _ramps(axis: Axis) -> tuple[tuple[int, int, bytes], ...]:
 def _interpolation(
     axis: Axis, sub: SubDevice, period_ns: int
 ) -> tuple[tuple[int, int, bytes], ...]:
-    """Return 0x60C2 for this period; empty if the drive lacks it or has the value already."""
+    """Return 0x60C2 for a period; empty if the drive lacks it or already has this value."""
     index = axis.index(Object.INTERPOLATION_TIME_PERIOD)
     try:
         found = (sub.sdo.read(index, 1, type=USINT), sub.sdo.read(index, 2, type=SINT))
@@ -117,16 +141,16 @@ def _interpolation(
         if abort.code not in OBJECT_MISSING:
             raise
         return ()
-    wanted = interpolation_time(period_ns)
-    if wanted is None:
+    needed = interpolation_time(period_ns)
+    if needed is None:
         raise ConfigurationError(
             f"{axis.name}: 0x{index:04X} cannot represent a period of {period_ns / 1e3:g} us "
             "(1 to 255 times a power of ten)",
             hint="choose a period such as 1 ms, 500 us, 250 us or 125 us",
         )
-    if found == wanted:
+    if found == needed:
         return ()
-    value, exponent = wanted
+    value, exponent = needed
     return (
         (index, 1, value.to_bytes(1, "little")),
         (index, 2, exponent.to_bytes(1, "little", signed=True)),

@@ -1,7 +1,7 @@
-"""The CiA 402 step in plain Python: the twin of `core/_cia402.pyx`, tested on the same tables.
+"""CiA 402 state machine of the MainDevice in plain Python, IEC 61800-7-201 §6.
 
-IEC 61800-7-201 §6, the MainDevice's side only. The state machine of the virtual servo is separate
-code, so that the two test each other.
+`core/_cia402.pyx` is the compiled equivalent; the same tables test both. The state machine of the
+virtual servo is separate code, so that each tests the other.
 """
 
 from __future__ import annotations
@@ -22,16 +22,17 @@ from catenary.wire.cia402 import (
 
 
 class RequestedState(IntEnum):
-    """Requested state of an axis, with the numbers of the core."""
+    """Requested state of an axis; the values are those of the core."""
 
     DISABLED = 0
     ENABLED = 1
     QUICK_STOP = 2
-    RESET = 3  # disabled, and a fault is acknowledged
+    RESET = 3  # disabled, with a fault reset
 
 
-# Command for (state, requested state). Default: DISABLE_VOLTAGE, which waits in a state that the
-# drive leaves by itself (0, 14), leaves a quick stop (12) and clears bit 7 in a fault.
+# Command for (state, requested state). The default is DISABLE_VOLTAGE. It does nothing in states
+# that the drive leaves itself (transitions 0, 14), leaves a quick stop (12), and clears bit 7 in a
+# fault.
 TOWARDS: dict[tuple[AxisState, RequestedState], Controlword] = {
     (AxisState.READY_TO_SWITCH_ON, RequestedState.DISABLED): SHUTDOWN,  # stays
     (AxisState.SWITCHED_ON, RequestedState.DISABLED): SHUTDOWN,  # transition 6
@@ -53,7 +54,7 @@ TOWARDS: dict[tuple[AxisState, RequestedState], Controlword] = {
     (
         AxisState.QUICK_STOP_ACTIVE,
         RequestedState.QUICK_STOP,
-    ): QUICK_STOP,  # stays; 16 would move at once
+    ): QUICK_STOP,  # stays; transition 16 would start a motion
     (AxisState.READY_TO_SWITCH_ON, RequestedState.RESET): SHUTDOWN,
     (AxisState.SWITCHED_ON, RequestedState.RESET): SHUTDOWN,
     (AxisState.OPERATION_ENABLED, RequestedState.RESET): DISABLE_OPERATION,
@@ -64,15 +65,14 @@ TOWARDS: dict[tuple[AxisState, RequestedState], Controlword] = {
 def controlword_towards(
     state: AxisState | None, requested_state: RequestedState, previous: int
 ) -> int:
-    """Return the command bits (0 to 3 and 7) that lead from `state` towards `requested_state`.
+    """Return the command bits (0 to 3 and 7) for the next transition towards a requested state.
 
-    A fault is reset by a rising edge of bit 7, so the commands of an enabled drive are cleared
-    first.
+    A rising edge of bit 7 resets a fault, so the other command bits are cleared first.
 
     Args:
-        state: Present state of the drive.
-        requested_state: Requested state.
-        previous: Controlword that was sent last.
+        state: present state of the drive; None if the statusword does not encode a valid state.
+        requested_state: requested state.
+        previous: previous controlword.
     """
     if state is None:
         return DISABLE_VOLTAGE.value

@@ -1,10 +1,11 @@
-"""Conversion of a drive's raw numbers to SI units at the joint, after the gear, and back.
+"""Conversion between the raw numbers of a drive and SI units at the joint, after the gear.
 
-A rotary axis has rad, rad/s and N·m. A linear axis (`metres_per_turn`) has m, m/s and N.
+The units of a rotary axis are rad, rad/s and N·m; those of a linear axis (`metres_per_turn`) are m,
+m/s and N.
 
-CiA 402-2 §8 (factor group) leaves the units to the drive. Most drives use the following units,
-which are the defaults: position in encoder counts, velocity in counts per second, torque in
-thousandths of the rated torque 0x6076 (mN·m).
+CiA 402-2 §8 (factor group) lets the drive choose its units. The defaults are those of most drives:
+position in encoder counts, velocity in counts per second, torque in thousandths of the rated torque
+0x6076 (mN·m).
 """
 
 from __future__ import annotations
@@ -21,16 +22,17 @@ V = TypeVar("V")
 
 
 class UnitNames(NamedTuple):
-    """Names of an axis' units, for reports and messages."""
+    """Names of the units of an axis, for reports and messages."""
 
     position: str
     velocity: str
     acceleration: str
     torque: str
-    torque_limit: str = "torque_limit"  # the option of `Drives`
+    torque_limit: str = "torque_limit"  # name of the option of `Drives`
 
     @property
     def torque_slope(self) -> str:
+        """Unit of a torque slope."""
         return f"{self.torque}/s"
 
 
@@ -39,12 +41,12 @@ LINEAR = UnitNames("m", "m/s", "m/s²", "N", "force_limit")
 
 
 class AxisDefaults(NamedTuple):
-    """Defaults of an axis, in its units."""
+    """Default limits of an axis, in its units."""
 
     velocity_limit: float  # in CSP and PP
-    step_limit: float  # least one
-    standstill: float  # velocity
-    deceleration: float  # of an axis without a velocity limit and without a cyclic mode
+    step_limit: float  # smallest default
+    standstill: float  # velocity below which the axis is at rest
+    deceleration: float  # for an axis without a velocity limit and without a cyclic mode
 
 
 ROTARY_DEFAULTS = AxisDefaults(2 * math.pi, 0.1, 0.05, 25.0)
@@ -53,14 +55,20 @@ LINEAR_DEFAULTS = AxisDefaults(0.1, 0.005, 0.005, 0.4)
 
 @dataclass(frozen=True, slots=True)
 class AxisUnits:
-    """Scales of an axis: one raw count in units of the joint.
+    """Scales of an axis, from raw counts to units of the joint.
 
-    `counts_per_turn`: of the motor's encoder. `gear_ratio`: motor turns per joint turn.
-    `direction`: +1, or -1 if the joint turns against the motor. `offset` [rad]: position of the
-    joint at the drive's 0. `velocity_unit` [rad/s of the motor]: one raw count; None: one position
-    count per second. `rated_torque` [N·m at the motor]: None until read from 0x6076.
-    `metres_per_turn`: travel per turn of the gear's output side; None: a rotary axis. For a linear
-    axis, the offset is in m.
+    Args:
+        counts_per_turn: encoder counts per turn of the motor.
+        gear_ratio: motor turns per joint turn.
+        direction: +1, or -1 if the joint turns opposite to the motor.
+        offset: position of the joint where the drive reads 0 [rad], [m].
+        velocity_unit: one raw velocity count [rad/s of the motor]; None for one position count per
+            second.
+        rated_torque: rated torque of the motor [N·m]; None until it is read from 0x6076.
+        metres_per_turn: travel per turn of the gear output [m]; None for a rotary axis.
+
+    Raises:
+        ValueError: A value is out of range.
     """
 
     counts_per_turn: float
@@ -94,37 +102,46 @@ class AxisUnits:
 
     @property
     def defaults(self) -> AxisDefaults:
-        """Defaults of limits, for an axis of this kind."""
+        """Default limits of a rotary or linear axis."""
         return ROTARY_DEFAULTS if self.metres_per_turn is None else LINEAR_DEFAULTS
 
     @property
     def per_motor_radian(self) -> float:
-        """Way of the axis per radian of the motor: [1], or [m/rad] of a linear axis."""
+        """Travel of the axis per radian of the motor: [rad/rad], or [m/rad] of a linear axis."""
         turn = 2 * math.pi if self.metres_per_turn is None else self.metres_per_turn
         return turn / (2 * math.pi * self.gear_ratio)
 
     @property
     def position_scale(self) -> float:
-        """[rad] or [m] of one position count."""
+        """Value of one position count [rad], [m]."""
         turn = 2 * math.pi if self.metres_per_turn is None else self.metres_per_turn
         return self.direction * turn / (self.counts_per_turn * self.gear_ratio)
 
     @property
     def velocity_scale(self) -> float:
-        """[rad/s] or [m/s] of one velocity count."""
+        """Value of one velocity count [rad/s], [m/s]."""
         if self.velocity_unit is None:
             return self.position_scale
         return self.direction * self.velocity_unit * self.per_motor_radian
 
     @property
     def torque_scale(self) -> float:
-        """[N·m] or [N] of one torque count."""
+        """Value of one torque count [N·m], [N].
+
+        Raises:
+            ValueError: The rated torque has not been read yet.
+        """
         if self.rated_torque is None:
-            raise ValueError("the rated torque is not known yet")
+            raise ValueError("the rated torque has not been read yet")
         return self.direction * self.rated_torque / self.per_motor_radian / 1000.0
 
     def apply(self, number: Number, unit: Unit) -> Number:
-        """Return `number` with this axis' scale for `unit`; RAW: unchanged."""
+        """Return a number of the process data with the scale of this axis.
+
+        Args:
+            number: the number.
+            unit: its unit; RAW means a scale of 1.
+        """
         match unit:
             case Unit.POSITION:
                 return replace(number, scale=self.position_scale, offset=self.offset)
@@ -143,12 +160,30 @@ class AxisUnits:
 
 
 def per_axis(name: str, value: V | Sequence[V], n: int) -> tuple[V, ...]:
-    """Return one value for each of n axes, from one value or from n values."""
+    """Return one value per axis.
+
+    Args:
+        name: name of the option, for messages.
+        value: one value for all axes, or a sequence with one per axis.
+        n: number of axes.
+
+    Raises:
+        ValueError: The number of values is wrong.
+    """
     return one_each(name, value, n) if isinstance(value, Sequence) else (value,) * n
 
 
 def one_each(name: str, values: Sequence[V], n: int) -> tuple[V, ...]:
-    """Check the number of values."""
+    """Return the values as a tuple after a check of their number.
+
+    Args:
+        name: name of the option, for messages.
+        values: one value per axis.
+        n: number of axes.
+
+    Raises:
+        ValueError: The number of values is wrong.
+    """
     if len(values) != n:
         raise ValueError(f"{name} has {len(values)} values for {n} axes")
     return tuple(values)

@@ -1,4 +1,4 @@
-"""Arrays of a process-data request, bound to the loop's private buffers when it opens."""
+"""Arrays of a process-data request, which are views of the buffers of the open loop."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ Array = npt.NDArray[np.float64] | npt.NDArray[np.int64]
 class AxisValues:
     """Quantities of n axes, one array each.
 
-    The arrays stay the same objects while the loop is open: read them, write into targets with
-    `[:] =`, keep a value with `.copy()`.
+    The arrays stay the same objects while the loop is open. Write targets with `[:] =`, and keep
+    values with `.copy()`.
     """
 
     __slots__ = ("_columns", "_owner", "mode", "position", "torque", "velocity")
@@ -42,7 +42,15 @@ class AxisValues:
         mode: Modes,
         columns: Mapping[str, Array],
     ) -> None:
-        """Receive the arrays of the loop that opens."""
+        """Connect the attributes to the arrays of the loop that opens.
+
+        Args:
+            position: (n,) [rad].
+            velocity: (n,) [rad/s].
+            torque: (n,) [N·m].
+            mode: (n,) modes of operation.
+            columns: further arrays by name.
+        """
         object.__setattr__(self, "position", position)
         object.__setattr__(self, "velocity", velocity)
         object.__setattr__(self, "torque", torque)
@@ -50,7 +58,11 @@ class AxisValues:
         object.__setattr__(self, "_columns", columns)
 
     def __getitem__(self, name: str) -> Array:
-        """Return the column `name`, (n,): SI float64, or raw int64 for words of bits."""
+        """Return a column (n,): float64 in SI units, or int64 for raw values.
+
+        Raises:
+            KeyError: The name is unknown.
+        """
         if not hasattr(self, "_columns"):
             raise RuntimeError(f"{self._owner}[{name!r}] has no values before a Loop is open")
         try:
@@ -58,18 +70,23 @@ class AxisValues:
         except KeyError:
             known = ", ".join(self._columns) or "none"
             raise KeyError(
-                f"no column {name!r} in {self._owner}; asked for in Drives(columns=...): {known}"
+                f"no column {name!r} in {self._owner}; requested by Drives(columns=...): {known}"
             ) from None
 
     def __setitem__(self, name: str, values: npt.ArrayLike) -> None:
-        """Write the column `name`: one value for all axes, or one for each."""
+        """Write a column: one value for all axes, or one per axis.
+
+        Raises:
+            KeyError: The name is unknown.
+            TypeError: The column is read-only.
+        """
         array = self[name]
         if not array.flags.writeable:
-            raise TypeError(f"{self._owner} values are read-only; write columns in target[...]")
+            raise TypeError(f"{self._owner} values are read-only; write to target[...] instead")
         array[:] = values
 
     def __getattr__(self, name: str) -> object:
-        # Called only for an empty slot, or an attribute that does not exist.
+        # Python calls this only for a slot without a value, or for an unknown attribute.
         if name not in QUANTITIES:
             raise unknown_attribute(self, name, self._owner)
         raise AttributeError(f"{self._owner}.{name} has no values before a Loop is open")

@@ -1,1 +1,1 @@
-"""Model of devices and segments: SII, object dictionary, topology, diagnosis. No I/O."""
+"""Models of devices and segments: descriptions, topology, diagnosis. No I/O."""

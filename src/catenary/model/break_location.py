@@ -1,4 +1,4 @@
-"""Location of an interruption of the segment, from the devices that do not answer."""
+"""Location of a break in the segment, based on the devices that do not answer."""
 
 from __future__ import annotations
 
@@ -8,14 +8,14 @@ from catenary.model.finding import Finding, Kind, Names
 from catenary.model.topology import Topology
 
 _BREAK = "check the plugs of that cable and the power of the device"
-_FORGOT = "it was power-cycled or reset itself: start it up again (scan)"
+_ADDRESS_LOST = "it was power-cycled or has reset itself: scan again to start it up"
 
 
 def judge_silence(topology: Topology, names: Names, silent: Collection[int]) -> tuple[Finding, ...]:
     """Return one finding for the first silent device of each branch.
 
-    If a device forwards frames but does not answer, the devices behind it still answer. Such a
-    device has lost its station address.
+    A silent device that still forwards frames has lost its station address. The devices behind it
+    answer.
 
     Args:
         topology: The tree of the devices.
@@ -25,7 +25,7 @@ def judge_silence(topology: Topology, names: Names, silent: Collection[int]) -> 
     found = []
     for position in sorted(silent):
         parent = topology.places[position].parent
-        if parent is not None and parent in silent and _cut(topology, parent, silent):
+        if parent is not None and parent in silent and _is_cut_off(topology, parent, silent):
             continue
         found.append(_finding(topology, names, position, silent))
     return tuple(found)
@@ -36,7 +36,7 @@ def behind(topology: Topology, position: int) -> tuple[int, ...]:
 
     Args:
         topology: The tree of the devices.
-        position: The device.
+        position: Position of the device.
     """
     found: list[int] = []
     waiting = [cable.lower for cable in topology.children(position)]
@@ -46,19 +46,19 @@ def behind(topology: Topology, position: int) -> tuple[int, ...]:
     return tuple(sorted(found))
 
 
-def _cut(topology: Topology, position: int, silent: Collection[int]) -> bool:
-    """Return True if all devices behind a silent device are silent, too."""
+def _is_cut_off(topology: Topology, position: int, silent: Collection[int]) -> bool:
+    """Return True if all devices behind a silent device are also silent."""
     return all(each in silent for each in behind(topology, position))
 
 
 def _finding(topology: Topology, names: Names, position: int, silent: Collection[int]) -> Finding:
     name = names.device(position)
     others = behind(topology, position)
-    if others and not _cut(topology, position, silent):
+    if others and not _is_cut_off(topology, position, silent):
         evidence = (
             "it does not answer, but the devices behind it do: it has lost its station address"
         )
-        return Finding(Kind.SILENT, name, evidence, _FORGOT, (position,))
+        return Finding(Kind.SILENT, name, evidence, _ADDRESS_LOST, (position,))
     cable = topology.cable_at(position, 0)
     where = f"{names.cable(cable)}, or the power of {name}" if cable else name
     also = f" and the {len(others)} behind it" * bool(others)

@@ -1,8 +1,8 @@
-"""Delay of a frame from one device to the next, computed from the times at which a broadcast write
-(0x0900) passed their ports.
+"""Delay of a frame from one device to the next.
 
-The delay is half of the time that the frame spent behind a port, minus the time inside the next
-device's branch. As in `delays`, both directions are assumed to take the same time.
+It is computed from the times at which a broadcast write (0x0900) passed the ports. The time behind
+a port minus the time in the branches of the next device is the round trip between the two devices.
+The delay is half of it. As in `delays`, both directions are assumed to take the same time.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from catenary.model.delays import TIME_SPAN, PortTimes
 from catenary.model.topology import Cable, Topology
 
-JITTER_NS = 200  # of four time stamps: one tick of 10 ns each, more with slow PHYs
+JITTER_NS = 200  # sum over four time stamps: one tick of 10 ns each, more with slow PHYs
 
 
 def cable_delays_ns(

@@ -1,13 +1,16 @@
-"""Propagation delays from the first clock to every other clock, computed from the times at which a
-broadcast write (0x0900) passed the ports. ETG.1000.4 §6.8.2; Beckhoff, ESC data sheet I, §9.1.2.
+"""Propagation delays from the first clock to every other clock.
+
+They are computed from the times at which a broadcast write (0x0900) passed the ports. ETG.1000.4
+§6.8.2; Beckhoff, ESC data sheet I, §9.1.2.
 
 The time between two ports of a device is the time that the frame spent in the branch behind the
-second port. This time minus the time inside the next device's branch is the way there and back.
-Both directions take the same time, except for the processing units (data sheet: t_Diff). A frame
-passes a processing unit when it leaves by a device's first port. It also passes one when it returns
-in the last device of a branch. SOEM (`ecx_configdc`), IgH (`ec_slave_calc_port_delays`) and
-ethercrab (`configure_subdevice_offsets`) ignore this difference: 20 ns per device on a line. Every
-clock measures with its own crystal. Over some microseconds an error of 100 ppm is negligible.
+second port. This time minus the time in the branches of the next device is the round trip between
+the two devices. Both directions take the same time, except for the
+processing units (data sheet: t_Diff). A frame passes a processing unit when it leaves by a device's
+first port. It also passes one when it turns back in the last device of a branch. SOEM
+(`ecx_configdc`), IgH (`ec_slave_calc_port_delays`) and ethercrab (`configure_subdevice_offsets`)
+ignore this difference of 20 ns per device on a line. Every clock measures with its own crystal.
+Over a few microseconds, an error of 100 ppm is negligible.
 
 Devices without clocks count as cable. If such a device branches, several clocks may share one
 measured time. The unknown part is then distributed evenly.
@@ -23,13 +26,16 @@ from typing import NamedTuple
 from catenary.model.topology import PORT_ORDER, Ports
 
 PortTimes = tuple[int, int, int, int]
-PROCESSING_NS = 40  # extra delay of a processing unit; other controllers have 20 to 40 ns
+PROCESSING_NS = 40  # extra delay of a processing unit; 20 to 40 ns, depending on the controller
 TIME_SPAN = 1 << 32  # receive times are 32 bits wide and wrap every 4.3 s
 
 
 @dataclass(frozen=True, slots=True)
 class ClockPlace:
-    """One device of the tree. `receive_times_ns` is of one latch; None if it has no clock."""
+    """One device of the tree.
+
+    `receive_times_ns` are the times of one latch; None if the device has no clock.
+    """
 
     parent: int | None
     parent_port: int | None
@@ -45,10 +51,10 @@ class _Head(NamedTuple):
 
 
 def delays_ns(latches: Sequence[Sequence[ClockPlace]]) -> tuple[int | None, ...]:
-    """Return the delay of every device from the first clock [ns]; None if it has no clock.
+    """Return the delay from the first clock to every device [ns]; None if it has no clock.
 
     The result is the mean over all latches. Single results are not rounded and may be negative.
-    The mean is therefore correct even for a wire shorter than the jitter of the time stamps.
+    The mean is therefore correct even if a cable delay is shorter than the jitter of the clocks.
 
     Args:
         latches: The same devices, measured once or several times.
@@ -74,7 +80,7 @@ def _delays(places: Sequence[ClockPlace]) -> list[float | None]:
         if times is None or delay is None:
             continue
         before = 0  # the port at which the frame last returned
-        for port in _onwards(place):
+        for port in _downstream_ports(place):
             away = _interval(times, before, port)
             reached = delay + _interval(times, 0, before)
             heads = [
@@ -121,15 +127,15 @@ def _share(
     Args:
         places: All devices.
         heads: The first clocks behind the port, in the order of the frame.
-        reached: Delay at which the frame leaves by the port [ns].
+        reached: Delay from the first clock when the frame leaves by the port [ns].
         away: Time until the frame returns to the port [ns].
         delays: The list to change.
-        first: True if the frame comes to this port directly from the processing unit.
+        first: True if the frame reaches this port directly from the processing unit.
     """
     wire = (away - sum(_loop(places[head.position]) for head in heads)) / (len(heads) + 1)
     if len(heads) == 1:
         [head] = heads
-        turns = not _onwards(places[head.position])
+        turns = not _downstream_ports(places[head.position])
         wire += PROCESSING_NS * (first + head.between - turns) / 2
     for head in heads:
         reached += wire
@@ -140,17 +146,17 @@ def _share(
 def _loop(place: ClockPlace) -> float:
     """Return the time [ns] that a frame spends in all branches behind a clock."""
     assert place.receive_times_ns is not None
-    ports = _onwards(place)
+    ports = _downstream_ports(place)
     return _interval(place.receive_times_ns, 0, ports[-1]) if ports else 0
 
 
 def _interval(times: PortTimes, start: int, end: int) -> int:
-    """Return the time from port to port [ns], with wrap-around. Jitter can make it negative."""
+    """Return the time between two ports [ns], with wrap-around. Jitter can make it negative."""
     interval = (times[end] - times[start]) % TIME_SPAN
     return interval - TIME_SPAN if interval >= TIME_SPAN // 2 else interval
 
 
-def _onwards(place: ClockPlace) -> list[int]:
+def _downstream_ports(place: ClockPlace) -> list[int]:
     return [port for port in PORT_ORDER if place.open_ports[port]]
 
 

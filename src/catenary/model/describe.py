@@ -1,8 +1,8 @@
-"""Registers and SII image → DeviceDescription, ETG.1000.6 §5.4.
+"""Description of a device from its registers and its SII image, ETG.1000.6 §5.4.
 
-Real images have faults: no FMMU category, no end mark, vendor 0, PDOs that name a missing
-SyncManager, an EEPROM that was never written. These faults do not end a scan. Unusable parts are
-left out and noted in the description.
+Real images have faults: no FMMU category, no end mark, vendor 0, PDOs assigned to a missing
+SyncManager, an EEPROM that was never written. Such faults do not stop a scan. Unusable parts are
+omitted, and a note in the description reports them.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ from catenary.wire.sync_manager import Buffering, Control
 from catenary.wire.sync_manager import Direction as Flow
 
 NOT_ASSIGNED = 0xFF
-MAILBOX_MIN = HEADER_SIZE + SDO_SIZE  # bytes: the shortest SDO message
+MAILBOX_MIN = HEADER_SIZE + SDO_SIZE  # [bytes]; the size of the shortest SDO message
 RAM_END = 0x10000
 _MANDATORY, _FIXED_CONTENT = 0x0001, 0x0010  # PDO flags, ETG.2010 table 14
 _CHECKSUM_DISABLED = struct.pack("<H", 0x88A4)
@@ -65,7 +65,7 @@ def describe(
     image: bytes,
     system_time: bool = False,
 ) -> DeviceDescription:
-    """Return the description of one device. Faults of the image become notes.
+    """Return the description of one device. Notes report faults of the image.
 
     Args:
         position: Position in the segment.
@@ -110,7 +110,7 @@ def _decoded(image: bytes, notes: list[str]) -> Sii | None:
     product = image[20:24]
     if product in _UNPROGRAMMED:
         return None
-    # Some devices were programmed by hand and work with a wrong checksum; the content may be valid.
+    # Some devices work with a wrong checksum, because their image was edited by hand.
     start = 2 * CHECKSUM_WORD
     try:
         return decode_sii(image[:start] + _CHECKSUM_DISABLED + image[start + 2 :])
@@ -161,13 +161,13 @@ def _mailbox(sii: Sii, notes: list[str]) -> MailboxLayout | None:
     impossible = [area for area in (receive, send) if not _is_possible(area)]
     if impossible:
         notes.append(
-            f"its SII has a mailbox of {impossible[0].size} bytes at 0x{impossible[0].offset:04X} "
-            f"({MAILBOX_MIN} to {MAXIMUM_DATA} bytes from 0x{PROCESS_RAM:04X} on are possible): "
-            "the mailbox is not used"
+            f"its SII specifies a mailbox of {impossible[0].size} bytes at "
+            f"0x{impossible[0].offset:04X}, which is not used: a mailbox has {MAILBOX_MIN} to "
+            f"{MAXIMUM_DATA} bytes and begins at 0x{PROCESS_RAM:04X} or above"
         )
         return None
     coe = sii.general.coe if sii.general else CoeDetails(0)
-    # Details without any bit set are treated as unknown, as in IgH, fsm_pdo.c (`has_general`).
+    # If no bit is set, the details are unknown, as in IgH (fsm_pdo.c, `has_general`).
     unknown = coe == CoeDetails(0)
     protocols = MailboxProtocol(sii.header.mailbox_protocols & 0x3F)
     return MailboxLayout(
@@ -184,7 +184,7 @@ def _mailbox(sii: Sii, notes: list[str]) -> MailboxLayout | None:
 
 
 def _is_possible(area: MailboxArea) -> bool:
-    """Return True if one datagram can carry the mailbox and it is in the process-data memory."""
+    """Return True if a mailbox fits into one datagram and into the process-data memory."""
     end = area.offset + area.size
     return (
         MAILBOX_MIN <= area.size <= MAXIMUM_DATA and area.offset >= PROCESS_RAM and end <= RAM_END
@@ -192,10 +192,12 @@ def _is_possible(area: MailboxArea) -> bool:
 
 
 def _sync_managers(sii: Sii, supported: int, notes: list[str]) -> tuple[SyncManager, ...]:
-    """Return the SyncManagers that the controller supports (register 0x0005; 0: unknown)."""
+    """Return the SyncManagers of the SII that the controller supports (0 means unknown)."""
     count = min(supported or SYNC_MANAGER_COUNT, SYNC_MANAGER_COUNT)
     if len(sii.sync_managers) > count:
-        notes.append(f"its SII has {len(sii.sync_managers)} SyncManagers, its controller {count}")
+        notes.append(
+            f"its SII has {len(sii.sync_managers)} SyncManagers, its controller has {count}"
+        )
     return tuple(
         SyncManager(
             index,
@@ -212,7 +214,7 @@ def _sync_managers(sii: Sii, supported: int, notes: list[str]) -> tuple[SyncMana
 def _kind(entry: sii_categories.SyncManagerEntry) -> SyncManagerUse:
     """Return the use of a SyncManager.
 
-    Early images leave it 0. It then follows from the control byte, as in SOEM.
+    Early images leave it at 0. It is then derived from the control byte, as in SOEM.
     """
     if entry.use in (1, 2, 3, 4):
         return SyncManagerUse(entry.use)
@@ -238,7 +240,7 @@ def _pdos(
         channel = None if pdo.sync_manager == NOT_ASSIGNED else pdo.sync_manager
         if channel is not None and channel not in usable:
             notes.append(
-                f"PDO 0x{pdo.index:04X} names SyncManager {channel}, which does not carry "
+                f"PDO 0x{pdo.index:04X} is assigned to SyncManager {channel}, which does not carry "
                 f"{kind.name.lower()}"
             )
             channel = None
@@ -273,7 +275,7 @@ def _op_mode(texts: _Texts, mode: sii_categories.ClockMode) -> OpMode:
 
 
 class _Texts:
-    """The printable strings of an image, by number from 1; empty if there is none."""
+    """Printable strings of an image, by number from 1; empty for an unknown number."""
 
     def __init__(self, sii: Sii) -> None:
         self._strings = ["", *(printable(text) for text in sii.strings)]

@@ -1,7 +1,7 @@
-"""The description of a SubDevice as values: identity, memory, mailbox, SyncManagers, PDOs.
+"""Description of a SubDevice: identity, memory, mailbox, SyncManagers, PDOs.
 
 The sources are its registers (ETG.1000.4 §6.1), its SII (ETG.1000.6 §5.4, ETG.2010) and, if
-present, its object dictionary (ETG.1000.6 §5.6.7.4). Nothing here accesses the network.
+present, its object dictionary (ETG.1000.6 §5.6.7.4). This module does not access the network.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from catenary.wire.sii_categories import SyncManagerUse
 
 
 class Identity(NamedTuple):
-    """The four numbers of object 0x1018, which are also in the SII."""
+    """The four numbers of object 0x1018, which the SII also contains."""
 
     vendor: int
     product: int
@@ -48,13 +48,13 @@ class Direction(IntEnum):
 
     @property
     def noun(self) -> str:
-        """Word for messages."""
+        """Name of the direction in messages."""
         return "outputs" if self is Direction.OUTPUT else "inputs"
 
 
 @dataclass(frozen=True, slots=True)
 class MailboxLayout:
-    """The standard mailbox, seen from the SubDevice: the MainDevice writes the receive mailbox."""
+    """The standard mailbox, as seen from the SubDevice: the MainDevice writes `receive`."""
 
     receive_offset: int
     receive_size: int
@@ -74,12 +74,12 @@ class MailboxLayout:
 
 @dataclass(frozen=True, slots=True)
 class SyncManager:
-    """One SyncManager as specified by its device (SII category 41)."""
+    """One SyncManager, as specified in the SII (category 41)."""
 
     index: int
     use: SyncManagerUse
     start: int  # physical address
-    length: int  # bytes; for process data, of the default mapping
+    length: int  # [bytes]; for process data, the size of the default mapping
     control: int  # register 0x0804 + 8·index
     enabled: bool = True
 
@@ -92,11 +92,11 @@ class Entry:
     subindex: int
     bit_length: int
     name: str = ""
-    data_type: int = 0  # ETG.1000.6 table 64, 0: unknown
+    data_type: int = 0  # ETG.1000.6 table 64; 0 if unknown
 
     @property
     def place(self) -> tuple[int, int, int]:
-        """Index, subindex and bit length. Entries are compared by these."""
+        """Index, subindex and bit length, by which entries are compared."""
         return self.index, self.subindex, self.bit_length
 
     def __str__(self) -> str:
@@ -110,15 +110,15 @@ class Pdo:
 
     index: int
     entries: tuple[Entry, ...]
-    sync_manager: int | None  # default assignment; None: not assigned
+    sync_manager: int | None  # default assignment; None if not assigned
     fixed: bool = False  # its entries cannot be changed
     mandatory: bool = False  # cannot be removed from the assignment
     name: str = ""
-    excludes: frozenset[int] = frozenset()  # PDOs that cannot be assigned with it (ESI `Exclude`)
+    excludes: frozenset[int] = frozenset()  # PDOs that cannot be assigned together with it (ESI)
 
     @property
     def bit_length(self) -> int:
-        """Total length of its entries."""
+        """Total length of the entries [bits]."""
         return sum(entry.bit_length for entry in self.entries)
 
 
@@ -132,24 +132,27 @@ class Assignment:
 
     @property
     def bit_length(self) -> int:
-        """Total length of its PDOs."""
+        """Total length of the PDOs [bits]."""
         return sum(pdo.bit_length for pdo in self.pdos)
 
     @property
     def byte_length(self) -> int:
-        """Total length of its PDOs, rounded up to whole bytes."""
+        """Total length of the PDOs [bytes], rounded up."""
         return (self.bit_length + 7) // 8
 
 
 @dataclass(frozen=True, slots=True)
 class OpMode:
-    """One mode of a device with distributed clocks: Dc/OpMode of an ESI file (ETG.2000), category
-    60 of the SII (ETG.2010). Factors are multiples of the period or of SYNC0, see `plan.clocks`."""
+    """One mode of a device with distributed clocks.
+
+    The source is Dc/OpMode of an ESI file (ETG.2000), or category 60 of the SII (ETG.2010). Factors
+    are multiples of the period or of SYNC0; see `plan.clocks`.
+    """
 
     name: str = ""
     description: str = ""
     assign_activate: int = 0  # registers 0x0980 (low byte) and 0x0981
-    sync0_ns: int = 0  # cycle time of SYNC0; 0: given by `sync0_factor`
+    sync0_ns: int = 0  # cycle time of SYNC0; if it is 0, `sync0_factor` applies
     sync0_factor: int = 0
     shift_ns: int = 0
     sync1_factor: int = 0
@@ -158,7 +161,7 @@ class OpMode:
 
 @dataclass(frozen=True, slots=True)
 class ObjectInformation:
-    """The dictionary's description of one entry (SDO information, ETG.1000.6 §5.6.3.6)."""
+    """Description of a dictionary entry (SDO information, ETG.1000.6 §5.6.3.6)."""
 
     index: int
     subindex: int
@@ -167,13 +170,13 @@ class ObjectInformation:
     output_mappable: bool = True  # as RxPDO
     input_mappable: bool = True  # as TxPDO
     name: str = ""
-    note: str = ""  # why the dictionary does not describe it
-    readable: bool = True  # False: write-only according to the dictionary
+    note: str = ""  # the reason if the dictionary does not describe it
+    readable: bool = True  # False if it is write-only according to the dictionary
 
 
 @dataclass(frozen=True, slots=True)
 class ObjectValue:
-    """The value of a dictionary entry at the time of reading; None if it could not be read."""
+    """Value of a dictionary entry when it was read; None if it could not be read."""
 
     index: int
     subindex: int
@@ -192,22 +195,22 @@ class DeviceDescription:
     controller: Information
     mailbox: MailboxLayout | None
     sync_managers: tuple[SyncManager, ...]
-    outputs: tuple[Assignment, ...]  # assigned now, by SyncManager
+    outputs: tuple[Assignment, ...]  # present assignment, by SyncManager
     inputs: tuple[Assignment, ...]
     output_pdos: tuple[Pdo, ...]  # all PDOs of the device, assigned or not
     input_pdos: tuple[Pdo, ...]
     open_ports: tuple[bool, bool, bool, bool] = (True, False, False, False)
-    sii_denies_lrw: bool = False  # flag of the general category; the controller has its own
+    sii_denies_lrw: bool = False  # flag of the general category; the controller has another one
     parent: int | None = None  # position of the device before it in the tree
     parent_port: int | None = None
-    system_time: bool = False  # it has a clock that can be synchronised (0x0910)
+    system_time: bool = False  # the device has a clock that can be synchronised (0x0910)
     op_modes: tuple[OpMode, ...] = ()  # modes of distributed clocks; the first is the default
     group: str = ""
     order: str = ""
     device_type: int | None = None  # object 0x1000
     slots: tuple[int, ...] = ()  # CiA 402 axes: objects + 0x800·slot
     objects: tuple[ObjectInformation, ...] = ()  # dictionary entries that were read
-    values: tuple[ObjectValue, ...] = ()  # values of objects that a start-up list would write
+    values: tuple[ObjectValue, ...] = ()  # present values of objects in a start-up list
     mapping_source: str = "SII"  # or "CoE"
     notes: tuple[str, ...] = ()  # faults of its SII, or differences from its dictionary
 
@@ -223,14 +226,14 @@ class DeviceDescription:
 
     @property
     def clock_bits(self) -> int:
-        """Width of its system time in bits, 64 or 32; 0 if it has none."""
+        """Width of the system time, 64 or 32 [bits]; 0 if the device has none."""
         return self.controller.clock_bits if self.system_time else 0
 
     @property
     def supports_lrw(self) -> bool:
         """True if neither the controller nor the SII excludes LRW.
 
-        SOEM checks only the SII (src/ec_config.c), IgH none of them (master/datagram_pair.c).
+        SOEM checks only the SII (src/ec_config.c), IgH neither of them (master/datagram_pair.c).
         """
         return self.controller.supports_lrw and not self.sii_denies_lrw
 
@@ -253,12 +256,12 @@ class DeviceDescription:
         assignments: tuple[Assignment, ...],
         pdos: tuple[Pdo, ...] | None = None,
     ) -> DeviceDescription:
-        """Return the description with other process data in one direction.
+        """Return a copy with other process data in one direction.
 
         Args:
             direction: Outputs or inputs.
             assignments: The new assignment, by SyncManager.
-            pdos: All PDOs of the direction; None leaves them unchanged.
+            pdos: All PDOs of the direction; None keeps the present ones.
         """
         pdos = self.pdos(direction) if pdos is None else pdos
         if direction is Direction.OUTPUT:
@@ -266,7 +269,7 @@ class DeviceDescription:
         return replace(self, inputs=assignments, input_pdos=pdos)
 
     def known_object(self, index: int, subindex: int) -> ObjectInformation | None:
-        """Return the description of a dictionary entry if it was read, else None.
+        """Return the description of a dictionary entry; None if it was not read.
 
         Args:
             index: The index of the object.
@@ -278,7 +281,7 @@ class DeviceDescription:
         return None
 
     def known_value(self, index: int, subindex: int) -> bytes | None:
-        """Return the value of a dictionary entry if it was read, else None.
+        """Return the value of a dictionary entry; None if it was not read.
 
         Args:
             index: The index of the object.

@@ -1,4 +1,4 @@
-"""Matching of found devices to known ones, after some were power-cycled, moved or replaced."""
+"""Matching of found devices to known ones after power cycles, moves or replacements."""
 
 from __future__ import annotations
 
@@ -8,33 +8,33 @@ from collections.abc import Sequence
 def vacancies(found: Sequence[int], known: Sequence[int]) -> dict[int, tuple[int, ...]]:
     """Return the free positions to which each unmatched device may belong.
 
-    A device matches if its address is known and in the order of the cable. As many devices as
-    possible are matched, so that a device with an address from another place is not a neighbour.
+    A device matches if its address is known and in the order of the wiring. The largest possible
+    number of devices is matched, so that a moved device does not count as a neighbour.
 
     Args:
         found: Station addresses in the order of the frame; a device that was powered up has 0.
         known: Station addresses of the known devices, by position.
 
     Returns:
-        For the rank of each unmatched device in `found`: the positions in `known` between its
-        matched neighbours.
+        A map from the rank of each unmatched device in `found` to the free positions in `known`,
+        which are those between its matched neighbours.
     """
     place = {address: position for position, address in enumerate(known)}
-    ours = _longest_rising([place.get(address, -1) for address in found])
+    matched = _longest_increasing([place.get(address, -1) for address in found])
     free: dict[int, tuple[int, ...]] = {}
     for rank in range(len(found)):
-        if rank in ours:
+        if rank in matched:
             continue
-        before = max((ours[other] for other in ours if other < rank), default=-1)
-        behind = min((ours[other] for other in ours if other > rank), default=len(known))
-        free[rank] = tuple(range(before + 1, behind))
+        before = max((matched[other] for other in matched if other < rank), default=-1)
+        after = min((matched[other] for other in matched if other > rank), default=len(known))
+        free[rank] = tuple(range(before + 1, after))
     return free
 
 
-def _longest_rising(places: Sequence[int]) -> dict[int, int]:
-    """Return the longest strictly rising sequence of non-negative places, as {rank: place}.
+def _longest_increasing(places: Sequence[int]) -> dict[int, int]:
+    """Return the longest strictly increasing sequence of non-negative places, as {rank: place}.
 
-    Of several such sequences, the first one found is returned.
+    If there are several, the result is the first one found.
     """
     length: dict[int, int] = {}  # of the longest sequence that ends at this rank
     before: dict[int, int] = {}  # the previous rank in that sequence

@@ -1,8 +1,9 @@
-"""Diagnosis: find the cable or device at fault from error counters.
+"""Location of faulty cables and devices, based on error counters.
 
 A controller that receives a broken frame counts an invalid frame at that port and marks the frame.
 The devices after it only count the frame as forwarded. The fault is therefore between the port with
-invalid frames and its neighbour. Symbol errors are noise on that cable, even if no frame was hit.
+invalid frames and its neighbour. Symbol errors show noise on that cable, even without broken
+frames.
 If a cable was unplugged, both ends count lost links. If a device lost its power, only its
 neighbours count lost links; its own counters restart at 0.
 
@@ -21,17 +22,17 @@ from catenary.model.finding import Finding, Kind, Names
 from catenary.model.topology import Cable, Topology
 from catenary.wire.error_counters import FULL, ErrorCounters, PortErrors
 
-WIDESPREAD = 3  # noisy cables; if they are also half of all, the cause is not a single cable
+WIDESPREAD = 3  # at least this many noisy cables, and half of all, have a shared cause
 
-_CABLE = "check its plugs, bends, shield and distance to power cables; replace it"
-_DEVICE = "check its supply, its earth and the plugs on both sides; then replace it"
+_CABLE = "check its plugs, bends, shield and distance to power cables, or replace it"
+_DEVICE = "check its supply, its earth connection and the plugs on both sides, or replace it"
 _POWER = (
     "check for a weak supply or a loose supply terminal; a cable with one broken pair shows "
     "similar counts"
 )
 _EVERYWHERE = (
-    "check what all devices share: earthing and shields, cables next to those of motors and "
-    "inverters, the supply"
+    "check what all devices share: earthing, shields, the supply, and cables next to those of "
+    "motors and inverters"
 )
 _MAIN = (
     "make sure that no other program uses this network interface; then check its driver and its "
@@ -43,19 +44,19 @@ _NO_ERRORS = PortErrors()
 
 @dataclass(frozen=True, slots=True)
 class Observation:
-    """Error counts of one time span, by position. None stands for a device that did not answer."""
+    """Error counts over a time span, by position. None stands for a device that did not answer."""
 
     topology: Topology
     names: Names
     errors: tuple[ErrorCounters | None, ...]
     restarted: frozenset[int] = frozenset()  # positions of devices whose counters restarted
-    lost_frames: int = 0  # frames that the MainDevice sent and did not receive undamaged
+    lost_frames: int = 0  # frames that the MainDevice sent but did not get back undamaged
 
     def port(self, position: int | None, port: int | None) -> PortErrors:
         """Return the counts at one end of a cable; all zero for the MainDevice.
 
         Args:
-            position: The device; None is the MainDevice.
+            position: Position of the device; None is the MainDevice.
             port: The port of the device.
         """
         if position is None or port is None:
@@ -105,7 +106,7 @@ def _power(seen: Observation) -> tuple[list[Finding], set[Cable]]:
             for end in lost
         )
         where = f"the power of {seen.names.device(position)}"
-        evidence = f"{links}, but it has counted none itself: its counters restarted at 0"
+        evidence = f"{links}, but the device itself has counted none: its counters restarted at 0"
         found.append(Finding(Kind.POWER, where, evidence, _POWER, (position,)))
     return found, explained
 
@@ -157,13 +158,13 @@ def _noise(seen: Observation) -> Iterator[Finding]:
         devices = tuple(sorted(cable.lower for cable in noisy))
         yield Finding(Kind.EVERYWHERE, "the whole segment", evidence, _EVERYWHERE, devices)
         return
-    culprit = _common_device(seen.topology, noisy)
-    if culprit is not None:
+    common = _common_device(seen.topology, noisy)
+    if common is not None:
         evidence = "all its cables are noisy, and no other cable is: " + "; ".join(
             _counted(seen, cable) for cable in noisy
         )
-        where = seen.names.device(culprit)
-        yield Finding(Kind.DEVICE, where, evidence, _DEVICE, (culprit,))
+        where = seen.names.device(common)
+        yield Finding(Kind.DEVICE, where, evidence, _DEVICE, (common,))
         return
     yield from (_cable_finding(seen, cable) for cable in noisy)
 
@@ -207,7 +208,7 @@ def _words(count: PortErrors) -> str:
 def _stray_ports(seen: Observation) -> Iterator[Finding]:
     """Yield the ports that count errors although no device is behind them.
 
-    They are connected to the second end of a ring, or to something that is not an EtherCAT device.
+    Each is connected to the second end of a ring, or to something that is not an EtherCAT device.
     """
     wired = {end for cable in seen.topology.cables for end in (cable[:2], cable[2:])}
     for position, errors in enumerate(seen.errors):
@@ -288,7 +289,7 @@ def _lost_frames(seen: Observation) -> Iterator[Finding]:
         f"{counted(seen.lost_frames, 'frame')} did not return undamaged, but no device has counted "
         "a broken one"
     )
-    where = f"the way back from {seen.names.device(0)} to the MainDevice, its port or its driver"
+    where = f"the path from {seen.names.device(0)} back to the MainDevice, its port or its driver"
     advice = f"the cable to the first device: {_CABLE}; {_MAIN}"
     yield Finding(Kind.MAIN, where, evidence, advice, (0,), seen.topology.cables[0])
 
@@ -299,7 +300,7 @@ def _lost_frames(seen: Observation) -> Iterator[Finding]:
 def _processors(seen: Observation) -> Iterator[Finding]:
     for position, errors in enumerate(seen.errors):
         if errors is not None and errors.pdi:
-            evidence = f"{counted(errors.pdi, 'error')} of the interface to its processor (PDI)"
+            evidence = f"{counted(errors.pdi, 'error')} at the interface to its processor (PDI)"
             where = seen.names.device(position)
             yield Finding(Kind.DEVICE, where, evidence, _PDI, (position,))
 
@@ -309,7 +310,7 @@ def counted(count: int, what: str) -> str:
 
     Args:
         count: The value of the counter.
-        what: The noun in the singular.
+        what: The noun, in the singular.
     """
     if count == 1:
         return f"1 {what}"

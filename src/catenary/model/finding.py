@@ -1,4 +1,4 @@
-"""Results of a diagnosis: location of a fault, evidence and advice."""
+"""Results of a diagnosis: where a fault is, the evidence, and advice."""
 
 from __future__ import annotations
 
@@ -10,20 +10,20 @@ from catenary.model.topology import Cable
 
 
 class Kind(StrEnum):
-    """Location of a fault."""
+    """Kind of fault, by its location."""
 
     CABLE = "cable"  # including its plugs
     DEVICE = "device"
     POWER = "power"  # power of a device
-    SILENT = "silent"  # a device, or all devices from one on, do not answer
-    EVERYWHERE = "everywhere"  # one cause for the whole segment
+    SILENT = "silent"  # a device does not answer, alone or with all devices behind it
+    EVERYWHERE = "everywhere"  # a cause that affects the whole segment
     MAIN = "main"  # the MainDevice, its port or driver
     WIRING = "wiring"  # the wiring is not a tree
 
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """One fault. `devices` are the positions that it concerns."""
+    """One fault. `devices` are the positions of the affected devices."""
 
     kind: Kind
     where: str
@@ -55,7 +55,7 @@ class Names:
         """Return the name of one end of a cable.
 
         Args:
-            position: The device; None is the MainDevice.
+            position: Position of the device; None is the MainDevice.
             port: The port of the device.
         """
         return "the MainDevice" if position is None else f"{self.device(position)} port {port}"

@@ -1,4 +1,4 @@
-"""Texts from devices: names in the SII and in the object dictionary."""
+"""Clean-up of texts from devices: names in the SII and in the object dictionary."""
 
 from __future__ import annotations
 

@@ -1,11 +1,11 @@
-"""The tree of the segment, from the open ports of all devices, ETG.1000.4 §6.1.3 (0x0110).
+"""Tree of the segment, derived from the open ports of all devices, ETG.1000.4 §6.1.3 (0x0110).
 
 A frame enters at port 0 and leaves by the open ports in the order 0 → 3 → 1 → 2. Positions follow
 this order. The open ports per position are therefore sufficient to find the parent of every device.
 
-Contradictions are reported, not corrected: a device with swapped IN and OUT, an open port without a
-device behind it. (SOEM, `ecx_configdc`, takes the port with the earliest receive time as the
-entry. The order of answers still does not show which devices are behind a swapped one.)
+Contradictions are reported, not corrected: a device with swapped IN and OUT, or an open port
+without a device behind it. SOEM (`ecx_configdc`) takes the port with the earliest receive time as
+the entry. Even then, the order of the devices does not show which ones are behind the swapped one.
 """
 
 from __future__ import annotations
@@ -22,12 +22,14 @@ Ports = tuple[bool, bool, bool, bool]
 
 @dataclass(frozen=True, slots=True)
 class Place:
-    parent: int | None  # position; None: wired to the MainDevice
+    """Place of one device in the tree."""
+
+    parent: int | None  # position; None if the device is wired to the MainDevice
     parent_port: int | None
 
 
 def open_ports(dl_status: int) -> Ports:
-    """Return for each port whether it communicates with a neighbour."""
+    """Return one flag per port: True if it communicates with a neighbour."""
     port_0, port_1, port_2, port_3 = DlStatus.from_word(dl_status).ports
     return (
         port_0.communication,
@@ -40,11 +42,11 @@ def open_ports(dl_status: int) -> Ports:
 def tree(ports: Sequence[Ports]) -> tuple[Place, ...]:
     """Return the place of each device in the tree.
 
-    If there are more devices than open ports, the registers do not describe a tree. The devices
-    without an open port then have no parent.
+    If there are more devices than open ports, the registers do not describe a tree. The devices for
+    which no port is left then have no parent.
     """
     places: list[Place] = []
-    unfilled: list[tuple[int, int]] = []  # (position, port); the last one is filled next
+    unfilled: list[tuple[int, int]] = []  # (position, port); the last one is next
     for position, open_here in enumerate(ports):
         if unfilled:
             parent, port = unfilled.pop()
@@ -67,10 +69,9 @@ class Cable(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Topology:
-    """The tree of a segment. All tuples are by position.
+    """The tree of a segment. All tuples are indexed by position.
 
-    `second_end` is the port (position, port) that is wired to the second interface of the
-    MainDevice in a ring.
+    In a ring, `second_end` is the (position, port) wired to the MainDevice's second interface.
     """
 
     ports: tuple[Ports, ...]
@@ -98,7 +99,7 @@ class Topology:
         """Return the cable at a port; None if no cable is known there.
 
         Args:
-            position: The device.
+            position: Position of the device.
             port: The port of the device.
         """
         for cable in self.cables:
@@ -107,7 +108,7 @@ class Topology:
         return None
 
     def path(self) -> tuple[tuple[int, int], ...]:
-        """Return the ports (position, port) at which a frame arrives, in order, there and back."""
+        """Return all ports (position, port) at which a frame arrives, in order, out and back."""
         arrivals: list[tuple[int, int]] = []
         waiting = [(cable.lower, cable.lower_port) for cable in self.cables[:1]]
         while waiting:
@@ -122,13 +123,13 @@ class Topology:
 
 
 def make_topology(ports: Sequence[Ports], *, ring: bool = False) -> Topology:
-    """Return the tree of the devices, with its contradictions.
+    """Return the tree of the devices and its contradictions.
 
     Args:
         ports: Open ports of each device, by position.
-        ring: True for a ring. One open port without a device behind it is then connected to the
-            second interface of the MainDevice. If the ring is cut, the MainDevice reaches the
-            devices after the cut from there.
+        ring: True for a ring. One open port without a device behind it is then wired to the second
+            interface of the MainDevice. If the ring is cut, the MainDevice reaches the devices
+            after the cut through this interface.
     """
     places = tree(ports)
     taken = {(place.parent, place.parent_port) for place in places}
@@ -147,9 +148,9 @@ def make_topology(ports: Sequence[Ports], *, ring: bool = False) -> Topology:
         *_entered_elsewhere(ports),
         *_without_a_place(places, unanswered),
         *(
-            f"device {position} port {port} is open, but no device answers behind it: something "
-            "that is not an EtherCAT device, a device without firmware, or a MainDevice's second "
-            "port (a ring)"
+            f"device {position} port {port} is open, but no device answers behind it: it leads to "
+            "something that is not an EtherCAT device, to a device without firmware, or to the "
+            "MainDevice's second port (a ring)"
             for position, port in unanswered
             if ports[position][0] and (position == 0 or places[position].parent is not None)
         ),
@@ -164,7 +165,7 @@ def _entered_elsewhere(ports: Sequence[Ports]) -> Iterator[str]:
         others = [str(port) for port in PORT_ORDER if open_here[port]]
         if others:
             yield (
-                f"frames enter device {position} by port {' or '.join(others)}, its port 0 is "
+                f"frames enter device {position} by port {' or '.join(others)}, and its port 0 is "
                 "closed: its IN and OUT are swapped"
             )
         else:

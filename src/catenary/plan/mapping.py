@@ -132,7 +132,7 @@ def _as_now(current: Mapping, wanted: Sequence[ObjectReference]) -> str:
     reasons = []
     for each in _missing(current, wanted):
         bits = lengths.get((each.index, each.subindex))
-        other = f"is mapped with {bits} bits, {each.bit_length} were asked for"
+        other = f"is mapped with {bits} bits, {each.bit_length} were requested"
         reasons.append(f"{object_names([each])} {'is not mapped' if bits is None else other}")
     return f"as assigned now ({pdo_names(current.pdos)}): {'; '.join(reasons)}"
 

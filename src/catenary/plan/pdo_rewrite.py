@@ -112,7 +112,7 @@ def _not_mappable(
     if not mappable:
         return "exists but cannot be mapped"
     if known.bit_length != reference.bit_length:
-        return f"has {known.bit_length} bits, {reference.bit_length} were asked for"
+        return f"has {known.bit_length} bits, {reference.bit_length} were requested"
     return ""
 
 

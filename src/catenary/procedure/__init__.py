@@ -1,1 +1,1 @@
-"""Conversations with devices as generators: no I/O, no clock, no retry."""
+"""Conversations with devices, as generators without I/O, clock or retries."""

@@ -11,9 +11,9 @@ from catenary.wire.al import AlControl, AlState, AlStatus, status_code
 from catenary.wire.datagram import EcatCommand
 from catenary.wire.register import AL_CONTROL, AL_STATUS, AL_STATUS_CODE
 
-# By requested state [s]; the defaults of the ESI (ETG.2000, StateMachine/Timeout).
+# [s] by requested state; the defaults of the ESI (ETG.2000, StateMachine/Timeout).
 TIMEOUTS = {
-    AlState.INIT: 5.0,  # back to INIT
+    AlState.INIT: 5.0,
     AlState.PRE_OP: 3.0,
     AlState.BOOT: 3.0,
     AlState.SAFE_OP: 10.0,
@@ -30,7 +30,7 @@ _STATUS_SIZE = AL_STATUS_CODE.address + AL_STATUS_CODE.size - AL_STATUS.address
 class DeviceState(NamedTuple):
     """AL status and its code, read together."""
 
-    state: AlState | None  # None: a value that the standard does not define
+    state: AlState | None  # None for a value that the standard does not define
     error: bool
     code: int
     word: int
@@ -58,7 +58,7 @@ def request_state(
         timeout: Time for the change [s]; None for the default of the state.
 
     Raises:
-        StateError: The device refuses or takes too long. The error has its AL status code.
+        StateError: The device refuses or takes too long. The error contains the AL status code.
     """
     before = yield from read_state(station)
     if before.error:
@@ -92,15 +92,17 @@ def write_control(station: Station, control: AlControl) -> Procedure[None]:
             return
         now = _decoded(answered(status, station, f"request for {control.state}"))
         if deadline.passed(status):
-            raise _refused(station, control.state, now, "does not read the request for")
+            raise _refused(
+                station, control.state, now, f"does not accept the request for {control.state}"
+            )
         yield after(pace.pause())
 
 
 def acknowledge(station: Station, pending: DeviceState) -> Procedure[DeviceState]:
     """Acknowledge an AL error by requesting the present state.
 
-    A controller that emulates its application only copies AL control to AL status. Its error is
-    then a copy of the acknowledgement. A request without acknowledgement clears it.
+    A controller with device emulation only copies AL control to AL status. Its error is then a copy
+    of the acknowledgement, and a request without acknowledgement clears it.
 
     Args:
         station: The device.
@@ -116,7 +118,7 @@ def acknowledge(station: Station, pending: DeviceState) -> Procedure[DeviceState
         now = yield from _await_no_error(station, ACKNOWLEDGE_TIMEOUT)
         if not now.error:
             return now
-    raise _refused(station, state, now, "does not accept the acknowledgement of its error in")
+    raise _refused(station, state, now, f"does not clear its error in {state}")
 
 
 def _await_no_error(station: Station, timeout: float) -> Procedure[DeviceState]:
@@ -135,11 +137,11 @@ def _await_state(station: Station, target: AlState, timeout: float) -> Procedure
         [reply] = yield [read_memory(station.address, _STATUS_START, _STATUS_SIZE, repeatable=True)]
         now = _decoded(answered(reply, station, "AL status"))
         if now.error:
-            raise _refused(station, target, now, "refused")
+            raise _refused(station, target, now, f"refused {target}")
         if now.state is target:
             return now
         if deadline.passed(reply):
-            raise _refused(station, target, now, f"did not reach within {timeout:g} s")
+            raise _refused(station, target, now, f"did not reach {target} within {timeout:g} s")
         yield after(pace.pause())
 
 
@@ -157,12 +159,12 @@ def _refused(station: Station, target: AlState, now: DeviceState, what: str) -> 
     known = status_code(now.code)
     reason = f", AL status code 0x{now.code:04X}: {known.text}" if now.code else ""
     return StateError(
-        f"{station} {what} {target}: it is in {now.name}{' with an error' * now.error}{reason}",
+        f"{station} {what}: it is in {now.name}{' with an error' * now.error}{reason}",
         position=station.position,
         requested=int(target),
         actual=now.word & 0x0F,
         code=now.code,
         hint=known.cause
-        or "read its AL status again; its manual lists the requirements. Without an "
+        or "read its AL status again; its manual lists the requirements. If there is no "
         "error code, check for a second master that also requests states",
     )

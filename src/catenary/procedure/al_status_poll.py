@@ -1,6 +1,6 @@
 """AL status of all devices in one frame, ETG.1000.4 §6.1, §6.4.
 
-Unlike in `al_state.read_state`, a missing reply is not an error, but a result.
+Unlike in `al_state.read_state`, a missing reply is a result, not an error.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ class Answer(NamedTuple):
 
 
 def survey(stations: Sequence[Station]) -> Procedure[list[Answer]]:
-    """Return the answers of all devices, including those that did not answer."""
+    """Read the AL status of all devices. `word` is None for a device that did not answer."""
     replies = yield [
         read_memory(station.address, _START, _SIZE, repeatable=True) for station in stations
     ]

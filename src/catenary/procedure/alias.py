@@ -1,4 +1,4 @@
-"""The station alias in the EEPROM, ETG.1000.6 §5.4: a word that the checksum covers."""
+"""Station alias in the EEPROM, ETG.1000.6 §5.4. The checksum covers this word."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def read_alias(station: Station) -> Procedure[int]:
 
 
 def write_alias(station: Station, alias: int) -> Procedure[None]:
-    """Write alias and checksum to the EEPROM. The device uses the alias from its next power-up.
+    """Write the alias and the checksum to the EEPROM. The alias is used from the next power-up.
 
     Args:
         station: The device.
@@ -31,7 +31,7 @@ def write_alias(station: Station, alias: int) -> Procedure[None]:
     Raises:
         ValueError: The alias is out of range.
         EepromError: The present checksum is wrong, or a word cannot be written. A corrected
-            checksum would hide that the rest of the configuration is invalid.
+            checksum would hide invalid words in the rest of the configuration.
     """
     if not 0 <= alias <= 0xFFFF:
         raise ValueError(f"station alias {alias} is out of range; use 0 to 65535")

@@ -1,4 +1,4 @@
-"""Test traffic: faults of a cable appear only while frames pass."""
+"""Test traffic for cables, whose faults appear only while frames pass."""
 
 from __future__ import annotations
 
@@ -8,37 +8,37 @@ from catenary.procedure.station import Deadline
 from catenary.wire.datagram import EcatCommand
 
 PAUSE = 1e-3  # [s] between two frames
-PATTERN = bytes(range(256)) * 5  # every byte value, nearly a full frame
-IN_VAIN = 50  # lost frames in a row
+PATTERN = bytes(range(256)) * 5  # all byte values; nearly a full frame
+LOST_IN_A_ROW_MAX = 50  # lost or damaged frames
 
 
 def exercise(seconds: float) -> Procedure[tuple[int, int]]:
-    """Send a long frame every millisecond for some time.
+    """Send a long frame every millisecond.
 
     Args:
-        seconds: The duration.
+        seconds: The duration [s].
 
     Returns:
-        The number of sent frames, and of those that were lost or returned damaged.
+        The number of sent frames, and the number of lost or damaged ones.
 
     Raises:
-        NoDeviceError: No frame comes back any more.
+        NoDeviceError: `LOST_IN_A_ROW_MAX` frames in a row were lost or damaged.
     """
-    deadline, sent, lost, in_vain = Deadline(seconds), 0, 0, 0
+    deadline, sent, lost, lost_in_a_row = Deadline(seconds), 0, 0, 0
     while True:
         [reply] = yield [Request(EcatCommand.NOP, 0, PATTERN, False)]
         sent += 1
-        in_vain = in_vain + 1 if _spoilt(reply) else 0
-        lost += bool(in_vain)
-        if in_vain >= IN_VAIN:
+        lost_in_a_row = lost_in_a_row + 1 if _is_damaged(reply) else 0
+        lost += bool(lost_in_a_row)
+        if lost_in_a_row >= LOST_IN_A_ROW_MAX:
             raise NoDeviceError(
-                f"the last {in_vain} frames were lost or damaged, after {sent - in_vain} frames",
-                hint="check the cable to the first device, and its power",
+                f"the last {lost_in_a_row} of {sent} frames were lost or damaged",
+                hint="check the cable to the first device, and the power of this device",
             )
         if deadline.passed(reply):
             return sent, lost
         yield after(PAUSE)
 
 
-def _spoilt(reply: Reply) -> bool:
+def _is_damaged(reply: Reply) -> bool:
     return reply.lost or reply.data != PATTERN

@@ -1,11 +1,12 @@
-"""Set-up of distributed clocks before the cycle: measure delays, write offsets, reset filters,
-compensate drift. ETG.1000.4 §6.8, ETG.1020 §"Distributed clocks"; Beckhoff, ESC data sheet I,
-§9.1.2 to §9.1.5. All steps are in PRE-OP.
+"""Set-up of distributed clocks in PRE-OP: delay measurement, offsets, filters, drift compensation.
+
+Sources: ETG.1000.4 §6.8; ETG.1020 §"Distributed clocks"; Beckhoff, ESC data sheet I, §9.1.2 to
+§9.1.5.
 
 The system time of a device is its local time plus its offset. Its time loop follows the time of the
 reference clock, which a frame carries, plus the propagation delay. A device may stamp receive times
-but have no system time (an EL2828: ethercrab's capture replay-dc.pcapng). Delays are then measured
-through it, and its clock is not configured, as in IgH (`has_dc_system_time`).
+without having a system time (an EL2828, for example: ethercrab's capture replay-dc.pcapng). Its
+times are used to measure delays, but its clock is not configured, as in IgH (`has_dc_system_time`).
 """
 
 from __future__ import annotations
@@ -36,8 +37,8 @@ from catenary.wire.register import (
     SYSTEM_TIME_OFFSET_LOW,
 )
 
-LATCHES = 16  # number of latches for the mean: time stamps jitter by 10 ns or more
-LOST_MAX = 16  # lost frames in a row; with more, the reference is assumed lost
+LATCHES = 16  # number of latches to average: time stamps jitter by 10 ns or more
+LOST_MAX = 16  # lost frames in a row after which the reference is assumed lost
 BURST_STEP = 512  # frames per step of the procedure
 # The reset values, which SOEM (`ecx_set_slaves_to_default`), KickCAT (`enableDC`) and ethercrab
 # write: no filter on the difference, 2^12 on the speed, and the bandwidth of the loop.
@@ -48,15 +49,15 @@ RingEnd = tuple[int, int]  # position and port wired to the second interface
 
 @dataclass(frozen=True, slots=True)
 class ClockMeasurement:
-    """Result of one measurement of the clocks of a segment; tuples by position."""
+    """Result of one measurement of the clocks of a segment. Tuples are indexed by position."""
 
-    delays_ns: tuple[int | None, ...]  # from the first clock; None: no clock
-    local_times_ns: tuple[int | None, ...]  # local time of the last latch; None: no system time
+    delays_ns: tuple[int | None, ...]  # from the first clock; None without a clock
+    local_times_ns: tuple[int | None, ...]  # at the last latch; None without a system time
     latched_ns: int  # the same time on the link's clock, within half a round trip
 
     @property
     def first(self) -> int | None:
-        """Position of the first device with a system time: the reference, unless one is given."""
+        """Position of the default reference, the first device with a system time; else None."""
         for position, local in enumerate(self.local_times_ns):
             if local is not None:
                 return position
@@ -77,8 +78,8 @@ def measure(
 
     Args:
         devices: All devices, by position.
-        second_end: In a ring, the port to close during the measurement. Frames do not return
-            through the ports of an intact ring. None for a line.
+        second_end: In a ring, the port to close during the measurement: in an intact ring, frames
+            do not return through the ports. None for a line.
         latches: The number of latches.
     """
     if second_end is None:
@@ -98,7 +99,7 @@ def _measure(devices: Sequence[DeviceDescription], latches: int) -> Procedure[Cl
     measured: list[list[ClockPlace]] = []
     for _ in range(latches):
         latched_ns = yield from _latch(clocks)
-        replies = yield [request for device in clocks for request in _questions(device)]
+        replies = yield [request for device in clocks for request in _time_reads(device)]
         answers = dict(zip((d.position for d in clocks), _pairs(replies), strict=True))
         times = {d.position: _port_times(d, answers[d.position][0]) for d in clocks}
         measured.append([_place(device, times.get(device.position)) for device in devices])
@@ -150,9 +151,9 @@ def align(
 def compensate(device: DeviceDescription, count: int = BURST) -> Procedure[None]:
     """Run the static drift compensation: distribute the time of the reference in many frames.
 
-    Each frame has one datagram. A controller compares with the time at which the *frame* began, so
-    that a second datagram has no effect (ESC data sheet I §9.1.5). KickCAT and ethercrab also send
-    one per frame.
+    Each frame contains one datagram. A controller compares with the start time of the *frame*, so a
+    second datagram has no effect (ESC data sheet I §9.1.5). KickCAT and ethercrab also send one per
+    frame.
 
     Args:
         device: The reference clock.
@@ -172,8 +173,9 @@ def compensate(device: DeviceDescription, count: int = BURST) -> Procedure[None]
 def lead(device: DeviceDescription, count: int, epoch_ns: int) -> Procedure[None]:
     """Run the static drift compensation for a reference that follows the MainDevice.
 
-    Each frame first writes the MainDevice's time, as of the last answer, to the reference. With a
-    NIC, the reference adopts our rate, and a phase about 10 us late. The cycle corrects the phase.
+    Each frame first writes the MainDevice's time at the last answer to the reference. With a real
+    NIC, the reference then has the MainDevice's rate and lags about 10 us behind. The cycle
+    corrects the phase.
 
     Args:
         device: The reference clock.
@@ -208,7 +210,7 @@ def _no_reference(device: DeviceDescription) -> ClockError:
 
 
 def distribute(device: DeviceDescription) -> Request:
-    """Return the FRMW of the low half of the system time. A time loop compares only this half."""
+    """Return the FRMW request for the low half of the system time, which time loops compare."""
     request = read(EcatCommand.FRMW, device.station_address, SYSTEM_TIME_LOW)
     return request._replace(repeatable=False, alone=True)
 
@@ -230,9 +232,9 @@ def alignment(device: DeviceDescription, offset: int, delay: int) -> tuple[Reque
 
 
 def filters(station: int | None = None) -> tuple[Request, ...]:
-    """Return the requests that reset the time loop of one device, or of all (None).
+    """Return the requests that reset the time loop of one device, or of all devices (None).
 
-    Filter depths come first: some controllers apply them with the write that resets the loop.
+    Filter depths are written first, because some controllers apply them when the loop is reset.
     """
     command = EcatCommand.BWR if station is None else EcatCommand.FPWR
     return (
@@ -243,7 +245,7 @@ def filters(station: int | None = None) -> tuple[Request, ...]:
 
 
 def read_system_time(device: DeviceDescription) -> Procedure[int]:
-    """Read the system time of a device [ns]; of a 32-bit clock, the low half."""
+    """Read the system time of a device [ns]; for a 32-bit clock, the low half."""
     register = SYSTEM_TIME if device.clock_bits == 64 else SYSTEM_TIME_LOW
     [reply] = yield [read(EcatCommand.FPRD, device.station_address, register)]
     return register.unpack(answered(reply, _station(device), "its system time"))
@@ -254,7 +256,7 @@ def no_system_time(device: DeviceDescription) -> ClockError:
     what = "only stamps receive times" if device.controller.supports_clocks else "has none"
     return ClockError(
         f"{device}: distributed clocks were requested, but the device {what}",
-        hint="remove it from dc=, and choose another reference clock",
+        hint="remove it from dc=, or choose another reference clock",
     )
 
 
@@ -266,13 +268,13 @@ def _latch(clocks: Sequence[DeviceDescription]) -> Procedure[int]:
         raise ClockError(
             f"{reply.working_counter} of {len(clocks)} devices with clocks received the broadcast "
             "that measures delays",
-            hint="the number of devices changes: check for a loose contact, then scan again",
+            hint="the number of devices is not stable: check for a loose contact, then scan again",
         )
     return (before.time_ns + reply.time_ns) // 2
 
 
-def _questions(device: DeviceDescription) -> tuple[Request, Request]:
-    """Return the reads of port times and local time; a 32-bit clock uses the time of port 0."""
+def _time_reads(device: DeviceDescription) -> tuple[Request, Request]:
+    """Return the reads of port times and local time. A 32-bit clock uses the time of port 0."""
     station = device.station_address
     if device.clock_bits == 64:
         unit = read(EcatCommand.FPRD, station, RECEIVE_TIME_PROCESSING_UNIT)

@@ -1,7 +1,7 @@
 """Configuration of SyncManagers, FMMUs and the watchdog, ETG.1000.4 §6.3, §6.6, §6.7.
 
 The SyncManagers of the mailbox are written in INIT, those of the process data in PRE-OP. The
-watchdog is verified, because drives rely on it if the MainDevice fails.
+watchdog is verified, because drives depend on it if the MainDevice fails.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ from catenary.wire.sync_manager import (
 
 
 def configure_mailbox(channel: MailboxChannel) -> Procedure[None]:
-    """Write SyncManagers 0 and 1 and reset the counters, in INIT."""
+    """Write SyncManagers 0 and 1 and reset the counters. The device must be in INIT."""
     layout = channel.layout
     yield from configure_mailbox_areas(
         channel.station,
@@ -42,7 +42,9 @@ def configure_mailbox(channel: MailboxChannel) -> Procedure[None]:
 def configure_mailbox_areas(
     station: Station, receive: MailboxArea, send: MailboxArea
 ) -> Procedure[None]:
-    """Write SyncManagers 0 and 1, in INIT: the standard mailbox, or before BOOT the bootstrap one.
+    """Write SyncManagers 0 and 1 for the standard or the bootstrap mailbox.
+
+    The device must be in INIT.
 
     Args:
         station: The device.
@@ -61,9 +63,10 @@ def configure_mailbox_areas(
 def configure_process_data(
     station: Station, device: DeviceDescription, plan: DevicePlan
 ) -> Procedure[None]:
-    """Write SyncManagers and FMMUs of the process data, and the watchdog, in PRE-OP.
+    """Write the SyncManagers and FMMUs of the process data, and the watchdog.
 
-    SyncManagers of an earlier plan are disabled first, because an enabled one keeps its length.
+    The device must be in PRE-OP. SyncManagers of an earlier plan are disabled first, because an
+    enabled SyncManager keeps its length.
 
     Args:
         station: The device.
@@ -71,8 +74,8 @@ def configure_process_data(
         plan: Its plan.
 
     Raises:
-        ConfigurationError: The watchdog reads back different from the written values, or a control
-            byte of the SII is invalid.
+        ConfigurationError: The watchdog registers do not keep the written values, or a control byte
+            of the SII is invalid.
     """
     planned = plan.layout.sync_managers
     possible = {each.index for each in device.sync_managers if not _is_mailbox(device, each.index)}

@@ -1,4 +1,4 @@
-"""The error counters of all devices, read in shared frames: 20 bytes each, 46 devices per frame.
+"""Error counters of all devices, read in shared frames: 20 bytes each, 46 devices per frame.
 
 As in `survey`, a missing reply is not an error.
 """
@@ -25,9 +25,9 @@ Totals: TypeAlias = tuple[ErrorCounters | None, ...]  # by position; None: no an
 
 
 def read_error_counters(stations: Sequence[Station]) -> Procedure[Totals]:
-    """Return the counts of every device; None for a device that did not answer.
+    """Read the counts of all devices; None for a device that did not answer.
 
-    If all frames are lost, no device has answered.
+    If all frames are lost, the result is None for every device.
 
     Raises:
         ResponseTimeout: Only some frames were lost. It is then unknown whether the devices in

@@ -1,8 +1,8 @@
-"""The interface between a procedure and its runner: datagrams to exchange, or a time to wait.
+"""Interface between a procedure and its runner: datagrams to exchange, or a time to wait.
 
-A procedure is a generator. It yields a list of `Request`s and is resumed with the list of their
-`Reply`s, in the same order. Or it yields `after(seconds)` and is resumed with an empty list after
-that time. It never sleeps, retries or accesses a link; its runner does. Its `return` value is the
+A procedure is a generator. It yields a list of requests and is resumed with the list of replies, in
+the same order. To wait, it yields `after(seconds)` and is resumed with an empty list after that
+time. It never sleeps, retries or accesses a link; its runner does. Its `return` value is the
 result. Its only clock is the time in its replies (`Reply.time_ns`, the link's clock).
 
     def read_al_status(station):
@@ -22,8 +22,9 @@ from catenary.wire.register import Register
 class Request(NamedTuple):
     """One datagram to send.
 
-    If it is `repeatable` and gets lost, the runner sends it again. Otherwise the procedure receives
-    a lost reply and recovers as the standard specifies. `alone`: it needs a separate frame.
+    If the request is lost and `repeatable`, the runner sends it again. Otherwise the procedure
+    receives a lost reply and recovers as the standard specifies. A request with `alone` gets a
+    separate frame.
     """
 
     command: EcatCommand
@@ -34,13 +35,17 @@ class Request(NamedTuple):
 
 
 class Reply(NamedTuple):
+    """The reply to one request."""
+
     data: bytes
     working_counter: int
-    lost: bool = False  # no answer, for a repeatable request after all repeats
-    time_ns: int = 0  # when it arrived or timed out; the link's clock
+    lost: bool = False  # no answer; for a repeatable request, not even after all repetitions
+    time_ns: int = 0  # time of its arrival or timeout, on the link's clock
 
 
 class After(NamedTuple):
+    """A step that waits on the link's clock."""
+
     seconds: float
 
 
@@ -51,7 +56,7 @@ Procedure: TypeAlias = Generator[Step, list[Reply], T]
 
 
 def after(seconds: float) -> After:
-    """Return the step that waits for a time on the link's clock [s]."""
+    """Return the step that waits for `seconds` on the link's clock [s]."""
     return After(seconds)
 
 

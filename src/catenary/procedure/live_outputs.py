@@ -1,8 +1,8 @@
-"""Devices found in SAFE-OP or OP: left by a master that was killed, or controlled by an active one.
+"""Devices in SAFE-OP or OP, left there by a killed master or controlled by an active one.
 
-The process-data watchdog distinguishes the two cases (ETG.1000.4 §6.3; ET1100 datasheet, section
-II, 0x0420 and 0x0440). It expires, unless another master still refreshes the outputs. Devices are
-addressed by position (APRD), because they may not have station addresses yet.
+The process-data watchdog distinguishes the two cases: it expires unless a master refreshes the
+outputs (ETG.1000.4 §6.3; ET1100 datasheet, section II, 0x0420 and 0x0440). Devices are addressed by
+position (APRD), because they may not have station addresses yet.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from catenary.wire.sync_manager import SIZE, Activation, Direction, decode_sync_
 
 RUNNING = (AlState.SAFE_OP, AlState.OP)
 ACTIVE = 0x01  # 0x0440: the watchdog has not expired or is disabled
-POLL = 0.010  # [s]
+POLL = 0.010  # [s] between two checks
 LONGEST_NS = 5_000_000_000  # longest wait: twice the watchdog time
 
 
@@ -45,10 +45,10 @@ class Running(NamedTuple):
 
 
 def find_running(device_count: int) -> Procedure[list[Running]]:
-    """Return the devices in SAFE-OP or OP. This changes nothing.
+    """Return the devices in SAFE-OP or OP. Nothing is written.
 
-    In a cut ring, two devices at the same distance from both ends answer together. They are left
-    out.
+    In a cut ring, two devices at the same distance from both ends answer together. They are
+    omitted.
     """
     replies = yield [
         read(EcatCommand.APRD, -position, register)
@@ -67,10 +67,11 @@ def find_running(device_count: int) -> Procedure[list[Running]]:
 
 
 def find_refreshed(running: Sequence[Running]) -> Procedure[list[int]]:
-    """Return the positions in OP whose outputs another master refreshes. This changes nothing.
+    """Return the positions of devices in OP whose outputs a master refreshes. Nothing is written.
 
-    It waits for at most twice the watchdog times. Only devices whose outputs trigger an enabled
-    watchdog are checked. SAFE-OP is left out: a watchdog that was never triggered looks active.
+    This takes at most twice the longest watchdog time. Only devices whose outputs trigger an
+    enabled watchdog are checked. Devices in SAFE-OP are not: a watchdog that was never triggered
+    looks active.
     """
     watched = {}
     for device in running:
@@ -129,5 +130,5 @@ def _triggers(blocks: bytes) -> bool:
 
 
 def _answers(reply: Reply) -> bool:
-    """Return True if one device has answered."""
+    """Return True if exactly one device has answered."""
     return not reply.lost and reply.working_counter == 1

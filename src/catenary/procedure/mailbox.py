@@ -1,18 +1,20 @@
-"""The mailbox of one SubDevice, ETG.1000.4 §5.6 and §6.7, ETG.1000.6 §5.1.
+"""Mailbox transfers of one SubDevice, ETG.1000.4 §5.6 and §6.7, ETG.1000.6 §5.1.
 
-One message is outstanding at a time, and whole transfers take turns (`exclusively`). Lost messages
-are recovered as the standard specifies. The datagram is never simply sent again, because that
-blocks mailboxes (SOEM#684):
+Only one message is outstanding at a time, and transfers run one after another (`exclusively`). Lost
+messages are recovered as the standard specifies. A datagram is never simply sent again, because
+that can block the mailbox (SOEM#684):
 
-- A lost read: toggle the repeat request of SyncManager 1, wait for the acknowledge, read again.
-- A lost write: it is unknown whether it arrived. An answer within a grace period shows that it did.
-  Otherwise write the message again with the same counter: the device recognises the repetition.
+- After a lost read, the repeat request of SyncManager 1 is toggled. When the device has
+  acknowledged it, the mailbox is read again.
+- After a lost write, it is unknown whether the message arrived. An answer within a grace period
+  shows that it did. Otherwise the message is written again with the same counter, so that the
+  device recognises the repetition.
 
 The counter in messages of the device only identifies repetitions. Devices may start it at any
 value, leave it constant at 0 (ethercrab#236) or another value, or copy the counter of the request
 (KickCAT, CoE/mailbox/response.cc). A message is therefore dropped only if a repetition was
-requested, and the message equals the last accepted one in every byte. SOEM (ecx_mbxreceive) and
-IgH (fsm_coe.c) do not compare the counter on reception.
+requested and the message equals the last accepted one in every byte. SOEM (ecx_mbxreceive) and IgH
+(fsm_coe.c) do not compare the counter on reception.
 """
 
 from __future__ import annotations
@@ -46,22 +48,22 @@ from catenary.wire.sync_manager import Activation, PdiControl, Status
 
 T = TypeVar("T")
 
-OUT, IN = 0, 1  # SyncManagers of the mailbox, defined by the standard
+OUT, IN = 0, 1  # SyncManagers of the mailbox, as defined by the standard
 WRITE_TIMEOUT = 1.0  # [s] until the device has emptied its mailbox
-READ_TIMEOUT = 2.0  # [s] until it answers; AKDs need long for 0x1010
+READ_TIMEOUT = 2.0  # [s] until it answers; AKD drives take long for 0x1010
 REPEAT_TIMEOUT = 0.2  # [s] until it acknowledges a repeat request
-EAGER_MAX = 256  # largest mailbox [bytes] that is read without a status check before
-LOOK = 100e-6  # [s] between the first two polls for an answer
-TURN = 0.5e-3  # [s] between two checks whether the mailbox is free
+EAGER_MAX = 256  # [bytes]; a larger mailbox is read only after a status check
+POLL = 100e-6  # [s] between the first two polls for an answer
+TURN = 0.5e-3  # [s] between two checks for a free mailbox
 GRACE = 0.1  # [s] for an answer to a message whose frame was lost
-RECOVERIES = 5  # attempts per message; after these the cable is assumed faulty
-STRANGERS = 64  # unexpected messages in a row; device queues are shorter
+RECOVERIES = 5  # attempts per message; then the cable is assumed to be faulty
+UNEXPECTED_MAX = 64  # unexpected messages in a row; the queues of devices are shorter
 
 
 def exclusively(channel: MailboxChannel, conversation: Procedure[T]) -> Procedure[T]:
     """Run a conversation when no other conversation with this device is active.
 
-    Transfers are therefore never interleaved. They run in the order in which they were started.
+    Conversations are never interleaved. They run in the order in which they were started.
 
     Args:
         channel: The mailbox of the device.
@@ -85,13 +87,13 @@ def converse(
     *,
     timeout: float = READ_TIMEOUT,
 ) -> Procedure[T]:
-    """Send one message and return its answer, as converted by `accept`.
+    """Send one message and return its answer, converted by `accept`.
 
     Args:
         channel: The mailbox of the device.
         kind: The protocol of the message.
         data: The data of the message.
-        accept: Converts an answer. It returns None for a message that is not the answer, such as
+        accept: Function that converts the answer. It returns None for any other message, such as
             a late answer to another request.
         timeout: Deadline of the answer [s].
 
@@ -112,7 +114,7 @@ def converse(
         if sent and channel.thinks_ns:
             yield after(channel.thinks_ns * 1e-9)
         if stale and (older := (yield from _take(channel))) is not None:
-            _put_aside(channel, older)
+            _drop_late(channel, older)
         before = channel.dropped
         answer = yield from _await(channel, accept, Deadline(timeout if sent else GRACE))
         if answer is not None:
@@ -128,11 +130,11 @@ def converse(
 def further(
     channel: MailboxChannel, accept: Callable[[Mailbox], T | None], *, timeout: float = READ_TIMEOUT
 ) -> Procedure[T]:
-    """Return the next part of an answer that consists of several messages.
+    """Receive the next part of an answer that consists of several messages.
 
     Args:
         channel: The mailbox of the device.
-        accept: Converts a message; it returns None for an unexpected one.
+        accept: Function that converts a message. It returns None for an unexpected message.
         timeout: Deadline of the part [s].
 
     Raises:
@@ -150,7 +152,7 @@ def _await(
     channel: MailboxChannel, accept: Callable[[Mailbox], T | None], deadline: Deadline
 ) -> Procedure[T | None]:
     """Return the first message that `accept` converts; None if none arrives by the deadline."""
-    for _ in range(STRANGERS):
+    for _ in range(UNEXPECTED_MAX):
         received = yield from _fetch(channel, deadline)
         if received is None:
             return None
@@ -160,25 +162,25 @@ def _await(
             return answer
         channel.owed = True
     raise MailboxError(
-        f"{channel.station} sent {STRANGERS} unexpected mailbox messages in a row",
-        hint="its firmware is at fault, or two masters talk to it",
+        f"{channel.station} sent {UNEXPECTED_MAX} unexpected mailbox messages in a row",
+        hint="its firmware is at fault, or a second master accesses it",
     )
 
 
 def _no_answer(
-    channel: MailboxChannel, kind: Type, timeout: float, strangers: int
+    channel: MailboxChannel, kind: Type, timeout: float, unexpected: int
 ) -> ResponseTimeout:
-    instead = f"; {strangers} other messages arrived" if strangers else ""
+    others = f"; {unexpected} other messages arrived" if unexpected else ""
     return ResponseTimeout(
-        f"{channel.station}: no answer to a {kind.name} message within {timeout:g} s{instead}",
-        hint="its firmware is at fault, or two masters talk to it"
-        if strangers
+        f"{channel.station}: no answer to a {kind.name} message within {timeout:g} s{others}",
+        hint="its firmware is at fault, or a second master accesses it"
+        if unexpected
         else "the application of the device may hang: read its state, then power-cycle it",
     )
 
 
 def send_only(channel: MailboxChannel, kind: Type, data: bytes) -> Procedure[bool]:
-    """Send one message that has no answer.
+    """Send one message that the device does not answer.
 
     Args:
         channel: The mailbox of the device.
@@ -186,7 +188,7 @@ def send_only(channel: MailboxChannel, kind: Type, data: bytes) -> Procedure[boo
         data: The data of the message.
 
     Returns:
-        False if the frame was lost; the device may have received the message.
+        False if the frame was lost. The device may still have received the message.
     """
     channel.counter = next_counter(channel.counter)
     message = Mailbox(kind, data, channel.counter).encode(channel.layout.receive_size)
@@ -198,10 +200,10 @@ def drain(channel: MailboxChannel, accept: Callable[[Mailbox], T | None]) -> Pro
 
     Args:
         channel: The mailbox of the device.
-        accept: Converts a message; it returns None for an unexpected one.
+        accept: Function that converts a message. It returns None for an unexpected message.
     """
     found: list[T] = []
-    for _ in range(STRANGERS):  # limits a device that sends continuously; the rest is read later
+    for _ in range(UNEXPECTED_MAX):  # a device may send without end; the rest is read later
         if not (yield from _is_full(channel, IN))[0]:
             break
         received = yield from _take(channel)
@@ -214,11 +216,13 @@ def drain(channel: MailboxChannel, accept: Callable[[Mailbox], T | None]) -> Pro
 def _post(channel: MailboxChannel, message: bytes) -> Procedure[tuple[bool, bool]]:
     """Write the message when the mailbox is empty.
 
-    The read mailbox is checked in the same frame. Without this check, a device that answers twice
-    would stay one answer behind. SOEM checks in a separate frame (ec_main.c).
+    The read mailbox is checked in the same frame. Otherwise, after a device has answered twice,
+    each request would receive the answer to the previous one. SOEM checks in a separate frame
+    (ec_main.c).
 
     Returns:
-        True if the frame came back, and True if an older message of the device was waiting.
+        Two flags: True if the frame came back, and True if an older message of the device was
+        waiting.
     """
     deadline, pace = Deadline(WRITE_TIMEOUT), Pace()
     station, layout = channel.station.address, channel.layout
@@ -240,14 +244,14 @@ def _post(channel: MailboxChannel, message: bytes) -> Procedure[tuple[bool, bool
 
 
 def _settle(channel: MailboxChannel) -> Procedure[None]:
-    """Wait for a late answer, so that it is not taken as the answer to the next request."""
+    """Wait for a late answer, so that it is not mistaken for the answer to the next request."""
     received = yield from _fetch(channel, Deadline(GRACE))
     if received is not None:
-        _put_aside(channel, received)
+        _drop_late(channel, received)
 
 
-def _put_aside(channel: MailboxChannel, message: Mailbox) -> None:
-    """Drop a late message. An emergency is still reported."""
+def _drop_late(channel: MailboxChannel, message: Mailbox) -> None:
+    """Drop a late message, but report an emergency."""
     emergency = _emergency(message)
     if emergency is not None:
         channel.add_emergency(emergency)
@@ -259,7 +263,7 @@ def _stuck(channel: MailboxChannel, full: bool) -> MailboxError:
     if full:
         return MailboxError(
             f"{channel.station} has not read its mailbox for {WRITE_TIMEOUT:g} s",
-            hint="its application hangs, or waits until its own mailbox is read: power-cycle it",
+            hint="its application hangs, or waits until its send mailbox is read: power-cycle it",
         )
     return MailboxError(
         f"{channel.station} does not accept mailbox messages at "
@@ -270,17 +274,17 @@ def _stuck(channel: MailboxChannel, full: bool) -> MailboxError:
 
 def _fetch(channel: MailboxChannel, deadline: Deadline) -> Procedure[Mailbox | None]:
     """Return the next message of the device; None if the deadline has passed."""
-    pace = Pace(max(LOOK, channel.thinks_ns * 1e-10))  # a tenth
+    pace = Pace(max(POLL, channel.thinks_ns * 1e-10))  # a tenth of the expected time
     empty_ns: int | None = None
     while True:
-        there, received, time_ns = yield from _look(channel)
-        if there:
+        arrived, received, time_ns = yield from _poll(channel)
+        if arrived:
             channel.learn(empty_ns)
         if received is not None:
             return received
         if channel.emptied:
             raise MailboxError(
-                f"{channel.station} was started up again before it answered",
+                f"{channel.station} was restarted before it answered",
                 hint="repeat the request",
             )
         if deadline.passed_at(time_ns):
@@ -289,18 +293,21 @@ def _fetch(channel: MailboxChannel, deadline: Deadline) -> Procedure[Mailbox | N
         yield after(pace.pause())
 
 
-def _look(channel: MailboxChannel) -> Procedure[tuple[bool, Mailbox | None, int]]:
-    """Return (True if there was a message, the message unless it was a repetition, time [ns]).
+def _poll(channel: MailboxChannel) -> Procedure[tuple[bool, Mailbox | None, int]]:
+    """Read the next message, if there is one.
 
     A small mailbox is read in the same frame as its status. This does not change an empty mailbox,
-    which answers with a working counter of 0. It is done only if counters identify repetitions: if
-    the frame is lost, it is unknown whether it emptied the mailbox. The mailbox is then read again.
-    A repetition is requested only if nothing arrives within a grace period, because some stacks
-    cannot repeat a message.
+    which answers with a working counter of 0. If the frame is lost, it is unknown whether it
+    emptied the mailbox, so this is done only if counters identify repetitions. The mailbox is then
+    read again. A repetition is requested only if nothing arrives within a grace period, because
+    some stacks cannot repeat a message.
+
+    Returns:
+        True if there was a message, the message (None for a repetition), and the time [ns].
     """
     careful = not channel.counts or channel.layout.send_size > EAGER_MAX
     if careful or channel.unsure_ns is not None:
-        return (yield from _look_first(channel))
+        return (yield from _poll_status_first(channel))
     station = channel.station
     check = read(EcatCommand.FPRD, station.address, sync_manager_status(IN))._replace(
         repeatable=False
@@ -316,12 +323,12 @@ def _look(channel: MailboxChannel) -> Procedure[tuple[bool, Mailbox | None, int]
     return True, _decoded(channel, reply.data), reply.time_ns
 
 
-def _look_first(channel: MailboxChannel) -> Procedure[tuple[bool, Mailbox | None, int]]:
-    """Do the same as `_look`, but read a full mailbox in a separate frame."""
+def _poll_status_first(channel: MailboxChannel) -> Procedure[tuple[bool, Mailbox | None, int]]:
+    """Do the same as `_poll`, but read a full mailbox in a separate frame."""
     full, status = yield from _is_full(channel, IN)
     unsure_ns = channel.unsure_ns
     if not full and unsure_ns is not None and status.time_ns - unsure_ns > GRACE * 1e9:
-        full = yield from _ask_again(channel)
+        full = yield from _request_repetition(channel)
         channel.unsure_ns = None
     if not full:
         return False, None, status.time_ns
@@ -344,13 +351,13 @@ def _read_request(channel: MailboxChannel) -> Request:
 
 
 def _take(channel: MailboxChannel) -> Procedure[Mailbox | None]:
-    """Read the full mailbox. Return None if it was empty or contained a repetition."""
+    """Read the mailbox. Return None if it was empty or contained a repetition."""
     for _ in range(RECOVERIES):
         [reply] = yield [_read_request(channel)]
         if not reply.lost:
             channel.received_ns = reply.time_ns
             return _decoded(channel, reply.data) if reply.working_counter else None
-        if not (yield from _ask_again(channel)):
+        if not (yield from _request_repetition(channel)):
             return None
     raise ResponseTimeout(
         f"{channel.station}: {RECOVERIES} frames that read its mailbox were lost",
@@ -364,15 +371,18 @@ def _decoded(channel: MailboxChannel, data: bytes) -> Mailbox | None:
     except DecodeError as error:
         raise MailboxError(
             f"{channel.station}: invalid mailbox message: {error}",
-            hint="its firmware is at fault; a capture of the start-up shows the bytes",
+            hint="its firmware is at fault; record a capture of the start-up to see the bytes",
         ) from error
     return message if channel.accept(message) else None
 
 
-def _ask_again(channel: MailboxChannel) -> Procedure[bool]:
-    """Request a repetition with SyncManager 1, ETG.1000.4 §6.7.2, and wait for the acknowledge.
+def _request_repetition(channel: MailboxChannel) -> Procedure[bool]:
+    """Request a repetition with SyncManager 1, ETG.1000.4 §6.7.2, and await the acknowledgement.
 
-    The device then writes its last message to the buffer again. Return True if there is one now.
+    The device then writes its last message to the buffer again.
+
+    Returns:
+        True if the buffer contains a message.
     """
     channel.repeat_requested = not channel.repeat_requested
     channel.repetitions += 1
@@ -397,7 +407,7 @@ def _ask_again(channel: MailboxChannel) -> Procedure[bool]:
         return False
     raise MailboxError(
         f"{station} does not acknowledge the repeat request of its mailbox",
-        hint="its stack does not support ETG.1000.4 §6.7.2: bring it to INIT and back",
+        hint="its stack does not support ETG.1000.4 §6.7.2: bring it to INIT, then to PRE-OP",
     )
 
 
@@ -417,7 +427,7 @@ def _sorted(
 
 
 def _error_reply(channel: MailboxChannel, message: Mailbox) -> MailboxError:
-    """Return the error for a mailbox error reply, valid or malformed."""
+    """Return the error for a mailbox error reply, even if the reply is malformed."""
     try:
         reply = decode_error(message.data)
         what = f"0x{reply.code:04X}: {reply.text}"
@@ -436,5 +446,5 @@ def _emergency(message: Mailbox) -> coe.Emergency | None:
     try:
         decoded = coe.decode_coe(message.data)
     except DecodeError:
-        return None  # truncated: dropped and counted like other unexpected messages
+        return None  # truncated: treated like any other unexpected message
     return decoded if isinstance(decoded, coe.Emergency) else None

@@ -1,4 +1,4 @@
-"""The state of one SubDevice's mailbox between two messages."""
+"""State of one SubDevice's mailbox between two messages."""
 
 from __future__ import annotations
 
@@ -29,34 +29,33 @@ Listener: TypeAlias = Callable[[ReceivedEmergency], None]
 
 @dataclass(slots=True)
 class MailboxChannel:
-    """Owns the state of one SubDevice's mailbox: counters, repeat toggle, emergencies.
+    """Owner of the state of one SubDevice's mailbox: counters, repeat toggle, emergencies.
 
-    Emergencies arrive between the answers to other requests. `listener` is called for each of them,
-    in every conversation. `listen` reports those that arrived before there was a listener.
+    Emergencies arrive between the answers to requests. `listener` is called for each of them, in
+    any conversation. `listen` also reports those that arrived before there was a listener.
     """
 
     station: Station
     layout: MailboxLayout
     counter: int = 0  # of the last written message
     received: Mailbox | None = None  # last accepted message
-    counts: bool = False  # its counter differed from the previous one and from 0
-    repetitions: int = 0  # requested from the device, not yet read
-    received_ns: int = 0  # when the last message was read
+    counts: bool = False  # the last counter differed from the previous one and from 0
+    repetitions: int = 0  # requested from the device, but not yet read
+    received_ns: int = 0  # time at which the last message was read
     repeat_requested: bool = False  # state of the toggle bit
     emergencies: deque[ReceivedEmergency] = field(
         default_factory=lambda: deque(maxlen=EMERGENCIES_KEPT)
     )
     listener: Listener | None = None
     dropped: int = 0  # unexpected messages and duplicates
-    turns: deque[object] = field(
-        default_factory=deque
-    )  # waiting conversations; the first one holds the mailbox
+    # Active and waiting conversations; the first one has the mailbox.
+    turns: deque[object] = field(default_factory=deque)
     posted_ns: int | None = None  # time of the last request, until its answer arrives
-    thinks_ns: int = 0  # minimum time until the device answers
+    thinks_ns: int = 0  # expected time until the device answers
     unsure_ns: int | None = None  # time of a lost frame that may have emptied the mailbox
     owed: bool = False  # a request timed out; its answer may still arrive
-    undescribed: int = 0  # consecutive missing or malformed SDO information answers
-    emptied: bool = False  # configured again since the request: it has no answer
+    undescribed: int = 0  # number of missing or malformed SDO information answers in a row
+    emptied: bool = False  # configured again since the request, which gets no answer
 
     def reset(self) -> None:
         """Reset the state after the SyncManagers were configured again."""
@@ -67,10 +66,10 @@ class MailboxChannel:
         self.emptied = True
 
     def accept(self, message: Mailbox) -> bool:
-        """Return False for a repetition of the last accepted message; else accept this one.
+        """Accept a message. Return False if it is a repetition of the last accepted one.
 
-        An equal message is a repetition only if one was requested. A device whose counter does not
-        change sends equal answers to equal requests.
+        An equal message is a repetition only if one was requested: a device with a constant counter
+        sends equal answers to equal requests.
         """
         expected, self.repetitions = self.repetitions > 0, max(self.repetitions - 1, 0)
         if expected and message == self.received:
@@ -81,24 +80,23 @@ class MailboxChannel:
         return True
 
     def learn(self, empty_ns: int | None) -> None:
-        """Adapt the time until the first poll to the time that an answer took.
+        """Adapt the time of the first poll to the time that the last answer took.
 
-        A device usually needs the same time again, and each poll costs a frame.
+        A device usually takes the same time again, and each poll costs a frame.
 
         Args:
-            empty_ns: Time of the last poll without an answer; None if the first poll had it.
+            empty_ns: Time of the last poll without an answer; None if the first poll succeeded.
         """
         if empty_ns is None:
             self.thinks_ns = self.thinks_ns * 9 // 10
         elif self.posted_ns is not None:
-            more = max(
-                2 * self.thinks_ns, THINKS_FIRST_NS
-            )  # limits the growth after a single slow answer
-            self.thinks_ns = min(empty_ns - self.posted_ns, more, THINKS_MAX_NS)
+            # A single slow answer must not delay all further polls.
+            limit_ns = max(2 * self.thinks_ns, THINKS_FIRST_NS)
+            self.thinks_ns = min(empty_ns - self.posted_ns, limit_ns, THINKS_MAX_NS)
         self.posted_ns = None
 
     def listen(self, listener: Listener) -> None:
-        """Set the listener, and report earlier emergencies to the first one."""
+        """Set the listener. The first listener also receives earlier emergencies."""
         if self.listener is None:
             for received in tuple(self.emergencies):
                 listener(received)

@@ -1,8 +1,8 @@
-"""Names of mapped entries and PDOs, and data types, from the object dictionary.
+"""Names and data types of mapped entries, and names of PDOs, from the object dictionary.
 
 They complete the SII, which may contain neither names nor types. An entry without a data type would
 be read as an unsigned integer. SOEM's slaveinfo.c also reads the dictionary (SDO information,
-ETG.1000.6 §5.6.3). Names are optional: no answer of the device causes an error here.
+ETG.1000.6 §5.6.3). Names are optional: no answer of the device is treated as an error.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ TIMEOUT = 5.0  # [s] for all names of one device
 def name_entries(
     channel: MailboxChannel, device: DeviceDescription
 ) -> Procedure[DeviceDescription]:
-    """Return the description with names of all assigned entries and PDOs, as far as known.
+    """Return the description with the names of assigned entries and PDOs that are known.
 
     Args:
         channel: The mailbox of the device.
@@ -48,7 +48,7 @@ def name_entries(
 
 
 class _Names:
-    """Owner of the descriptions of one dictionary; each is read once."""
+    """Owner of the object descriptions of one dictionary. Each is read only once."""
 
     def __init__(self, channel: MailboxChannel) -> None:
         self._channel = channel
@@ -66,7 +66,7 @@ class _Names:
         return replace(pdo, entries=tuple(entries))
 
     def _named(self, entry: Entry) -> Procedure[Entry]:
-        """Return the entry with its name, or with the name of its object if it has none."""
+        """Return the entry with its name, or with the name of its object if the entry has none."""
         known = yield from self._object(entry.index)
         if known is not None and known.object_code == ObjectCode.VAR:
             return _completed(entry, printable(known.name), known.data_type)
@@ -90,7 +90,7 @@ class _Names:
             self._objects[index] = yield from read_object_description(self._channel, index)
             self._channel.undescribed = 0
         except SdoAbort:
-            pass  # the object does not exist or has no name
+            pass  # the object does not exist or has no description
         except (MailboxError, ResponseTimeout):
             self._channel.undescribed += 1
         return self._objects[index]
@@ -103,7 +103,7 @@ class _Names:
 
 
 def _completed(entry: Entry, name: str, data_type: int) -> Entry:
-    """Return the entry with a name, and with a data type of its length if it has none."""
+    """Return the entry with a name. Add the data type if it is missing and the length agrees."""
     try:
         fits = by_index(data_type).bit_length == entry.bit_length
     except ValueError:

@@ -18,12 +18,12 @@ from catenary.wire.register import DL_CONTROL, DL_STATUS
 T = TypeVar("T")
 
 TEMPORARY = 1 << 1  # the settings expire after about a second, even if the program is killed
-LOOPS = 8  # the first bit of port 0
-LOOKS, PAUSE = 10, 1e-3  # [s] until a port is closed: controllers close it at the end of the frame
+LOOPS = 8  # first bit of the loop settings, for port 0
+POLLS, PAUSE = 10, 1e-3  # [s] until a port is closed, which happens at the end of the frame
 
 
 def as_line(station: Station, port: int, procedure: Procedure[T]) -> Procedure[T]:
-    """Run a procedure with a closed port, and open the port again.
+    """Run a procedure while a port is closed, then open the port again.
 
     Args:
         station: The device at the second end of the ring.
@@ -31,8 +31,8 @@ def as_line(station: Station, port: int, procedure: Procedure[T]) -> Procedure[T
         procedure: The procedure to run.
 
     Raises:
-        ClockError: The port cannot be closed, or it opened before the end. The measurement is
-            then invalid.
+        ClockError: The port cannot be closed, or it opened before the procedure ended. The
+            measurement is then invalid.
     """
     [reply] = yield [read(EcatCommand.FPRD, station.address, DL_CONTROL)]
     before = DL_CONTROL.unpack(answered(reply, station, "DL control"))
@@ -56,7 +56,7 @@ def as_line(station: Station, port: int, procedure: Procedure[T]) -> Procedure[T
 
 
 def _await_closed(station: Station, port: int) -> Procedure[None]:
-    for _ in range(LOOKS):
+    for _ in range(POLLS):
         if (yield from _is_closed(station, port)):
             return
         yield after(PAUSE)

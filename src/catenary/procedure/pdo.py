@@ -1,5 +1,7 @@
-"""PDO assignment and mapping in the object dictionary, ETG.1000.6 §5.6.7.4: reading, writing
-according to a plan, and verification."""
+"""PDO assignment and mapping in the object dictionary, ETG.1000.6 §5.6.7.4.
+
+The mapping of a device is read, written according to a plan, and verified.
+"""
 
 from __future__ import annotations
 
@@ -22,15 +24,15 @@ from catenary.procedure.exchange import Procedure
 from catenary.procedure.mailbox import MailboxChannel
 from catenary.procedure.sdo import NOT_THERE, download, refused, upload, upload_small
 
-WRITE_ONLY = frozenset((0x0601_0000, 0x0601_0001))  # access not supported; cannot be read
-# An optional object that is absent, read-only, or refuses the value or the state
+WRITE_ONLY = frozenset((0x0601_0000, 0x0601_0001))  # abort codes of an object that cannot be read
+# Abort codes of an optional object that is absent, read-only, or refuses the value or the state
 LEFT_ALONE = NOT_THERE | {0x0601_0000, 0x0601_0002, 0x0609_0030, 0x0800_0020, 0x0800_0022}
 
 
 def read_mapping(
     channel: MailboxChannel, device: DeviceDescription
 ) -> Procedure[DeviceDescription]:
-    """Return the description with the present mapping of the device.
+    """Read the present mapping of a device, and return the description with it.
 
     A direction whose 0x1C1x cannot be read keeps the mapping of the SII, as in IgH (fsm_pdo.c).
 
@@ -81,7 +83,7 @@ def write_downloads(
 
 
 def _write_object(channel: MailboxChannel, step: Download) -> Procedure[None]:
-    """Write one object outside of the mapping, and verify it if the plan requires it."""
+    """Write one object outside the mapping, and verify it if the plan requires this."""
     try:
         yield from download(channel, step.index, step.subindex, step.data)
     except SdoAbort as abort:
@@ -96,7 +98,7 @@ def _write_object(channel: MailboxChannel, step: Download) -> Procedure[None]:
         if abort.code not in WRITE_ONLY:
             raise
         return
-    # Devices may pad texts with zeros, or return an integer in a longer type.
+    # Devices may pad texts with zeros, or return an integer of a longer type.
     if found.rstrip(b"\0") != step.data.rstrip(b"\0"):
         raise ConfigurationError(
             f"{channel.station}: start-up object {step.place}: wrote {step.text}, bytes "
@@ -110,7 +112,7 @@ def restore_mapping(
 ) -> Procedure[None]:
     """Write the old mapping back, as far as the device allows.
 
-    SOEM and IgH leave the device without a mapping. Its next scan then finds no process data.
+    SOEM and IgH leave the device without a mapping. The next scan then finds no process data.
 
     Args:
         channel: The mailbox of the device.
@@ -136,8 +138,8 @@ def _refused_mapping(
     return MappingError(
         f"{channel.station}: {what}: {refusal}"
         + (f"\n  tried because:{alternatives}" if alternatives else ""),
-        hint="its SII allows the change, the device does not; request only objects that it maps, "
-        "or choose other PDOs with pdos= (`catenary scan` shows the mapping)",
+        hint="its SII allows the change, but the device does not; request only objects that it "
+        "maps, or choose other PDOs with pdos= (`catenary scan` shows the mapping)",
     )
 
 
@@ -156,14 +158,14 @@ def verify_mapping(
     """
     for direction in Direction:
         found = yield from _read_direction(channel, device, direction)
-        wanted = _shape(plan.assignments(direction))
-        if found is None or _shape(found) == wanted:
+        planned = _shape(plan.assignments(direction))
+        if found is None or _shape(found) == planned:
             continue
         yield from restore_mapping(channel, device, plan)
         taken = place_names(_shape(found), empty="nothing")
         raise MappingError(
             f"{channel.station}: its mapping of {direction.noun} differs from the written one: "
-            f"{taken} instead of {place_names(wanted, empty='nothing')}",
+            f"{taken} instead of {place_names(planned, empty='nothing')}",
             hint="its firmware changes mappings; map only objects that it accepts",
         )
 
@@ -175,7 +177,7 @@ def _shape(assignments: tuple[Assignment, ...]) -> tuple[tuple[int, int, int], .
 def _read_direction(
     channel: MailboxChannel, device: DeviceDescription, direction: Direction
 ) -> Procedure[tuple[Assignment, ...] | None]:
-    """Return the assignments; None if the dictionary has none of this direction."""
+    """Read the assignments; return None if the dictionary has none of this direction."""
     known = {pdo.index: pdo for pdo in device.pdos(direction)}
     before = {each.sync_manager: each for each in device.assignments(direction)}
     shown = False
@@ -188,7 +190,7 @@ def _read_direction(
         pdos = []
         for data in indices:
             index = int.from_bytes(data[:2], "little")
-            if index:  # 0: an unused place
+            if index:  # 0 marks an unused place
                 pdos.append((yield from _read_pdo(channel, index, known.get(index), manager.index)))
         before[manager.index] = Assignment(manager.index, tuple(pdos))
         shown = True
@@ -233,7 +235,7 @@ def _entry(data: bytes, names: dict[tuple[int, int], Entry]) -> Entry:
 
 
 def read_list(channel: MailboxChannel, index: int) -> Procedure[list[bytes] | None]:
-    """Return subindices 1 to n of a list object; None if it cannot be read.
+    """Read subindices 1 to n of a list object. Return None if the device refuses.
 
     Args:
         channel: The mailbox of the device.
@@ -252,7 +254,7 @@ def read_list(channel: MailboxChannel, index: int) -> Procedure[list[bytes] | No
 def _joined(
     offered: tuple[Pdo, ...], assignments: tuple[Assignment, ...] | None
 ) -> tuple[Pdo, ...]:
-    """Return all PDOs of a device: those of the SII, updated and completed by the assignments."""
+    """Return all PDOs of a device: those of the SII, updated with those that are assigned."""
     if assignments is None:
         return offered
     read = {pdo.index: pdo for pdo in mapped_pdos(assignments)}

@@ -1,6 +1,6 @@
-"""The PDOs that a device offers, read before planning. Nothing is written.
+"""PDOs that a device offers, read before planning. Nothing is written to the device.
 
-The reports contain differences from the SII, the contents of PDOs that are not assigned, and lists
+The results contain differences from the SII, the contents of PDOs that are not assigned, and lists
 and entries that cannot be changed.
 """
 
@@ -23,7 +23,7 @@ from catenary.procedure.station import within
 from catenary.wire.sdo_information import Access
 
 MAPPING_TIMEOUT = 15.0  # [s] for the mapping of one device in a scan
-OFFERS_MAX = 64  # PDOs read in one direction; an EL6731 has 250 of them
+OFFERS_MAX = 64  # number of PDOs read per direction; an EL6731 has 250
 
 
 def read_first_mapping(
@@ -41,7 +41,7 @@ def read_first_mapping(
     try:
         found = yield from reading
     except (MappingError, MailboxError, ResponseTimeout) as error:
-        note = f"its mapping cannot be read, that of its SII is used: {error.message}"
+        note = f"its mapping cannot be read, so that of its SII is used: {error.message}"
         return replace(device, notes=(*device.notes, note))
     notes = [note for direction in Direction for note in _differences(device, found, direction)]
     return replace(found, notes=(*device.notes, *notes))
@@ -52,7 +52,7 @@ def read_offers(
 ) -> Procedure[DeviceDescription]:
     """Return the description with the PDOs that are not assigned, and with `fixed` flags.
 
-    This is for a direction in which requested objects are missing. After a missing or malformed
+    Use this for a direction in which requested objects are missing. After a missing or malformed
     reply, the entries of the remaining PDOs are those of the SII.
 
     Args:
@@ -84,7 +84,7 @@ def read_offers(
 def read_values(
     channel: MailboxChannel, device: DeviceDescription, places: Sequence[tuple[int, int]]
 ) -> Procedure[DeviceDescription]:
-    """Return the description with the values of some objects, to be shown in a plan.
+    """Return the description with the values of some objects, which a plan displays.
 
     After a missing or malformed reply, the remaining objects are not read.
 
@@ -111,7 +111,7 @@ def _is_read_only(
 ) -> Procedure[bool]:
     """Return True if subindex 0 cannot be written in PRE-OP according to the dictionary.
 
-    An entry without any read access is inconclusive: some devices leave the access word empty.
+    An entry without read access is inconclusive: some devices leave the access word empty.
     """
     if device.mailbox is None or not device.mailbox.sdo_information:
         return False
@@ -133,10 +133,11 @@ def _differences(
         now = pdo_names(each.pdos, empty="none")
         then = pdo_names(before.get(each.sync_manager, ()), empty="none")
         if now != then:
-            yield f"SyncManager {each.sync_manager} carries PDOs {now}, its SII specifies {then}"
+            manager = f"SyncManager {each.sync_manager}"
+            yield f"{manager} carries PDOs {now}, but its SII specifies {then}"
         for pdo in each.pdos:
             other = known.get(pdo.index)
             if other is not None and shape(other) != shape(pdo):
                 has = place_names(shape(pdo), empty="no entries")
                 expected = place_names(shape(other), empty="no entries")
-                yield f"PDO 0x{pdo.index:04X} has {has}, its SII specifies {expected}"
+                yield f"PDO 0x{pdo.index:04X} has {has}, but its SII specifies {expected}"

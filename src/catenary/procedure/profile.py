@@ -1,7 +1,7 @@
 """Device type (object 0x1000) and slots of CiA 402 axes.
 
 ETG.6010 §"Multi-axis": the objects of axis k are 0x800·k above those of the first axis. Modular
-devices (profile 5001, ETG.5001) list the profile of every slot in 0xF010.
+devices (profile 5001, ETG.5001) list the profiles of all slots in 0xF010.
 """
 
 from __future__ import annotations
@@ -31,13 +31,13 @@ WRITABLE = Access.WRITE_PRE_OP | Access.WRITE_SAFE_OP | Access.WRITE_OP
 def read_profile(
     channel: MailboxChannel, device: DeviceDescription
 ) -> Procedure[DeviceDescription]:
-    """Return the description with device type and drive slots.
+    """Read the device type and the slots of drives, and return the description with them.
 
     Args:
         channel: The mailbox of the device.
         device: The description.
     """
-    data = yield from _upload_if_there(channel, DEVICE_TYPE, 0)
+    data = yield from _upload_if_present(channel, DEVICE_TYPE, 0)
     if data is None:
         return device
     device_type = int.from_bytes(data[:4], "little")
@@ -53,10 +53,10 @@ def read_profile(
 def read_object(
     channel: MailboxChannel, device: DeviceDescription, index: int, subindex: int
 ) -> Procedure[ObjectInformation]:
-    """Return the dictionary's description of an entry. Bit length 0 means that it does not exist.
+    """Read the description of a dictionary entry. Its bit length is 0 if it does not exist.
 
-    If the device does not describe it by SDO information, its length is found by reading it. The
-    device then decides whether it can be mapped.
+    If the device does not describe the entry (SDO information), the length is that of its value.
+    Only the device can then decide whether the entry can be mapped.
 
     Args:
         channel: The mailbox of the device.
@@ -69,7 +69,7 @@ def read_object(
         entry, note = yield from describe_entry(channel, index, subindex)
         if entry is not None:
             return _information(entry)
-    data = yield from _upload_if_there(channel, index, subindex)
+    data = yield from _upload_if_present(channel, index, subindex)
     return ObjectInformation(index, subindex, 0 if data is None else 8 * len(data), note=note)
 
 
@@ -89,24 +89,26 @@ def _information(entry: EntryDescription) -> ObjectInformation:
 def _count_axes(channel: MailboxChannel) -> Procedure[tuple[int, ...]]:
     slots = [0]
     for slot in range(1, SLOTS_MAX):
-        there = yield from _upload_if_there(channel, STATUSWORD + SLOT_STRIDE * slot, 0)
-        if there is None:
+        statusword = yield from _upload_if_present(channel, STATUSWORD + SLOT_STRIDE * slot, 0)
+        if statusword is None:
             break
         slots.append(slot)
     return tuple(slots)
 
 
 def _listed_axes(channel: MailboxChannel) -> Procedure[tuple[int, ...]]:
-    count = yield from _upload_if_there(channel, MODULE_PROFILES, 0)
+    count = yield from _upload_if_present(channel, MODULE_PROFILES, 0)
     slots = []
     for slot in range(min(int.from_bytes((count or b"")[:1], "little"), SLOTS_MAX)):
-        data = yield from _upload_if_there(channel, MODULE_PROFILES, slot + 1)
+        data = yield from _upload_if_present(channel, MODULE_PROFILES, slot + 1)
         if data is not None and int.from_bytes(data[:2], "little") == PROFILE_DRIVE:
             slots.append(slot)
     return tuple(slots)
 
 
-def _upload_if_there(channel: MailboxChannel, index: int, subindex: int) -> Procedure[bytes | None]:
+def _upload_if_present(
+    channel: MailboxChannel, index: int, subindex: int
+) -> Procedure[bytes | None]:
     """Read an object. Return None if the device refuses, for any reason."""
     try:
         return (yield from upload_small(channel, index, subindex))

@@ -1,7 +1,7 @@
-"""Passive scan of a segment for diagnostics, without a change of its operation.
+"""Passive scan of a segment for diagnostics. It does not affect the operation of the segment.
 
-No state is requested, and no mapping, FMMU or SyncManager is written. Only a device without a
-unique station address is written: it has none, or another device has the same.
+The scan requests no state and writes no mapping, FMMU or SyncManager. It only writes the station
+address of a device that has none, or that shares it with another device.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from catenary.wire.register import STATION_ADDRESS
 
 
 def visit(device_count: int) -> Procedure[tuple[StationRegisters, ...]]:
-    """Read the registers of all devices, by their present station addresses."""
+    """Read the registers of all devices. Present station addresses are kept if they are unique."""
     found = yield from read_addresses(device_count)
     addresses = distinct(found)
     yield from give_addresses(found, addresses)
@@ -50,7 +50,7 @@ def give_addresses(found: Sequence[int], wanted: Sequence[int]) -> Procedure[Non
 
 
 def distinct(found: Sequence[int]) -> tuple[int, ...]:
-    """Return unique addresses: an address that is 0 or a duplicate becomes the next free one."""
+    """Return unique addresses: an address that is 0 or a duplicate is replaced by a free one."""
     taken = set(found)
     addresses: list[int] = []
     for position, address in enumerate(found):

@@ -1,5 +1,7 @@
-"""Receive times of one broadcast at the ports of all devices: registers 0x0900 to 0x090F,
-ETG.1000.4 §6.8.2. Other clock registers are not changed."""
+"""Receive times of one broadcast at the ports of all devices, ETG.1000.4 §6.8.2.
+
+The times are in registers 0x0900 to 0x090F. Other clock registers are not changed.
+"""
 
 from __future__ import annotations
 
@@ -16,7 +18,7 @@ from catenary.wire.register import RECEIVE_TIME_LATCH, RECEIVE_TIMES
 def read_receive_times(
     devices: Sequence[DeviceDescription],
 ) -> Procedure[tuple[PortTimes | None, ...]]:
-    """Latch and read the receive times, by position; None if a device has no clock or no answer."""
+    """Latch and read the receive times, by position; None without a clock or an answer."""
     clocks = [device for device in devices if device.controller.supports_clocks]
     if not clocks:
         return (None,) * len(devices)

@@ -1,7 +1,7 @@
 """Return of one device to a running network: find, identify and configure it again.
 
 A device that was switched off has lost its station address, SyncManagers, FMMUs and mapping; only
-its EEPROM remains. As in IgH and TwinCAT, it goes to INIT and is completely configured again.
+its EEPROM remains. As in IgH and TwinCAT, it is brought to INIT and configured completely.
 """
 
 from __future__ import annotations
@@ -32,21 +32,21 @@ from catenary.wire.sii_interface import CONFIGURATION_FORCE
 
 
 class Presence(NamedTuple):
-    """One device that is present now."""
+    """One device that is present."""
 
     rank: int  # in the order of the frame
-    station_address: int  # 0: it was powered up and has no address yet
+    station_address: int  # 0 if the device was powered up and has no address yet
     alias: int
 
 
 def look_around(at_most: int) -> Procedure[list[Presence]]:
     """Return the present devices, by position.
 
-    If devices appear or disappear meanwhile, the result is empty; try again later. Devices after
-    the cut of a ring are counted but have no position.
+    The result is empty if devices appear or disappear at the same time; try again later. In a cut
+    ring, the devices after the cut are counted but have no position.
 
     Args:
-        at_most: Largest number of devices to read.
+        at_most: Maximum number of devices to read.
     """
     [counted] = yield [read(EcatCommand.BRD, 0, AL_STATUS)]
     count = min(counted.working_counter, at_most)
@@ -82,12 +82,12 @@ def give_address(presence: Presence, station: Station) -> Procedure[None]:
 
 
 def forget_address(presence: Presence) -> Procedure[None]:
-    """Clear the station address of an unknown device, so that no two devices have the same."""
+    """Clear the station address of an unknown device, so that addresses stay unique."""
     yield [write(EcatCommand.APWR, -presence.rank, STATION_ADDRESS, 0)]
 
 
 def identify(station: Station) -> Procedure[Identity]:
-    """Take the EEPROM from the device's application, and read the identity from it."""
+    """Take the EEPROM from the device's processor, and read the identity."""
     replies = yield [
         write(EcatCommand.FPWR, station.address, SII_CONFIGURATION, CONFIGURATION_FORCE),
         write(EcatCommand.FPWR, station.address, SII_CONFIGURATION, 0),
@@ -111,9 +111,8 @@ def bring_to_pre_op(station: Station, channel: MailboxChannel | None) -> Procedu
     ]
     for reply in (yield requests):
         answered(reply, station, "FMMUs and SyncManagers")
-    yield [
-        write(EcatCommand.FPWR, station.address, ACTIVATION, 0)
-    ]  # no answer from a device without clocks
+    # A device without clocks does not answer.
+    yield [write(EcatCommand.FPWR, station.address, ACTIVATION, 0)]
     if channel is not None:
         yield from configure_mailbox(channel)
     yield from hand_over(station)
@@ -129,7 +128,7 @@ def bring_to_safe_op(
 ) -> Procedure[None]:
     """Write the start-up list and the process data, and bring a device from PRE-OP to SAFE-OP.
 
-    The mapping is read first, because it may have changed with the power-up.
+    The mapping is read first, because the power-up may have changed it.
 
     Args:
         station: The device.

@@ -38,7 +38,7 @@ ABORT_LENGTH = 0x0607_0012  # data type does not match, length too high
 ABORT_MEMORY = 0x0504_0005  # out of memory
 UPLOAD_LIMIT = 1 << 20  # bytes: larger than all known objects
 UPLOAD_TIMEOUT = 60.0  # [s] for all segments: 1 MiB in mailboxes of 128 bytes, 7 ms each
-SMALL_LIMIT = 4096  # bytes: most of these objects have up to 4, but some are strings
+SMALL_LIMIT = 4096  # bytes: most of these objects have at most 4, but some are strings
 SMALL_TIMEOUT = 5.0  # [s] per object
 NOT_THERE = frozenset((0x0602_0000, 0x0609_0011))  # no such object, no such subindex
 
@@ -59,7 +59,7 @@ def upload(
         index: The index of the object.
         subindex: The subindex of the entry.
         complete_access: True to read all subindices from `subindex` on.
-        limit: Largest size [bytes].
+        limit: Maximum size [bytes].
         timeout: Deadline of the whole transfer [s]. Each message also has its own deadline.
 
     Raises:
@@ -205,8 +205,8 @@ def _ask(
     def accept(mailbox: Mailbox) -> T | Abort | None:
         message = decoded(channel, mailbox)
         if isinstance(message, Abort):
-            # Some devices name no object or another one. Only one service runs at a time, so the
-            # abort belongs to it. SOEM (ecx_SDOread) and IgH (fsm_coe.c) do not compare it either.
+            # Do not compare the object: some devices send none, or another one. Only one service
+            # runs at a time. SOEM (ecx_SDOread) and IgH (fsm_coe.c) do not compare it either.
             return message
         return message if isinstance(message, expected) and matches(message) else None
 
@@ -218,7 +218,7 @@ def _ask(
 
 
 def decoded(channel: MailboxChannel, mailbox: Mailbox) -> Message | None:
-    """Return the CoE message in a mailbox message; None if it is of another protocol.
+    """Decode a CoE message; return None if the mailbox message has another protocol.
 
     Args:
         channel: The mailbox of the device, for errors.
@@ -234,7 +234,7 @@ def decoded(channel: MailboxChannel, mailbox: Mailbox) -> Message | None:
     except DecodeError as error:
         raise MailboxError(
             f"{channel.station}: invalid CoE message: {error}",
-            hint="its firmware is at fault; a capture of the start-up shows the bytes",
+            hint="its firmware is at fault; record a capture of the start-up to see the bytes",
         ) from error
 
 
@@ -243,13 +243,13 @@ def _break_off(
 ) -> Procedure[MailboxError]:
     """Abort a transfer, and return the error for the caller to raise.
 
-    An abort has no answer. The device receives it unless the frame is lost.
+    An abort is not answered. The device receives it unless the frame is lost.
     """
     yield from send_only(channel, Type.COE, Abort(index, subindex, code).encode())
     return MailboxError(
         f"{channel.station}: SDO 0x{index:04X}:{subindex:02X}: a segment violates the protocol "
         f"({abort_code(code).text})",
-        hint="its firmware is at fault, or two masters talk to it",
+        hint="its firmware is at fault, or a second master accesses it",
     )
 
 
@@ -263,7 +263,7 @@ def refused(
         index: The index of the object.
         subindex: The subindex of the entry.
         code: The abort code; None if it is missing or incomplete. The error then has code 0.
-        what: What was refused; empty for an SDO to the object.
+        what: Name of the refused access; empty for an SDO to the object.
     """
     known = abort_code(code or 0)
     why = "without an abort code" if code is None else f"with 0x{code:08X}: {known.text}"

@@ -38,13 +38,13 @@ T = TypeVar("T")
 ABOUT = {Opcode.LIST_RESPONSE: 2, Opcode.OBJECT_RESPONSE: 2, Opcode.ENTRY_RESPONSE: 3}  # bytes
 ANSWER_MAX = 2 + 2 * 0x1_0000  # bytes: a list of all possible indices
 ANSWER_TIMEOUT = 20.0  # [s] for all fragments of one answer
-FAILURES_MAX = 3  # missing or malformed answers in a row, then requests end
-PLACES_SHOWN = 8  # per reason
+FAILURES_MAX = 3  # missing or malformed answers in a row after which requests end
+PLACES_SHOWN = 8  # number of places that a note lists per reason
 FAILURES = (SdoAbort, MailboxError, ResponseTimeout)
 
 
 class ObjectIndices(NamedTuple):
-    """The indices of a list, and a note about its faults; empty if there are none."""
+    """The indices of a list, and a note about its faults; empty if it is complete."""
 
     indices: tuple[int, ...]
     note: str = ""
@@ -59,7 +59,10 @@ class ObjectDescriptions(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class DescribedObject:
-    """An object and its entries, by subindex; a variable has one. `notes` lists what is missing."""
+    """An object and its entries, by subindex. A variable has one entry.
+
+    `notes` explains missing entries.
+    """
 
     description: ObjectDescription
     entries: tuple[EntryDescription, ...]
@@ -93,7 +96,7 @@ def read_object_list(
     data, cut = yield from _ask(channel, list_request(kind), Opcode.LIST_RESPONSE, (0, 0))
     indices = _understood(channel, decode_object_list, data).indices
     if cut or len(data) % 2:
-        reason = cut or f"{len(data)} bytes are not whole indices"
+        reason = cut or f"{len(data)} bytes are not a whole number of indices"
         return ObjectIndices(indices, f"the list of objects is truncated: {reason}")
     if kind is ListType.ALL:
         count = yield from _count_objects(channel)
@@ -139,8 +142,8 @@ def read_entry_description(
 def describe_object(channel: MailboxChannel, index: int) -> Procedure[DescribedObject]:
     """Read the descriptions of an object and of its entries.
 
-    Subindices that do not exist are left out, because arrays may have gaps. Other subindices that
-    the device does not describe are left out with a note, as in IgH (fsm_coe.c,
+    Subindices that do not exist are omitted, because arrays may have gaps. Other subindices that
+    the device does not describe are omitted with a note, as in IgH (fsm_coe.c,
     dict_entry_response).
 
     Args:
@@ -169,7 +172,7 @@ def describe_entry(
 ) -> Procedure[tuple[EntryDescription | None, str]]:
     """Read the optional description of an entry.
 
-    After `FAILURES_MAX` missing or malformed answers in a row, the device is not asked again.
+    After `FAILURES_MAX` missing or malformed answers in a row, no further request is sent.
 
     Args:
         channel: The mailbox of the device.
@@ -177,8 +180,8 @@ def describe_entry(
         subindex: The subindex of the entry.
 
     Returns:
-        The description, or None if the device does not describe the entry; and a note if its
-        answer was missing or malformed.
+        The description, and a note. The description is None if the device does not describe the
+        entry. The note is empty unless the answer was missing or malformed.
     """
     if channel.undescribed >= FAILURES_MAX:
         return None, ""
@@ -199,8 +202,8 @@ def list_objects(
 ) -> Procedure[ObjectDescriptions]:
     """Read the descriptions of all objects of a kind.
 
-    Objects that are listed but do not exist are left out. Other objects that the device does not
-    describe have object code 0. Both have a note.
+    Listed objects that do not exist are omitted. Other objects that the device does not describe
+    have object code 0. There is a note about both.
 
     Args:
         channel: The mailbox of the device.
@@ -244,7 +247,7 @@ class _Failures:
 
     @property
     def are_too_many(self) -> bool:
-        """True if the device should not be asked again: each further request may take seconds."""
+        """True if no further request should be sent: each one may take seconds."""
         return self._in_a_row >= FAILURES_MAX
 
     def forget(self) -> None:
@@ -252,7 +255,7 @@ class _Failures:
         self._in_a_row = 0
 
     def add(self, place: str, error: CatenaryError) -> None:
-        """Add a failure at a place. A refusal does not count as a failure in a row."""
+        """Add a failure at a place. A refusal is an answer and resets the count of failures."""
         refusal = isinstance(error, SdoAbort)
         reason = error.message.removeprefix(self._prefix)
         reason = "refused " + reason.partition(" refused ")[2] if refusal else reason
@@ -273,14 +276,14 @@ def _count_objects(channel: MailboxChannel) -> Procedure[int]:
     """Return the number of objects that the device reports; 0 if it does not report it.
 
     KickCAT (lib/src/CoE/mailbox/response.cc, fillList) computes the number of fragments from the
-    mailbox size and ignores the headers. It therefore omits the end of a list without notice.
+    mailbox size and ignores the headers. The end of a list may therefore be missing without notice.
     """
     request = list_request(ListType.LENGTHS)
     try:
         data, _ = yield from _ask(channel, request, Opcode.LIST_RESPONSE, (0, 0))
         return next(iter(_understood(channel, decode_object_list, data).indices), 0)
     except FAILURES:
-        return 0  # optional: the list itself was received
+        return 0  # the number is optional: the list itself was received
 
 
 def _ask(
@@ -292,7 +295,7 @@ def _ask(
 def _exchange(
     channel: MailboxChannel, request: SdoInformation, expected: Opcode, place: tuple[int, int]
 ) -> Procedure[tuple[bytes, str]]:
-    """Return the joined data of all fragments, and why the last are missing (empty if complete)."""
+    """Return the joined data of all fragments, and the reason if some are missing (else empty)."""
 
     def accept_part(mailbox: Mailbox) -> SdoInformation | None:
         message = decoded(channel, mailbox)
@@ -316,15 +319,15 @@ def _exchange(
         except FAILURES as error:
             return bytes(data), error.message.removeprefix(f"{channel.station}: ")
         if deadline.passed_at(channel.received_ns):
-            return bytes(data), f"fragments still follow after {ANSWER_TIMEOUT:g} s"
+            return bytes(data), f"it was not complete after {ANSWER_TIMEOUT:g} s"
         if not content or len(data) + len(content) > ANSWER_MAX:
-            return bytes(data), "its fragments have no end"
+            return bytes(data), "its fragments do not end"
         data += content
     return bytes(data), ""
 
 
 def _is_continued(part: SdoInformation) -> bool:
-    """Return True if fragments follow. A list uses both fields, as in IgH (fsm_coe.c)."""
+    """Return True if fragments follow. For a list, check both fields, as in IgH (fsm_coe.c)."""
     return part.incomplete or (part.opcode is Opcode.LIST_RESPONSE and part.fragments_left > 0)
 
 
@@ -342,5 +345,5 @@ def _understood(channel: MailboxChannel, decode: Callable[[bytes], T], data: byt
     except DecodeError as error:
         raise MailboxError(
             f"{channel.station}: invalid SDO information answer: {error}",
-            hint="its firmware is at fault; a capture shows the bytes",
+            hint="its firmware is at fault; record a capture to see the bytes",
         ) from error

@@ -1,8 +1,8 @@
 """Read access to the SII, ETG.1000.4 §6.4 (interface) and ETG.1000.6 §5.4 (content).
 
-Only the used words of the header and the wanted categories are read, and no word is read twice. If
-an EEPROM was ready by the next frame, the frame that fetches a word also contains the command for
-the next one.
+Only the used words of the header and the requested categories are read, and no word is read twice.
+If an EEPROM is ready by the next frame, the frame that fetches a word also contains the read
+command for the next one.
 """
 
 from __future__ import annotations
@@ -18,21 +18,22 @@ from catenary.wire.register import SII_CONTROL_STATUS, SII_DATA
 from catenary.wire.sii_interface import ControlStatus, SiiCommand
 
 READ_TIMEOUT = 0.5  # [s] for 4 or 8 bytes; an I²C EEPROM needs less than a millisecond
-SHORTEN = 0.9
-NOT_WORTH_WAITING = 50e-6  # [s]; as long as a frame
-ERRORS_FORGIVEN = 3  # an EEPROM behind a busy processor may miss an acknowledge (SOEM, IgH retry)
+SHORTEN = 0.9  # reduces the pause before the first poll while that poll is successful
+NOT_WORTH_WAITING = 50e-6  # [s]; about the duration of a frame
+# Per read: an EEPROM behind a busy processor may fail to acknowledge. SOEM and IgH retry, too.
+ERRORS_FORGIVEN = 3
 
 HEADER_WORDS = 0x40
 IDENTITY_WORD, IDENTITY_WORDS = 0x08, 8
 END = 0xFFFF
-ADDRESSES = 0x10000  # words in the range of a 16-bit address
-CATEGORIES_MAX = 64  # limit for valid images; an unprogrammed one has no end
-# Used parts of the header, as (first word, words); the rest is for programming the EEPROM.
+ADDRESSES = 0x10000  # number of words with a 16-bit address
+CATEGORIES_MAX = 64  # limit for valid images; an unprogrammed one has no end mark
+# Used parts of the header: (first word, number of words). Other words are not needed.
 HEADER_PARTS = ((0x00, 0x10), (0x14, 0x0A), (0x3E, 0x02))
 STRINGS, GENERAL, FMMU, SYNC_MANAGERS, TX_PDO, RX_PDO, CLOCKS = 10, 30, 40, 41, 50, 51, 60
 WANTED = frozenset((STRINGS, GENERAL, FMMU, SYNC_MANAGERS, TX_PDO, RX_PDO, CLOCKS))
 
-_START = SII_CONTROL_STATUS.address  # control/status, address and data are one block
+_START = SII_CONTROL_STATUS.address  # control/status, address and data are adjacent
 _SIZE = SII_DATA.address + SII_DATA.size - _START
 _DATA = SII_DATA.address - _START
 _COMMAND = struct.Struct("<HI")
@@ -42,14 +43,14 @@ _EIGHT_BYTES = ControlStatus(eight_bytes=True).word
 
 
 def read_image(station: Station, *, wanted: Collection[int] = WANTED) -> Procedure[bytes]:
-    """Read the image up to END.
+    """Read the image up to the end mark.
 
-    Unread words are zero; unwanted categories are left out. A list of categories without an end,
-    as in an unprogrammed EEPROM, is truncated.
+    Unread words of the header are zero; other categories are omitted. If there is no end mark, as
+    in an unprogrammed EEPROM, the categories are truncated.
 
     Args:
         station: The device.
-        wanted: The types of categories to read.
+        wanted: Types of the categories to read.
     """
     reader = _Reader(station)
     image = bytearray(2 * HEADER_WORDS)
@@ -73,7 +74,7 @@ def read_words(station: Station, first: int, count: int) -> Procedure[bytes]:
     Args:
         station: The device.
         first: Address of the first word.
-        count: The number of words.
+        count: Number of words.
     """
     return (yield from _Reader(station).words(first, count))
 
@@ -85,10 +86,10 @@ def read_identity(station: Station) -> Procedure[Identity]:
 
 
 class _Reader:
-    """Owner of the last read bytes and of the typical read time.
+    """Owner of the bytes of the last read, and of the typical read time.
 
-    A read returns two or four words, so that the next words may already be known. The read time
-    determines when the EEPROM is first polled.
+    A read returns two or four words, so the next words may already be known. The read time
+    determines when the EEPROM is polled first.
     """
 
     def __init__(self, station: Station) -> None:
@@ -96,7 +97,7 @@ class _Reader:
         self._start = 0  # word address of `_data`
         self._data = b""
         self._typical = 0.0  # [s]
-        self._prompt = False  # the first poll found it ready, without a pause
+        self._prompt = False  # the first poll was successful without a pause
         self._commanded = (-1, 0)  # the word of the pending read, and its start [ns]
 
     def words(self, first: int, count: int) -> Procedure[bytes]:
@@ -107,7 +108,7 @@ class _Reader:
             data = self._data[2 * (first - self._start) :]
         while len(data) < 2 * count:
             self._start = first + len(data) // 2
-            # The width is that of the last read; the first read has no command ahead.
+            # Assume the width of the last read. Before the first read, it is unknown.
             ahead = self._start + len(self._data) // 2
             wanted = self._start < ahead < first + count
             self._data = yield from self._read(self._start, ahead if wanted else None)
@@ -115,7 +116,7 @@ class _Reader:
         return data[: 2 * count]
 
     def _read(self, word: int, ahead: int | None) -> Procedure[bytes]:
-        """Return the 4 or 8 bytes of one read command. `ahead` is the next wanted word."""
+        """Return the 4 or 8 bytes of one read command. `ahead` is the next word to read."""
         if ahead is not None and self._prompt:
             data = yield from self._read_and_command(word, ahead)
             if data:
@@ -128,7 +129,7 @@ class _Reader:
         Return no bytes if this fails. It is then unknown which of the two words the EEPROM has
         read, and `word` must be read again.
         """
-        started_ns = yield from self._under_way(word)
+        started_ns = yield from self._start_read(word)
         command = _COMMAND.pack(SiiCommand.READ << 8, ahead)
         station = self._station
         fetched, commanded = yield [
@@ -158,8 +159,8 @@ class _Reader:
                 raise _failed(self._station, word, status)
             yield after(pace.pause())
 
-    def _under_way(self, word: int) -> Procedure[int]:
-        """Command the read of `word` unless it is pending; return the time of the command [ns]."""
+    def _start_read(self, word: int) -> Procedure[int]:
+        """Command the read of `word` unless it is pending. Return the time of the command [ns]."""
         commanded, since_ns = self._commanded
         self._commanded = (-1, 0)
         if commanded == word:
@@ -168,17 +169,17 @@ class _Reader:
 
     def _read_alone(self, word: int) -> Procedure[bytes]:
         station = self._station
-        deadline, pace, errors, looks = Deadline(READ_TIMEOUT), Pace(), 0, 0
-        started_ns = yield from self._under_way(word)
+        deadline, pace, errors, polls = Deadline(READ_TIMEOUT), Pace(), 0, 0
+        started_ns = yield from self._start_read(word)
         if self._typical:
             yield after(self._typical)
         while True:
             [reply] = yield [read_memory(station.address, _START, _SIZE, repeatable=True)]
             block = answered(reply, station, "SII data")
             status = int.from_bytes(block[:2], "little")
-            looks += 1
+            polls += 1
             if not status & _NOT_READY:
-                self._learn(looks, (reply.time_ns - started_ns) * 1e-9)
+                self._learn(polls, (reply.time_ns - started_ns) * 1e-9)
                 return block[_DATA : _DATA + (8 if status & _EIGHT_BYTES else 4)]
             if not status & _BUSY:
                 errors += 1
@@ -190,17 +191,17 @@ class _Reader:
                 raise _failed(station, word, status)
             yield after(pace.pause())
 
-    def _learn(self, looks: int, elapsed: float) -> None:
-        """Adapt the pause before the first poll: the time of this read, then slowly shorter."""
-        self._prompt = looks == 1 and not self._typical
-        if looks > 1:
+    def _learn(self, polls: int, elapsed: float) -> None:
+        """Set the pause before the first poll to the time of this read, or reduce it slowly."""
+        self._prompt = polls == 1 and not self._typical
+        if polls > 1:
             self._typical = elapsed
         elif self._typical:
             shorter = SHORTEN * self._typical
             self._typical = shorter if shorter > NOT_WORTH_WAITING else 0.0
 
     def _command(self, command: SiiCommand, word: int) -> Procedure[int]:
-        """Write a command with its address; return the time of its reply [ns]."""
+        """Write a command with its address. Return the time of the reply [ns]."""
         data = _COMMAND.pack(command << 8, word)
         [reply] = yield [write_memory(self._station.address, _START, data, repeatable=True)]
         answered(reply, self._station, "SII command")
@@ -211,5 +212,5 @@ def _failed(station: Station, word: int, status: int) -> EepromError:
     why = f"busy for {READ_TIMEOUT:g} s" if status & _BUSY else "interface error"
     return EepromError(
         f"{station}: SII word 0x{word:04X} cannot be read: {why} (control/status 0x{status:04X})",
-        hint="the EEPROM is missing, or the processor is using it: power-cycle the device",
+        hint="the EEPROM is missing, or the device's processor uses it: power-cycle the device",
     )

@@ -1,5 +1,7 @@
-"""Owner of the EEPROM: the MainDevice or the device's processor (PDI), registers 0x0500 and 0x0501,
-ETG.1000.4 §6.4.2."""
+"""Ownership of the EEPROM: the MainDevice or the device's processor (PDI), ETG.1000.4 §6.4.2.
+
+The registers are 0x0500 and 0x0501.
+"""
 
 from __future__ import annotations
 
@@ -20,7 +22,7 @@ T = TypeVar("T")
 
 
 def hand_over(station: Station) -> Procedure[None]:
-    """Assign the EEPROM to the device's processor. Some devices need it from INIT to PRE-OP.
+    """Assign the EEPROM to the device's processor, which may need it between INIT and PRE-OP.
 
     SOEM (`ecx_config_init`) and IgH (`ec_fsm_slave_config_enter_assign_pdi`) do the same just
     before PRE-OP.
@@ -34,7 +36,7 @@ def with_eeprom(station: Station, procedure: Procedure[T], *, force: bool = Fals
     Args:
         station: The device.
         procedure: The procedure to run.
-        force: True to take the EEPROM even during an access of the device's processor.
+        force: True to take the EEPROM even while the device's processor accesses it.
 
     Raises:
         EepromError: The device's processor is accessing the EEPROM, and `force` is False.
@@ -62,7 +64,7 @@ def _take(station: Station, force: bool) -> Procedure[bool]:
     if in_use and not force:
         raise EepromError(
             f"{station}: its processor is using the EEPROM (register 0x0501)",
-            hint="bring it to INIT, or try again in a moment",
+            hint="bring it to INIT, or try again later",
         )
     if in_use:
         yield from _configure(station, CONFIGURATION_FORCE)

@@ -1,4 +1,4 @@
-"""The size of an EEPROM, according to its image."""
+"""Size of an EEPROM, according to its image."""
 
 from __future__ import annotations
 
@@ -15,16 +15,16 @@ from catenary.wire.sii import MAXIMUM_SIZE, decode_header
 from catenary.wire.sii_check import BYTES_PER_KBIT
 from catenary.wire.sii_interface import ControlStatus
 
-SMALL = 2048  # bytes: limit of one address byte, 16 kbit
+SMALL = 2048  # bytes: the range of one address byte, 16 kbit
 PROBE_WORDS = 16  # includes vendor, product, revision and serial number
 CAUTIOUS = 4096  # bytes: the smallest EEPROM with two address bytes
 
 
 class Extent(NamedTuple):
-    """The size of an EEPROM, and a note about its faults."""
+    """Size of an EEPROM, and a note about faults of its image."""
 
     size: int  # bytes
-    limit: int  # bytes that its controller can address
+    limit: int  # number of bytes that its controller can address
     note: str = ""
 
 
@@ -44,14 +44,14 @@ def read_extent(station: Station) -> Procedure[Extent]:
         end = yield from _end_of_categories(station, limit)
         if end is None:
             bound = min(limit, CAUTIOUS)
-            return Extent(bound, limit, f"{error.message}; no end mark: {bound} bytes are used")
+            return Extent(bound, limit, f"{error.message}; no end mark, {bound} bytes are used")
         return Extent(end, limit, f"{error.message}; {end} bytes up to the end mark")
     if size > limit and not (yield from _wraps(station, data)):
         limit = MAXIMUM_SIZE
     if size <= limit:
         return Extent(size, limit)
     return Extent(
-        limit, limit, f"its header specifies {size} bytes, its controller can address {limit}"
+        limit, limit, f"its header specifies {size} bytes, but its controller can address {limit}"
     )
 
 
@@ -65,7 +65,7 @@ def _wraps(station: Station, header: bytes) -> Procedure[bool]:
 
 
 def _end_of_categories(station: Station, limit: int) -> Procedure[int | None]:
-    """Return the bytes up to and including the end mark; None if none is found within `limit`."""
+    """Return the size up to and including the end mark; None if there is none within `limit`."""
     word = HEADER_WORDS
     for _ in range(CATEGORIES_MAX):
         kind, length = struct.unpack("<HH", (yield from read_words(station, word, 2)))

@@ -16,11 +16,11 @@ from catenary.wire.sii import CONFIGURATION_WORDS
 from catenary.wire.sii_interface import ControlStatus, SiiCommand
 
 WRITE_TIMEOUT = 0.5  # [s] for a word; EEPROMs need 3 to 10 ms
-ATTEMPTS = 4  # per word: an EEPROM behind a busy processor may miss an acknowledge
-REST = 5e-3  # [s] longest write cycle of an I²C EEPROM; some devices do not report it as busy (IgH)
+ATTEMPTS = 4  # per word: an EEPROM behind a busy processor may fail to acknowledge
+REST = 5e-3  # [s] longest write cycle of an I²C EEPROM; some devices do not report busy then (IgH)
 
-# Control, address and data in one datagram: the enable bit is valid only for the frame that sets it
-# (ESC data sheet, register 0x0502)
+# One datagram for control, address and data: the enable bit is valid only in the frame that sets it
+# (ESC data sheet, register 0x0502).
 _COMMAND = struct.Struct("<HIH")
 _WRITE = ControlStatus(command=SiiCommand.WRITE, write_enable=True).word
 _ADDRESSES = 0x10000
@@ -36,8 +36,8 @@ class Change(NamedTuple):
 def changes(old: bytes, new: bytes) -> tuple[Change, ...]:
     """Return the words in which two images differ, the configuration with its checksum last.
 
-    During a write, or if it was interrupted, the checksum is wrong. The controller then detects
-    that its configuration is incomplete.
+    The checksum is therefore wrong until the last write, even if the sequence is interrupted. The
+    controller then detects that its configuration is incomplete.
 
     Args:
         old: The present image.
@@ -89,7 +89,7 @@ def write_word(station: Station, wanted: Change) -> Procedure[None]:
     found, status = b"", ControlStatus()
     for _ in range(ATTEMPTS):
         yield from _until_idle(station, wanted.word)
-        # Not repeatable: a controller that is busy with the first command rejects the second.
+        # Not repeatable: a controller that is busy with the first command rejects the second one.
         yield [write_memory(station.address, SII_CONTROL_STATUS.address, data, repeatable=False)]
         status = yield from _until_idle(station, wanted.word)
         yield after(REST)
@@ -124,6 +124,6 @@ def _refused(station: Station, wanted: Change, found: bytes, status: ControlStat
         why = f"the value read back is 0x{int.from_bytes(found, 'little'):04X}"
         hint = "it is write-protected (by a pin, or by a processor that emulates it), or worn out"
     return EepromError(
-        f"{station}: SII word 0x{wanted.word:04X} cannot be written to 0x{wanted.value:04X}: {why}",
+        f"{station}: SII word 0x{wanted.word:04X} cannot be set to 0x{wanted.value:04X}: {why}",
         hint=hint,
     )

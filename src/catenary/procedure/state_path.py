@@ -1,7 +1,7 @@
 """State changes of one device through intermediate states, ETG.1000.6 §6.4.1.
 
-On the way up, no state may be skipped, and each needs some configuration before it is requested. On
-the way down, all intermediate states may be skipped.
+On the way up, no state may be skipped, and the device is configured before each request. On the way
+down, all intermediate states may be skipped.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ UPWARDS = (AlState.INIT, AlState.PRE_OP, AlState.SAFE_OP, AlState.OP)
 
 
 def path(now: AlState | None, target: AlState) -> tuple[AlState, ...]:
-    """Return the states to request in order; only `target` if it is already reached.
+    """Return the states to request, in order; only `target` if the device is already in it.
 
     Args:
         now: The present state; None if it is invalid.
@@ -38,7 +38,7 @@ def path(now: AlState | None, target: AlState) -> tuple[AlState, ...]:
     """
     if now is target:
         return (target,)
-    # The only neighbour of BOOT is INIT.
+    # BOOT can be entered only from INIT, and left only for INIT.
     if now is None or AlState.BOOT in (now, target):
         start = () if now is AlState.INIT or target is AlState.INIT else (AlState.INIT,)
         return (*start, *(upwards(target) or (target,)))
@@ -46,7 +46,7 @@ def path(now: AlState | None, target: AlState) -> tuple[AlState, ...]:
 
 
 def upwards(target: AlState, above: AlState = AlState.INIT) -> tuple[AlState, ...]:
-    """Return the states above one state, up to another; empty if the other is below.
+    """Return the states after `above` up to `target`; empty if `target` is lower.
 
     Args:
         target: The last state.
@@ -68,7 +68,7 @@ def climb(
         target: The final state.
 
     Returns:
-        Its mailbox if it was opened on the way, else None.
+        Its mailbox if it was configured on the way, else None.
     """
     channel = None
     before = (yield from read_state(station)).state
@@ -86,7 +86,7 @@ def climb(
 def restart(station: Station, device: DeviceDescription) -> Procedure[DeviceDescription]:
     """Bring a device through INIT to PRE-OP, and return the description with its mapping.
 
-    INIT is necessary even if the device is in PRE-OP. Only then its mailbox counters restart.
+    INIT is necessary even if the device is in PRE-OP: it restarts the mailbox counters.
 
     Args:
         station: The device.

@@ -1,4 +1,4 @@
-"""The device of a conversation, checks of its replies, and deadlines."""
+"""The device in a conversation, checks of its replies, and deadlines."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ T = TypeVar("T")
 
 
 class Station(NamedTuple):
-    """The name of one device in errors. `address` is its configured station address."""
+    """One device, as named in errors. `address` is its configured station address."""
 
     position: int
     address: int
@@ -22,12 +22,12 @@ class Station(NamedTuple):
 
 
 def answered(reply: Reply, station: Station, what: str) -> bytes:
-    """Return the data of a reply that exactly this device must have given.
+    """Return the data of a reply that must come from exactly one device.
 
     Args:
         reply: The reply.
         station: The device.
-        what: The requested data, for errors.
+        what: Name of the requested data, for errors.
 
     Raises:
         ResponseTimeout: The frame was lost, or the device did not answer.
@@ -36,7 +36,7 @@ def answered(reply: Reply, station: Station, what: str) -> bytes:
     if reply.lost:
         raise ResponseTimeout(
             f"{station}: {what}: the frame did not come back",
-            hint="check cable and power of the first device; check for other traffic on this port",
+            hint="check the cable and the power of the first device, and other traffic on the port",
         )
     if reply.working_counter == 0:
         raise ResponseTimeout(
@@ -48,16 +48,16 @@ def answered(reply: Reply, station: Station, what: str) -> bytes:
         raise SegmentError(
             f"{station}: {what}: {reply.working_counter} devices answer to station "
             f"0x{station.address:04X}",
-            hint="a device was added with an old station address: scan again",
+            hint="a device with an old station address was added: scan again",
         )
     return reply.data
 
 
 class Deadline:
-    """A deadline [s] measured by the time stamps of replies. It starts with the first reply.
+    """A deadline [s], measured with the time stamps of replies. It starts at the first reply.
 
-    The time between two replies counts for at most a quarter of the deadline. A program that was
-    halted therefore polls a few more times before it treats a device as silent.
+    The time between two replies counts for at most a quarter of the deadline. After a program was
+    halted, it therefore polls a few more times before the deadline passes.
     """
 
     def __init__(self, seconds: float) -> None:
@@ -83,13 +83,13 @@ def within(
     """Run a procedure with an overall deadline.
 
     Args:
-        seconds: The deadline.
+        seconds: The deadline [s].
         station: The device, for the error.
         procedure: The procedure to run.
-        what: What it reads or writes, for the error, with a verb: "its description was".
+        what: Subject and verb of the error message, such as "its description was".
 
     Raises:
-        ResponseTimeout: The procedure has not ended after `seconds`.
+        ResponseTimeout: The procedure takes longer than `seconds`.
     """
     deadline = Deadline(seconds)
     try:
@@ -111,7 +111,7 @@ def within(
 
 
 class Pace:
-    """The pause between two polls [s]. It doubles after each poll, up to a maximum."""
+    """Pause between two polls [s]. It doubles after each poll, up to a maximum."""
 
     def __init__(self, first: float = 100e-6, longest: float = 5e-3) -> None:
         self._next = first

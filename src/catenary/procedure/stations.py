@@ -25,15 +25,15 @@ from catenary.wire.register import (
 )
 from catenary.wire.sii_interface import CONFIGURATION_FORCE
 
-RESET_TIMEOUT = 2.0  # [s]; a device that is not in INIT then is requested separately
-STATION_BASE = 0x1001  # of position 0; 0 is not an address, small numbers are likely aliases
+RESET_TIMEOUT = 2.0  # [s]; afterwards, devices that are not in INIT get separate requests
+STATION_BASE = 0x1001  # of position 0; 0 is not an address, and small numbers are often aliases
 FMMU_BLOCK = (0x0600, 256)  # all 16 FMMUs
 SYNC_MANAGER_BLOCK = (0x0800, 128)  # all 16 SyncManagers
 
 
 @dataclass(frozen=True, slots=True)
 class StationRegisters:
-    """Registers of one device that are read before its EEPROM."""
+    """Registers of one device, read before its EEPROM."""
 
     position: int
     station_address: int
@@ -51,7 +51,7 @@ class Counted(NamedTuple):
 
 
 def count() -> Procedure[Counted]:
-    """Count the devices that process a broadcast. Raises NoDeviceError if there is none."""
+    """Count the devices that process a broadcast. Raises NoDeviceError if none does."""
     [reply] = yield [read(EcatCommand.BRD, 0, AL_STATUS)]
     if reply.lost:
         raise NoDeviceError(
@@ -69,7 +69,7 @@ def count() -> Procedure[Counted]:
 def reset(device_count: int) -> Procedure[None]:
     """Bring all devices to INIT, and clear their FMMUs, SyncManagers and SYNC signals.
 
-    Errors are acknowledged. The EEPROMs are taken from the process data interface.
+    Errors are acknowledged, and all EEPROMs are assigned to the MainDevice.
 
     Raises:
         SegmentError: The number of devices differs from `device_count`.
@@ -86,14 +86,14 @@ def reset(device_count: int) -> Procedure[None]:
         raise SegmentError(
             f"{device_count} devices were counted, "
             f"but {replies[-1].working_counter} received a broadcast",
-            hint="the number of devices changes: check for a loose contact, then scan again",
+            hint="the number of devices is not stable: check for a loose contact, then scan again",
         )
 
 
 def bring_all_down(stations: Sequence[Station], state: AlState, timeout: float) -> Procedure[None]:
     """Bring all devices to a lower state by broadcast, from any state.
 
-    Devices that do not answer are ignored, so that the others still reach the state.
+    Devices that do not answer are ignored, so that the others reach the state.
 
     Args:
         stations: The devices.
@@ -121,16 +121,16 @@ def bring_all_down(stations: Sequence[Station], state: AlState, timeout: float) 
 def _all_to(state: AlState, timeout: float) -> Procedure[bool]:
     """Request a state from all devices, acknowledge errors, and return True if all reach it.
 
-    Controllers that emulate their application copy AL control to AL status. The acknowledgement
-    then looks like an error. The state is therefore requested again without it.
+    A controller with device emulation copies AL control to AL status. The acknowledgement then
+    looks like an error, so the state is requested again without it.
     """
     for control in (AlControl(state, acknowledge=True), AlControl(state)):
-        if not (yield from _ask_all(control.word, timeout)):
+        if not (yield from _request_all(control.word, timeout)):
             return False
     return True
 
 
-def _ask_all(word: int, timeout: float) -> Procedure[bool]:
+def _request_all(word: int, timeout: float) -> Procedure[bool]:
     """Write AL control until the OR of all AL status words is `word`, with or without an error.
 
     A controller rejects AL control until its application has read the previous one. The working
@@ -139,8 +139,8 @@ def _ask_all(word: int, timeout: float) -> Procedure[bool]:
     deadline, pace = Deadline(timeout), Pace()
     taken = False
     while True:
-        asked = [] if taken else [write(EcatCommand.BWR, 0, AL_CONTROL, word)]
-        replies = yield [*asked, read(EcatCommand.BRD, 0, AL_STATUS)]
+        control = [] if taken else [write(EcatCommand.BWR, 0, AL_CONTROL, word)]
+        replies = yield [*control, read(EcatCommand.BRD, 0, AL_STATUS)]
         status = replies[-1]
         taken = taken or replies[0].working_counter >= status.working_counter
         if taken and AL_STATUS.unpack(status.data) & 0x1F in (word, word & 0x0F):
@@ -154,7 +154,7 @@ def assign(places: Sequence[int]) -> Procedure[tuple[StationRegisters, ...]]:
     """Set the station addresses of all devices, then read their registers.
 
     Args:
-        places: The positions of the devices, in the order of the frame.
+        places: Positions of the devices, in the order of the frame.
     """
     addresses = [STATION_BASE + place for place in places]
     replies = yield [
@@ -172,7 +172,7 @@ def assign(places: Sequence[int]) -> Procedure[tuple[StationRegisters, ...]]:
 def read_registers(addresses: Sequence[int]) -> Procedure[tuple[StationRegisters, ...]]:
     """Read the registers of all devices by station address, in the order of positions."""
     per_device = 4
-    replies = yield [request for address in addresses for request in _questions(address)]
+    replies = yield [request for address in addresses for request in _register_reads(address)]
     registers = []
     for position, address in enumerate(addresses):
         station = Station(position, address)
@@ -192,7 +192,7 @@ def read_registers(addresses: Sequence[int]) -> Procedure[tuple[StationRegisters
 
 
 def duplicate_aliases(registers: Sequence[StationRegisters]) -> dict[int, tuple[int, ...]]:
-    """Return aliases shared by several devices, with their positions. Alias 0 means no alias."""
+    """Return the aliases that several devices share, with the positions of these devices."""
     positions: dict[int, list[int]] = {}
     for device in registers:
         if device.alias:
@@ -200,7 +200,7 @@ def duplicate_aliases(registers: Sequence[StationRegisters]) -> dict[int, tuple[
     return {alias: tuple(where) for alias, where in positions.items() if len(where) > 1}
 
 
-def _questions(address: int) -> list[Request]:
+def _register_reads(address: int) -> list[Request]:
     return [
         read(EcatCommand.FPRD, address, INFORMATION),
         read(EcatCommand.FPRD, address, STATION_ALIAS),

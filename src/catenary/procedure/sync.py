@@ -1,8 +1,8 @@
 """Start and stop of SYNC signals, ETG.1000.4 §6.8.5 and ETG.1020 §"Distributed clocks".
 
 SYNC signals are started in PRE-OP, because devices check them on the way to SAFE-OP. All devices
-receive one start time, which must be in the future. It is verified that it was written in time: a
-32-bit clock reaches a past start time again after 4 s, a 64-bit clock never.
+receive the same start time, which must be in the future when the last device receives it. This is
+verified: a 32-bit clock reaches a past start time again after 4 s, a 64-bit clock never does.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ from catenary.wire.register import (
 )
 
 ATTEMPTS = 3
-PEERS_MAX = 4  # devices asked for their system time
+PEERS_MAX = 4  # number of devices whose system time is read
 AHEAD_NS = 1_000_000  # minimum time between the last write and the start time
 
 
@@ -65,7 +65,7 @@ def bring_together(
         reference: Position of the reference clock.
         epoch_ns: System time minus the link's time [ns].
         burst: Number of frames of the drift compensation.
-        follow: The clock that the others follow.
+        follow: The clock that all others follow.
         second_end: In a ring, the port that is wired to the second interface; None for a line.
 
     Raises:
@@ -91,15 +91,16 @@ def rejoin(
 ) -> Procedure[None]:
     """Set the clock of a device that was switched off, while all other clocks run.
 
-    The device and one of its peers are read in the same frame. The difference is the offset.
+    The system times of the device and of its peers are read in the same frame. Their difference is
+    the offset.
 
     Args:
         devices: All devices, by position.
         position: The device.
         sync: Its SYNC signals; None if it has none.
         peers: Positions of devices with running clocks, the reference first.
-        delay_ns: Its delay from the reference, as measured before [ns].
-        epoch_ns: System time minus the link's time, now [ns].
+        delay_ns: Its delay from the reference, as measured earlier [ns].
+        epoch_ns: Present system time minus the link's time [ns].
 
     Raises:
         ClockError: None of the peers answers.
@@ -108,10 +109,10 @@ def rejoin(
     resets = filters(device.station_address)
     for each in (*alignment(device, 0, delay_ns), *resets):
         yield from _write_all([device], [each])
-    asked = [devices[peer] for peer in peers if peer != position][:PEERS_MAX]
-    replies = yield [_system_time(each) for each in (*asked, device)]
+    chosen = [devices[peer] for peer in peers if peer != position][:PEERS_MAX]
+    replies = yield [_system_time(each) for each in (*chosen, device)]
     own = _read_time(replies[-1], device, epoch_ns)
-    for peer, reply in zip(asked, replies, strict=False):
+    for peer, reply in zip(chosen, replies, strict=False):
         if reply.lost or reply.working_counter != 1:
             continue
         offset = _read_time(reply, peer, epoch_ns) - own
@@ -144,7 +145,7 @@ def start(
         The SYNC0 time at which they start, without shifts [ns, system time].
 
     Raises:
-        ClockError: The start time had passed before all devices had received it.
+        ClockError: The start time passed before all devices had received it.
     """
     chosen = [devices[position] for position in sorted(syncs)]
     for _ in range(ATTEMPTS):
@@ -161,14 +162,14 @@ def start(
         if written_ns + AHEAD_NS < first_ns:
             return sync0_time_ns
     raise ClockError(
-        f"SYNC signals: writing the start time to {len(chosen)} devices took longer than the "
-        f"{(sync0_time_ns - now_ns) * 1e-6:.0f} ms until it, in {ATTEMPTS} attempts",
+        f"SYNC signals: the start time passed before all {len(chosen)} devices received it: in "
+        f"{ATTEMPTS} attempts, writing took longer than {(sync0_time_ns - now_ns) * 1e-6:.0f} ms",
         hint="the machine is too busy: reserve a processor core for the program",
     )
 
 
 def read_types(channel: MailboxChannel) -> Procedure[dict[int, bytes]]:
-    """Return the synchronisation types of a device: 0x1C32:01 and 0x1C33:01, as far as readable."""
+    """Read the synchronisation types of a device (0x1C32:01, 0x1C33:01), if they are readable."""
     found = {}
     for index in SYNC_OBJECTS:
         with suppress(SdoAbort):
@@ -177,14 +178,14 @@ def read_types(channel: MailboxChannel) -> Procedure[dict[int, bytes]]:
 
 
 def write_types(channel: MailboxChannel, types: Mapping[int, bytes]) -> Procedure[None]:
-    """Restore the synchronisation types that a device had before, as far as writable.
+    """Restore the earlier synchronisation types of a device, if they are writable.
 
     Args:
         channel: The mailbox of the device.
         types: The values of 0x1C32:01 and 0x1C33:01, by index.
 
     Raises:
-        SdoAbort: The device refuses for another reason than a read-only or missing object.
+        SdoAbort: The device refuses for a reason other than a missing or read-only object.
     """
     for index, kind in types.items():
         try:
@@ -202,7 +203,7 @@ def stop(devices: Sequence[DeviceDescription]) -> Procedure[None]:
 
 
 def _now(reference: DeviceDescription, epoch_ns: int) -> Procedure[int]:
-    """Return the full system time: the reference's low half, completed by the link's time."""
+    """Return the full system time: the reference's low half, extended with the link's time."""
     [reply] = yield [read(EcatCommand.FPRD, reference.station_address, SYSTEM_TIME_LOW)]
     low = SYSTEM_TIME_LOW.unpack(answered(reply, _station(reference), "its system time"))
     return _near(low, reply.time_ns + epoch_ns)
@@ -214,7 +215,7 @@ def _system_time(device: DeviceDescription) -> Request:
 
 
 def _read_time(reply: Reply, device: DeviceDescription, epoch_ns: int) -> int:
-    """Return the full system time of a reply; a 32-bit clock is completed by the link's time."""
+    """Return the full system time of a reply. A 32-bit time is extended with the link's time."""
     value = int.from_bytes(answered(reply, _station(device), "its system time"), "little")
     return value if device.clock_bits == 64 else _near(value, reply.time_ns + epoch_ns)
 

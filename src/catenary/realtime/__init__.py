@@ -1,6 +1,6 @@
-"""Real time from Python: tasks with fixed priorities, their analysis, machine and virtual clocks.
+"""Real-time tasks with fixed priorities, their analysis, and machine and virtual clocks.
 
-Also private networks, scheduling and child processes. NumPy is imported on first use.
+Submodules contain scheduling, private networks and child processes.
 
     def control(task, gain):
         for job in task:            # every 2 ms, until the task is stopped
@@ -49,7 +49,7 @@ __all__ = [
     "session",
 ]
 
-_HOMES = {
+_MODULES = {
     "Demand": "analysis",
     "Job": "job",
     "Participant": "clock",
@@ -71,9 +71,9 @@ _HOMES = {
 
 
 def __getattr__(name: str) -> object:
-    if name not in _HOMES:
+    if name not in _MODULES:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    return getattr(import_module(f"{__name__}.{_HOMES[name]}"), name)
+    return getattr(import_module(f"{__name__}.{_MODULES[name]}"), name)
 
 
 def __dir__() -> list[str]:

@@ -14,12 +14,12 @@ cdef extern from "clock.h":
         void (*wake)(void *) noexcept nogil
 
 cdef class Memory:
-    """A view of a writable buffer that another object owns, at a fixed address."""
+    """View of a writable buffer that another object owns, at a fixed address."""
     cdef Py_buffer view
     cdef uint8_t *at(self, size_t offset, size_t size) except NULL
 
 cdef class Timer:
-    """Owner of one waiter's clock table."""
+    """One waiter on a clock. It belongs to one thread; other threads may only call `wake`."""
     cdef cat_clock table
     cdef Memory memory
     cdef readonly object capsule

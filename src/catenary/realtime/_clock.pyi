@@ -1,4 +1,4 @@
-"""Clocks of tasks: the machine's and the virtual one. Waiting releases the GIL."""
+"""Timers of tasks on the machine's clock and on a virtual clock. Waits release the GIL."""
 
 from typing_extensions import Buffer
 
@@ -9,7 +9,7 @@ MACHINE_TIMER_SIZE: int
 VIRTUAL_TIME_SIZE: int
 
 class Timer:
-    """One waiter on a clock. It belongs to one thread; other threads may only call `wake`."""
+    """Timer of one thread. Other threads may only call `wake`."""
 
     @property
     def capsule(self) -> object:
@@ -20,10 +20,10 @@ class Timer:
     @property
     def is_virtual(self) -> bool: ...
     def wait_until(self, deadline_ns: int) -> bool:
-        """Wait. Return True if the deadline has passed, False if woken before."""
+        """Wait. Return True if the deadline has passed, False if `wake` ended the wait."""
 
     def spend(self, duration_ns: int) -> None:
-        """Consume execution time: simulated on a virtual clock, computed on the machine's."""
+        """Spend execution time: simulated on a virtual clock, real on the machine's clock."""
 
     def wake(self) -> None:
         """End the current or the next wait."""
@@ -44,7 +44,7 @@ class VirtualTime:
         """Return a slot for a new participant. Time stands still until it first waits."""
 
     def expect(self, slot: int) -> None:
-        """Reset the slot to its state after `join`: its participant is restarted."""
+        """Reset the slot to its state after `join`, to restart its participant."""
 
     def run(self, slot: int) -> None:
         """Mark the participant as running: time stands still until it waits."""

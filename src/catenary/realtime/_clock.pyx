@@ -1,5 +1,5 @@
 # cython: boundscheck=False, wraparound=False, cdivision=True
-"""Clocks of tasks: the machine's and the virtual one. Waiting releases the GIL."""
+"""Timers of tasks on the machine's clock and on a virtual clock. Waits release the GIL."""
 
 from cpython.buffer cimport PyBUF_CONTIG, PyBuffer_Release, PyObject_GetBuffer
 from cpython.exc cimport PyErr_CheckSignals
@@ -40,7 +40,7 @@ MACHINE_TIMER_SIZE = sizeof(machine_time)
 VIRTUAL_TIME_SIZE = sizeof(virtual_time)
 
 cdef enum:
-    SPENT_AT_ONCE_NS = 10_000_000        # between two checks for Python's signals
+    SPENT_AT_ONCE_NS = 10_000_000        # interval of the checks for Python signals
 
 
 cdef class Memory:
@@ -52,7 +52,7 @@ cdef class Memory:
 
     cdef uint8_t *at(self, size_t offset, size_t size) except NULL:
         if offset + size > <size_t>self.view.len:
-            raise ValueError(f"{size} bytes at {offset} lie outside {self.view.len} bytes")
+            raise ValueError(f"{size} bytes at offset {offset} exceed {self.view.len} bytes")
         return <uint8_t *>self.view.buf + offset
 
 
@@ -102,7 +102,7 @@ cdef class Timer:
 
 
 cdef class MachineTimer(Timer):
-    """A waiter on CLOCK_MONOTONIC. `memory` starts as zeros; all threads that wake it share it."""
+    """Timer on CLOCK_MONOTONIC. Its memory starts as zeros; all threads that wake it share it."""
 
     def __init__(self, memory, size_t offset=0):
         self.memory = Memory(memory)
@@ -114,7 +114,7 @@ cdef class MachineTimer(Timer):
 
 
 cdef class VirtualTime:
-    """A view of the participants' table; all participants share its `memory`."""
+    """Table of the participants of a virtual clock, in shared memory."""
     cdef Memory memory
     cdef virtual_time *time
 
@@ -125,7 +125,7 @@ cdef class VirtualTime:
     def reset(self):
         cdef int error = vt_init(self.time)
         if error:
-            raise OSError(error, "a lock that processes share could not be made")
+            raise OSError(error, "cannot initialise the process-shared mutex of the virtual clock")
 
     @property
     def now_ns(self):
@@ -134,7 +134,7 @@ cdef class VirtualTime:
     def join(self, int priority, int cpu):
         cdef int slot = vt_join(self.time, priority, cpu)
         if slot < 0:
-            raise ValueError(f"a virtual clock has room for {VT_PARTICIPANTS} participants")
+            raise ValueError(f"all {VT_PARTICIPANTS} slots of the virtual clock are in use")
         return slot
 
     def expect(self, int slot):
@@ -151,7 +151,7 @@ cdef class VirtualTime:
 
     cdef int checked(self, int slot) except -1:
         if not 0 <= slot < VT_PARTICIPANTS:
-            raise ValueError(f"there is no participant {slot}")
+            raise ValueError(f"slot {slot} is not within 0..{VT_PARTICIPANTS - 1}")
         return slot
 
 
@@ -170,7 +170,7 @@ cdef int virtual_wait_until(void *owner, int64_t deadline) noexcept nogil:
 
 
 cdef int virtual_spend(void *owner, int64_t duration) noexcept nogil:
-    """Continue after a signal. Python handles it once the time is spent, which is soon."""
+    """Spend virtual time, also across signals. Python handles a signal afterwards."""
     cdef participant_t *p = <participant_t *>owner
     cdef int error = vt_spend(p.time, p.slot, duration)
     while error == -EINTR:

@@ -1,4 +1,4 @@
-"""Wait-free values and queues between tasks, as bytes."""
+"""Wait-free values and queues of bytes between tasks."""
 
 from typing import TypeAlias
 
@@ -23,7 +23,7 @@ class ValueCore:
     def number(self) -> int: ...
     def write(self, data: Array | bytes) -> None: ...
     def read(self, into: Array | bytearray) -> int:
-        """Return the number of the copied value, or -1 if every attempt was overwritten."""
+        """Copy the value. Return its number, or -1 if a write interfered with every attempt."""
 
 class QueueCore:
     """A queue in shared memory that starts as zeros. Raises ValueError if the size differs."""

@@ -1,5 +1,5 @@
 # cython: boundscheck=False, wraparound=False, cdivision=True
-"""Wait-free values and queues between tasks, as bytes."""
+"""Wait-free values and queues of bytes between tasks."""
 
 from cpython.buffer cimport PyBUF_CONTIG, PyBUF_CONTIG_RO, PyBuffer_Release, PyObject_GetBuffer
 from libc.stdint cimport int32_t, int64_t, uint8_t, uint32_t, uint64_t
@@ -36,12 +36,12 @@ def queue_size(uint32_t size, uint32_t length):
 
 cdef int check_size(Py_buffer *view, uint32_t size) except -1:
     if view.len != size:
-        raise ValueError(f"{view.len} bytes given, {size} expected")
+        raise ValueError(f"received {view.len} bytes, expected {size}")
     return 0
 
 
 cdef class ValueCore:
-    """A view of a value's memory."""
+    """A value in shared memory that starts as zeros. Raises ValueError if the size differs."""
     cdef Memory memory
     cdef latest_value *c
 
@@ -82,7 +82,7 @@ cdef class ValueCore:
 
 
 cdef class QueueCore:
-    """A view of a queue's memory."""
+    """A queue in shared memory that starts as zeros. Raises ValueError if the size differs."""
     cdef Memory memory
     cdef record_queue *c
 

@@ -14,8 +14,8 @@ FIGURE_NAMES: tuple[str, ...]
 class Block:
     """One task's memory.
 
-    The task's thread writes the job and the figures. Other threads stop it, change its period and
-    signal it.
+    The task's thread writes the job and the figures. Other threads request a stop, change the
+    period and set signals.
     """
 
     def __init__(self, memory: Buffer, offset: int = 0) -> None: ...
@@ -35,7 +35,7 @@ class Block:
         """Skip all releases that have passed, after a restart."""
 
     def wait_while(self, state: int, deadline_ns: int) -> None:
-        """Wait until the state changes, or the deadline (CLOCK_MONOTONIC). May return early."""
+        """Wait while the state is `state`, until the deadline (CLOCK_MONOTONIC) or earlier."""
 
     state: int
     process: int

@@ -66,7 +66,11 @@ cdef void write_text(char *text, str value, size_t size):
 
 
 cdef class Block:
-    """A view of one task's memory."""
+    """One task's memory.
+
+    The task's thread writes the job and the figures. Other threads stop it, change its period and
+    signal it.
+    """
     cdef Memory memory
     cdef task_block *c
 
@@ -227,7 +231,7 @@ cdef class Block:
 
     cdef const cat_histogram *histogram(self, int number) except NULL:
         if not 0 <= number < FIGURES:
-            raise ValueError(f"there is no figure {number}")
+            raise ValueError(f"figure {number} is not within 0..{FIGURES - 1}")
         return &self.c.figures[number]
 
 

@@ -4,11 +4,12 @@ Joseph and Pandya, "Finding response times in a real-time system", 1986, and its
 release jitter, blocking and arbitrary deadlines: Tindell, Burns and Wellings, "An extendible
 approach for analysing fixed priority hard real-time tasks", 1994, equations 12 to 16:
 
-    w(q) = (q + 1) C + B + sum over j, of no lower priority: ceil((w(q) + Jj) / Tj) Cj
-    R    = max over q = 0, 1, ... of  J + w(q) - q T,  until job q ends before its next release
+    w(q) = (q + 1) C + B + sum over tasks j of higher or equal priority: ceil((w(q) + Jj) / Tj) Cj
+    R    = max over q = 0, 1, ... of  J + w(q) - q T,  up to the first job that ends before the
+           next release
 
-Tasks of equal priority count as if each had the higher one. SCHED_FIFO serves them in the order
-of their releases, so this is an upper bound. All sums are integers, in nanoseconds.
+Each task treats other tasks of equal priority as higher. SCHED_FIFO serves them in the order of
+their releases, so this is an upper bound. All sums are integers, in nanoseconds.
 """
 
 from __future__ import annotations
@@ -18,22 +19,23 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 LONGEST = 1e9  # [s]
-MOST_STEPS = 1_000_000  # iterations for one task; reached only if the load is close to 1
+MOST_STEPS = 1_000_000  # iteration limit for one task; only loads close to 1 reach it
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Demand:
-    """Processor load of a task.
+    """Load of a task on its processor.
 
     Args:
         name: Name of the task.
         period: Minimum time between two releases [s].
         execution: Longest execution time of one job [s].
-        deadline: Deadline after the release [s]. None: the period. It may exceed the period.
+        deadline: Deadline after the release [s]; None for the period. It may exceed the period.
         blocking: Longest time for which a task of lower priority blocks the task [s].
         jitter: Longest delay of a release after its nominal time [s].
-        priority: Priority; a larger number is higher. None for all tasks: deadline-monotonic.
-        cpu: Processor of the task. None for all tasks: they share one.
+        priority: Priority; a larger number is higher. If all tasks have None, their priorities
+            are deadline-monotonic.
+        cpu: Processor of the task. If all tasks have None, they share one processor.
     """
 
     name: str
@@ -54,8 +56,8 @@ class Demand:
     def _check(self, what: str, seconds: float, least_ns: int) -> None:
         if not math.isfinite(seconds) or seconds > LONGEST:
             raise ValueError(
-                f"task {self.name!r}: {what} of {seconds} s is beyond {LONGEST:g} s; "
-                "is it in seconds?"
+                f"task {self.name!r}: {what} of {seconds} s is beyond the maximum of {LONGEST:g} s"
+                "; give it in seconds"
             )
         if round(seconds * 1e9) < least_ns:
             word = "not positive" if least_ns else "negative"
@@ -81,7 +83,7 @@ class Response:
 
 @dataclass(frozen=True, slots=True)
 class Verdict:
-    """Result of an analysis. `utilisation`: of the busiest processor; `hyperperiod` in [s]."""
+    """Result of an analysis: utilisation of the busiest processor, hyperperiod [s], responses."""
 
     utilisation: float
     hyperperiod: float
@@ -128,10 +130,10 @@ class Load:
 
 
 def analyse(demands: Sequence[Demand]) -> Verdict:
-    """Analyse tasks that share one processor, or are bound to several.
+    """Analyse tasks that share one processor or are each bound to one of several.
 
-    Raises ValueError if there are no tasks, if two have the same name, or if only some have a
-    priority or a processor.
+    Raises ValueError if there are no tasks, if two tasks have the same name, or if only some of
+    them have a priority or a processor.
     """
     check(demands)
     ranked = sorted(with_priorities(demands), key=lambda demand: -rank(demand))
@@ -167,14 +169,14 @@ def check(demands: Sequence[Demand]) -> None:
         missing = [demand.name for demand in demands if getattr(demand, what) is None]
         if missing and len(missing) < len(demands):
             raise ValueError(
-                f"task {missing[0]!r} has no {what}, but others have one: give it to all or to none"
+                f"task {missing[0]!r} has no {what}, but others do; set it for all or for none"
             )
 
 
 def with_priorities(demands: Sequence[Demand]) -> list[Demand]:
-    """Assign deadline-monotonic priorities if none are given.
+    """Assign deadline-monotonic priorities if the tasks have none.
 
-    This is optimal for deadlines up to the period.
+    This assignment is optimal if no deadline is longer than its period.
     """
     if demands[0].priority is not None:
         return list(demands)
@@ -185,7 +187,7 @@ def with_priorities(demands: Sequence[Demand]) -> list[Demand]:
 
 
 def rank(demand: Demand) -> int:
-    assert demand.priority is not None  # with_priorities
+    assert demand.priority is not None  # ensured by with_priorities
     return demand.priority
 
 
@@ -205,7 +207,7 @@ def as_load(demand: Demand) -> Load:
 
 
 def utilisation(demands: Sequence[Demand]) -> float:
-    """Return the utilisation of the busiest processor: 1.0 is full, above is overload."""
+    """Return the utilisation of the busiest processor; above 1.0, it is overloaded."""
     processors = {demand.cpu for demand in demands}
     return max(
         math.fsum(demand.execution / demand.period for demand in demands if demand.cpu == cpu)
@@ -214,7 +216,7 @@ def utilisation(demands: Sequence[Demand]) -> float:
 
 
 def hyperperiod(demands: Sequence[Demand]) -> float:
-    """Return the time [s] after which the releases repeat; infinite if a float overflows."""
+    """Return the time [s] after which the releases repeat; infinity if a float cannot hold it."""
     try:
         return math.lcm(*(as_load(demand).period for demand in demands)) / 1e9
     except OverflowError:
@@ -239,7 +241,7 @@ def longest_response(task: Load, above: Sequence[Load]) -> int | None:
         if window + task.jitter <= (job + 1) * task.period:
             return longest
         if repeats is not None and (job + 1) * task.period >= repeats:
-            return longest  # from here on the responses repeat
+            return longest  # later responses repeat
         window += task.execution
     return None
 

@@ -1,4 +1,4 @@
-"""Tasks to analyse, as a TOML file: `[[task]]` tables with times in seconds.
+"""TOML files with tasks to analyse: `[[task]]` tables with times in seconds.
 
 [[task]]
 name = "control"

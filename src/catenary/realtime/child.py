@@ -1,7 +1,7 @@
-"""Child processes that end with this process: own session, parent-death signal, end by deadline.
+"""Child processes that end with this process.
 
-The own session keeps a Ctrl-C in the terminal away from them. This process ends them after
-everything that depends on them.
+Each child has its own session, so a Ctrl-C in the terminal does not reach it. This process ends it
+after everything that depends on it. If this process dies, the kernel sends SIGTERM to the child.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ PR_SET_PDEATHSIG = 1  # linux/prctl.h
 
 
 class Child:
-    """Owner of one running child process; reads its standard output."""
+    """Owner of one child process and of the pipe from its standard output."""
 
     def __init__(self, process: subprocess.Popen[bytes]) -> None:
         self.process = process
@@ -38,7 +38,7 @@ class Child:
         return self.process.poll() is None
 
     def read_line(self, seconds: float) -> str | None:
-        """Return the next line of output; None if it ended or wrote none within `seconds`."""
+        """Return the next line of output; None at the end of the output or after `seconds`."""
         output = self.process.stdout
         assert output is not None
         deadline = time.monotonic() + seconds
@@ -84,7 +84,7 @@ def wait_readable(output: IO[bytes], deadline: float) -> bool:
 
 
 def start_python(arguments: Sequence[str]) -> Child:
-    """Start this interpreter with `-m module ...` or `script.py ...` as a child."""
+    """Start a child that runs this interpreter with `-m module ...` or `script.py ...`."""
     if not arguments or (arguments[0] == "-m" and len(arguments) < 2):
         raise ValueError("arguments must be `-m module ...` or `script.py ...`")
     command = [sys.executable, "-m", "catenary.realtime.child", str(os.getpid()), *arguments]
@@ -94,16 +94,16 @@ def start_python(arguments: Sequence[str]) -> Child:
 def start_program(command: Sequence[str]) -> Child:
     """Start any program as a child."""
     if not command:
-        raise ValueError("command is empty: name a program")
+        raise ValueError("the command is empty; give the name of a program")
     own = [sys.executable, "-m", "catenary.realtime.child", str(os.getpid()), "--exec", *command]
     return Child(subprocess.Popen(own, stdout=subprocess.PIPE, start_new_session=True))
 
 
 def end_with_parent(parent: int) -> None:
-    """Let the kernel send SIGTERM to this process when `parent` ends.
+    """Make the kernel send SIGTERM to this process when `parent` ends.
 
-    Called in the child itself: executing an interpreter with file capabilities, as advised to
-    ordinary users, clears a parent-death signal that was set before. prctl(2).
+    Call this in the child itself. Executing an interpreter with file capabilities, as recommended
+    to ordinary users, clears a parent-death signal set earlier, prctl(2).
     """
     if ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGTERM) != 0 or os.getppid() != parent:
         sys.exit("the parent process has ended")

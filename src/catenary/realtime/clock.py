@@ -1,4 +1,4 @@
-"""The virtual clock of tasks, and its participants.
+"""Virtual clock of tasks, and its participants.
 
 Time stands still while any participant runs. It advances when every participant waits or spends
 execution time. A participant has the clock interface of a loop's segment: `now_ns`, `wait_until`,
@@ -18,7 +18,7 @@ from catenary.realtime._clock import (
 )
 from catenary.realtime.system.memory import SharedMemory
 
-FIRST = 100  # precedes every task: these have 0 (ordinary scheduling) to 99
+FIRST = 100  # above all priorities of tasks, 0 (ordinary scheduling) to 99
 
 
 class Participant:
@@ -42,7 +42,7 @@ class Participant:
         return self.timer.capsule
 
     def wait_until(self, deadline_ns: int) -> bool:
-        """Wait. Return True if the deadline has passed, False if woken before."""
+        """Wait. Return True if the deadline has passed, False if `wake` ended the wait."""
         return self.timer.wait_until(deadline_ns)
 
     def spend(self, seconds: float) -> None:
@@ -54,7 +54,7 @@ class Participant:
         self.timer.wake()
 
     def expect(self) -> None:
-        """Keep time still until the restarted participant first waits."""
+        """Stop the time until the restarted participant first waits."""
         self._time.expect(self.timer.slot)
 
     def step_aside(self) -> None:
@@ -88,7 +88,7 @@ class VirtualClock:
 
         Args:
             priority: fixed priority on the simulated processor; greater is higher.
-            cpu: simulated processor, shared with others by priority; None: its own.
+            cpu: simulated processor, shared by priority; None for its own.
 
         Raises:
             ValueError: the clock already has 64 participants.
@@ -106,18 +106,18 @@ class VirtualClock:
         return self.home.capsule
 
     def wait_until(self, deadline_ns: int) -> bool:
-        """Let time pass for all participants, as the thread that created the clock.
+        """Wait in the thread that created the clock, while time passes for all participants.
 
-        Return False if woken before the deadline.
+        Return True if the deadline has passed, False if a wake-up ended the wait.
         """
         return self.home.wait_until(deadline_ns)
 
     def spend(self, seconds: float) -> None:
-        """Let time pass as if this thread computed for `seconds`, on its own processor."""
+        """Let time pass as if this thread computed for `seconds` on its own processor."""
         self.home.spend(seconds)
 
     def close(self) -> None:
-        """Let time advance without the thread that created the clock."""
+        """Remove the thread that created the clock from the participants."""
         self.home.leave()
 
     def __enter__(self) -> Self:

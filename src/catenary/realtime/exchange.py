@@ -1,8 +1,8 @@
 """Wait-free values and queues between tasks, in threads or processes.
 
-A `Value` holds the latest array, from one writer to any number of readers. A `Queue` passes every
-record from one producer to one consumer. Create both before the tasks start, and pass them as
-arguments. They hold NumPy arrays of one type and shape.
+A `Value` passes the latest array from one writer to any number of readers. A `Queue` passes every
+record from one producer to one consumer. Both hold NumPy arrays of a fixed type and shape. Create
+them before the tasks start, and pass them as arguments.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ class Form:
             raise TypeError(f"{self.dtype} holds Python objects, which processes cannot share")
         self.size = int(self.dtype.itemsize * np.prod(self.shape, dtype=int))
         if self.size <= 0:
-            raise ValueError(f"{self} has no bytes")
+            raise ValueError(f"{self} has a size of 0 bytes")
 
     def __reduce__(self) -> tuple[type[Form], tuple[npt.DTypeLike, tuple[int, ...]]]:
         return Form, (self.dtype, self.shape)
@@ -62,10 +62,10 @@ class Form:
 
 
 class Value:
-    """The latest array of one writer, for any number of readers.
+    """The latest array, passed from one writer to any number of readers.
 
-    If a writer is killed during a write, readers keep the previous value. The task that replaces
-    it can continue to write.
+    If a writer is killed during a write, the previous value remains, and a restarted writer can
+    continue.
     """
 
     def __init__(self, dtype: npt.DTypeLike = "f8", shape: int | tuple[int, ...] = ()) -> None:
@@ -76,7 +76,7 @@ class Value:
             shape: shape of the array.
 
         Raises:
-            ValueError: the array has no bytes.
+            ValueError: the array has a size of 0 bytes.
         """
         self._bind(Form(dtype, shape), None)
 
@@ -98,7 +98,7 @@ class Value:
         return self._core.number
 
     def write(self, data: npt.ArrayLike) -> None:
-        """Publish an array as a whole.
+        """Publish an array. Readers never receive a partly written array.
 
         Raises:
             ValueError: the shape differs.
@@ -112,34 +112,37 @@ class Value:
     def read(self) -> Array:
         """Return a consistent copy of the latest array.
 
-        Raises RuntimeError if 1000 attempts were overwritten while reading.
+        Raises RuntimeError if a write interfered with each of 1000 attempts.
         """
         array = self._form.empty()
         if self._core.read(array) < 0:
-            raise RuntimeError(f"cannot read a value of {self._form.size} bytes: written too fast")
+            raise RuntimeError(
+                f"cannot read a value of {self._form.size} bytes, because a write interfered with "
+                "each of 1000 attempts; write it less often"
+            )
         return array
 
 
 class Silence:
-    """Counter of consecutive reads of a value without a new write: the writer may have ended."""
+    """Counter of consecutive checks without a new value, to detect that the writer has ended."""
 
     def __init__(self, value: Value) -> None:
         self._value = value
         self._number = 0
-        self._looks = 0
+        self._calls = 0
 
     def look(self) -> int:
-        """Return the number of calls since the last new value; 0 before the first value."""
+        """Return the number of calls without a new value; 0 before the first value."""
         before, self._number = self._number, self._value.number
-        self._looks = self._looks + 1 if before == self._number > 0 else 0
-        return self._looks
+        self._calls = self._calls + 1 if before == self._number > 0 else 0
+        return self._calls
 
 
 class Queue:
     """A bounded queue of records, from one producer to one consumer.
 
-    A producer that is killed during `put` leaves no record. A consumer that is killed during
-    `take` finds its record again.
+    If a producer is killed during `put`, the queue is unchanged. If a consumer is killed during
+    `take`, the record stays in the queue.
     """
 
     def __init__(
@@ -156,10 +159,10 @@ class Queue:
             dtype: NumPy type of a record; may be structured.
             shape: shape of a record.
             length: capacity in records.
-            full: a `put` to a full queue can "refuse" the new record or "overwrite" the oldest.
+            full: effect of `put` on a full queue: "refuse" the record or "overwrite" the oldest.
 
         Raises:
-            ValueError: a record has no bytes, or `length` or `full` is out of range.
+            ValueError: a record has a size of 0 bytes, or `length` or `full` is invalid.
         """
         if not 0 < length < 2**31:
             raise ValueError(f"a length of {length} records is not within 1 to 2**31 - 1")
@@ -194,7 +197,7 @@ class Queue:
         return self._core.lost
 
     def put(self, record: npt.ArrayLike) -> bool:
-        """Append a record. Return False if the queue is full: the record is refused and counted.
+        """Append a record. Return False if the queue is full; the refused record is counted.
 
         Raises:
             ValueError: the shape differs.
@@ -218,8 +221,10 @@ class Queue:
 
 
 def claim(what: str, role: str, holder: int) -> int:
-    """Return the calling thread's id; it takes a role that no running thread has."""
-    me = threading.get_native_id()
-    if holder not in (0, me) and os.path.exists(f"/proc/{holder}"):
-        raise RuntimeError(f"this {what} already has a {role}, thread {holder}; it takes only one")
-    return me
+    """Return the id of the calling thread. Raises RuntimeError if another thread has the role."""
+    thread = threading.get_native_id()
+    if holder not in (0, thread) and os.path.exists(f"/proc/{holder}"):
+        raise RuntimeError(
+            f"this {what} already has a {role}: thread {holder}. Only one thread can have this role"
+        )
+    return thread

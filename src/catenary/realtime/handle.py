@@ -1,4 +1,4 @@
-"""Handle: one running task, as its starter controls it."""
+"""Handle: control of one running task from the process that started it."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ class Handle:
 
     @property
     def process(self) -> int:
-        """Id of its process; 0 before the start."""
+        """Process id of the task; 0 before it starts."""
         return self.block.process
 
     @property
@@ -59,7 +59,7 @@ class Handle:
         return read_statistics(self.name, self.block)
 
     def histogram(self, figure: str) -> list[tuple[float, float, int]]:
-        """Return (lower edge, upper edge, jobs) of each bucket of a figure; times in [s]."""
+        """Return (lower edge, upper edge, jobs) of every bucket of a figure; times in [s]."""
         return read_histogram(self.block, figure)
 
     def stop(self) -> None:
@@ -75,34 +75,34 @@ class Handle:
             self.place.participant.expect()
 
     def leave(self) -> None:
-        """Leave the clock: the worker has ended, or was never started."""
+        """Leave the clock, because the worker has ended or was never started."""
         if self.place.participant is not None:
             self.place.participant.leave()
         if self.running:
             self.block.state = FAILED
 
     def failure(self, exit_code: int | None) -> TaskError | None:
-        """Return the error with which its worker ended; None if it ended normally."""
+        """Return the error that ended the worker; None if it ended normally."""
         if self.block.state == ENDED:
             return None
         if self.block.state == FAILED:
-            what, _, hint = self.block.failure.partition("\n  hint: ")  # as errors print it
-            message = f"{self.task}{self._where()}: {what}"
+            text, _, hint = self.block.failure.partition("\n  hint: ")  # the format of `str(error)`
+            message = f"{self.task}{self._where()}: {text}"
             return TaskError(message, task=self.name, exit_code=exit_code, hint=hint)
         if self.block.state == NEW:
             return TaskError(
-                f"{self.task}: its process {how_it_died(exit_code)} before it could start",
+                f"{self.task}: its process {describe_exit(exit_code)} before it could start",
                 task=self.name,
                 exit_code=exit_code,
-                hint="its output shows the cause; it imports the program's file, so put the code "
-                'that starts the program under `if __name__ == "__main__":`',
+                hint="its output shows the cause. Each process imports the program's file, so put "
+                'the code that starts the tasks under `if __name__ == "__main__":`',
             )
         return TaskError(
-            f"{self.task} (process {self.process}) {how_it_died(exit_code)}{self._where()}",
+            f"{self.task} (process {self.process}) {describe_exit(exit_code)}{self._where()}",
             task=self.name,
             exit_code=exit_code,
-            hint='on_failure="restart" starts such a task again; '
-            "SIGKILL comes from another process, or from the kernel out of memory (dmesg)",
+            hint='on_failure="restart" restarts such a task. SIGKILL comes from another process, '
+            "or from the kernel if memory runs out (see dmesg)",
         )
 
     def _where(self) -> str:
@@ -113,7 +113,7 @@ class Handle:
         return f" {inside} job {self.block.number}, released at {released:.6f} s"
 
 
-def how_it_died(exit_code: int | None) -> str:
+def describe_exit(exit_code: int | None) -> str:
     if exit_code is not None and exit_code < 0:
         return f"was killed by {signal.Signals(-exit_code).name}"
     return f"ended with exit status {exit_code}"

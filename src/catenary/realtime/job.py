@@ -6,7 +6,7 @@ from catenary.realtime._task import Releases
 
 
 class Job:
-    """The current job: one release of a task. The object is reused: copy the values you keep."""
+    """The current job of a task. The next job reuses the object: copy the values you keep."""
 
     __slots__ = ("_origin_ns", "_releases")
 
@@ -16,7 +16,7 @@ class Job:
 
     @property
     def number(self) -> int:
-        """Number of the job, from 0. Skipped releases leave gaps only in `time`."""
+        """Number of the job, from 0. Skipped releases are not counted, but leave gaps in `time`."""
         return self._releases.number
 
     @property

@@ -1,9 +1,10 @@
-/* The latest value, from one writer to any number of readers in any process; neither side waits.
+/* Wait-free latest value, from one writer to any number of readers. All may be in different
+ * processes.
  *
  * The writer uses four slots in turn. Each has a sequence number that is odd during a write (a
- * seqlock). A reader copies the slot published last. It tries again if that slot was overwritten
- * meanwhile: the writer must publish three values during one copy for that. A writer that is killed
- * during a write leaves the previous value; the next writer continues from there.
+ * seqlock). A reader copies the slot published last, and repeats the copy if that slot was
+ * overwritten. This happens only if the writer publishes three values during one copy. If a writer
+ * is killed during a write, the previous value remains, and the next writer continues from there.
  */
 #ifndef CATENARY_LATEST_VALUE_H
 #define CATENARY_LATEST_VALUE_H
@@ -19,7 +20,7 @@
 typedef struct latest_value {
     uint64_t number;                  /* values published; the last is in slot number % SLOTS */
     uint64_t sequence[VALUE_SLOTS];
-    int32_t writer;                   /* the thread that writes, 0: none yet */
+    int32_t writer;                   /* id of its thread; 0 if none yet */
     uint32_t size;
     uint8_t slots[] __attribute__((aligned(64)));
 } latest_value;
@@ -38,7 +39,7 @@ static void value_write(latest_value *v, const void *bytes) {
     __atomic_store_n(&v->number, number, __ATOMIC_RELEASE);
 }
 
-/* Return the number of the copied value, or -1 if every attempt was overwritten. */
+/* Copy the value. Return its number, or -1 if a write interfered with every attempt. */
 static int64_t value_read(latest_value *v, void *bytes) {
     for (int k = 0; k < VALUE_TRIES; k++) {
         uint64_t number = cat_load_acquire64(&v->number);

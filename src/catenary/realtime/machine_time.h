@@ -1,4 +1,4 @@
-/* The machine's clock, CLOCK_MONOTONIC, for one waiter that others can wake. */
+/* The machine's clock, CLOCK_MONOTONIC, for one waiting thread that other threads can wake. */
 #ifndef CATENARY_MACHINE_TIME_H
 #define CATENARY_MACHINE_TIME_H
 
@@ -12,7 +12,7 @@
 
 typedef struct machine_time {
     uint32_t wakes;                   /* futex word */
-    uint32_t seen;                    /* wake-ups that the waiter has consumed */
+    uint32_t seen;                    /* wake-ups that the waiting thread has consumed */
 } machine_time;
 
 static inline int64_t machine_read(clockid_t clock) {

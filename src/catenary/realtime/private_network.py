@@ -1,10 +1,10 @@
 """Private network namespace: real frames over veth pairs, without hardware or side effects.
 
-    state = private_network.enter()         # runs this program again, inside
+    state = private_network.enter()         # restarts this program inside
     if isinstance(state, Refused):
         print(f"no real frames: {state.reason}")
 
-Call `enter` at the start of `main`, before anything is started or opened. From a shell:
+Call `enter` at the start of `main`, before the program starts threads or opens files. From a shell:
 `python -m catenary.realtime.private_network -m pytest`.
 """
 
@@ -24,9 +24,9 @@ from pathlib import Path
 VARIABLE = "CATENARY_PRIVATE_NETWORK"  # in the environment of a program run by `enter`
 INSIDE = "inside"
 MODULE = "catenary.realtime.private_network"
-PROBE_SECONDS = 30.0  # a refusal is prompt, but a busy machine is slow
+PROBE_SECONDS = 30.0  # generous, because a busy machine is slow
 ETHERTYPE = 0x88A4
-CARRIER_SECONDS, LOOK_SECONDS = 2.0, 0.001  # timeout; between two checks
+CARRIER_SECONDS, CHECK_SECONDS = 2.0, 0.001  # timeout, and interval of the checks
 STATE_UP = " state UP "
 
 
@@ -37,13 +37,13 @@ class Private:
 
 @dataclass(frozen=True, slots=True)
 class Refused:
-    """State of a process for which the machine provides no namespace with real frames."""
+    """State of a process that has no private network; `reason` is the cause."""
 
     reason: str
 
 
 def state() -> Private | Refused:
-    """Return whether this process is in a private network, without changing it."""
+    """Return `Private` in a private network, otherwise `Refused` with the reason."""
     value = os.environ.get(VARIABLE, "")
     if value == INSIDE:
         return Private()
@@ -51,46 +51,46 @@ def state() -> Private | Refused:
 
 
 def enter(command: Sequence[str] | None = None) -> Private | Refused:
-    """Replace this process by `command` (default: this program again) in its own namespace.
+    """Replace this process by `command` in a new namespace; the default restarts this program.
 
     Return only if this process is already inside, or if the namespace is refused.
     """
     if VARIABLE in os.environ:
         return state()
-    way = find_way()
-    if isinstance(way, Refused):
-        os.environ[VARIABLE] = way.reason  # probe only once; children inherit the result
-        return way
+    unshare = find_namespace()
+    if isinstance(unshare, Refused):
+        os.environ[VARIABLE] = unshare.reason  # children inherit the result and do not probe again
+        return unshare
     command = command or [sys.executable, *sys.orig_argv[1:]]
     sys.stdout.flush()
     sys.stderr.flush()
-    os.execvpe(way[0], [*way, *inside_command(command)], {**os.environ, VARIABLE: INSIDE})
+    os.execvpe(unshare[0], [*unshare, *inside_command(command)], {**os.environ, VARIABLE: INSIDE})
 
 
-def find_way() -> list[str] | Refused:
-    """Return the `unshare` command that gives a working namespace, found by probing."""
+def find_namespace() -> list[str] | Refused:
+    """Return the `unshare` command that creates a working namespace, found by probing."""
     if sys.platform != "linux":
         return Refused("private network namespaces exist only on Linux")
     for tool, package in (("unshare", "util-linux"), ("ip", "iproute2")):
         if shutil.which(tool) is None:
             return Refused(f"`{tool}` is not installed (package {package})")
     as_user = ["unshare", "--user", "--map-root-user", "--net"]
-    ways = [["unshare", "--net"], as_user] if os.geteuid() == 0 else [as_user]
+    candidates = [["unshare", "--net"], as_user] if os.geteuid() == 0 else [as_user]
     reasons = []
-    for way in ways:
-        reason = probe(way)
+    for unshare in candidates:
+        reason = probe(unshare)
         if not reason:
-            return way
-        reasons.append(f"`{' '.join(way)}`: {reason}")
+            return unshare
+        reasons.append(f"`{' '.join(unshare)}`: {reason}")
     return Refused("; ".join(reasons))
 
 
-def probe(way: Sequence[str]) -> str:
-    """Return why real frames do not work in this namespace; "" if they do.
+def probe(unshare: Sequence[str]) -> str:
+    """Return the reason why real frames fail in such a namespace; "" if they work.
 
-    AppArmor of Ubuntu 24.04 permits `unshare` but refuses the next steps, so probe all of them.
+    Probe all steps, because AppArmor on Ubuntu 24.04 permits `unshare` but refuses later steps.
     """
-    command = [*way, *inside_command([sys.executable, "-m", MODULE, "--probe"])]
+    command = [*unshare, *inside_command([sys.executable, "-m", MODULE, "--probe"])]
     try:
         done = subprocess.run(
             command, capture_output=True, text=True, timeout=PROBE_SECONDS, check=False
@@ -101,12 +101,12 @@ def probe(way: Sequence[str]) -> str:
 
 
 def inside_command(command: Sequence[str]) -> list[str]:
-    """Return `command`, preceded by the setup that a new namespace needs."""
+    """Return `command`, preceded by the setup of a new namespace."""
     return ["sh", "-c", 'ip link set lo up; exec "$0" "$@"', *command]
 
 
 def try_real_frames() -> None:
-    """Send one frame over a new veth pair. Raises OSError if refused."""
+    """Send one frame over a new veth pair. Raises OSError if this fails."""
     frame = b"\xff" * 6 + bytes(6) + ETHERTYPE.to_bytes(2, "big") + bytes(46)
     with (
         veth_pair() as (first, second),
@@ -122,7 +122,7 @@ def try_real_frames() -> None:
 
 @contextlib.contextmanager
 def veth_pair() -> Iterator[tuple[str, str]]:
-    """Create two connected interfaces, up and without IPv6; yield their names, then remove them."""
+    """Create two connected interfaces without IPv6, yield their names, and remove them."""
     first, second = make_veth_pair()
     try:
         yield first, second
@@ -131,13 +131,13 @@ def veth_pair() -> Iterator[tuple[str, str]]:
 
 
 def make_veth_pair() -> tuple[str, str]:
-    """Create a pair as `veth_pair` does; it exists as long as the namespace. Return the names."""
+    """Create a veth pair that exists until the namespace ends, and return the two names."""
     taken = {name for _, name in socket.if_nameindex()}
     number = next(n for n in range(len(taken) + 1) if f"cat{n}a" not in taken)
     names = f"cat{number}a", f"cat{number}b"
     run_ip("link", "add", "name", names[0], "type", "veth", "peer", "name", names[1])
     for name in names:
-        silence(name)
+        disable_ipv6(name)
         run_ip("link", "set", name, "up")
     for name in names:
         await_carrier(name)
@@ -147,22 +147,22 @@ def make_veth_pair() -> tuple[str, str]:
 def await_carrier(name: str) -> None:
     """Wait until the interface is up, at most CARRIER_SECONDS.
 
-    The kernel notices asynchronously that both ends are up, and silently drops frames until then.
-    After the timeout, continue: some kernels never report the state.
+    The kernel detects the carrier asynchronously, and silently drops frames until then. After the
+    timeout, continue, because some kernels never report the state.
     """
     until = time.monotonic() + CARRIER_SECONDS
     while STATE_UP not in run_ip("-o", "link", "show", name) and time.monotonic() < until:
-        time.sleep(LOOK_SECONDS)
+        time.sleep(CHECK_SECONDS)
 
 
-def silence(name: str) -> None:
-    """Disable IPv6: a real EtherCAT cable carries no router solicitations."""
+def disable_ipv6(name: str) -> None:
+    """Disable IPv6, because a real EtherCAT cable carries no router solicitations."""
     with contextlib.suppress(OSError):  # no IPv6 in this kernel, or /proc/sys is read-only
         Path("/proc/sys/net/ipv6/conf", name, "disable_ipv6").write_text("1")
 
 
 def run_ip(*arguments: str) -> str:
-    """Run `ip` and return its output. Raises OSError with its error output if it fails."""
+    """Run `ip` and return its output. Raises OSError with the error output if it fails."""
     done = subprocess.run(["ip", *arguments], capture_output=True, text=True, check=False)
     if done.returncode != 0:
         raise OSError(f"ip {' '.join(arguments)}: {done.stderr.strip()}")
@@ -170,7 +170,7 @@ def run_ip(*arguments: str) -> str:
 
 
 def main(arguments: Sequence[str]) -> None:
-    """Run Python with `arguments` inside; if refused, print the reason and run it here."""
+    """Run Python with `arguments` in a private network, or in the current one if refused."""
     if list(arguments) == ["--probe"]:
         try:
             try_real_frames()

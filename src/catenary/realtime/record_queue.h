@@ -1,11 +1,11 @@
-/* A bounded queue of records of one size, from one producer to one consumer in any process;
- * neither side waits.
+/* Wait-free bounded queue of records of one size, from one producer to one consumer. Both may be
+ * in different processes.
  *
  * The record with ticket t is in slot t % length. The slot's stamp is t + 1 once the record is
  * complete. When the queue is full, the producer either refuses the newest record or overwrites the
- * oldest. In the latter case the consumer detects the changed stamp and skips the lost records. A
- * producer that is killed during a put leaves no record. A consumer that is killed during a take
- * finds the record again.
+ * oldest. In the latter case the consumer detects the changed stamp and skips the lost records. If
+ * a producer is killed during a put, the queue is unchanged. If a consumer is killed during a take,
+ * the record stays in the queue.
  */
 #ifndef CATENARY_RECORD_QUEUE_H
 #define CATENARY_RECORD_QUEUE_H
@@ -18,11 +18,11 @@
 typedef struct record_queue {
     uint64_t put __attribute__((aligned(64)));    /* written by the producer: records put */
     uint64_t refused;
-    int32_t producer;                             /* its thread, 0: none yet */
+    int32_t producer;                             /* id of its thread; 0 if none yet */
     uint64_t taken __attribute__((aligned(64)));  /* written by the consumer: records taken or lost */
     uint64_t lost;
     int32_t consumer;
-    uint32_t size;                                /* of a record */
+    uint32_t size;                                /* of a record [bytes] */
     uint32_t length;                              /* in records */
     uint32_t overwrite;
 } record_queue;
@@ -39,7 +39,7 @@ static inline uint64_t queue_memory(uint32_t size, uint32_t length) {
     return sizeof(record_queue) + (uint64_t)length * (sizeof(uint64_t) + size);
 }
 
-/* Append a record. Return 0 if the queue is full and refuses it, else 1. */
+/* Append a record. Return 1, or 0 if the queue is full and refuses it. */
 static int queue_put(record_queue *q, const void *bytes) {
     uint64_t ticket = q->put;
     if (!q->overwrite && ticket - cat_load_acquire64(&q->taken) >= q->length) {
@@ -55,8 +55,8 @@ static int queue_put(record_queue *q, const void *bytes) {
     return 1;
 }
 
-/* Take the oldest record that still exists. Return 0 if the queue is empty, or if records are
- * overwritten faster than they can be copied; else 1. */
+/* Take the oldest record that still exists. Return 1, or 0 if the queue is empty or if records are
+ * overwritten faster than they can be copied. */
 static int queue_take(record_queue *q, void *bytes) {
     for (uint32_t tries = 0; tries < 1000; tries++) {
         uint64_t ticket = q->taken, put = cat_load_acquire64(&q->put);

@@ -1,4 +1,4 @@
-"""The task object that the task's own function receives: `for job in task:`."""
+"""Running: the object that a task's function receives as its first argument."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from catenary.realtime.task import Task, check_period
 
 
 class Running:
-    """The running task, as its own function sees it."""
+    """Interface of a running task for its own function: `for job in task:`."""
 
     def __init__(self, task: Task, block: Block, timer: Timer) -> None:
         self._task = task
@@ -27,7 +27,7 @@ class Running:
 
     @property
     def now_ns(self) -> int:
-        """Time of the task's clock [ns]: CLOCK_MONOTONIC, or virtual time."""
+        """Time of the task's clock [ns]: CLOCK_MONOTONIC or virtual time."""
         return self._timer.now_ns
 
     @property
@@ -44,7 +44,7 @@ class Running:
             yield self._job
 
     def wait(self) -> bool:
-        """End the current job and wait for the next release. Return False if the task must end."""
+        """End the current job and wait for the next release. Return False on a stop request."""
         self.finish()
         return self._releases.wait()
 
@@ -56,16 +56,17 @@ class Running:
             self._task.on_miss(self._job)
         elif self._task.on_miss == "stop":
             raise TaskError(
-                f"the job ended after its deadline of {self._block.deadline_ns * 1e-6:.3f} ms",
+                f"a job ended after its deadline of {self._block.deadline_ns * 1e-6:.3f} ms",
                 task=self.name,
-                hint='its statistics show how long jobs take; on_miss="count" continues',
+                hint="the task's statistics show its response times; "
+                'on_miss="count" continues after a miss',
             )
 
     def spend(self, seconds: float) -> None:
         """Spend execution time [s].
 
-        On a virtual clock, time passes and tasks of higher priority preempt this one. On the
-        machine's clock, the thread computes that long without the GIL.
+        On a virtual clock, time passes, and tasks of higher priority preempt this one. On the
+        machine's clock, the thread uses this much processor time without the GIL.
         """
         self._releases.spend(round(seconds * 1e9))
 
@@ -75,5 +76,5 @@ class Running:
 
     @property
     def releases(self) -> Releases:
-        """Compiled object that computes the releases."""
+        """Compiled object that waits for the releases."""
         return self._releases

@@ -33,16 +33,16 @@ class Statistics:
     name: str
     jobs: int  # released
     misses: int  # ended after the deadline
-    skipped: int  # releases that did not happen
+    skipped: int  # releases skipped after a miss or a restart
     signals_refused: int
-    scheduling: str  # settings that its thread obtained, and those refused
+    scheduling: str  # settings of its thread, and refused requests
     period: Figure  # [s] from start to start
     jitter: Figure  # [s] from release to start
     response: Figure  # [s] from release to end
     execution: Figure  # [s] processor time of the thread; on a virtual clock, the time spent
     page_faults: Figure  # per job
-    switches: Figure  # involuntary ones, per job
-    collections: Figure  # runs of the garbage collector in its process, per job
+    switches: Figure  # involuntary context switches per job
+    collections: Figure  # runs of the garbage collector in its process per job
 
 
 def read_statistics(name: str, block: Block) -> Statistics:
@@ -84,7 +84,7 @@ def measured_demand(task: Task, statistics: Statistics) -> Demand:
 
 
 def as_table(all_statistics: Iterable[Statistics]) -> str:
-    """Format one line per task; times as mean/max/min/sd, as in the published tables."""
+    """Format a table with one line per task; times are mean/max/min/sd, as in published tables."""
     lines = [
         f"{'task':14}{'jobs':>8}{'missed':>8}"
         + "".join(f"{name + ' [ms]: mean/max/min/sd':>36}" for name in ("period", "response"))

@@ -1,8 +1,8 @@
-"""Supervisor: detect the end of tasks, for whatever reason, and apply their failure policies.
+"""Supervisor: detect the end of each task and apply its failure policy.
 
-The sentinel of a process becomes readable when the process ends, also after SIGKILL. One thread
-starts and watches all processes, because a parent-death signal is bound to the lifetime of the
-thread that started the process, prctl(2).
+The sentinel of a process becomes readable when the process ends, even after SIGKILL. One thread
+starts and monitors all processes, because the kernel sends the parent-death signal when the thread
+that started the process ends, prctl(2).
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from catenary.realtime._task import FAILED
 from catenary.realtime.handle import Handle
 from catenary.realtime.worker import ProcessWorker, Worker
 
-RESTARTS = 3  # of one task; its next failure stops all tasks
+RESTARTS = 3  # maximum for each task; the next failure stops all tasks
 KILL_SECONDS = 2.0  # from SIGTERM to SIGKILL, and from SIGKILL to the end
 
 
@@ -45,7 +45,7 @@ class Supervisor:
         self._workers = {name: make_worker(handle, self) for name, handle in handles.items()}
         self._alive = set(handles)
         self._restarts = dict.fromkeys(handles, 0)
-        self._stubborn: set[str] = set()
+        self._overdue: set[str] = set()
         self._failures: list[TaskError] = []
         self._fatal: TaskError | None = None
         self._raised = False
@@ -60,27 +60,27 @@ class Supervisor:
         """Start all workers."""
         self._started = True
         if any(isinstance(worker, ProcessWorker) for worker in self._workers.values()):
-            threading.Thread(target=self._watch, name="task supervisor", daemon=True).start()
+            threading.Thread(target=self._monitor, name="task supervisor", daemon=True).start()
             return
         for name in self._workers:
             self._start(name)
 
     def wait(self, seconds: float | None) -> bool:
-        """Wait until all tasks have ended; return False after `seconds`."""
+        """Wait until all tasks have ended. Return False if they have not after `seconds`."""
         return self._all_ended.wait(seconds)
 
     def raise_failure(self) -> None:
-        """Raise the failure that stopped all tasks, if any; only once."""
+        """Raise the failure that stopped all tasks, if any. Later calls do nothing."""
         if self._fatal is not None and not self._raised:
             self._raised = True
             raise self._fatal
 
     def thread_ended(self, name: str) -> None:
-        """Handle the end of a task's thread; its last action."""
-        if self._take_note(name):
+        """Handle the end of a task's thread, which calls this as its last action."""
+        if self._record_end(name):
             self._start(name)
 
-    def ask_to_stop(self) -> None:
+    def request_stop(self) -> None:
         """Request a stop: each task ends when it next waits."""
         self._stopping = True
         for handle in self._handles.values():
@@ -100,18 +100,18 @@ class Supervisor:
     def _kill(self, number: signal.Signals, seconds: float) -> bool:
         """Record the tasks that did not end, and send them a signal.
 
-        Return False if threads are among them: a thread cannot be killed.
+        Return False if some of them are threads, which cannot be killed.
         """
         with self._lock:
             alive = sorted(self._alive)
             for name in alive:
-                if name not in self._stubborn:
-                    self._fail(would_not_end(self._handles[name], seconds))
-            self._stubborn.update(alive)
+                if name not in self._overdue:
+                    self._fail(overdue_error(self._handles[name], seconds))
+            self._overdue.update(alive)
         return all([self._workers[name].kill(number) for name in alive])
 
-    def _watch(self) -> None:
-        """Start the processes and wait for their ends; body of the supervisor thread."""
+    def _monitor(self) -> None:
+        """Start the processes and wait until they end: the body of the supervisor thread."""
         to_start = list(self._workers)
         running: dict[int, str] = {}
         while to_start or running:
@@ -121,32 +121,32 @@ class Supervisor:
                     running[worker.sentinel] = name
             to_start = []
             for ready in connection.wait(list(running)) if running else ():
-                assert isinstance(ready, int)  # it was one of the sentinels
+                assert isinstance(ready, int)  # connection.wait returns the given sentinels
                 name = running.pop(ready)
-                if self._take_note(name):
+                if self._record_end(name):
                     to_start.append(name)
 
     def _start(self, name: str) -> Worker | None:
-        """Start a worker. Return None if that failed; the failure is recorded."""
+        """Start a worker. If this fails, record the failure and return None."""
         worker = self._workers[name]
         try:
             worker.start()
-        except Exception as error:  # from pickling the arguments, or from limits of the system
+        except Exception as error:  # the arguments cannot be pickled, or a system limit is reached
             block = self._handles[name].block
             block.failure = f"the task could not be started: {' '.join(str(error).split())}"
             block.state = FAILED
-            self._take_note(name, may_restart=False)
+            self._record_end(name, may_restart=False)
             return None
         return worker
 
-    def _take_note(self, name: str, *, may_restart: bool = True) -> bool:
-        """Record the end of a task. Return True if its new worker must be started."""
+    def _record_end(self, name: str, *, may_restart: bool = True) -> bool:
+        """Record the end of a task. Return True if the caller must start its new worker."""
         handle = self._handles[name]
         with self._lock:
             failure = handle.failure(self._workers[name].wait())
-            if failure is not None and name not in self._stubborn:
+            if failure is not None and name not in self._overdue:
                 self._failures.append(failure)
-                if may_restart and self._wants_restart(handle):
+                if may_restart and self._can_restart(handle):
                     self._restarts[name] += 1
                     handle.make_ready_again()
                     self._workers[name] = self._make_worker(handle, self)
@@ -157,24 +157,24 @@ class Supervisor:
             handle.leave()
             last = not self._alive
         if self._fatal is not None and not self._stopping:
-            self.ask_to_stop()
+            self.request_stop()
             self._on_failure()
         if last:
             self._all_ended.set()
         return False
 
-    def _wants_restart(self, handle: Handle) -> bool:
-        wanted = handle.task.on_failure == "restart" and not self._stopping
-        return wanted and self._restarts[handle.name] < RESTARTS
+    def _can_restart(self, handle: Handle) -> bool:
+        requested = handle.task.on_failure == "restart" and not self._stopping
+        return requested and self._restarts[handle.name] < RESTARTS
 
     def _fail(self, failure: TaskError) -> None:
         self._failures.append(failure)
         self._fatal = self._fatal or failure
 
 
-def would_not_end(handle: Handle, seconds: float) -> TaskError:
+def overdue_error(handle: Handle, seconds: float) -> TaskError:
     return TaskError(
         f"{handle.task} did not end within {seconds:g} s after the stop request",
         task=handle.name,
-        hint="a task notices a stop request when it waits: use `for job in task`",
+        hint="a task detects a stop request only when it waits; use `for job in task`",
     )

@@ -1,4 +1,4 @@
-"""Task: a function with a period, a priority and policies. A value; `Tasks` runs it."""
+"""Task: an immutable description of a function, its period, priority and policies."""
 
 from __future__ import annotations
 
@@ -23,17 +23,20 @@ PAGE = 4096
 
 @dataclass(frozen=True, slots=True)
 class Task:
-    """A function that runs as a task: `function(task, *arguments)` with `for job in task:`.
+    """A function that `Tasks` runs as `function(task, *arguments)`, with `for job in task:`.
 
     Args:
-        period: Time between two releases [s]. With a `trigger`: the minimum time between them.
-        name: Name in reports and errors. Default: the name of the function.
-        priority: SCHED_FIFO priority, 1 to 99; a larger number is higher. None: ordinary
+        function: Function of the task. Its first argument is the running task.
+        arguments: Further arguments of the function.
+        period: Time between two releases [s]. With a `trigger`, it is the minimum time.
+        name: Name in reports and errors; by default, the name of the function.
+        priority: SCHED_FIFO priority, 1 to 99; a larger number is higher. None for ordinary
             scheduling.
-        cpu: Processor on which the task runs. None: any.
-        stack_size: Size of the stack, a multiple of 4096 from 32 KiB [bytes].
-        deadline: Deadline after the release [s]. None: the period.
-        trigger: Signal of a sporadic task. The task sleeps until the signal is set.
+        cpu: Processor on which the task runs; None for any.
+        stack_size: Size of the stack [bytes], a multiple of 4096, at least 32 KiB. None for the
+            default size.
+        deadline: Deadline after the release [s]; None for the period.
+        trigger: Signal that releases a sporadic task; None for a periodic task.
         on_miss: Reaction to a missed deadline. "count": count the job and continue with the next
             release, late or not. "skip": skip the releases that have passed. "stop": stop the task
             with an error. A function: call it with the late job.
@@ -55,7 +58,7 @@ class Task:
 
     def __post_init__(self) -> None:
         if not callable(self.function):
-            raise TypeError(f"the task's function is {self.function!r}, which is not callable")
+            raise TypeError(f"the task's function {self.function!r} is not callable")
         if not isinstance(self.arguments, tuple):
             raise TypeError(f"arguments must be a tuple such as (x,), not {self.arguments!r}")
         if not self.name:
@@ -72,7 +75,7 @@ class Task:
 
 
 def check_period(task: str, what: str, seconds: float) -> int:
-    """Return a time in ns.
+    """Convert a time to whole nanoseconds.
 
     Args:
         task: name of the task, for errors.
@@ -80,8 +83,8 @@ def check_period(task: str, what: str, seconds: float) -> int:
         seconds: the time [s].
 
     Raises:
-        TypeError: not a number.
-        ValueError: not positive, too short or too long.
+        TypeError: `seconds` is not a number.
+        ValueError: `seconds` is not positive, too short or too long.
     """
     if isinstance(seconds, bool) or not isinstance(seconds, int | float):
         raise TypeError(f"task {task!r}: {what} must be a number of seconds, not {seconds!r}")
@@ -90,28 +93,30 @@ def check_period(task: str, what: str, seconds: float) -> int:
     if seconds < SHORTEST_PERIOD:
         raise ValueError(
             f"task {task!r}: a {what} of {seconds * 1e6:g} us is too short, because wake-ups "
-            f"take microseconds: use at least {SHORTEST_PERIOD * 1e6:g} us"
+            f"take microseconds; use at least {SHORTEST_PERIOD * 1e6:g} us"
         )
     if seconds > LONGEST_PERIOD:
         raise ValueError(
             f"task {task!r}: a {what} of {seconds:g} s is longer than {LONGEST_PERIOD:g} s; "
-            "is it in seconds?"
+            "give it in seconds"
         )
     return round(seconds * 1e9)
 
 
 def check_place(task: Task) -> None:
-    """Check priority, processor and stack size. Raises ValueError if no machine has them."""
+    """Check priority, processor and stack size. Raises ValueError if one is out of range."""
     if task.priority is not None and task.priority not in PRIORITIES:
         raise ValueError(
-            f"{task}: priority {task.priority} is not within 1..99; None is ordinary scheduling"
+            f"{task}: priority {task.priority} is not within 1..99; use None for ordinary "
+            "scheduling"
         )
     if task.cpu is not None and (not isinstance(task.cpu, int) or not 0 <= task.cpu < 1024):
         raise ValueError(f"{task}: CPU {task.cpu} does not exist")
     size = task.stack_size
     if size is not None and (size < SMALLEST_STACK or size % PAGE):
         raise ValueError(
-            f"{task}: invalid stack of {size} bytes: use a multiple of {PAGE} from {SMALLEST_STACK}"
+            f"{task}: invalid stack size of {size} bytes; use a multiple of {PAGE}, at least "
+            f"{SMALLEST_STACK}"
         )
 
 

@@ -1,6 +1,6 @@
-/* A periodic or sporadic task: its releases, deadlines and statistics, in memory that processes
- * share. The task's own thread writes the job and the figures; other threads write `stop`, `period`
- * and signals. Budget per job: two readings of three clocks and of getrusage, about 2 us.
+/* Releases, deadlines and statistics of a periodic or sporadic task, in shared memory. The task's
+ * own thread writes the job and the figures; other threads write `stop`, `period` and signals.
+ * Time budget per job: two readings of three clocks and of getrusage, about 2 us.
  */
 #ifndef CATENARY_TASK_BLOCK_H
 #define CATENARY_TASK_BLOCK_H
@@ -19,14 +19,14 @@
 
 enum { TASK_NEW, TASK_STARTED, TASK_ENDED, TASK_FAILED };
 
-/* quantities of each job; one histogram for each */
+/* quantities of a job; each has a histogram */
 enum {
     FIGURE_PERIOD,                    /* from start to start [ns] */
     FIGURE_JITTER,                    /* from the release to the start [ns] */
     FIGURE_RESPONSE,                  /* from the release to the end [ns] */
-    FIGURE_EXECUTION,                 /* the thread's processor time [ns]; on a virtual clock the time spent */
+    FIGURE_EXECUTION,                 /* processor time of the thread [ns]; on a virtual clock, the time spent */
     FIGURE_PAGE_FAULTS,
-    FIGURE_SWITCHES,                  /* involuntary ones */
+    FIGURE_SWITCHES,                  /* involuntary context switches */
     FIGURE_COLLECTIONS,               /* of Python's garbage collector, in its process */
     FIGURES
 };
@@ -44,19 +44,19 @@ typedef struct task_block {
     uint32_t stop;
     uint32_t sporadic;
     uint32_t skip;                    /* after a miss, skip the releases that have passed */
-    int64_t origin;                   /* the first release; 0: not known yet */
+    int64_t origin;                   /* time of the first release; 0 until it is set */
     uint32_t origin_set;              /* futex word */
     int32_t process;
     int64_t period;
-    int64_t deadline;                 /* 0: the period */
+    int64_t deadline;                 /* 0 if it equals the period */
 
-    uint64_t signalled;               /* sporadic: number of signals; their times below */
+    uint64_t signalled;               /* sporadic tasks: number of signals; their times follow */
     uint64_t signals_refused;
     uint64_t taken;
     int64_t signal_times[TASK_SIGNALS];
 
     uint64_t number;                  /* of the running or last job */
-    uint32_t busy;                    /* between its start and its end */
+    uint32_t busy;                    /* 1 between the start and the end of a job */
     uint32_t missed;                  /* the last job ended after its deadline */
     int64_t release;
     int64_t start;
@@ -90,7 +90,7 @@ static int64_t task_deadline(const task_block *b) {
     return deadline ? deadline : task_load(&b->period);
 }
 
-/* A signal releases a sporadic task, at the earliest one period after its last release. */
+/* Return the release time of the next signal: at least one period after the last release. */
 static int64_t task_next_signal(const task_block *b) {
     if (cat_load_acquire64(&b->signalled) == b->taken) return CAT_CLOCK_FOREVER;
     int64_t signalled = task_load(&b->signal_times[b->taken % TASK_SIGNALS]);
@@ -159,7 +159,7 @@ static int task_finish(task_block *b, const cat_clock *clock) {
     return (int)b->missed;
 }
 
-/* Release a sporadic task once. Return 0 if too many signals are pending: this one is dropped. */
+/* Release a sporadic task once. Return 0 if too many signals are pending; this one is dropped. */
 static int task_signal(task_block *b, int64_t now) {
     uint64_t waiting = cat_load_acquire64(&b->signalled) - cat_load_relaxed64(&b->taken);
     if (waiting >= TASK_SIGNALS) {

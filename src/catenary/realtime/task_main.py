@@ -25,7 +25,7 @@ from catenary.realtime.task import Task
 from catenary.realtime.task_memory import Place
 
 START_SECONDS = 60.0  # maximum from the start of one task to the start of all
-STACK_LEFT = 32 * 1024  # [bytes] not touched: already in use
+STACK_LEFT = 32 * 1024  # [bytes] not pre-faulted, because it is already in use
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,27 +38,27 @@ class Work:
 
 
 def run_in_process(work: Work, session: Session | None, parent: int) -> None:
-    """Run a task in its process. Exit with status 1 if it fails; its block has the reason."""
+    """Run a task in its process. If it fails, store the reason in its block and exit with 1."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent handles Ctrl-C and stops its tasks
     signal.signal(signal.SIGTERM, end_now)
     libc.signal_on_parents_death(signal.SIGTERM)
     if os.getppid() != parent:
         sys.exit("the parent process has ended")
     if work.task.stack_size is not None:
-        _, most = resource.getrlimit(resource.RLIMIT_STACK)
-        resource.setrlimit(resource.RLIMIT_STACK, (work.task.stack_size, most))
+        _, hard_limit = resource.getrlimit(resource.RLIMIT_STACK)
+        resource.setrlimit(resource.RLIMIT_STACK, (work.task.stack_size, hard_limit))
     with session or contextlib.nullcontext():
         failed = not run(work)
     sys.exit(1 if failed else 0)
 
 
 def end_now(number: int, frame: object) -> None:
-    """Handle SIGTERM: the parent has ended, or its timeout has passed. `finally` blocks run."""
+    """Exit on SIGTERM, sent when the parent ends or its timeout expires. `finally` blocks run."""
     sys.exit(128 + number)
 
 
 def start_thread(work: Work, ended: Callable[[str], None]) -> threading.Thread:
-    """Start the task in its own thread, which calls `ended` at its end."""
+    """Start the task in its own thread. The thread calls `ended` as its last action."""
 
     def body() -> None:
         run(work)
@@ -72,7 +72,7 @@ def start_thread(work: Work, ended: Callable[[str], None]) -> threading.Thread:
 
 @contextlib.contextmanager
 def stack_size(size: int | None) -> Iterator[None]:
-    """Set the stack size of threads started in this block; Python has one setting for all."""
+    """Set the stack size of threads started in this block, because Python's setting is global."""
     if size is None:
         yield
         return
@@ -84,7 +84,7 @@ def stack_size(size: int | None) -> Iterator[None]:
 
 
 def run(work: Work) -> bool:
-    """Run a task. Return False if it failed; its block has the reason."""
+    """Run a task. If it fails, store the reason in its block and return False."""
     block = Block(work.place.memory.buffer)
     try:
         block.scheduling = prepare(work)
@@ -116,7 +116,7 @@ def prepare(work: Work) -> str:
 
 
 def schedule(task: Task, best_effort: bool) -> Scheduling:
-    """Set priority and processor of the calling thread. Raises RealtimeError if refused."""
+    """Set priority and processor of this thread. Raises RealtimeError unless `best_effort`."""
     refusals = []
     if task.cpu is not None:
         cpus = {task.cpu}
@@ -129,8 +129,8 @@ def schedule(task: Task, best_effort: bool) -> Scheduling:
     if refusals and not best_effort:
         raise RealtimeError(
             "; ".join(refusals),
-            hint=f"run as root, or once: {SET_CAPABILITIES}; or an rtprio line in "
-            "/etc/security/limits.d; or continue without it by best_effort=True",
+            hint=f"run as root, or run once: {SET_CAPABILITIES}; or add an rtprio line to "
+            "/etc/security/limits.d; or set best_effort=True to continue without it",
         )
     return replace(what_scheduling(), refusals=tuple(refusals))
 
@@ -138,7 +138,7 @@ def schedule(task: Task, best_effort: bool) -> Scheduling:
 def leave_priority() -> None:
     """Return to ordinary scheduling after the last job.
 
-    Ending a process takes 100 ms, which must not delay the releases of other tasks.
+    Ending a process takes about 100 ms, which must not delay the releases of other tasks.
     """
     with contextlib.suppress(OSError):
         os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))
@@ -163,7 +163,7 @@ def counted_collections(releases: Releases) -> Iterator[None]:
 
 
 def reason(error: Exception) -> str:
-    """Return the text of an error, for errors outside of Catenary with the line that raised it."""
+    """Return the text of an error, with its source line unless it is a CatenaryError."""
     if isinstance(error, CatenaryError):
         return str(error)
     frames = traceback.extract_tb(error.__traceback__)

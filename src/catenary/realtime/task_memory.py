@@ -1,4 +1,4 @@
-"""Place: the memory of a task and its participant on a clock. Passed to its process."""
+"""Place: the shared memory of a task and its participant on a clock, passed to its process."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ from catenary.realtime.system.memory import SharedMemory
 
 @dataclass(frozen=True, slots=True)
 class Place:
-    memory: SharedMemory  # a Block; it begins with the machine's timer
-    participant: Participant | None  # on a virtual clock
+    memory: SharedMemory  # a Block, which begins with the memory of a MachineTimer
+    participant: Participant | None  # None on the machine's clock
 
     def open_timer(self) -> Timer:
         """Return the task's timer; any process can use it to wake the task."""

@@ -1,7 +1,7 @@
 """Tasks: a set of tasks that run together, from their common start to their end.
 
-Several tasks run in one process each. Under a common interpreter lock, a task of low priority
-would delay one of high priority by up to 5 ms at every switch.
+By default, several tasks run in one process each. With a shared interpreter lock, a task of low
+priority would delay one of high priority by up to 5 ms at every switch.
 """
 
 from __future__ import annotations
@@ -30,24 +30,24 @@ from catenary.realtime.worker import ProcessWorker, ThreadWorker, Worker, Worker
 
 LEAD_SECONDS = 0.01  # from the last task's start to the first release of all
 STOP_SECONDS = 5.0
-LOOK_NS = 1_000_000_000  # [ns] of virtual time, between two checks
+CHECK_NS = 1_000_000_000  # [ns] of virtual time between two checks
 
 T = TypeVar("T")
 
 
 class Tasks:
-    """A set of running tasks.
+    """A set of tasks that run together.
 
-    `with Tasks(a, b) as tasks:` starts them together; the end of the block ends them. `tasks["a"]`
-    is one of them; `print(tasks)` shows the statistics of their jobs.
+    `with Tasks(a, b) as tasks:` starts them together, and stops them at the end of the block.
+    `tasks["a"]` is the handle of one task; `print(tasks)` shows the statistics of all jobs.
 
     Args:
         tasks: Tasks to run.
-        workers: "processes" or "threads". None: processes for more than one task.
+        workers: "processes" or "threads"; None selects processes for more than one task.
         clock: VirtualClock that simulates the tasks by priority and processor. A `cpu` of None
             counts as 0.
         session: `realtime.session()` to enter in each process; for threads, in this process.
-        best_effort: True: continue without the priorities and processors that are refused.
+        best_effort: True to continue without refused priorities and processors.
     """
 
     def __init__(
@@ -88,7 +88,7 @@ class Tasks:
         return self._supervisor.failures if self._supervisor else ()
 
     def start(self) -> None:
-        """Start all tasks. Once all have started, their first releases are at the same time."""
+        """Start all tasks, and release their first jobs at the same time."""
         if self._supervisor is not None:
             raise RuntimeError("these tasks have already been started")
         if self.workers == "processes":
@@ -114,10 +114,10 @@ class Tasks:
             handle.block.start_at(origin)
 
     def join(self, seconds: float | None = None) -> bool:
-        """Wait until all tasks have ended. On a virtual clock, time passes in this call.
+        """Wait until all tasks have ended. On a virtual clock, time passes during this call.
 
         Args:
-            seconds: timeout on the tasks' clock [s]; None: no timeout.
+            seconds: timeout on the tasks' clock [s]; None for no timeout.
 
         Returns:
             True if all tasks have ended.
@@ -139,17 +139,17 @@ class Tasks:
         return ended
 
     def stop(self, seconds: float = STOP_SECONDS, *, raising: bool = True) -> None:
-        """End all tasks: each one ends when it next waits.
+        """Stop all tasks. Each task ends when it next waits.
 
         Args:
-            seconds: processes that have not ended after this time get SIGTERM, then SIGKILL.
+            seconds: timeout [s]; after it, processes receive SIGTERM, then SIGKILL.
             raising: raise the failure that stopped the tasks.
 
         Raises:
             TaskError: a task failed, or did not end in time.
         """
         supervisor = self._started()
-        supervisor.ask_to_stop()
+        supervisor.request_stop()
         if self._clock is not None:
             self._clock.home.step_aside()
         try:
@@ -168,24 +168,25 @@ class Tasks:
         priority: int = 0,
         cpu: int | None = None,
     ) -> T:
-        """Run `function(place, *arguments)` in parallel to the tasks, and return its result.
+        """Run `function(place, *arguments)` in parallel with the tasks, and return its result.
 
-        On the machine's clock, it runs in this thread and `place` is None. If the tasks are
-        processes, this process is in the session, too. On a virtual clock, it runs in its own
-        thread, `place` is its participant (`Segment(..., clock=place)`), and time passes. Ctrl-C
-        takes effect after the function has ended, because a thread cannot be killed.
+        On the machine's clock, the function runs in this thread, and `place` is None. If the tasks
+        are processes, this process also enters the session. On a virtual clock, the function runs
+        in its own thread while time passes, and `place` is its participant
+        (`Segment(..., clock=place)`). Ctrl-C then takes effect after the function has ended,
+        because a thread cannot be killed.
 
         Args:
-            function: the function to run; its exceptions are passed on.
+            function: the function to run; its exceptions propagate.
             arguments: further arguments of the function.
             priority: priority on the virtual clock.
-            cpu: simulated processor on the virtual clock; None: its own.
+            cpu: simulated processor on the virtual clock; None for its own.
 
         Returns:
             The result of the function.
 
         Raises:
-            TaskError: a task failed meanwhile; `failures` has it at once.
+            TaskError: a task failed; `failures` contains the error as soon as it occurs.
         """
         supervisor = self._started()
         if self._clock is not None:
@@ -197,9 +198,9 @@ class Tasks:
         return result
 
     def verdict(self, *others: Demand) -> Verdict:
-        """Analyse these tasks with the longest execution times measured so far.
+        """Analyse these tasks with their longest execution times measured so far.
 
-        `others` are further demands on the processors, for example a loop.
+        `others` are additional demands on the processors, for example a loop.
         """
         measured = [measured_demand(handle.task, handle.statistics) for handle in self]
         return analyse([*measured, *others])
@@ -220,7 +221,7 @@ class Tasks:
         self.stop(raising=error is None)
 
     def _own_session(self) -> contextlib.AbstractContextManager[object]:
-        """Return the session for this process if the tasks are processes; threads have it."""
+        """Return the session if the tasks are processes, otherwise a null context."""
         if self._session is None or self.workers == "threads":
             return contextlib.nullcontext()
         return self._session
@@ -252,7 +253,7 @@ class Tasks:
         return time.monotonic_ns() if self._clock is None else self._clock.now_ns
 
     def _wake_clock(self) -> None:
-        """Wake the clock's thread: a failure ends `join`."""
+        """Wake the thread of the clock, so that a failure ends `join`."""
         if self._clock is not None:
             self._clock.home.wake()
 
@@ -278,7 +279,7 @@ def run_at(
         future.add_done_callback(lambda _: clock.home.wake())
         try:
             while not future.done():
-                clock.wait_until(clock.now_ns + LOOK_NS)
+                clock.wait_until(clock.now_ns + CHECK_NS)
         except BaseException:  # Ctrl-C: let time pass, so that the function can end
             clock.home.step_aside()
             wait([future])
@@ -288,10 +289,10 @@ def run_at(
 
 
 def share_one_cpu(undo: contextlib.ExitStack) -> None:
-    """Bind this thread, and the threads and processes it starts, to one processor.
+    """Bind this thread, and the threads and processes that it starts, to one processor.
 
-    On a virtual clock only one of them runs at a time. A switch within one processor takes half as
-    long as waking another (8 us, not 18).
+    On a virtual clock, only one of them runs at a time. A switch on one processor takes 8 us, and a
+    switch to another processor takes 18 us.
     """
     thread = threading.get_native_id()
     undo.callback(os.sched_setaffinity, thread, os.sched_getaffinity(thread))
@@ -300,23 +301,23 @@ def share_one_cpu(undo: contextlib.ExitStack) -> None:
 
 def check_set(tasks: tuple[Task, ...], workers: Workers | None) -> None:
     if not tasks:
-        raise ValueError("no tasks: Tasks(task, ...)")
+        raise ValueError("no tasks given; use Tasks(task, ...)")
     for task in tasks:
         if not isinstance(task, Task):
-            raise TypeError(f"{task!r} is not a Task; Task(function, period=...) makes one")
+            raise TypeError(f"{task!r} is not a Task; use Task(function, period=...)")
     names = [task.name for task in tasks]
     for name in names:
         if names.count(name) > 1:
-            raise ValueError(f"two tasks have the name {name!r}: give each its own `name`")
+            raise ValueError(f"two tasks have the name {name!r}; give each task a different `name`")
     triggers = [task.trigger for task in tasks if task.trigger is not None]
     if len(set(map(id, triggers))) < len(triggers):
-        raise ValueError("two tasks have the same trigger: a Signal releases one task")
+        raise ValueError("two tasks have the same trigger, but a Signal releases only one task")
     if workers not in (None, "processes", "threads"):
-        raise ValueError(f'workers={workers!r}: must be "processes" or "threads"')
+        raise ValueError(f'workers must be "processes" or "threads", not {workers!r}')
 
 
 def make_handles(tasks: tuple[Task, ...], clock: VirtualClock | None) -> dict[str, Handle]:
-    """Create the handles, or none if one fails: a virtual clock waits for all participants."""
+    """Create the handles. If one fails, remove all, because a virtual clock would wait for them."""
     handles: dict[str, Handle] = {}
     try:
         for task in tasks:
@@ -329,21 +330,21 @@ def make_handles(tasks: tuple[Task, ...], clock: VirtualClock | None) -> dict[st
 
 
 def check_cpus(tasks: tuple[Task, ...]) -> None:
-    ours = os.sched_getaffinity(0)
+    allowed = os.sched_getaffinity(0)
     for task in tasks:
-        if task.cpu is not None and task.cpu not in ours and not may_have(task.cpu, ours):
+        if task.cpu is not None and task.cpu not in allowed and not may_have(task.cpu, allowed):
             raise ValueError(
                 f"{task}: CPU {task.cpu} does not exist or is not allowed; this process may use "
-                + ", ".join(map(str, sorted(ours)))
+                + ", ".join(map(str, sorted(allowed)))
             )
 
 
-def may_have(cpu: int, ours: set[int]) -> bool:
-    """Return True if the process may use `cpu`: an isolated one (isolcpus) is in no default set."""
+def may_have(cpu: int, allowed: set[int]) -> bool:
+    """Return True if the process may use `cpu`, even if it is isolated (isolcpus)."""
     thread = threading.get_native_id()
     try:
         os.sched_setaffinity(thread, {cpu})
     except OSError:
         return False
-    os.sched_setaffinity(thread, ours)
+    os.sched_setaffinity(thread, allowed)
     return True

@@ -1,4 +1,4 @@
-"""Signal: releases a sporadic task. Any task or process that has the signal can set it."""
+"""Signal: trigger of a sporadic task. Any thread or process that has the signal can set it."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from catenary.realtime.task_memory import Place
 class Signal:
     """Trigger of one sporadic task.
 
-    `Task(..., trigger=signal)` waits for it. Tasks that get it as an argument can set it.
+    `Task(..., trigger=signal)` waits for it. Tasks that receive it as an argument can set it.
     """
 
     def __init__(self) -> None:
@@ -28,9 +28,9 @@ class Signal:
         self._place, self._ends = place, None
 
     def set(self) -> bool:
-        """Release the task once, as soon as its period allows. Never waits.
+        """Release the task once, as soon as its period allows. This never blocks.
 
-        Return False if 64 releases are already pending: this one is dropped and counted.
+        Return False if 64 releases are already pending; this one is dropped and counted.
         Raises RuntimeError if no task has this trigger.
         """
         if self._ends is None:

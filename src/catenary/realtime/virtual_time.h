@@ -1,16 +1,16 @@
 /* Virtual time: a discrete-event simulation of fixed priorities, for threads and processes alike.
  *
  * The table is in shared memory. Exactly one participant runs at a time, and virtual time stands
- * still meanwhile. A participant blocks by waiting for a time or by spending execution time. The
- * participant that blocks last selects the next one:
+ * still while it runs. A participant blocks by waiting for a time or by spending execution time.
+ * The participant that blocks last selects the next one:
  *  - a participant that has just spent its time runs before any release at the same time: a job
- *    that ends when another begins was not preempted by it, as in response-time analysis;
- *  - participants that are due are released;
- *  - each processor serves its ready participant of highest priority until that one waits or a
- *    higher one is released; equal priorities are served in the order of their release (SCHED_FIFO,
- *    sched(7));
- *  - of those served with no time left to spend, the one of the highest priority runs;
- *  - if there is none, time advances to the next release or end of spending.
+ *    is not preempted by another that begins when it ends, as in response-time analysis;
+ *  - participants whose waiting time is over are released;
+ *  - each processor serves its ready participant of highest priority until that participant waits
+ *    or one of higher priority is released; equal priorities are served in the order of their
+ *    release (SCHED_FIFO, sched(7));
+ *  - among the served participants with no time left to spend, the one of highest priority runs;
+ *  - if there is none, time advances to the next release or to the next end of execution.
  * A robust mutex guards the table: a participant that is killed while it holds the mutex leaves the
  * table usable. The supervisor that notices the death frees the slot (VT_FREE).
  */
@@ -29,15 +29,15 @@
 
 #define VT_PARTICIPANTS 64
 #define VT_OWN_PROCESSOR (-1)
-#define VT_SIGNALS_NS 500000000       /* machine time: longest sleep between checks for signals */
+#define VT_SIGNALS_NS 500000000       /* machine time between two checks for signals */
 
 enum {
     VT_FREE,                          /* the slot is unused */
     VT_EXPECTED,                      /* will start: time stands still until then */
-    VT_WAITING,                       /* for `due`, or to be woken */
-    VT_READY,                         /* needs its processor: to spend `remaining`, then to run */
+    VT_WAITING,                       /* until `due` or a wake-up */
+    VT_READY,                         /* needs its processor to spend `remaining`, then runs */
     VT_RUNNING,                       /* its code runs; time stands still */
-    VT_ASIDE,                         /* does not participate at present; time advances without it */
+    VT_ASIDE,                         /* suspended: time advances without it */
 };
 
 typedef struct vt_participant {
@@ -45,7 +45,7 @@ typedef struct vt_participant {
     uint32_t seen;                    /* number of turns taken */
     uint32_t state;
     uint32_t woken;
-    uint32_t spent;                   /* finished spending at this time: runs before any release */
+    uint32_t spent;                   /* has just spent its time: runs before any release */
     int32_t priority;
     int32_t cpu;                      /* VT_OWN_PROCESSOR: does not compete */
     int64_t due;
@@ -89,7 +89,7 @@ static int vt_precedes(const vt_participant *a, const vt_participant *b) {
     return a->order < b->order;
 }
 
-/* Return 1 if this participant is served by its processor. */
+/* Return 1 if its processor serves this participant. */
 static int vt_served(const virtual_time *v, const vt_participant *p) {
     if (p->state != VT_READY) return 0;
     if (p->cpu == VT_OWN_PROCESSOR) return 1;
@@ -123,7 +123,7 @@ static vt_participant *vt_next(virtual_time *v) {
     return next;
 }
 
-/* Advance to the next event. Return 0 if there is none until a participant is woken. */
+/* Advance to the next event. Return 0 if there is no event before a participant is woken. */
 static int vt_advance(virtual_time *v) {
     int64_t step = INT64_MAX;
     int served[VT_PARTICIPANTS];
@@ -144,8 +144,8 @@ static int vt_advance(virtual_time *v) {
     return 1;
 }
 
-/* Give the turn to the next participant, unless one runs. Each round releases a participant or
- * ends a spending, so there are at most two rounds for each participant. */
+/* Give the turn to the next participant, unless one is running. Each round releases a participant
+ * or ends its execution, so there are at most two rounds for each participant. */
 static void vt_schedule(virtual_time *v) {
     if (vt_time_stands(v)) return;
     do {
@@ -160,8 +160,9 @@ static void vt_schedule(virtual_time *v) {
     } while (vt_advance(v));
 }
 
-/* Sleep until the turn comes. Return -EINTR after a signal; the participant stays blocked. A signal
- * just before the sleep, or to another thread, does not end it, so the sleep has a timeout. */
+/* Sleep until it is this participant's turn. Return -EINTR after a signal; the participant stays
+ * blocked. The sleep has a timeout, because a signal just before it, or to another thread, does
+ * not interrupt it. */
 static int vt_sleep(vt_participant *p) {
     struct timespec t;
     clock_gettime(CLOCK_MONOTONIC, &t);
@@ -190,7 +191,7 @@ static int vt_join(virtual_time *v, int32_t priority, int32_t cpu) {
     return found;
 }
 
-/* Reset a slot that is kept: its process died and is started again. */
+/* Reset the slot of a participant whose process died and is restarted. */
 static void vt_expect(virtual_time *v, int slot) {
     vt_lock(v);
     v->who[slot].state = VT_EXPECTED;
@@ -205,10 +206,10 @@ static void vt_change(virtual_time *v, int slot, uint32_t state) {
     vt_unlock(v);
 }
 
-/* Block until `deadline`. Return 0 if no wait is necessary, 1 if it must sleep until its turn. */
+/* Begin to wait for `deadline`. Return 0 if no wait is necessary, 1 if the caller must sleep. */
 static int vt_begin_waiting(virtual_time *v, vt_participant *p, int64_t deadline) {
     int goes_on = p->state == VT_WAITING || p->state == VT_READY;     /* continues after a signal */
-    int has_turn = p->state == VT_RUNNING && p->turn != p->seen;      /* turn given meanwhile */
+    int has_turn = p->state == VT_RUNNING && p->turn != p->seen;      /* turn given, not yet taken */
     if (goes_on || has_turn) return 1;
     if (p->state == VT_RUNNING && (p->woken || deadline <= v->now)) return 0;
     p->due = p->woken ? v->now : deadline;
@@ -217,7 +218,7 @@ static int vt_begin_waiting(virtual_time *v, vt_participant *p, int64_t deadline
     return 1;
 }
 
-/* Return 0 if the deadline has passed, 1 if woken before, -EINTR after a signal: call again. */
+/* Return 0 if the deadline has passed, 1 if woken earlier, -EINTR after a signal (call again). */
 static int vt_wait_until(virtual_time *v, int slot, int64_t deadline) {
     vt_participant *p = &v->who[slot];
     vt_lock(v);
@@ -231,7 +232,7 @@ static int vt_wait_until(virtual_time *v, int slot, int64_t deadline) {
     return woken;
 }
 
-/* Return 0 if the time is spent, -EINTR after a signal: call vt_sleep to continue. */
+/* Return 0 if the time is spent, -EINTR after a signal (call vt_sleep to continue). */
 static int vt_spend(virtual_time *v, int slot, int64_t duration) {
     vt_participant *p = &v->who[slot];
     if (duration <= 0) return 0;

@@ -34,7 +34,7 @@ class Worker(Protocol):
 
 
 class ProcessWorker:
-    """Worker in its own process, started afresh (spawn), so that it shares no interpreter."""
+    """Worker in its own process, started with `spawn` so that it has its own interpreter."""
 
     def __init__(self, work: Work, session: Session | None) -> None:
         arguments = (work, session, os.getpid())
@@ -44,7 +44,7 @@ class ProcessWorker:
 
     @property
     def sentinel(self) -> int:
-        """A descriptor that becomes readable when the process is gone."""
+        """File descriptor that becomes readable when the process ends."""
         return self._process.sentinel
 
     def start(self) -> None:
@@ -81,13 +81,13 @@ class ThreadWorker:
 
 
 def check_importable(task: Task) -> None:
-    """Check that a process can import the task's functions by name. Raises TypeError if not."""
+    """Check that a new process can import the task's functions. Raises TypeError if it cannot."""
     functions = (task.function, task.on_miss)
     for function in filter(callable, functions):
         try:
             pickle.dumps(function)
         except (pickle.PicklingError, AttributeError, TypeError) as error:
             raise TypeError(
-                f"{task}: its process cannot import {function!r}: {error}. Define it at the top of "
-                'a module, or use workers="threads"'
+                f"{task}: its process cannot import {function!r}: {error}. Define the function at "
+                'the top level of a module, or use workers="threads"'
             ) from error

@@ -8,7 +8,7 @@
     recording["position"], recording.time   # (cycles, axes) [rad], (cycles,) [s]
     record.plot(recording, "arm.png")
 
-The package builds on `share`, like the dashboard: its only access to a loop is to attach to it.
+Like the dashboard, the package attaches to the share of a loop and has no other access to it.
 """
 
 from catenary.record.figure import plot

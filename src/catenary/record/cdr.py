@@ -1,8 +1,9 @@
-"""CDR of messages of constant size: one layout, then NumPy encodes all rows of a batch together.
+"""CDR encoding of messages of constant size, so that NumPy encodes many rows in one step.
 
-OMG DDS-XTypes 1.3 §7.4.3, version 1 (what ROS 2 writes): little endian, every primitive aligned to
-its own size, counted from the end of the four bytes of encapsulation. The length of a string
-includes its final zero; a sequence is its length and its elements; an array has no length.
+OMG DDS-XTypes 1.3 §7.4.3, version 1, as ROS 2 writes it. The encoding is little endian. Every
+primitive is aligned to its own size; offsets count from the end of the 4-byte encapsulation header.
+A string is its length, including the final zero, and its bytes. A sequence is its length and its
+elements. An array has no length.
 """
 
 from __future__ import annotations
@@ -21,25 +22,33 @@ Rows = npt.NDArray[np.void]
 
 @dataclass(frozen=True, slots=True)
 class CdrMessage:
-    """A message type. `constant`: its bytes with zero fields; `dtype`: offsets of its fields."""
+    """A message type: a template with all fields zero, and the dtype with their offsets."""
 
     dtype: np.dtype[np.void]
     constant: bytes
 
     def encode(self, columns: Mapping[str, npt.NDArray[Any]], count: int) -> bytes:
-        """Return `count` consecutive messages; each column has one value per message."""
+        """Encode consecutive messages.
+
+        Args:
+            columns: values of each field, one per message.
+            count: number of messages.
+
+        Returns:
+            Encoded messages, one after the other.
+        """
         out = np.frombuffer(bytearray(self.constant * count), self.dtype)
         for name, values in columns.items():
             out[name] = values
         return out.tobytes()
 
     def decode(self, messages: bytes) -> Rows:
-        """Return the fields of consecutive messages."""
+        """Return the fields of consecutive messages, one row per message."""
         return np.frombuffer(messages, self.dtype)
 
 
 class CdrLayout:
-    """Builder of a message layout, to which fields are added in their order."""
+    """Builder of a message type; fields are added in the order of the definition."""
 
     def __init__(self) -> None:
         self._constant = bytearray(ENCAPSULATION)
@@ -48,7 +57,13 @@ class CdrLayout:
         self._offsets: list[int] = []
 
     def field(self, name: str, dtype: str, shape: tuple[int, ...] = ()) -> None:
-        """Add a primitive, or an array of primitives."""
+        """Add a primitive, or an array of primitives.
+
+        Args:
+            name: name of the field.
+            dtype: NumPy type of an element, such as "<f8".
+            shape: shape of the array; () for a single primitive.
+        """
         size = np.dtype(dtype).itemsize
         self._align(size)
         self._names.append(name)
@@ -57,7 +72,13 @@ class CdrLayout:
         self._constant += bytes(size * prod(shape))
 
     def sequence(self, name: str, dtype: str, length: int) -> None:
-        """Add a sequence with a constant number of elements."""
+        """Add a sequence with a constant number of elements.
+
+        Args:
+            name: name of the field.
+            dtype: NumPy type of an element, such as "<f8".
+            length: number of elements.
+        """
         self._count(length)
         if length:
             self.field(name, dtype, (length,))
@@ -75,6 +96,7 @@ class CdrLayout:
             self.text(value)
 
     def make(self) -> CdrMessage:
+        """Return the message type."""
         dtype = np.dtype(
             {
                 "names": self._names,

@@ -1,14 +1,14 @@
-"""The channels of a file, and the fields of the rows that each one carries.
+"""Channels of an MCAP file, and the fields of the rows in each channel.
 
-    /NAME/joint_states    sensor_msgs/JointState    position, velocity, effort as measured
-    /NAME/joint_commands  sensor_msgs/JointState    the same as sent to the drives
-    /NAME/cycle           catenary_msgs/Cycle       all the rest: timing, flags, states, inputs ...
-    /NAME/log             rcl_interfaces/Log        events, in words
-    /NAME/events          std_msgs/String           events, as JSON
+    /NAME/joint_states    sensor_msgs/JointState    measured position, velocity, effort
+    /NAME/joint_commands  sensor_msgs/JointState    position, velocity, effort sent to the drives
+    /NAME/cycle           catenary_msgs/Cycle       other fields: timing, flags, states, inputs ...
+    /NAME/log             rcl_interfaces/Log        events as text
+    /NAME/events          std_msgs/String           events as JSON
 
-All is CDR with its definition in the file, so any reader of ROS 2 bags reads it, and PlotJuggler
-and Foxglove know joints by their names. catenary_msgs/Cycle depends on the loop: its definition is
-the file's own.
+All messages are CDR, and the file contains their definitions. Any reader of ROS 2 bags can
+therefore read them, and PlotJuggler and Foxglove show joints by name. The definition of
+catenary_msgs/Cycle depends on the loop.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ from catenary.record.definitions import (
 )
 from catenary.record.layout import Field, Layout
 
-JOINT_CHANNELS = {  # topic: ROS's name → the row's
+JOINT_CHANNELS = {  # topic: field of the message → field of the row
     "joint_states": {"position": "position", "velocity": "velocity", "effort": "torque"},
     "joint_commands": {
         "position": "commanded_position",
@@ -40,15 +40,15 @@ JOINT_CHANNELS = {  # topic: ROS's name → the row's
 }
 FORMAT, OLD_FORMAT = "2", "1"
 SECOND_NS = 1_000_000_000
-INFO, WARNING, ERROR = 20, 30, 40  # of rcl_interfaces/Log
+INFO, WARNING, ERROR = 20, 30, 40  # levels of rcl_interfaces/Log
 
 
 @dataclass(frozen=True, slots=True)
 class Channel:
-    """A channel with one message for each row.
+    """A channel with one message per row.
 
-    `fields`: field of the message → field of the row. `instants`: the same for fields of type
-    builtin_interfaces/Time.
+    `fields` maps fields of the message to fields of the row. `instants` does the same for fields of
+    type builtin_interfaces/Time.
     """
 
     topic: str
@@ -58,7 +58,15 @@ class Channel:
     instants: dict[str, str]
 
     def encode(self, rows: Rows, times_ns: np.ndarray[tuple[int], np.dtype[np.int64]]) -> bytes:
-        """Return one message for each row. `times_ns`: UTC times, one for each row."""
+        """Encode one message per row.
+
+        Args:
+            rows: cycles to encode.
+            times_ns: UTC time of each row [ns].
+
+        Returns:
+            Encoded messages, one after the other.
+        """
         columns = {name: rows[source] for name, source in self.fields.items()}
         columns["sec"], columns["nanosec"] = np.divmod(times_ns, SECOND_NS)
         for name, source in self.instants.items():
@@ -66,7 +74,12 @@ class Channel:
         return self.message.encode(columns, len(rows))
 
     def decode(self, messages: bytes, rows: Rows) -> None:
-        """Write the fields of messages into rows, one row for each message."""
+        """Decode messages into rows.
+
+        Args:
+            messages: encoded messages, one after the other.
+            rows: output, one row per message.
+        """
         values = self.message.decode(messages)
         for name, source in self.fields.items():
             rows[source] = values[name]
@@ -76,6 +89,7 @@ class Channel:
 
 
 def topic(layout: Layout, name: str) -> str:
+    """Return the topic of a channel of the layout, such as "/arm/cycle" for "cycle"."""
     return f"/{_ros_name(layout.name)}/{name}"
 
 
@@ -85,23 +99,35 @@ def is_event(topic: str) -> bool:
 
 
 def make_channels(layout: Layout, format_: str = FORMAT) -> list[Channel]:
-    """Return the channels of a layout; each field is in exactly one channel.
+    """Return the channels of a layout. Each field is in exactly one channel.
 
-    In format 1, times were integers. PlotJuggler refuses integers beyond 2^53, which a machine
-    reaches after 104 days.
+    In format 1, times are integers. PlotJuggler rejects integers above 2^53, which a time in
+    nanoseconds exceeds after 104 days of uptime.
+
+    Args:
+        layout: layout of the rows.
+        format_: version of the file format.
     """
     joints = [
         _joint_channel(layout, name, fields)
-        for name, wanted in JOINT_CHANNELS.items()
-        if (fields := {ros: row for ros, row in wanted.items() if layout.of_axes(row)})
+        for name, sources in JOINT_CHANNELS.items()
+        if (fields := {ros: row for ros, row in sources.items() if layout.of_axes(row)})
     ]
-    carried = {row for channel in joints for row in channel.fields.values()}
-    rest = [field for field in layout.fields if field.name not in carried]
+    in_joints = {row for channel in joints for row in channel.fields.values()}
+    rest = [field for field in layout.fields if field.name not in in_joints]
     return [*joints, _cycle_channel(layout, rest, has_instants=format_ != OLD_FORMAT)]
 
 
 def encode_log(time_ns: int, level: int, name: str, message: str, number: int) -> bytes:
-    """Encode a rcl_interfaces/Log. `line` is the cycle's number, limited to 32 bits."""
+    """Encode an rcl_interfaces/Log message.
+
+    Args:
+        time_ns: UTC time [ns].
+        level: level of rcl_interfaces/Log.
+        name: name of the logger.
+        message: text.
+        number: number of the cycle. Its lower 32 bits are stored as the line.
+    """
     layout = CdrLayout()
     layout.field("sec", "<i4")
     layout.field("nanosec", "<u4")
@@ -115,14 +141,14 @@ def encode_log(time_ns: int, level: int, name: str, message: str, number: int) -
 
 
 def encode_text(text: str) -> bytes:
-    """Encode a std_msgs/String."""
+    """Encode a std_msgs/String message."""
     layout = CdrLayout()
     layout.text(text)
     return layout.make().constant
 
 
 def decode_text(message: bytes) -> str:
-    """Return the text of a std_msgs/String."""
+    """Return the text of a std_msgs/String message."""
     return message[8:-1].decode()
 
 
@@ -169,8 +195,9 @@ def _ros_type(layout: Layout, field: Field) -> str:
     code = f"{dtype.kind}{dtype.itemsize}"
     if code not in TYPES or 0 in field.shape or dtype.byteorder == ">":
         raise RecordingError(
-            f"{layout.name}: field {field.name!r} of {field.dtype} {field.shape} is no message's",
-            hint="recorded are little endian numbers of 1 to 8 bytes, and arrays of them",
+            f"{layout.name}: field {field.name!r} has dtype {field.dtype} and shape {field.shape}, "
+            "which cannot be recorded",
+            hint="use little-endian numbers of 1 to 8 bytes, or arrays of them",
         )
     return TYPES[code]
 
@@ -182,9 +209,10 @@ def _comment(field: Field) -> str:
 
 
 def _ros_name(name: str) -> str:
-    """Return a valid ROS name: lower case, digits, single underscores, a letter first."""
+    """Return a valid ROS name: lower-case letters, digits, single underscores, first a letter."""
     plain = re.sub(r"[^a-z0-9]+", "_", name.lower()).strip("_")
-    usable = plain[:1].isalpha() and not keyword.iskeyword(plain)  # messages become classes
+    # readers make Python classes from the definitions, so a keyword is not a usable name
+    usable = plain[:1].isalpha() and not keyword.iskeyword(plain)
     return plain if usable else f"x_{plain}".rstrip("_")
 
 

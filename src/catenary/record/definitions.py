@@ -1,7 +1,7 @@
 """ROS 2 message definitions as MCAP stores them (schema encoding `ros2msg`).
 
-The message comes first, then the types that it contains. Definitions with names of ROS are exact
-copies of ROS's own, without comments.
+The message comes first, then the types that it contains. The definitions of ROS messages are exact
+copies of those of ROS, without comments.
 """
 
 from __future__ import annotations
@@ -63,7 +63,7 @@ uint32 line
 
 STRING = Definition("std_msgs/msg/String", "string data\n")
 
-TYPES = {  # NumPy's to ROS's
+TYPES = {  # NumPy kind and size → ROS type
     "b1": "bool",
     "i1": "int8",
     "u1": "uint8",

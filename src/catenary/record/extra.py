@@ -1,4 +1,4 @@
-"""Modules of the extra `catenary[log]`: imported on first use; the error names a missing one."""
+"""Import on first use of the modules of the extra `catenary[log]`."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from catenary.errors import RecordingError
 
 
 def require(module: str) -> ModuleType:
-    """Import a module of a package of the extra. Raises RecordingError if it is missing."""
+    """Return a module of the extra. Raises RecordingError if its package is not installed."""
     try:
         return import_module(module)
     except ImportError as error:

@@ -1,6 +1,6 @@
-"""Figures of a recording with matplotlib: one row for each axis, the timing of the cycles below.
+"""Figures of a recording with matplotlib: one row per axis, and below it the cycle timing.
 
-They do not use pyplot, so there is no global state and no window.
+The module does not use pyplot. It therefore has no global state and opens no window.
 """
 
 from __future__ import annotations
@@ -30,12 +30,14 @@ from catenary.record.series import (
 )
 from catenary.record.timeline import Mark, draw_marks, draw_timeline, marks_of
 
-POINTS, FEW_POINTS = 700, 350  # of each line: about two for each pixel of a column; of many axes
+# Points per line, with few and with many axes: about two per pixel of a column.
+POINTS, FEW_POINTS = 700, 350
 WIDTH = 14.0  # [inch]
-HEAD_HEIGHT, TIMELINE_HEIGHT, TIMING_HEIGHT = 0.9, 2.1, 2.5
-ROOMY, TIGHT, MANY = 1.75, 1.2, 8  # the height of a row, for up to so many axes and for more
-TIMES_EVERY = 8  # rows the times are written below, where there are many
-WIDE, NARROW = 3.4, 1.0  # of lines [points]
+HEAD_HEIGHT, TIMELINE_HEIGHT, TIMING_HEIGHT = 0.9, 2.1, 2.5  # [inch]
+MANY = 8  # axes above which the rows are low and the lines have few points
+TALL_ROW, LOW_ROW = 1.75, 1.2  # [inch]
+TIMES_EVERY = 8  # rows between two time scales
+WIDE, NARROW = 3.4, 1.0  # line widths [points]
 RESOLUTION = 110  # [pixels per inch]
 
 INK, SOFT, RULE = "#1d2430", "#5f6b7a", "#dfe3e8"
@@ -57,13 +59,15 @@ STYLE = {
     "xtick.labelsize": 8.0,
     "ytick.labelsize": 8.0,
     "legend.frameon": False,
-    "svg.fonttype": "none",  # text stays text
-    "svg.hashsalt": "catenary",  # the same picture, the same bytes
+    "svg.fonttype": "none",  # text instead of outlines
+    "svg.hashsalt": "catenary",  # equal figures result in equal files
 }
 
 
 @dataclass(frozen=True, slots=True)
 class Line:
+    """A line of each axis, with its legend and style."""
+
     name: str
     values: Floats  # (cycles, axes)
     color: str
@@ -90,14 +94,15 @@ def plot(
 
     Args:
         recording: the recording.
-        path: the file; its suffix selects the format.
-        axes: names of the axes to plot; None: all.
-        reference: field to compare positions with; None: the commanded positions, in CSP.
+        path: output file; its suffix selects the format.
+        axes: names of the axes to plot; None for all.
+        reference: field to compare positions with; None for the commanded positions if any drive
+            is in CSP.
         unit: unit of angles, "rad" or "deg".
 
     Raises:
-        RecordingError: unknown axis or field.
-        ValueError: unknown unit or file format.
+        RecordingError: An axis or field is unknown, or matplotlib is not installed.
+        ValueError: The unit or the file format is unknown.
     """
     from catenary.record.page import as_html
 
@@ -125,12 +130,23 @@ def draw(
     reference: str | None = None,
     unit: str = "rad",
 ) -> Any:
-    """Return a matplotlib Figure."""
+    """Return the matplotlib Figure of a recording.
+
+    Args:
+        recording: the recording.
+        axes: names of the axes to plot; None for all.
+        reference: field to compare positions with; None for the default.
+        unit: unit of angles, "rad" or "deg".
+
+    Raises:
+        RecordingError: An axis or field is unknown, or matplotlib is not installed.
+        ValueError: The unit is unknown.
+    """
     chosen = choose(recording, axes)
     reference = checked_reference(recording, reference)
     columns = make_columns(recording, reference, unit)
     rows = len(chosen) if columns else 0
-    row_height = ROOMY if rows <= MANY else TIGHT
+    row_height = TALL_ROW if rows <= MANY else LOW_ROW
     heights = [rows * row_height, TIMELINE_HEIGHT, TIMING_HEIGHT]
     marks = marks_of(recording)
     figure = require("matplotlib.figure").Figure(
@@ -148,43 +164,66 @@ def draw(
 
 
 def choose(recording: Recording, axes: Sequence[str] | None) -> list[int]:
-    """Return the numbers of the selected axes; of all if None."""
+    """Return the numbers of the named axes.
+
+    Args:
+        recording: the recording.
+        axes: names; None for all axes.
+
+    Raises:
+        RecordingError: An axis is unknown.
+    """
     if axes is None:
         return list(range(len(recording.axes)))
     unknown = [name for name in axes if name not in recording.axes]
     if unknown:
         raise RecordingError(
             f"{recording.name} has no axis {', '.join(map(repr, unknown))}",
-            hint=f"it has {', '.join(recording.axes)}",
+            hint=f"its axes are {', '.join(recording.axes)}",
         )
     return [recording.axes.index(name) for name in axes]
 
 
 def checked_reference(recording: Recording, reference: str | None) -> str | None:
-    """Return the requested reference field, or the default for the recording."""
+    """Return the reference field, or the default if it is None.
+
+    Args:
+        recording: the recording.
+        reference: name of the field; None for the default.
+
+    Raises:
+        RecordingError: The recording has no such field with one number per axis.
+    """
     if reference is None:
         return reference_of(recording)
     if not recording.layout.of_axes(reference):
         known = [field.name for field in recording.layout.fields]
         raise RecordingError(
-            f"{recording.name} has no field {reference!r} with a number for each axis",
-            hint="it has " + ", ".join(name for name in known if recording.layout.of_axes(name)),
+            f"{recording.name} has no field {reference!r} with one number per axis",
+            hint="such fields are "
+            + ", ".join(name for name in known if recording.layout.of_axes(name)),
         )
     return reference
 
 
 def make_columns(recording: Recording, reference: str | None, unit: str) -> list[Column]:
-    """Return the recorded columns of position, tracking error and torque.
+    """Return the columns for position, tracking error and torque, if they were recorded.
 
-    Raises ValueError for an unknown unit.
+    Args:
+        recording: the recording.
+        reference: field to compare positions with; None to omit it.
+        unit: unit of angles, "rad" or "deg".
+
+    Raises:
+        ValueError: The unit is unknown.
     """
     if unit not in ("rad", "deg"):
-        raise ValueError(f"unit of angles must be rad or deg, not {unit!r}")
+        raise ValueError(f"unit {unit!r} of angles must be 'rad' or 'deg'")
     length = recording.unit("position")
     if length in ("", "rad"):
         factor, name = (1.0, "rad") if unit == "rad" else (degrees(1.0), "°")
     else:
-        factor, name = 1.0, length  # of linear axes
+        factor, name = 1.0, length  # linear axes
     commanded = of_axes(recording, "commanded_torque")
     columns = (
         _column(
@@ -211,7 +250,7 @@ def make_columns(recording: Recording, reference: str | None, unit: str) -> list
 
 
 def was_commanded(values: Floats | None) -> bool:
-    """Return True if a quantity is known and not always zero."""
+    """Return True if a quantity was recorded and is not always zero."""
     return values is not None and bool(np.nan_to_num(values).any())
 
 
@@ -221,8 +260,8 @@ def _line(
     return None if values is None else Line(name, values * factor, color, width)
 
 
-def _column(title: str, unit: str, *wanted: Line | None) -> Column:
-    lines = [line for line in wanted if line is not None]
+def _column(title: str, unit: str, *candidates: Line | None) -> Column:
+    lines = [line for line in candidates if line is not None]
     if not lines:
         return Column(title, ())
     top = max((line.values for line in lines), key=lambda values: float(_top(values)))
@@ -237,7 +276,7 @@ def _top(values: Floats) -> float:
 
 
 def headline(recording: Recording) -> str:
-    """Return a description of the recording in two lines."""
+    """Return a two-line description of the recording."""
     seconds = float(np.ptp(recording.time)) if len(recording) else 0.0
     lost = f"{recording.lost} lost" if recording.lost else "none lost"
     count = len(recording.events)
@@ -252,7 +291,7 @@ def headline(recording: Recording) -> str:
 def _draw_axes(
     part: Any, recording: Recording, columns: list[Column], chosen: list[int], marks: list[Mark]
 ) -> None:
-    """Plot one row for each axis, one column for each quantity."""
+    """Plot one row per axis and one column per quantity."""
     grid = part.subplots(len(chosen), len(columns), sharex=True, squeeze=False)
     points = POINTS if len(chosen) <= MANY else FEW_POINTS
     for place, column in enumerate(columns):
@@ -279,7 +318,7 @@ def _draw_axes(
 
 
 def _head(plot: Any, column: Column) -> None:
-    """Draw the title of a column with its legend next to it."""
+    """Draw the title and the legend of a column."""
     plot.set_title(column.title, loc="left", fontsize=10.0)
     plot.legend(
         loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=len(column.lines), fontsize=8.0,
@@ -309,6 +348,6 @@ def _draw_timing(part: Any, recording: Recording) -> None:
         words = f"median {median:.1f}, p99 {np.quantile(values, 0.99):.1f}, max {values.max():.1f}"
         plot.set_title(f"{title}: {words}", loc="left", fontsize=9.0)
         beyond = int(np.count_nonzero(values > edges[-1]))
-        note = f"; {beyond} beyond, in the last bar" if beyond else ""
+        note = f"; the last bar includes {beyond} larger values" if beyond else ""
         plot.set_xlabel(f"{title} [µs]{note}")
         plot.set_ylabel("cycles")

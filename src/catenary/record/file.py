@@ -33,7 +33,7 @@ from catenary.record.mcap_records import END_RECORD, LAYOUT_RECORD
 from catenary.record.output import Output
 from catenary.share import SharedEvent
 
-GOOD_NEWS = ("DeviceReturned", "LinkRestored", "ClockLocked", "Marker")
+INFO_KINDS = ("DeviceReturned", "LinkRestored", "ClockLocked", "Marker")
 CHUNK_SECONDS = 0.5  # maximum loss if the recorder is killed
 SMALLEST_CHUNK, LARGEST_CHUNK = 1 << 14, 1 << 22  # [bytes]
 SEQUENCE_MASK = 0xFFFFFFFF
@@ -55,7 +55,14 @@ class RecordingFile:
     ) -> None:
         """Create the file.
 
-        Raises RecordingError if it exists (without `force`), or if the extra is not installed.
+        Args:
+            path: the file.
+            layout: layout of the rows.
+            force: replace an existing file.
+
+        Raises:
+            RecordingError: The file exists (without `force`), or the extra is not installed.
+            OSError: The file cannot be created or written.
         """
         library: Any = require("mcap.writer")
         self.layout = layout
@@ -74,7 +81,7 @@ class RecordingFile:
         self._events = self._register(topic(layout, "events"), STRING)
 
     def write(self, rows: Rows) -> None:
-        """Write all messages of these rows, in the order of time."""
+        """Write all messages of these rows in the order of their times."""
         times = rows[TIME].astype(np.int64) + self.layout.utc_offset_ns
         parts = [
             (number, channel.encode(rows, times), len(channel.message.constant))
@@ -89,22 +96,22 @@ class RecordingFile:
                 add(number, time, message, time, sequence & SEQUENCE_MASK)
 
     def write_event(self, event: SharedEvent) -> None:
-        """Write an event: as a log message for people, and as JSON for programs."""
+        """Write an event twice: as a log message for people, and as JSON for programs."""
         time_ns = round(event.time * 1e9) + self.layout.utc_offset_ns
         level, number = level_of(event.kind), event.number
-        words = encode_log(time_ns, level, self.layout.name, event.message, number)
-        whole = encode_text(msgspec.json.encode(event).decode())
-        for channel, message in ((self._log, words), (self._events, whole)):
+        text = encode_log(time_ns, level, self.layout.name, event.message, number)
+        data = encode_text(msgspec.json.encode(event).decode())
+        for channel, message in ((self._log, text), (self._events, data)):
             self._writer.add_message(channel, time_ns, message, time_ns, number & SEQUENCE_MASK)
 
     def finish(self, end: Mapping[str, object]) -> None:
-        """Write `end` as metadata, then the index, and close the file."""
+        """Write `end` as metadata, write the index, and close the file."""
         self._writer.add_metadata(END_RECORD, {key: str(value) for key, value in end.items()})
         self._writer.finish()
         self._output.close()
 
     def close(self) -> None:
-        """Close the file as it is; a no-op after `finish`."""
+        """Close the file without an index. A no-op after `finish`."""
         self._output.close()
 
     def _describe(self) -> dict[str, str]:
@@ -123,15 +130,18 @@ class RecordingFile:
 
 
 def level_of(kind: str) -> int:
-    """Return the log level of an event by its kind: errors end a loop; a return is only info."""
+    """Return the log level of an event kind.
+
+    Kinds of errors end the loop. Kinds of recovery and markers are only information.
+    """
     if kind.endswith("Error"):
         return ERROR
-    return INFO if kind in GOOD_NEWS else WARNING
+    return INFO if kind in INFO_KINDS else WARNING
 
 
 def chunk_size(layout: Layout, channels: list[Channel]) -> int:
-    """Return the size of CHUNK_SECONDS of cycles [bytes], before compression."""
-    record = 31  # MCAP's own bytes before each message
+    """Return the uncompressed size of CHUNK_SECONDS of cycles, within bounds [bytes]."""
+    record = 31  # header of an MCAP message record
     cycle = sum(len(channel.message.constant) + record for channel in channels)
     return min(max(int(cycle * CHUNK_SECONDS / layout.period), SMALLEST_CHUNK), LARGEST_CHUNK)
 
@@ -141,5 +151,6 @@ def _create(path: str | os.PathLike[str], force: bool) -> Output:
         return Output(path, force=force)
     except FileExistsError as error:
         raise RecordingError(
-            f"{Path(path)} exists", hint="use another name, or --force (force=True) to replace it"
+            f"{Path(path)} exists",
+            hint="use another name, or replace the file with --force (force=True)",
         ) from error

@@ -1,4 +1,4 @@
-"""The CSV file of a loop's log (`Log.to_csv`), read as a recording."""
+"""Reader of the CSV file of a log (`Log.to_csv`), which returns a recording."""
 
 from __future__ import annotations
 
@@ -16,20 +16,25 @@ from catenary.errors import RecordingError
 from catenary.record.layout import NUMBER, TIME, Field, Layout
 from catenary.record.recording import Recording
 
-SECONDS = "time"  # [s] on the clock of `cycle.time`
-AXIS = ".actual.position"  # ends the column that every logged axis has
+SECONDS = "time"  # column with the time [s], as `cycle.time`
+AXIS = ".actual.position"  # suffix of a column that every logged axis has
 UNITS = {"position": "rad", "velocity": "rad/s", "torque": "N·m"}
-HINT = "loop.log.to_csv(path) writes such a file; Loop(log_axes=True) adds the axes"
+HINT = "write the file with loop.log.to_csv(path); Loop(log_axes=True) adds the axes"
 Columns = Mapping[str, npt.NDArray[Any]]
 
 
 def read_csv(path: str | os.PathLike[str], *, start: float = 0.0, end: float = np.inf) -> Recording:
-    """Read the CSV file of a log, or the cycles from `start` to `end` [s] on the clock of
-    `cycle.time`. A start of 0 includes the cycles before the first iteration.
+    """Read the CSV file of a log, or a part of it.
+
+    Args:
+        path: the file.
+        start: start of the part [s], as `cycle.time`. 0 includes the cycles before the first
+            iteration.
+        end: end of the part [s], as `cycle.time`.
 
     Raises:
-        RecordingError: it is not such a file; names the line that is damaged.
-        OSError: it cannot be read.
+        RecordingError: The file is not the CSV file of a log, or a line is damaged.
+        OSError: The file cannot be read.
     """
     columns = _columns(Path(path))
     _check(path, columns)
@@ -54,7 +59,7 @@ def read_csv(path: str | os.PathLike[str], *, start: float = 0.0, end: float = n
 
 
 def _columns(path: Path) -> dict[str, npt.NDArray[Any]]:
-    """Return the columns by their names."""
+    """Return the columns of the file by name."""
     with path.open(newline="") as file:
         try:
             head, *lines = csv.reader(file)
@@ -69,27 +74,28 @@ def _columns(path: Path) -> dict[str, npt.NDArray[Any]]:
 
 
 def _numbers(path: Path, name: str, cells: Sequence[str]) -> npt.NDArray[Any]:
-    """Return a column: whole numbers, or float64."""
+    """Return a column as integers if possible, otherwise as float64."""
     for kind in (int, float):
         try:
             return np.array([kind(cell) for cell in cells])
         except (ValueError, OverflowError):
             continue
-    raise RecordingError(f"{path}: the column {name!r} has values that are not numbers", hint=HINT)
+    raise RecordingError(f"{path}: column {name!r} has values that are not numbers", hint=HINT)
 
 
 def _check(path: str | os.PathLike[str], columns: Columns) -> None:
     missing = [name for name in (SECONDS, NUMBER, TIME) if name not in columns]
     if missing:
         raise RecordingError(
-            f"{path} is not the CSV file of a log: no column {', '.join(missing)}", hint=HINT
+            f"{path} is not the CSV file of a log: it has no column {', '.join(missing)}",
+            hint=HINT,
         )
     if len(columns[NUMBER]) < 2 or not (np.diff(columns[NUMBER]) > 0).all():
-        raise RecordingError(f"{path}: needs two cycles or more, in their order", hint=HINT)
+        raise RecordingError(f"{path} must have at least two cycles, in ascending order", hint=HINT)
 
 
 def _fields(columns: Columns, axes: Sequence[str]) -> tuple[Field, ...]:
-    """Return the fields of the cycle, then those that every axis has."""
+    """Return the fields of the cycle, followed by those of the axes."""
     of_axes = [f"{axis}." for axis in axes]
     own = [name for name in columns if not name.startswith(tuple(of_axes)) and name != SECONDS]
     fields = [Field(name, columns[name].dtype.str) for name in own]
@@ -109,8 +115,10 @@ def _fields(columns: Columns, axes: Sequence[str]) -> tuple[Field, ...]:
 
 
 def field_name(kind: str) -> str:
-    """Return the name of a recording's field: actual.position → position, target.torque →
-    target_torque."""
+    """Return the name of the field for a column of an axis.
+
+    Examples: actual.position → position, target.torque → target_torque.
+    """
     return kind.removeprefix("actual.").replace(".", "_")
 
 
@@ -119,8 +127,8 @@ def _rows(layout: Layout, columns: Columns, part: npt.NDArray[np.bool_]) -> npt.
     names = {field.name for field in layout.fields if not field.per_axis}
     for name in names:
         rows[name] = columns[name][part]
-    for place, axis in enumerate(layout.axes):
+    for number, axis in enumerate(layout.axes):
         for name, values in columns.items():
             if name.startswith(f"{axis}."):
-                rows[field_name(name.removeprefix(f"{axis}."))][:, place] = values[part]
+                rows[field_name(name.removeprefix(f"{axis}."))][:, number] = values[part]
     return rows

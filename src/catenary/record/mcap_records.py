@@ -19,18 +19,18 @@ from catenary.errors import RecordingError
 from catenary.record.extra import require
 
 MAGIC = b"\x89MCAP0\r\n"
-HEAD = struct.Struct("<BQ")  # opcode, length of what follows
-MESSAGE_HEAD = struct.Struct("<BQHIQQ")  # ... channel, sequence, log time, publish time
+HEAD = struct.Struct("<BQ")  # opcode, length of the content
+MESSAGE_HEAD = struct.Struct("<BQHIQQ")  # the same; channel, sequence, log time, publish time
 HEADER, FOOTER, SCHEMA, CHANNEL, MESSAGE, CHUNK, MESSAGE_INDEX = range(0x01, 0x08)
 METADATA, DATA_END = 0x0C, 0x0F
-LAYOUT_RECORD = "catenary.layout"  # the metadata that begins a recording
-END_RECORD = "catenary.end"  # and the one that ends it
-LARGEST_CHUNK = 1 << 28  # [bytes] a longer chunk indicates damage
+LAYOUT_RECORD = "catenary.layout"  # metadata at the start of a recording
+END_RECORD = "catenary.end"  # metadata at its end
+LARGEST_CHUNK = 1 << 28  # [bytes] a larger size indicates damage
 
 
 @contextmanager
 def refusing_damage(name: str) -> Iterator[None]:
-    """Raise RecordingError for any error of the libraries that a damaged file causes."""
+    """Convert the exceptions that a damaged file causes into RecordingError."""
     damage: tuple[type[Exception], ...] = (
         *(require("mcap.exceptions").McapError, msgspec.MsgspecError, struct.error),
         *(ArithmeticError, LookupError, MemoryError, RecursionError, TypeError, ValueError),
@@ -46,22 +46,26 @@ class Place(NamedTuple):
     """A complete record in a file."""
 
     opcode: int
-    offset: int  # of its first byte, the opcode
-    end: int
+    offset: int  # position of its first byte, the opcode
+    end: int  # position after its last byte
 
 
 class ChunkMessage(NamedTuple):
-    """A message within the bytes of a chunk."""
+    """A message within a chunk."""
 
     channel: int
     sequence: int
     time_ns: int  # log time, UTC
-    offset: int  # of its record within the chunk
+    offset: int  # position of its record within the chunk
     data: bytes
 
 
 def places(stream: BinaryIO) -> Iterator[Place]:
-    """Yield the complete records of the data section. Raises RecordingError if not an MCAP file."""
+    """Yield the complete records of the data section.
+
+    Raises:
+        RecordingError: The file is not an MCAP file.
+    """
     size = os.fstat(stream.fileno()).st_size
     stream.seek(0)
     if stream.read(len(MAGIC)) != MAGIC:
@@ -80,7 +84,12 @@ def places(stream: BinaryIO) -> Iterator[Place]:
 
 
 def read_record(stream: BinaryIO, place: Place) -> Any:
-    """Return the Metadata or Chunk record at a place of the file; None if it is damaged."""
+    """Return a record as an object of the library; None if it is damaged.
+
+    Args:
+        stream: the file.
+        place: position of the Metadata or Chunk record.
+    """
     exceptions: Any = require("mcap.exceptions")
     stream.seek(place.offset)
     try:
@@ -90,7 +99,7 @@ def read_record(stream: BinaryIO, place: Place) -> Any:
 
 
 def decode_record(data: bytes) -> Any:
-    """Return the library's record of these bytes: Metadata, Chunk, Schema or Channel."""
+    """Decode a Metadata, Chunk, Schema or Channel record into an object of the library."""
     records: Any = require("mcap.records")
     streams: Any = require("mcap.data_stream")
     kinds = {
@@ -103,7 +112,7 @@ def decode_record(data: bytes) -> Any:
 
 
 def chunk_bytes(chunk: Any) -> bytes | None:
-    """Return the content of a chunk; None if it is damaged."""
+    """Return the uncompressed content of a chunk; None if it is damaged."""
     reader: Any = require("mcap.stream_reader")
     unknown: Any = require("mcap.exceptions").McapError
     damage = (ValueError, RuntimeError, MemoryError, unknown, require("zstandard").ZstdError)
@@ -117,7 +126,7 @@ def chunk_bytes(chunk: Any) -> bytes | None:
 
 
 def chunk_records(data: bytes) -> Iterator[tuple[int, int, int]]:
-    """Yield (opcode, offset, end) of each record within a chunk's bytes."""
+    """Yield (opcode, offset, end) of each record in the content of a chunk."""
     at = 0
     while at + HEAD.size <= len(data):
         opcode, length = HEAD.unpack_from(data, at)
@@ -126,7 +135,7 @@ def chunk_records(data: bytes) -> Iterator[tuple[int, int, int]]:
 
 
 def chunk_messages(data: bytes) -> Iterator[ChunkMessage]:
-    """Yield the messages within a chunk's bytes, in their order."""
+    """Yield the messages in the content of a chunk, in their order."""
     for opcode, at, end in chunk_records(data):
         if opcode == MESSAGE:
             _, _, channel, sequence, time_ns, _ = MESSAGE_HEAD.unpack_from(data, at)

@@ -1,6 +1,6 @@
-"""A recording as a self-contained HTML page: plots as SVG, results for each axis, events.
+"""Self-contained HTML page of a recording: plots as SVG, results per axis, events.
 
-The page fetches and executes nothing.
+The page loads no other files and contains no scripts.
 """
 
 from __future__ import annotations
@@ -34,7 +34,14 @@ tbody th, .words td, .words th { text-align: left; }
 
 
 def as_html(recording: Recording, figure: Any, *, reference: str | None, unit: str) -> str:
-    """Return the HTML page. `figure`: the result of `draw` for the same recording."""
+    """Return the HTML page of a recording.
+
+    Args:
+        recording: the recording.
+        figure: result of `draw` for the same recording.
+        reference: field to compare positions with; None to omit the tracking error.
+        unit: unit of angles, "rad" or "deg".
+    """
     return f"""<!doctype html>
 <html lang="en">
 <head>
@@ -66,10 +73,10 @@ def _summary(recording: Recording) -> str:
 
 def _svg(figure: Any) -> str:
     text = StringIO()
-    figure.suptitle("")  # the page has a heading of its own
+    figure.suptitle("")  # the page has its own heading
     figure.savefig(text, format="svg", metadata={"Date": None})
-    drawn = text.getvalue()
-    return drawn[drawn.index("<svg") :]
+    svg = text.getvalue()
+    return svg[svg.index("<svg") :]
 
 
 def _axis_table(recording: Recording, reference: str | None, unit: str) -> str:
@@ -84,12 +91,12 @@ def _axis_table(recording: Recording, reference: str | None, unit: str) -> str:
     columns = {"axis": list(recording.axes)}
     if error is not None:
         columns[f"error, rms [{name}]"] = [f"{x * factor:.4g}" for x in rms(error)]
-        columns[f"error, greatest [{name}]"] = [f"{x * factor:.4g}" for x in largest(error)]
+        columns[f"error, max [{name}]"] = [f"{x * factor:.4g}" for x in largest(error)]
     if velocity is not None:
-        columns[f"velocity, greatest [{speed}]"] = [f"{x:.4g}" for x in largest(velocity)]
+        columns[f"velocity, max [{speed}]"] = [f"{x:.4g}" for x in largest(velocity)]
     if torque is not None:
         columns[f"torque, rms [{effort}]"] = [f"{x:.4g}" for x in rms(torque)]
-        columns[f"torque, greatest [{effort}]"] = [f"{x:.4g}" for x in largest(torque)]
+        columns[f"torque, max [{effort}]"] = [f"{x:.4g}" for x in largest(torque)]
     if len(columns) == 1 or not len(recording):
         return ""
     rows = zip(*columns.values(), strict=True)
@@ -111,8 +118,8 @@ def _event_table(recording: Recording) -> str:
         for event in recording.events[:SHOWN_EVENTS]
     ]
     left = len(recording.events) - len(rows)
-    more = f"<p>{left} more are in the file.</p>" if left else ""
-    heads = ["time [s]", "cycle", "device", "kind", "what"]
+    more = f"<p>The recording contains {left} more events.</p>" if left else ""
+    heads = ["time [s]", "cycle", "device", "kind", "message"]
     return "<h2>Events</h2>\n" + _table(heads, rows, kind=" words") + more
 
 

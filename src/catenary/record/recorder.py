@@ -1,7 +1,7 @@
-"""Recorder: write every cycle of a share into a file.
+"""Recorder, which writes every cycle of a share into a file.
 
-It attaches like any other reader, so it cannot delay the loop. Cycles that it misses are counted;
-the file has events for these gaps and their total number.
+It attaches to the share like any other reader, so it cannot delay the loop. It counts the cycles
+that it misses. The file contains an event for each gap, and the total number of missed cycles.
 """
 
 from __future__ import annotations
@@ -22,9 +22,9 @@ from catenary.record.layout import NUMBER, TIME, Field, Layout
 from catenary.record.repair import repair
 from catenary.share import Reader, SharedEvent, ShareLayout, attach
 
-PACE = 0.05  # [s] between two reads; the cycles of one read are encoded together
-LOOKS_PER_HISTORY = 8  # minimum reads per history, for a share that keeps less than 0.5 s
-PATIENCE = 0.25  # [s] without a cycle, before checking whether the writer is alive
+READ_INTERVAL = 0.05  # [s] the cycles of one read are encoded together
+READS_PER_HISTORY = 8  # minimum, for a share whose history is shorter than 0.4 s
+WRITER_TIMEOUT = 0.25  # [s] without a cycle, before checking whether the writer is alive
 ENDINGS = {
     "running": "stopped",
     "ended": "the loop ended",
@@ -40,11 +40,19 @@ class Recorder:
         with record.Recorder("arm", "arm.mcap") as recorder:
             recorder.run(seconds=60.0)
 
-    It begins with the oldest cycle that the share keeps. `take` writes the new cycles; `run` does
-    so until the loop ends. `share`: a name, or a Reader of `cat.attach`; `stale`: accept a share
-    whose process has died; `uid`: user of the share (`cat.attach`). Raises RecordingError if the
-    file exists (without `force`) or the extra is not installed, OSError if the file cannot be
-    created.
+    The recording starts with the oldest cycle in the share. `take` writes the new cycles; `run`
+    repeats this until the loop ends.
+
+    Args:
+        share: name of the share, or a Reader from `cat.attach`.
+        path: the file.
+        force: replace an existing file.
+        stale: accept a share whose process has died.
+        uid: user ID of the owner of the share (`cat.attach`).
+
+    Raises:
+        RecordingError: The file exists (without `force`), or the extra is not installed.
+        OSError: The file cannot be created.
     """
 
     def __init__(
@@ -57,20 +65,20 @@ class Recorder:
         uid: int | None = None,
     ) -> None:
         self.path = Path(path)
-        self.cycles = 0  # written
-        self.lost = 0  # overwritten before they were taken
-        self.ended = ""  # reason of the end, once it has ended
+        self.cycles = 0  # number of cycles written
+        self.lost = 0  # number of cycles overwritten in the share before they were read
+        self.ended = ""  # reason for the end; empty while the recording is running
         self._share = attach(share, stale=stale, uid=uid) if isinstance(share, str) else share
         self._own = isinstance(share, str)
-        self._number = 0  # of the last cycle taken
-        self._serial = 0  # of the last event taken
+        self._number = 0  # of the last cycle written
+        self._serial = 0  # of the last event written
         self._file: RecordingFile | None = None
         try:
             self._file = RecordingFile(path, describe(self._share.layout), force=force)
             (rows, _), (events, _) = self._share.rows(0), self._share.events()
-            self._write(rows, events)  # older cycles do not count as lost
+            self._write(rows, events)  # cycles before the first one do not count as lost
         except BaseException:
-            self._let_go()
+            self._release()
             raise
 
     def __enter__(self) -> Self:
@@ -89,9 +97,11 @@ class Recorder:
         return f"{layout.name} ({len(layout.axes)} axes at {1.0 / layout.period:.6g} Hz)"
 
     def take(self) -> int:
-        """Write every cycle and event since the last call. Return the number of cycles.
+        """Write the cycles and events since the last call. Return the number of cycles.
 
-        Raises RecordingError if the disk is full or fails; the file is repaired up to that point.
+        Raises:
+            RecordingError: The disk is full or fails. The file is repaired and contains the
+                recording up to this point.
         """
         rows, lost = self._share.rows(self._number)
         events, events_lost = self._share.events(self._serial)
@@ -107,8 +117,11 @@ class Recorder:
         """Record until the loop ends, for `seconds` [s], or until `stop` is set.
 
         Args:
-            seconds: maximum duration; None: no limit.
+            seconds: maximum duration [s]; None for no limit.
             stop: event that ends the recording.
+
+        Raises:
+            RecordingError: The disk is full or fails, as for `take`.
         """
         stop = stop or threading.Event()
         alarm = threading.Timer(seconds or 0.0, stop.set)
@@ -117,31 +130,36 @@ class Recorder:
             alarm.start()
         try:
             while not stop.is_set():
-                if self._share.wait(PATIENCE):
+                if self._share.wait(WRITER_TIMEOUT):
                     self.take()
-                    stop.wait(self._pace)
+                    stop.wait(self._read_interval)
                 elif not self._share.alive:
                     break
         finally:
             alarm.cancel()
 
     def close(self) -> None:
-        """Write the remaining cycles and finish the file. Raises RecordingError as `take` does."""
+        """Write the remaining cycles and finish the file.
+
+        Raises:
+            RecordingError: The disk is full or fails, as for `take`.
+        """
         if self._file is None:
             return
         try:
-            state = self._share.state  # read first: after an end no more cycles can follow
+            # Read the state before the last cycles: after the end, the loop writes no more.
+            state = self._share.state
             self.take()
             self.ended = ENDINGS[state]
-            words = {"ended": self.ended, "cycles": self.cycles, "lost": self.lost}
-            self._on_disk(RecordingFile.finish, words)
+            end = {"ended": self.ended, "cycles": self.cycles, "lost": self.lost}
+            self._on_disk(RecordingFile.finish, end)
         finally:
-            self._let_go()
+            self._release()
 
     @property
-    def _pace(self) -> float:
+    def _read_interval(self) -> float:
         layout = self._share.layout
-        return min(PACE, layout.rows.count * layout.period / LOOKS_PER_HISTORY)
+        return min(READ_INTERVAL, layout.rows.count * layout.period / READS_PER_HISTORY)
 
     def _write(self, rows: Rows, events: Sequence[SharedEvent]) -> None:
         for event in events:
@@ -153,7 +171,7 @@ class Recorder:
             self.cycles += len(rows)
 
     def _report_lost_cycles(self, rows: Rows) -> None:
-        """Write an event for each gap before or within the rows."""
+        """Write an event for each gap before the rows or between them."""
         numbers = rows[NUMBER].astype(np.int64)
         missing = np.diff(numbers, prepend=self._number) - 1
         for row in np.flatnonzero(missing).tolist():
@@ -162,7 +180,7 @@ class Recorder:
             self._report(number, "CyclesLost", f"{lost} cycles", time, {"cycles": lost})
 
     def _report_lost_events(self, lost: int, first: SharedEvent) -> None:
-        what = f"{lost} events before this"
+        what = f"{lost} events before this one"
         self._report(first.number, "EventsLost", what, first.time, {"events": lost})
 
     def _report(
@@ -173,32 +191,33 @@ class Recorder:
         self._on_disk(RecordingFile.write_event, event)
 
     def _on_disk(self, write: Callable[[RecordingFile, T], None], value: T) -> None:
-        """Run a write that may fail on a full disk."""
+        """Run a write. If it fails, repair the file and raise RecordingError."""
         assert self._file is not None, "the recorder is closed"
         try:
             write(self._file, value)
         except OSError as error:
-            self._let_go()
-            raise self._cut_off(error) from error
+            self._release()
+            raise self._repaired(error) from error
 
-    def _cut_off(self, error: OSError) -> RecordingError:
+    def _repaired(self, error: OSError) -> RecordingError:
+        """Repair the file after a failed write. Return the error to raise."""
         reason = error.strerror or str(error)
         failed = f"{self.path}: {reason}"
         try:
             repaired = repair(self.path, end={"ended": reason, "lost": self.lost})
         except OSError as second:
             return RecordingError(
-                f"{failed}; not even its end could be written ({second.strerror})",
-                hint=f"make room, then: catenary record --repair {self.path}",
+                f"{failed}; the index at the end could not be written either ({second.strerror})",
+                hint=f"free disk space, then run: catenary record --repair {self.path}",
             )
         if not repaired.chunks:
-            return RecordingError(f"{failed}; nothing was recorded", hint="make room first")
+            return RecordingError(f"{failed}; nothing was recorded", hint="free disk space first")
         return RecordingError(
-            f"{failed}; the recording is whole, but ends after {repaired.seconds:.3f} s",
-            hint="make room before the next one",
+            f"{failed}; the recording is readable, but ends after {repaired.seconds:.3f} s",
+            hint="free disk space before the next recording",
         )
 
-    def _let_go(self) -> None:
+    def _release(self) -> None:
         if self._file is not None:
             self._file.close()
             self._file = None
@@ -207,7 +226,7 @@ class Recorder:
 
 
 def describe(layout: ShareLayout) -> Layout:
-    """Return the recording's layout of a share."""
+    """Return the layout of a recording of this share."""
     fields = tuple(
         Field(each.name, each.dtype, each.shape, each.unit, each.per_axis) for each in layout.fields
     )

@@ -1,4 +1,4 @@
-"""Recording: the rows of a loop, read from a file, by the names of their fields."""
+"""Recording of a loop, read from a file, with its fields by name."""
 
 from __future__ import annotations
 
@@ -44,15 +44,15 @@ from catenary.record.mcap_records import (
 )
 from catenary.share import SharedEvent
 
-LONGEST = 1e9  # [s]
+LONGEST = 1e9  # [s] longer than any recording
 
 
 @dataclass(frozen=True, slots=True)
 class Recording:
     """The cycles of a loop, oldest first. `recording["position"]` has the shape (cycles, axes).
 
-    `events`: events of the loop; `lost`: number of cycles that the recorder missed; `ended`: why
-    the recording ended, "cut off" if the file does not have a reason (the recorder was killed).
+    `lost` is the number of cycles that the recorder missed. `ended` is the reason for the end of
+    the recording; it is "cut off" if the file is truncated, because the recorder was killed.
     """
 
     layout: Layout
@@ -60,12 +60,12 @@ class Recording:
     events: tuple[SharedEvent, ...]
     lost: int
     ended: str
-    began_ns: int | None = None  # of a part: first cycle of the whole, on the loop's clock
+    began_ns: int | None = None  # of a part: start of the whole recording, on the loop's clock
 
     def __getitem__(self, field: str) -> npt.NDArray[Any]:
         if self.layout.field(field) is None:
             names = ", ".join(each.name for each in self.layout.fields)
-            raise KeyError(f"{self.layout.name} has no field {field!r}; it has {names}")
+            raise KeyError(f"{self.layout.name} has no field {field!r}; its fields are {names}")
         return self.rows[field]
 
     def __len__(self) -> int:
@@ -73,6 +73,7 @@ class Recording:
 
     @property
     def name(self) -> str:
+        """Name of the loop."""
         return self.layout.name
 
     @property
@@ -92,13 +93,13 @@ class Recording:
 
     @property
     def start_ns(self) -> int:
-        """Time of its first cycle [ns] on the loop's clock; + layout.utc_offset_ns: UTC."""
+        """Time of the first cycle [ns] on the loop's clock; add layout.utc_offset_ns for UTC."""
         if self.began_ns is not None:
             return self.began_ns
         return int(self.rows[TIME][0]) if len(self.rows) else 0
 
     def unit(self, field: str) -> str:
-        """Return the unit of a field; "" for a number without a unit."""
+        """Return the unit of a field; "" for a number without a unit or an unknown field."""
         found = self.layout.field(field)
         return found.unit if found is not None else ""
 
@@ -108,21 +109,22 @@ def read(path: str | os.PathLike[str], *, start: float = 0.0, end: float = np.in
 
     Args:
         path: the file.
-        start: begin of the part, after the first cycle [s].
-        end: end of the part, after the first cycle [s].
+        start: start of the part [s], counted from the first cycle.
+        end: end of the part [s], counted from the first cycle.
 
     Raises:
-        RecordingError: not a recording of Catenary, or damaged.
+        RecordingError: The file is not a recording of Catenary, or it is damaged.
         ValueError: `start` or `end` is not a valid time.
+        OSError: The file cannot be read.
     """
     if not start <= LONGEST or math.isnan(end):
-        raise ValueError(f"start={start} s, end={end} s: numbers of seconds")
+        raise ValueError(f"start={start} s and end={end} s must be valid times of a recording")
     with Path(path).open("rb") as stream, refusing_damage(stream.name):
         return _Reader(stream, start, end).read()
 
 
 class _Reader:
-    """Collector of the content of a file."""
+    """Reader of one file, which collects the messages of the requested part."""
 
     def __init__(self, stream: BinaryIO, start: float, end: float) -> None:
         self._stream = stream
@@ -130,9 +132,9 @@ class _Reader:
         self._metadata: dict[str, dict[str, str]] = {}
         self._topics: dict[int, str] = {}  # by channel id
         self._messages: dict[str, list[ChunkMessage]] = defaultdict(list)  # by topic
-        self._wanted = (-math.inf, math.inf)  # log time [ns]; known with the first cycle
+        self._span = (-math.inf, math.inf)  # log times of the part [ns]; set by the first cycle
         self._began: int | None = None  # log time of the first cycle [ns]
-        self._complete = False  # the data section ends as it should
+        self._complete = False  # True if the last record is the end of the data section
 
     def read(self) -> Recording:
         for place in places(self._stream):
@@ -149,8 +151,8 @@ class _Reader:
         return self._make()
 
     def _read_chunk(self, chunk: Any) -> bool:
-        """Read a chunk. Return False if it is damaged: the rest of the file is then ignored."""
-        first, last = self._wanted
+        """Read a chunk. Return False if it is damaged; the caller then ignores the rest."""
+        first, last = self._span
         if chunk.message_start_time > last or chunk.message_end_time < first:
             return True
         data = chunk_bytes(chunk)
@@ -159,17 +161,18 @@ class _Reader:
         self._read_channels(data)
         for message in chunk_messages(data):
             if message.channel not in self._topics:
-                return False  # the first chunk is missing
+                return False  # the chunk with the description of the channel is missing
             self._read_message(self._topics[message.channel], message)
         return True
 
     def _read_message(self, topic: str, message: ChunkMessage) -> None:
-        if self._wanted == (-math.inf, math.inf) and not is_event(topic):
+        if self._span == (-math.inf, math.inf) and not is_event(topic):
             self._began = message.time_ns
-            start, end = self._part  # events before the first cycle are of its first part
+            start, end = self._part
+            # A part that starts at 0 includes the events before the first cycle.
             low = message.time_ns + round(start * 1e9) if start > 0 else -math.inf
-            self._wanted = (low, message.time_ns + round(min(end, LONGEST) * 1e9))
-        if self._wanted[0] <= message.time_ns <= self._wanted[1]:
+            self._span = (low, message.time_ns + round(min(end, LONGEST) * 1e9))
+        if self._span[0] <= message.time_ns <= self._span[1]:
             self._messages[topic].append(message)
 
     def _read_channels(self, data: bytes) -> None:
@@ -183,14 +186,14 @@ class _Reader:
         if head is None or head.get("format") not in (FORMAT, OLD_FORMAT):
             raise RecordingError(
                 f"{self._stream.name} is not a recording of Catenary (format {FORMAT})",
-                hint="other MCAP files are read with the packages mcap and mcap-ros2-support",
+                hint="read other MCAP files with the packages mcap and mcap-ros2-support",
             )
         layout = self._layout(head.get("layout", ""))
         tail = self._metadata.get(END_RECORD, {})
         messages = self._messages[topic(layout, "events")]
         texts = [decode_text(message.data) for message in messages]
         events = (msgspec.json.decode(text, type=SharedEvent) for text in texts)
-        first = self._wanted[0]  # those before the first cycle were met before it was known
+        first = self._span[0]  # events before the first cycle were read before it was set
         return Recording(
             layout=layout,
             rows=_rows(layout, self._messages, head["format"]),
@@ -207,18 +210,18 @@ class _Reader:
             numbers = [layout.dtype[name].kind for name in (TIME, NUMBER)]
         except (msgspec.MsgspecError, TypeError, ValueError, LookupError, MemoryError) as error:
             raise RecordingError(
-                f"{self._stream.name}: the description of its cycles is damaged: {error}"
+                f"{self._stream.name}: the layout of its cycles is damaged: {error}"
             ) from error
         if not 0.0 < layout.period < math.inf or not set(numbers) <= set("iu"):
             raise RecordingError(
-                f"{self._stream.name}: the description of its cycles is damaged: period "
-                f"{layout.period} s, {TIME} and {NUMBER} of kinds {numbers}"
+                f"{self._stream.name}: the layout of its cycles is damaged: period "
+                f"{layout.period} s, dtype kinds {numbers} of {TIME} and {NUMBER}"
             )
         return layout
 
 
 def _rows(layout: Layout, messages: Mapping[str, list[ChunkMessage]], format_: str) -> Rows:
-    """Return the cycles that have all their messages; a truncation may divide one."""
+    """Return the cycles whose messages are complete; a truncation may split the last cycle."""
     channels = make_channels(layout, format_)
     numbers = [
         np.array([message.sequence for message in messages[channel.topic]], np.int64)
@@ -228,6 +231,6 @@ def _rows(layout: Layout, messages: Mapping[str, list[ChunkMessage]], format_: s
     rows = np.zeros(len(whole), layout.dtype)
     for channel, present in zip(channels, numbers, strict=True):
         chosen = np.flatnonzero(np.isin(present, whole))
-        data = b"".join(messages[channel.topic][place].data for place in chosen)
+        data = b"".join(messages[channel.topic][number].data for number in chosen)
         channel.decode(data, rows)
     return rows

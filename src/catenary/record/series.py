@@ -1,4 +1,4 @@
-"""Series for plots, computed from rows: thinned lines, timing in microseconds, figures of merit."""
+"""Series for plots: thinned lines, timing in microseconds, RMS and maximum values."""
 
 from __future__ import annotations
 
@@ -8,52 +8,68 @@ import numpy.typing as npt
 from catenary.record.layout import NUMBER
 from catenary.record.recording import Recording
 
-CSP = 8  # mode of operation, IEC 61800-7-201 §7.2: cyclic synchronous position
-UNKNOWN_BELOW = 0.0  # a cycle that does not know a phase has -1 ns
+CSP = 8  # mode of operation "cyclic synchronous position", IEC 61800-7-201 §7.2
+UNKNOWN_BELOW = 0.0  # an unknown phase is recorded as -1 ns
 Floats = npt.NDArray[np.float64]
 PREFIXES = ((1.0, ""), (1e-3, "m"), (1e-6, "µ"), (1e-9, "n"))
 
 
 def of_axes(recording: Recording, field: str | None) -> Floats | None:
-    """Return a field with a value for each axis, (cycles, axes); None if not recorded."""
+    """Return a field with one value per axis, (cycles, axes); None if it was not recorded.
+
+    Args:
+        recording: the recording.
+        field: name of the field; None results in None.
+    """
     if field is None or not recording.layout.of_axes(field):
         return None
     return np.asarray(recording[field], np.float64)
 
 
 def reference_of(recording: Recording) -> str | None:
-    """Return the field to compare positions with: the commanded positions, if any drive is in CSP.
+    """Return the field to compare positions with; None if the recording does not contain it.
 
-    In other modes only the application knows the reference.
+    If any drive is in CSP, this is the commanded position. In other modes, only the application
+    knows the reference.
     """
     sent = recording.layout.of_axes("commanded_position")
-    followed = recording.layout.field("mode") is None or (recording["mode"] == CSP).any()
-    return "commanded_position" if sent and followed else None
+    in_csp = recording.layout.field("mode") is None or (recording["mode"] == CSP).any()
+    return "commanded_position" if sent and in_csp else None
 
 
 def tracking_error(recording: Recording, reference: str | None) -> Floats | None:
-    """Return reference minus actual position, (cycles, axes) [rad]; None if one is missing."""
+    """Return reference minus actual position, (cycles, axes) [rad]; None if one is missing.
+
+    Args:
+        recording: the recording.
+        reference: name of the reference field, or None.
+    """
     actual = of_axes(recording, "position")
-    wanted = of_axes(recording, reference)
-    return None if wanted is None or actual is None else wanted - actual
+    target = of_axes(recording, reference)
+    return None if target is None or actual is None else target - actual
 
 
 def rms(values: Floats) -> Floats:
-    """Return the RMS of the known values of each column."""
+    """Return the RMS of each column, without NaN."""
     known = np.isfinite(values)
     count = np.maximum(known.sum(axis=0), 1)
     return np.asarray(np.sqrt(np.square(values).sum(axis=0, where=known) / count))
 
 
 def largest(values: Floats) -> Floats:
-    """Return the largest magnitude of the known values of each column."""
+    """Return the largest magnitude of each column, without NaN."""
     return np.asarray(np.abs(values).max(axis=0, where=np.isfinite(values), initial=0.0))
 
 
 def phase_us(recording: Recording, phase: str) -> Floats | None:
-    """Return a phase of every cycle [us], NaN where unknown; None if it was not recorded.
+    """Return the duration of a phase in every cycle [us]; None if it was not recorded.
 
-    `in_controller` is the sum of three phases.
+    Args:
+        recording: the recording.
+        phase: name of the phase; "in_controller" is the sum of receive, process and send.
+
+    Returns:
+        Durations (cycles,), NaN where unknown.
     """
     names = ("receive", "process", "send") if phase == "in_controller" else (phase,)
     if any(recording.layout.field(f"{name}_ns") is None for name in names):
@@ -64,7 +80,12 @@ def phase_us(recording: Recording, phase: str) -> Floats | None:
 
 
 def timing_us(recording: Recording, phase: str) -> Floats | None:
-    """Return the known values of a phase [us]; None if there are none."""
+    """Return the known durations of a phase [us]; None if no cycle has one.
+
+    Args:
+        recording: the recording.
+        phase: name of the phase, as for `phase_us`.
+    """
     values = phase_us(recording, phase)
     if values is None or not np.isfinite(values).any():
         return None
@@ -72,16 +93,27 @@ def timing_us(recording: Recording, phase: str) -> Floats | None:
 
 
 def with_gaps(recording: Recording, values: Floats) -> tuple[Floats, Floats]:
-    """Return time and values with a NaN where cycles were lost, so that lines are interrupted."""
+    """Return time and values with a NaN in each gap of lost cycles, which interrupts the line.
+
+    Args:
+        recording: the recording.
+        values: one row per cycle.
+    """
     numbers = recording[NUMBER].astype(np.int64)
     lost = np.flatnonzero(np.diff(numbers) > 1) + 1
     return np.insert(recording.time, lost, np.nan), np.insert(values, lost, np.nan, axis=0)
 
 
 def thin(time: Floats, values: Floats, most: int) -> tuple[Floats, Floats]:
-    """Return at most 2·most points of each column: minimum and maximum of equal parts.
+    """Reduce lines to the minimum and maximum of equal parts, which look the same in a plot.
 
-    They look the same as all points.
+    Args:
+        time: (points,).
+        values: (points, lines).
+        most: number of parts.
+
+    Returns:
+        Time and values of at most 2 · `most` points.
     """
     if len(time) <= 2 * most:
         return time, values
@@ -93,13 +125,22 @@ def thin(time: Floats, values: Floats, most: int) -> tuple[Floats, Floats]:
 
 
 def peaks(time: Floats, values: Floats, most: int) -> tuple[Floats, Floats]:
-    """Return at most `most` points: the maximum of the known values of equal parts."""
+    """Reduce a line to the maximum of equal parts, without NaN.
+
+    Args:
+        time: (points,).
+        values: (points,).
+        most: number of parts.
+
+    Returns:
+        Time and value of at most `most` points.
+    """
     starts = np.linspace(0, len(time), min(most, len(time)), endpoint=False).astype(np.intp)
     return time[starts], np.fmax.reduceat(values, starts)
 
 
 def prefix_for(values: Floats) -> tuple[float, str]:
-    """Return the prefix with which the largest value is 0.1 or more: 0.7 rad stay radians."""
+    """Return the SI prefix, and its factor, with which the largest value is at least 0.1."""
     finite = np.abs(values[np.isfinite(values)])
     top = float(finite.max()) if len(finite) else 0.0
     if top == 0.0:
@@ -108,4 +149,5 @@ def prefix_for(values: Floats) -> tuple[float, str]:
 
 
 def count_of(count: int, one: str, many: str) -> str:
+    """Return a number with its noun, in the singular or plural."""
     return f"{count} {one if count == 1 else many}"

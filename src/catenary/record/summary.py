@@ -1,4 +1,4 @@
-"""What stands at the end of an MCAP file: index and summary, made from what is whole in it."""
+"""Index and summary at the end of an MCAP file, made from its complete records."""
 
 from __future__ import annotations
 
@@ -35,45 +35,46 @@ from catenary.record.mcap_records import (
 
 
 @dataclass(frozen=True, slots=True)
-class WholeChunk:
-    """A chunk, with its index behind it."""
+class CompleteChunk:
+    """A complete chunk of the file."""
 
-    index: Any  # the library's ChunkIndex
-    counts: Counter[int]  # messages of each channel
+    index: Any  # ChunkIndex of the library
+    counts: Counter[int]  # number of messages by channel id
 
 
 @dataclass(slots=True)
 class Summary:
-    """Owns what is known of a file's data section. `end`: where what is whole of it ends."""
+    """Owner of the contents of the complete part of a data section."""
 
-    end: int = len(MAGIC)
+    end: int = len(MAGIC)  # position after the complete part
     schemas: dict[int, Any] = field(default_factory=dict)
     channels: dict[int, Any] = field(default_factory=dict)
-    chunks: list[WholeChunk] = field(default_factory=list)
-    metadata: list[Any] = field(default_factory=list)  # the library's MetadataIndex
-    ended: dict[str, str] = field(default_factory=dict)  # what the recorder said of its end
+    chunks: list[CompleteChunk] = field(default_factory=list)
+    metadata: list[Any] = field(default_factory=list)  # MetadataIndex of the library
+    ended: dict[str, str] = field(default_factory=dict)  # end record of the recorder
     first_ns: int | None = None  # log time of the first cycle
-    complete: bool = False  # the end of the data section is there
-    missing: bytes = b""  # index of the last chunk, to be written behind it
+    complete: bool = False  # True if the end of the data section was found
+    missing: bytes = b""  # index of the last chunk, if it must be written again
 
     @property
     def seconds(self) -> float:
-        """From the first cycle to the last message."""
+        """Time from the first cycle to the last message [s]."""
         if not self.chunks or self.first_ns is None:
             return 0.0
         return float((self.chunks[-1].index.message_end_time - self.first_ns) * 1e-9)
 
     def drop_last_chunk(self) -> None:
+        """Remove the last chunk and everything after it."""
         self.missing, self.complete = b"", False
         self.end = self.chunks.pop().index.chunk_start_offset
         self.metadata = [each for each in self.metadata if each.offset < self.end]
 
 
-def find_whole(stream: BinaryIO) -> Summary:
-    """Read a file up to its end, or to the first damage.
+def read_complete_part(stream: BinaryIO) -> Summary:
+    """Read a file up to its end, or up to the first damaged record.
 
     Raises:
-        RecordingError: It is not a recording of Catenary.
+        RecordingError: The file is not a recording of Catenary.
     """
     records: Any = require("mcap.records")
     summary = Summary()
@@ -98,13 +99,13 @@ def find_whole(stream: BinaryIO) -> Summary:
     if LAYOUT_RECORD not in [each.name for each in summary.metadata]:
         raise RecordingError(
             f"{stream.name} is not a recording of Catenary",
-            hint="repair other MCAP files with `mcap recover`, by MCAP's authors",
+            hint="repair other MCAP files with `mcap recover` (https://mcap.dev)",
         )
     return summary
 
 
 def groups(found: Iterable[Place]) -> Iterator[list[Place]]:
-    """Every record with the message indexes that follow it."""
+    """Yield every record together with the message indexes that follow it."""
     group: list[Place] = []
     for place in found:
         if group and place.opcode != MESSAGE_INDEX:
@@ -116,7 +117,10 @@ def groups(found: Iterable[Place]) -> Iterator[list[Place]]:
 
 
 def _add_chunk(summary: Summary, stream: BinaryIO, place: Place, indexes: list[Place]) -> bool:
-    """Add a chunk. Return False if the chunk or its index is not whole: nothing can follow."""
+    """Add a chunk. Return False if the chunk or its index is incomplete.
+
+    The complete part of the file then ends here.
+    """
     records: Any = require("mcap.records")
     chunk = read_record(stream, place)
     data = chunk_bytes(chunk) if chunk is not None else None
@@ -125,9 +129,9 @@ def _add_chunk(summary: Summary, stream: BinaryIO, place: Place, indexes: list[P
     counts = Counter(message.channel for message in chunk_messages(data))
     offsets = {_channel(stream, index): index.offset for index in indexes}
     length = indexes[-1].end - place.end if indexes else 0
-    whole = set(offsets) == set(counts)
-    if not whole:
-        offsets, summary.missing = _index_anew(data, place.end)
+    indexed = set(offsets) == set(counts)
+    if not indexed:
+        offsets, summary.missing = _make_index(data, place.end)
         length = len(summary.missing)
     _add_descriptions(summary, data)
     if summary.first_ns is None:
@@ -143,16 +147,16 @@ def _add_chunk(summary: Summary, stream: BinaryIO, place: Place, indexes: list[P
         compressed_size=len(chunk.data),
         uncompressed_size=chunk.uncompressed_size,
     )
-    summary.chunks.append(WholeChunk(index, counts))
-    summary.end = place.end + (length if whole else 0)
-    return whole
+    summary.chunks.append(CompleteChunk(index, counts))
+    summary.end = place.end + (length if indexed else 0)
+    return indexed
 
 
-def _index_anew(data: bytes, start: int) -> tuple[dict[int, int], bytes]:
-    """Return the index of a chunk for the position `start`.
+def _make_index(data: bytes, start: int) -> tuple[dict[int, int], bytes]:
+    """Make the message indexes of a chunk, for the position `start` of the file.
 
     Returns:
-        The position of the index of each channel, and the bytes of all.
+        Position of the index of each channel, and the encoded indexes.
     """
     records: Any = require("mcap.records")
     entries: dict[int, list[tuple[int, int]]] = {}
@@ -173,7 +177,7 @@ def _first_cycle(summary: Summary, data: bytes) -> int | None:
 
 
 def _channel(stream: BinaryIO, index: Place) -> int:
-    """Which channel a MessageIndex is of."""
+    """Return the channel id of a MessageIndex."""
     stream.seek(index.offset + HEAD.size)
     return int.from_bytes(stream.read(2), "little")
 
@@ -188,13 +192,20 @@ def _add_descriptions(summary: Summary, data: bytes) -> None:
             summary.channels[channel.id] = channel
 
 
-def encode_end(summary: Summary, words: dict[str, str]) -> bytes:
-    """All that follows `summary.end`: a missing index, a metadata record, the end of the data, the
-    summary, the footer."""
+def encode_end(summary: Summary, entries: dict[str, str]) -> bytes:
+    """Encode everything that follows the complete part of the file.
+
+    This is a missing index, the end record, the end of the data section, the summary and the
+    footer.
+
+    Args:
+        summary: contents of the complete part.
+        entries: entries of the end record, unless the recorder has written one.
+    """
     records: Any = require("mcap.records")
     metadata, data = list(summary.metadata), summary.missing
-    if not (summary.complete and summary.ended):  # else the recorder has said it
-        last = _encode([records.Metadata(END_RECORD, {**summary.ended, **words})])
+    if not (summary.complete and summary.ended):
+        last = _encode([records.Metadata(END_RECORD, {**summary.ended, **entries})])
         metadata = [each for each in metadata if each.name != END_RECORD]
         metadata.append(records.MetadataIndex(summary.end + len(data), len(last), END_RECORD))
         data += last

@@ -1,4 +1,4 @@
-"""What happened when: the timing of the cycles over time, with events and quick stops by name."""
+"""Timeline of a recording: cycle timing over time, with events and quick stops."""
 
 from __future__ import annotations
 
@@ -13,25 +13,25 @@ from catenary.record.recording import Recording
 from catenary.record.series import count_of, peaks, phase_us
 from catenary.wire.cia402 import QUICK_STOP_COMMAND
 
-MARKED = 40  # more would hide the lines
-NAMED, LEVELS = 24, 4  # names beyond are in the page's table; they lie on so many lines
-LEVEL_HEIGHT = 0.12  # of the plot
+MARKED = 40  # maximum number of marks; more would hide the lines
+NAMED = 24  # maximum number of names; the table of the page has the others
+LEVELS, LEVEL_HEIGHT = 4, 0.12  # the names are on 4 levels, each 12 % of the height of the plot
 EVENT, STOP = "#b42318", "#1d2430"
 COLORS = {"lateness": "#b9c2cc", "in_controller": "#2f6f9f"}
 
 
 @dataclass(frozen=True, slots=True)
 class Mark:
-    """Something at an instant."""
+    """A vertical line in a plot, for an event or a quick stop."""
 
-    time: float  # from the first cycle on [s]
+    time: float  # [s] since the first cycle
     text: str
     color: str
     dashes: tuple[float, ...]
 
 
 def marks_of(recording: Recording) -> list[Mark]:
-    """Events, and the cycles whose frames were the first with a quick stop, by time."""
+    """Return the events and the starts of quick stops, sorted by time."""
     start = recording.start_ns * 1e-9
     events = [Mark(e.time - start, e.kind, EVENT, (3, 2)) for e in recording.events]
     stops = [
@@ -42,7 +42,7 @@ def marks_of(recording: Recording) -> list[Mark]:
 
 
 def quick_stops(recording: Recording) -> list[tuple[int, list[int]]]:
-    """Rows in which a quick stop is sent to axes that had none sent the cycle before, and these."""
+    """Return the rows in which a quick stop starts, each with the numbers of its axes."""
     if recording.layout.field("controlword") is None or len(recording) < 2:
         return []
     stop = braking(recording)
@@ -52,29 +52,43 @@ def quick_stops(recording: Recording) -> list[tuple[int, list[int]]]:
 
 
 def braking(recording: Recording) -> npt.NDArray[np.bool_]:
-    """(cycles, axes) whose frames said quick stop."""
+    """Return True for each cycle and axis whose controlword commands a quick stop.
+
+    The shape is (cycles, axes).
+    """
     mask, value = QUICK_STOP_COMMAND
     return np.asarray(recording["controlword"] & mask == value)
 
 
 def stop_text(recording: Recording, axes: list[int]) -> str:
+    """Return the name of a quick stop mark of these axes."""
     one = recording.axes[axes[0]]
     return f"quick stop: {one if len(axes) == 1 else count_of(len(axes), 'axis', 'axes')}"
 
 
 def draw_marks(plot: Any, marks: list[Mark]) -> None:
+    """Draw the marks as vertical lines."""
     for mark in marks[:MARKED]:
         plot.axvline(mark.time, color=mark.color, lw=0.9, ls=(0, mark.dashes), zorder=1.5)
 
 
 def draw_timeline(plot: Any, recording: Recording, marks: list[Mark], points: int) -> None:
-    """Draw the greatest value of each pixel, so that a single late cycle is visible."""
+    """Draw the cycle timing over time.
+
+    Each point is the maximum of its interval, so that a single late cycle is visible.
+
+    Args:
+        plot: matplotlib Axes.
+        recording: the recording.
+        marks: events and quick stops to mark.
+        points: number of points per line.
+    """
     for phase, color in COLORS.items():
         values = phase_us(recording, phase)
         if values is not None and len(recording):
             time, top = peaks(recording.time, values, points)
             plot.plot(time, top, color=color, lw=0.9, label=phase.replace("_", " "))
-    plot.set_title("cycles, greatest of each pixel [µs]", loc="left", fontsize=10.0)
+    plot.set_title("cycle timing, maximum per pixel [µs]", loc="left", fontsize=10.0)
     if plot.lines:
         plot.legend(
             loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2, fontsize=8.0, borderaxespad=0.1
@@ -86,10 +100,10 @@ def draw_timeline(plot: Any, recording: Recording, marks: list[Mark], points: in
 
 
 def _name_marks(plot: Any, marks: list[Mark]) -> None:
-    """Names beside the lines, those that follow each other below one another."""
-    room = 1.0 + LEVEL_HEIGHT * (1 + min(len(marks), LEVELS)) if marks else 1.0
+    """Write names next to the lines, on alternating levels, so that they do not overlap."""
+    margin = 1.0 + LEVEL_HEIGHT * (1 + min(len(marks), LEVELS)) if marks else 1.0
     low, high = plot.get_ylim()
-    plot.set_ylim(min(low, 0.0), max(high, 1.0) * room)
+    plot.set_ylim(min(low, 0.0), max(high, 1.0) * margin)
     for place, mark in enumerate(marks[:NAMED]):
         is_late = mark.time > 0.8 * plot.get_xlim()[1]
         plot.annotate(

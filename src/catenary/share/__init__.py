@@ -1,7 +1,7 @@
-"""Shared memory: a loop's cycles for other processes, commands from them, and a mutex.
+"""Shared memory: cycles of a loop for other processes, commands from them, and a mutex.
 
 with cat.Share("arm") as share, cat.Loop(arm, sink=share) as loop: ...      # one process
-with cat.attach("arm") as arm: ...                                          # any others
+with cat.attach("arm") as arm: ...                                          # any other process
 """
 
 from catenary.share.command_table import Reason

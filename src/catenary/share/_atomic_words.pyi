@@ -1,23 +1,24 @@
 """64-bit words in shared memory with acquire/release ordering."""
 
 class Words:
-    """`count` words of a buffer from `offset` on, `stride` bytes apart.
+    """View of `count` words in a buffer: the first at byte `offset`, `stride` bytes apart.
 
-    Raises ValueError if they do not fit in the buffer, IndexError for a word out of range.
+    The constructor raises ValueError if they do not fit in the buffer.
+    The methods raise IndexError if a word is out of range.
     """
 
     def __init__(self, memory: object, offset: int, count: int, stride: int = 8) -> None: ...
     def load(self, k: int) -> int:
-        """Load a word (acquire), after a full fence for earlier reads.
+        """Load word `k` (acquire), after a full fence that orders earlier reads.
 
-        Data that was written before the store of this value is visible afterwards.
+        Data written before the store of this value is visible afterwards.
         """
 
     def load_all(self) -> list[int]:
-        """Load every word."""
+        """Load all words."""
 
     def store(self, k: int, value: int) -> None:
-        """Store a word (release), and then a full fence for later writes.
+        """Store word `k` (release), followed by a full fence that orders later writes.
 
-        This publishes the data that was written before.
+        The store publishes all data written before it.
         """

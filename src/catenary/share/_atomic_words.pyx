@@ -1,10 +1,10 @@
 # cython: boundscheck=False, wraparound=False
 """64-bit words in shared memory that one process publishes and another reads without a lock.
 
-Release stores pair with acquire loads: data written before the store is visible after a load of
-the new value. Full fences give the converse: while a later load still returns the old value, data
-written after the store was not read before it. x86 guarantees the first half itself, AArch64
-neither. Budget: 0.1 us for a call from Python, 0.3 us for all words of a desk.
+Release stores pair with acquire loads: data written before a store is visible after a load of the
+new value. Full fences ensure the converse: if a load still returns the old value, earlier reads did
+not see data written after the store. x86 guarantees the first half in hardware, AArch64 neither.
+Time budget: 0.1 us for a call from Python, 0.3 us for all words of a desk.
 """
 
 from cpython.buffer cimport PyBUF_WRITABLE, PyBuffer_Release, PyObject_GetBuffer
@@ -29,16 +29,17 @@ cdef class Words:
         PyObject_GetBuffer(memory, &self.buffer, PyBUF_WRITABLE)
         size = <uint64_t>self.buffer.len
         if not 1 <= count <= COUNT_MAX or offset % 8 or stride % 8 or not 8 <= stride <= size:
-            raise ValueError(f"{count} words at {offset}, {stride} bytes apart")
+            raise ValueError(f"invalid words: {count} at offset {offset}, stride {stride} bytes")
         if offset > size or (count - 1) * stride + 8 > size - offset:
-            raise ValueError(f"{count} words at {offset}, {stride} bytes apart, of {size} bytes")
+            raise ValueError(f"{count} words at offset {offset}, stride {stride} bytes, do not fit"
+                             f" in {size} bytes")
         self.first = <uint8_t *>self.buffer.buf + offset
         self.stride = stride
         self.count = count
 
     cdef uint64_t *place(self, uint64_t k) except NULL:
         if k >= self.count:
-            raise IndexError(f"word {k} of {self.count}")
+            raise IndexError(f"word {k} is out of range: there are {self.count} words")
         return <uint64_t *>(self.first + k * self.stride)
 
     def load(self, uint64_t k):

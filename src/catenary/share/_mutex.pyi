@@ -1,17 +1,20 @@
-"""The mutex of mutex.h, in a buffer."""
+"""Binding of the mutex in mutex.h, which lies in a shared buffer."""
 
 MUTEX_SIZE: int
 
 class SharedMutex:
-    """A mutex at `offset` of a buffer; `fresh`: initialise it. Raises ValueError if invalid."""
+    """A mutex at byte `offset` of a buffer. With `fresh`, the constructor initialises it.
+
+    Raises ValueError if it does not fit in the buffer, or is not a mutex of this version.
+    """
 
     def __init__(self, memory: object, offset: int, *, fresh: bool = False) -> None: ...
     def lock(self, timeout_ns: int) -> bool | None:
-        """Wait for the mutex without the GIL. Signal handlers run meanwhile.
+        """Wait for the mutex without the GIL. Signal handlers still run.
 
-        Return False if acquired, True if acquired from an owner that died, None at the timeout.
-        Raises RuntimeError if this thread already has it.
+        Return False if acquired, True if acquired from an owner that died, None on timeout.
+        Raises RuntimeError if this thread already holds it.
         """
 
     def unlock(self) -> None:
-        """Release the mutex. Raises RuntimeError if this thread does not have it."""
+        """Release the mutex. Raises RuntimeError if this thread does not hold it."""

@@ -1,5 +1,5 @@
 # cython: boundscheck=False, wraparound=False
-"""The mutex of mutex.h, in a buffer. Slow path: 0.2 us."""
+"""Binding of the mutex in mutex.h, which lies in a shared buffer. Slow path: 0.2 us."""
 
 import os
 
@@ -18,7 +18,7 @@ cdef extern from "mutex.h" nogil:
     int mutex_unlock(share_mutex *m)
 
 cdef enum:
-    SLICE_NS = 100_000_000     # between checks for signals
+    SLICE_NS = 100_000_000     # interval between checks for signals
 
 MUTEX_SIZE = (sizeof(share_mutex) + 63) // 64 * 64
 
@@ -31,12 +31,13 @@ cdef class SharedMutex:
     def __cinit__(self, memory, uint64_t offset, *, bint fresh=False):
         PyObject_GetBuffer(memory, &self.buffer, PyBUF_WRITABLE)
         if offset % 64 or offset + sizeof(share_mutex) > <uint64_t>self.buffer.len:
-            raise ValueError(f"a mutex at {offset} of {self.buffer.len} bytes")
+            raise ValueError(f"a mutex at offset {offset} does not fit in {self.buffer.len} bytes,"
+                             " or is not aligned to 64 bytes")
         self.mutex = <share_mutex *>(<uint8_t *>self.buffer.buf + offset)
         if fresh:
             self.check(mutex_init(self.mutex))
         if not mutex_is_ours(self.mutex):
-            raise ValueError("no mutex of this version")
+            raise ValueError("not a mutex of this version")
 
     def lock(self, int64_t timeout_ns):
         cdef int64_t slice
@@ -57,13 +58,13 @@ cdef class SharedMutex:
         if rc == -ETIMEDOUT:
             return None
         if rc == -EDEADLK:
-            raise RuntimeError("this thread has the mutex already")
+            raise RuntimeError("this thread already holds the mutex")
         return self.check(rc)
 
     def unlock(self):
         cdef int rc = mutex_unlock(self.mutex)
         if rc == -EPERM:
-            raise RuntimeError("this thread does not have the mutex")
+            raise RuntimeError("this thread does not hold the mutex")
         self.check(rc)
         self.held = False
 
@@ -72,6 +73,6 @@ cdef class SharedMutex:
             raise OSError(-rc, os.strerror(-rc))
 
     def __dealloc__(self):
-        # Keep the memory of a held mutex: the kernel reads it when the owner ends.
+        # Keep the memory of a held mutex, because the kernel reads it when the owner ends.
         if not self.held:
             PyBuffer_Release(&self.buffer)

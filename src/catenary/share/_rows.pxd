@@ -43,7 +43,10 @@ cdef extern from "sink.h" nogil:
                     const void *target) noexcept nogil
 
 cdef class Ring:
-    """A buffer and the view of a ring in it."""
+    """A ring at `offset` of a buffer, of `count` rows (a power of two) of `size` bytes.
+
+    Raises ValueError if it does not fit.
+    """
     cdef Py_buffer buffer
     cdef ring_view view
 
@@ -56,6 +59,6 @@ cdef struct cycle_rows:
     uint64_t target_at
 
 cdef class CycleWriter(Ring):
-    """Owner of the sink table that a cycle calls."""
+    """A ring whose rows are the cycles of an engine: `sizes` of its three blocks."""
     cdef cat_sink sink
     cdef cycle_rows rows

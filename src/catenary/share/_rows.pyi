@@ -1,15 +1,15 @@
-"""Rings of rows in shared memory; ring.h has the theory of operation."""
+"""Rings of rows in shared memory. See ring.h for the theory of operation."""
 
 def memory_size(count: int, size: int) -> int:
     """Return the memory size [bytes] of a ring of `count` rows of `size` bytes."""
 
 def row_parts(record_size: int, actual_size: int, target_size: int) -> tuple[int, int, int, int]:
-    """Return the offsets of a cycle's three blocks in its row, and the size of the row."""
+    """Return the offsets of the three blocks of a cycle in its row, and the size of the row."""
 
 class Ring:
-    """A ring at `offset` of a buffer, of `count` rows (a power of two) of `size` bytes.
+    """A ring of `count` rows (a power of two) of `size` bytes, at byte `offset` of a buffer.
 
-    Raises ValueError if it does not fit.
+    Raises ValueError if it does not fit in the buffer.
     """
 
     def __init__(
@@ -17,35 +17,35 @@ class Ring:
     ) -> None: ...
     @property
     def newest(self) -> int:
-        """Number of the last row; 0 before the first."""
+        """Number of the last row; 0 before the first row."""
 
     @property
     def ended(self) -> bool:
         """True if no more rows will come."""
 
     def copy(self) -> tuple[int, bytes]:
-        """Return the number of the newest row, 0 if there is none yet, and the row."""
+        """Return the number of the newest row (0 before the first row) and its bytes."""
 
     def copy_after(self, after: int) -> tuple[bytearray, int]:
-        """Return the rows after number `after` that still exist, oldest first.
+        """Return the rows after row `after` that still exist, oldest first.
 
-        Also return the number of overwritten rows before the last of them.
+        Also return how many rows between `after` and the last returned row were overwritten.
         """
 
     def wait(self, seen: int, deadline_ns: int) -> bool:
-        """Sleep without the GIL until there is a row after `seen`. Signal handlers run meanwhile.
+        """Sleep without the GIL until row `seen` has a successor. Signal handlers still run.
 
-        Return False if the deadline [CLOCK_MONOTONIC] or the end comes first.
+        Return False if the deadline [ns, CLOCK_MONOTONIC] passes or the ring ends first.
         """
 
     def write(self, row: bytes) -> None:
         """Append a row, padded with zeros. Only one thread may call this at a time."""
 
     def end(self) -> None:
-        """Mark the ring as ended: no more rows will come. Wake all readers."""
+        """Mark the ring as ended and wake all readers. No more rows will come."""
 
 class CycleWriter(Ring):
-    """A ring whose rows are the cycles of an engine: `sizes` of its three blocks."""
+    """A ring whose rows are the cycles of an engine. `sizes`: bytes of the three blocks."""
 
     def __init__(
         self,
@@ -59,4 +59,4 @@ class CycleWriter(Ring):
     ) -> None: ...
     @property
     def capsule(self) -> object:
-        """Sink table of native/sink.h."""
+        """Capsule of the sink table; it keeps the writer and its memory alive."""

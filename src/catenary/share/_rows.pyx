@@ -1,8 +1,8 @@
 # cython: boundscheck=False, wraparound=False, cdivision=True
-"""Rings of rows in shared memory (ring.h): writing, reading, and the sink table of a cycle.
+"""Rings of rows in shared memory (ring.h): read, write, and the sink table that a cycle calls.
 
-Budget of a put: copies of some kilobytes into uncached memory and one system call, about 1 us for
-33 axes.
+Time budget of `put`: about 1 us for 33 axes. It copies some kilobytes into uncached memory and makes
+one system call.
 """
 
 from cpython.buffer cimport PyBUF_SIMPLE, PyBUF_WRITABLE, PyBuffer_Release, PyObject_GetBuffer
@@ -34,12 +34,12 @@ cdef class Ring:
         """Map a ring of `count` rows of `size` bytes. Raises ValueError if it does not fit."""
         PyObject_GetBuffer(memory, &self.buffer, PyBUF_WRITABLE if writable else PyBUF_SIMPLE)
         if not (1 <= count <= COUNT_MAX and 1 <= size <= SIZE_MAX) or count & (count - 1):
-            raise ValueError(f"a ring of {count} rows of {size} bytes")
+            raise ValueError(f"a ring cannot have {count} rows of {size} bytes")
         if offset % 64 or offset > <uint64_t>self.buffer.len:
-            raise ValueError(f"a ring at {offset} of {self.buffer.len} bytes")
+            raise ValueError(f"a ring cannot begin at offset {offset} of {self.buffer.len} bytes")
         if memory_size(count, size) > <uint64_t>self.buffer.len - offset:
-            raise ValueError(f"a ring of {count} rows of {size} bytes at {offset} does not lie"
-                             f" in {self.buffer.len} bytes")
+            raise ValueError(f"a ring of {count} rows of {size} bytes at offset {offset} does not"
+                             f" fit in {self.buffer.len} bytes")
         self.view = ring_view(
             ring=<share_ring *>(<uint8_t *>self.buffer.buf + offset),
             count=count,
@@ -103,7 +103,7 @@ cdef class Ring:
         if self.buffer.readonly:
             raise ValueError("the memory is read-only")
         if size > self.view.size:
-            raise ValueError(f"{size} bytes, a row has {self.view.size}")
+            raise ValueError(f"{size} bytes do not fit in a row of {self.view.size}")
         place = ring_begin(&self.view, number)
         cat_copy_to_shared(place, PyBytes_AS_STRING(row), size)
         cat_clear_shared(place + size, self.view.size - size)
@@ -134,7 +134,7 @@ cdef class CycleWriter(Ring):
         record_size, actual_size, target_size = sizes
         _, actual_at, target_at, whole = row_parts(record_size, actual_size, target_size)
         if not writable or whole != size:
-            raise ValueError(f"rows of {size} bytes for blocks of {whole}")
+            raise ValueError(f"blocks of {whole} bytes do not match writable rows of {size} bytes")
         self.rows = cycle_rows(
             view=self.view,
             record_size=record_size,

@@ -1,13 +1,14 @@
-"""The desk: memory for the commands of clients to a loop, and for their leases on axes.
+"""Desk of a loop: shared memory for the commands of clients and for their leases on axes.
 
-It is sealed memory without a name, because clients write in it. They get it over a socket
-(desk_socket.py). Clients trust each other: they share a mutex, whose robust list holds pointers.
-The loop does not trust them. It never takes the mutex, and bounds whatever it reads.
+The desk is sealed, anonymous memory, because clients write to it. They receive it over a socket
+(desk_socket.py). Clients trust each other: they share a mutex, whose robust list contains pointers.
+The loop does not trust them. It never locks the mutex, and checks the bounds of all that it reads.
 
-The head is followed by the mutex, the holders (for each axis the serial of its lease; 0: none), the
-places (one for each client) and the ring of each place. Clients change these under the mutex. The
-loop sees a lease by the word that publishes it (`_words.pyx`). It writes two words of a place: the
-number of commands that it has read, and the lease that it has ended. At its end it sets `closed`.
+The desk contains, in this order: the header, the mutex, the holders (for each axis the serial of
+its lease; 0: none), the places (one for each client) and one ring for each place. Clients change
+these parts while they hold the mutex. One atomic word (`_atomic_words.pyx`) publishes a lease to
+the loop. The loop writes two words of a place: the number of commands that it has read, and the
+lease that it has ended. When it closes, it sets `closed`.
 """
 
 from __future__ import annotations
@@ -35,20 +36,20 @@ from catenary.share.process import Process
 MAGIC = b"CATADESK"
 HEAD = struct.Struct("<8sII32s")
 PLACES = 16
-COMMANDS = 64  # of a client that the loop has not read
+COMMANDS = 64  # maximum number of unread commands of a client
 QUANTITIES = ("position", "velocity", "torque")
 
 PLACE = np.dtype(
     [
-        # Atomic words: both sides read them, the loop without the mutex.
+        # Atomic words. Both sides read them; the loop does so without the mutex.
         ("lease", "<u8"),  # serial; 0: the place is free. Publishes the client and its axes.
         ("ended", "<u8"),  # the lease that the loop has ended. Publishes the reason.
-        ("taken", "<u8"),  # commands that the loop has read
+        ("taken", "<u8"),  # number of commands that the loop has read
         ("deadline_ns", "<u8"),  # CLOCK_MONOTONIC
-        # The rest is published by them.
-        ("last", "<u8"),  # the previous lease; `reason`: why it ended
-        ("reason", "<u8"),
-        ("start_time", "<u8"),  # the client
+        # The atomic words publish the other fields.
+        ("last", "<u8"),  # the previous lease
+        ("reason", "<u8"),  # why the previous lease ended
+        ("start_time", "<u8"),  # of the client process
         ("pid", "<i8"),
         ("command", "S64"),
     ]
@@ -58,11 +59,11 @@ Values = npt.NDArray[np.float64]
 
 
 class Reason(IntEnum):
-    """The reason for which a lease has ended."""
+    """Reason why a lease has ended."""
 
     RELEASED = 1
     EXPIRED = 2  # not renewed in time
-    DIED = 3  # its process has ended
+    DIED = 3  # the client process has ended
     LOOP_ENDED = 4
 
     def __str__(self) -> str:
@@ -72,7 +73,7 @@ class Reason(IntEnum):
 REASONS = {
     Reason.RELEASED: "released",
     Reason.EXPIRED: "not renewed in time",
-    Reason.DIED: "its process died",
+    Reason.DIED: "the client process has died",
     Reason.LOOP_ENDED: "the loop has ended",
 }
 
@@ -89,13 +90,14 @@ class Geometry(NamedTuple):
 
 
 def row_dtype(axes: int) -> np.dtype[np.void]:
-    """Return the type of a command's row; NaN marks an axis without a command."""
+    """Return the type of a command row. NaN marks an axis without a command."""
     return np.dtype(
         [("lease", "<u8"), ("quantities", "<u8"), *((q, "<f8", (axes,)) for q in QUANTITIES)]
     )
 
 
 def geometry(axes: int) -> Geometry:
+    """Return the offsets of the parts of a desk for this number of axes."""
     closed = memory_aligned(HEAD.size) + MUTEX_SIZE
     holders = memory_aligned(closed + 8)
     places = memory_aligned(holders + 8 * axes)
@@ -109,7 +111,7 @@ def memory_aligned(offset: int) -> int:
 
 
 class Desk:
-    """One process's view of the desk of a loop."""
+    """View of the desk of a loop, in the loop or in a client."""
 
     def __init__(self, memory: mmap.mmap, layout: ShareLayout, *, fresh: bool = False) -> None:
         axes = len(layout.axes)
@@ -136,7 +138,7 @@ class Desk:
         ]
 
     def client(self, place: int) -> Process:
-        """Return the client that has the place, or that had it last."""
+        """Return the client that holds the place, or that held it last."""
         entry = self.places[place]
         return Process(
             int(entry["pid"]),
@@ -146,7 +148,7 @@ class Desk:
         )
 
     def is_valid(self, place: int, serial: int) -> bool:
-        """Return True if the lease is valid and neither side has ended it."""
+        """Return True if the place still has this lease and neither side has ended it."""
         return (
             self.leases.load(place) == serial
             and self.ended.load(place) != serial
@@ -154,7 +156,7 @@ class Desk:
         )
 
     def reason(self, place: int, serial: int) -> Reason:
-        """Return why a lease of the place has ended."""
+        """Return the reason why a lease of this place has ended."""
         if self._closed.load(0):
             return Reason.LOOP_ENDED
         is_recorded = serial in (self.ended.load(place), int(self.places[place]["last"]))
@@ -162,31 +164,31 @@ class Desk:
         return Reason(reason) if is_recorded and reason in tuple(Reason) else Reason.EXPIRED
 
     def end(self, place: int, serial: int, reason: Reason) -> None:
-        """End a lease; called by the loop. The lease cannot be renewed afterwards."""
+        """End a lease, so that it cannot be renewed. Called by the loop."""
         self.places[place]["reason"] = reason
         self.ended.store(place, serial)
 
     def end_all(self) -> None:
-        """End all leases; called by the loop. No lease can be renewed or taken afterwards."""
+        """End all leases, so that none can be renewed or taken. Called by the loop."""
         self._closed.store(0, 1)
 
     def ending(self, place: int, now_ns: int) -> Reason | None:
-        """Return why the lease of a place is over; None if it is not.
+        """Return the reason why the lease of a place must end; None if it remains valid.
 
-        Ask the kernel whether the client's process is alive.
+        The method checks whether the client process is alive, which takes a system call.
         """
         if self.deadlines_ns.load(place) <= now_ns:
             return Reason.EXPIRED if self.client(place).is_alive else Reason.DIED
         return None if self.client(place).is_alive else Reason.DIED
 
     def _words(self, places: int, name: str) -> Words:
-        """Return one field of every place."""
+        """Return one field of all places."""
         assert PLACE.fields is not None
         return Words(self._memory, places + PLACE.fields[name][1], PLACES, PLACE.itemsize)
 
 
 def make_desk(layout: ShareLayout) -> tuple[Desk, int]:
-    """Make a desk that no client has yet. Returns it and the descriptor of its memory."""
+    """Create a desk. Return it and the descriptor of its memory, which the caller owns."""
     axes = len(layout.axes)
     descriptor, memory = make_sealed(f"catenary-{layout.name}", geometry(axes).size)
     try:
@@ -198,14 +200,24 @@ def make_desk(layout: ShareLayout) -> tuple[Desk, int]:
 
 
 def open_desk(layout: ShareLayout, path: Path, owner: int) -> Desk:
-    """Open the desk of a running loop, over its socket. Raises ShareError if that fails."""
+    """Open the desk of a running loop over its socket.
+
+    Args:
+        layout: layout of the share.
+        path: path of the socket.
+        owner: user id of the owner of the share.
+
+    Raises:
+        ShareError: the loop does not accept commands from this user, or the desk is damaged or
+            belongs to another loop.
+    """
     try:
         descriptor = request_descriptor(path, owner)
     except FileNotFoundError as error:
-        raise ShareError(f"the share {layout.name!r} takes no commands") from error
+        raise ShareError(f"the share {layout.name!r} does not accept commands") from error
     except PermissionError as error:
         raise ShareError(
-            f"the share {layout.name!r} may not be commanded: {path} belongs to another user",
+            f"no permission to command the share {layout.name!r}: {path} belongs to another user",
             hint="its writer can allow it: cat.Share(..., mode=0o660) for the group",
         ) from error
     memory = map_sealed(descriptor, geometry(len(layout.axes)).size)

@@ -1,4 +1,4 @@
-"""The loop's side of the desk: commands of clients, and leases that end."""
+"""Loop side of the desk: commands of clients, and leases that have ended."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ from catenary.share.command_table import QUANTITIES, Desk, Reason, Values
 from catenary.share.layout import ShareLayout
 from catenary.share.process import Process
 
-LOOK_NS = 20_000_000  # between two checks whether the clients' processes are alive
+ALIVE_CHECK_NS = 20_000_000  # interval at which client processes are checked
 
 
 class Targets(Protocol):
-    """The arrays that commands are written to: the `target` of `Drives`."""
+    """Arrays that commands are written to: the `target` of `Drives`."""
 
     @property
     def position(self) -> Values: ...
@@ -29,7 +29,7 @@ class Targets(Protocol):
 
 
 class Commanded(Protocol):
-    """The part of `Drives` that commands need."""
+    """Part of `Drives` that commands need."""
 
     @property
     def names(self) -> tuple[str, ...]: ...
@@ -39,9 +39,9 @@ class Commanded(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class AxisCommand:
-    """Set-points of a client; None: not commanded."""
+    """Set-points of a client. None: the quantity is not commanded."""
 
-    axes: tuple[int, ...]  # in the layout's order
+    axes: tuple[int, ...]  # indices, in the order of the layout
     position: Values | None  # [rad], one for each of `axes`
     velocity: Values | None  # [rad/s]
     torque: Values | None  # [N·m]
@@ -50,7 +50,7 @@ class AxisCommand:
 
 @dataclass(frozen=True, slots=True)
 class LeaseEnd:
-    """A lease that is over; no client commands its axes now."""
+    """A lease that has ended. Its axes are no longer commanded under it."""
 
     axes: tuple[str, ...]
     reason: Reason
@@ -62,7 +62,7 @@ class LeaseEnd:
 
 @dataclass(slots=True)
 class _Known:
-    """A lease as the loop has seen it."""
+    """A lease that the loop has recorded."""
 
     serial: int
     axes: tuple[int, ...]
@@ -70,24 +70,24 @@ class _Known:
 
 
 class CommandReader:
-    """The loop's record of its clients. Only the iterating thread calls it; it never waits."""
+    """The loop's record of its clients. Only the iterating thread uses it; it never blocks."""
 
     def __init__(self, desk: Desk, layout: ShareLayout) -> None:
         self._desk = desk
         self._layout = layout
         self._known: dict[int, _Known] = {}  # by place
         self._ended: list[LeaseEnd] = []
-        self._look_ns = 0
+        self._next_check_ns = 0
 
     def commands(self) -> list[AxisCommand]:
-        """Return the commands of valid leases since the last call; by client, oldest first."""
+        """Return the new commands of valid leases, grouped by client, oldest first."""
         self._follow_leases()
         return [
             command for place, known in self._known.items() for command in self._read(place, known)
         ]
 
     def ended(self) -> list[LeaseEnd]:
-        """Return the leases whose end `commands` has detected since the last call."""
+        """Return the leases that `commands` has found ended since the last call."""
         ended, self._ended = self._ended, []
         return ended
 
@@ -96,7 +96,7 @@ class CommandReader:
         taken = desk.taken.load(place)
         rows, lost = desk.rings[place].copy_after(taken)
         array = np.frombuffer(rows, desk.row)
-        array = array[array["lease"] <= known.serial]  # a later one, of a lease not seen yet, stays
+        array = array[array["lease"] <= known.serial]  # leave those of a lease not recorded yet
         if not len(array):
             return []
         desk.taken.store(place, taken + lost + len(array))
@@ -116,29 +116,29 @@ class CommandReader:
         if not self._known and not any(leases):
             return
         now = time.monotonic_ns()
-        ask = now >= self._look_ns
-        if ask:
-            self._look_ns = now + LOOK_NS
+        check_clients = now >= self._next_check_ns
+        if check_clients:
+            self._next_check_ns = now + ALIVE_CHECK_NS
         for place, serial in enumerate(leases):
             known = self._known.get(place)
             if known is not None and known.serial != serial:
                 self._forget(place, self._desk.reason(place, known.serial))
-            if serial and self._desk.is_valid(place, serial) and self._knows(place, serial):
-                self._end_if_over(place, serial, now, ask)
+            if serial and self._desk.is_valid(place, serial) and self._record(place, serial):
+                self._end_if_over(place, serial, now, check_clients)
 
-    def _knows(self, place: int, serial: int) -> bool:
-        """Record a lease if it is new. Return False if it was released meanwhile."""
+    def _record(self, place: int, serial: int) -> bool:
+        """Record a lease if it is new. Return False if it has just been released."""
         if place in self._known:
             return True
         axes = tuple(np.flatnonzero(self._desk.holders == serial).tolist())
         client = self._desk.client(place)
         if self._desk.leases.load(place) != serial:
-            return False  # released just now: the data read may belong to another lease
+            return False  # the data read may belong to another lease
         self._known[place] = _Known(serial, axes, client)
         return True
 
-    def _end_if_over(self, place: int, serial: int, now: int, ask: bool) -> None:
-        if self._desk.deadlines_ns.load(place) > now and not ask:
+    def _end_if_over(self, place: int, serial: int, now: int, check_client: bool) -> None:
+        if self._desk.deadlines_ns.load(place) > now and not check_client:
             return
         reason = self._desk.ending(place, now)
         if reason is not None:
@@ -160,15 +160,15 @@ def apply(
 ) -> None:
     """Write commands into the targets of drives.
 
-    Axes whose lease has ended hold their commanded position, without velocity or torque. Then the
-    newest command of each axis is written, because another client may already have the axis.
+    First, axes whose lease has ended hold their commanded position, with zero velocity and torque.
+    Then the newest command of each axis is written: another client may already have leased it.
 
     Args:
         commands: new commands, oldest first.
         ended: leases that have ended.
         drives: the drives to command.
         axes: names of the axes, in the order of the layout.
-        commanded: commanded positions [rad], shape (axes,); NaN keeps the target.
+        commanded: commanded positions [rad], shape (axes,). NaN leaves the target unchanged.
     """
     places = {name: (each.target, k) for each in drives for k, name in enumerate(each.names)}
     for name in (name for end in ended for name in end.axes if name in places):

@@ -1,8 +1,8 @@
-"""The socket next to a share: over it, clients get the memory for their commands (SCM_RIGHTS).
+"""Socket of a share, over which clients receive the memory for their commands (SCM_RIGHTS).
 
-The memory has no name, because whoever may write in a file can truncate it: the loop would get a
-SIGBUS. The kernel checks the socket's permissions when a client connects. The client checks with
-SO_PEERCRED which user answers. unix(7), memfd_create(2).
+The memory has no name, because a user with write access to a file can truncate it, and the loop
+would then receive SIGBUS. The kernel checks the permissions of the socket when a client connects.
+The client checks the user of the server with SO_PEERCRED. See unix(7) and memfd_create(2).
 """
 
 from __future__ import annotations
@@ -20,17 +20,17 @@ from catenary.share.folder import draft_path
 
 ANSWER = b"desk"
 BACKLOG = 16
-PATIENCE = 2.0  # [s]
-RETRY = 0.1  # [s] after an accept that failed: the process has no descriptor left
-PAUSE = 0.002  # [s] after each client; before a client tries again
+TIMEOUT = 2.0  # [s]
+RETRY = 0.1  # [s] pause after a failed accept, for example without a free descriptor
+PAUSE = 0.002  # [s] after each client, and between the attempts of a client
 CREDENTIALS = struct.Struct("3i")  # pid, uid, gid: struct ucred
 
 
 class DeskSocket:
-    """Owns a listening socket, and the thread that sends a descriptor to each client."""
+    """Owner of a listening socket and of the thread that sends a descriptor to each client."""
 
     def __init__(self, folder: Path, descriptor: int, mode: int) -> None:
-        """Take over the descriptor. The socket gets its name and its thread by `publish`."""
+        """Take ownership of the descriptor. `publish` names the socket and starts the thread."""
         self._descriptor = descriptor
         self._ended = threading.Event()
         self._listening = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
@@ -45,26 +45,29 @@ class DeskSocket:
             raise
 
     def publish(self, under: Path) -> None:
-        """Rename the socket. It replaces one that a killed process has left."""
+        """Rename the socket to `under`, and start the thread.
+
+        It replaces a socket that a killed process has left behind.
+        """
         self.path.rename(under)
         self.path = under
         self._thread.start()
 
     def close(self) -> None:
-        """Remove the name, then end the thread."""
+        """Remove the socket from its folder, then end the thread."""
         self._ended.set()
         self.path.unlink(missing_ok=True)
-        with suppress(OSError):  # it never listened
-            self._listening.shutdown(socket.SHUT_RDWR)  # wakes accept
+        with suppress(OSError):  # if the socket never listened
+            self._listening.shutdown(socket.SHUT_RDWR)  # wake accept
         if self._thread.is_alive():
-            self._thread.join(PATIENCE)
-        if self._thread.is_alive():  # starved: it must not send a descriptor of this number
-            return
+            self._thread.join(TIMEOUT)
+        if self._thread.is_alive():
+            return  # the thread is starved and could send a new descriptor with this number
         self._listening.close()
         os.close(self._descriptor)
 
     def _serve(self) -> None:
-        from catenary.bus.thread_priority import step_behind  # readers of a share need no bus
+        from catenary.bus.thread_priority import step_behind  # a reader must not import bus
 
         step_behind()
         while not self._ended.is_set():
@@ -74,44 +77,50 @@ class DeskSocket:
                 self._ended.wait(RETRY)
                 continue
             with client, suppress(OSError):
-                client.setblocking(False)  # a client that does not read causes no wait
+                client.setblocking(False)  # do not wait for a client that does not read
                 socket.send_fds(client, [ANSWER], [self._descriptor])
-            self._ended.wait(PAUSE)  # clients that connect without end cost the loop little
+            self._ended.wait(PAUSE)  # limit the load from clients that connect continuously
 
 
 def request_descriptor(path: Path, owner: int) -> int:
-    """Return the descriptor that the socket sends; the caller owns it.
+    """Return the descriptor that the server of a socket sends. The caller owns it.
+
+    Args:
+        path: path of the socket.
+        owner: expected user id of the server.
 
     Raises:
         FileNotFoundError, PermissionError: from the kernel.
-        ShareError: no process answers, or one that is not of user `owner`.
+        ShareError: no process answers, or the process belongs to another user.
     """
     flags = socket.SOCK_SEQPACKET | socket.SOCK_CLOEXEC
-    with socket.socket(socket.AF_UNIX, flags) as asking:
-        asking.settimeout(PATIENCE)
+    with socket.socket(socket.AF_UNIX, flags) as connection:
+        connection.settimeout(TIMEOUT)
         try:
-            _connect(asking, path)
-            peer = asking.getsockopt(socket.SOL_SOCKET, socket.SO_PEERCRED, CREDENTIALS.size)
+            _connect(connection, path)
+            peer = connection.getsockopt(socket.SOL_SOCKET, socket.SO_PEERCRED, CREDENTIALS.size)
             _, uid, _ = CREDENTIALS.unpack(peer)
             if uid != owner:
-                raise ShareError(f"{path} is answered by user {uid}, its share is of user {owner}")
+                raise ShareError(
+                    f"user {uid} answers on {path}, but the share belongs to user {owner}"
+                )
             flags = socket.MSG_CMSG_CLOEXEC
-            _, descriptors, _, _ = socket.recv_fds(asking, len(ANSWER), 1, flags)
+            _, descriptors, _, _ = socket.recv_fds(connection, len(ANSWER), 1, flags)
         except (FileNotFoundError, PermissionError):
             raise
         except OSError as error:  # refused, or timed out
             raise ShareError(f"{path} does not answer: {error.strerror or error}") from error
     if not descriptors:
-        raise ShareError(f"{path} has sent no memory for commands")
+        raise ShareError(f"the process that answers on {path} sent no memory for commands")
     return descriptors[0]
 
 
-def _connect(asking: socket.socket, path: Path) -> None:
-    """Connect. While other clients fill the queue, the kernel refuses with EAGAIN: try again."""
-    deadline = time.monotonic() + PATIENCE
+def _connect(connection: socket.socket, path: Path) -> None:
+    """Connect, and retry while the queue is full: the kernel then returns EAGAIN."""
+    deadline = time.monotonic() + TIMEOUT
     while True:
         try:
-            return asking.connect(str(path))
+            return connection.connect(str(path))
         except BlockingIOError:
             if time.monotonic() >= deadline:
                 raise

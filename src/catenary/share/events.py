@@ -1,4 +1,4 @@
-"""Events of a loop, as lines of JSON in a ring."""
+"""Events of a loop, as JSON texts in a ring."""
 
 from __future__ import annotations
 
@@ -10,18 +10,18 @@ from catenary.errors import ShareError
 from catenary.plan.sink import Incident
 from catenary.share.layout import EVENT_SIZE
 
-CUT_OFF = " ..."
+ELLIPSIS = " ..."
 
 
 class SharedEvent(msgspec.Struct, frozen=True):
-    """An event of a loop."""
+    """Event of a loop."""
 
-    serial: int  # of the event, from 1
-    number: int  # of the last cycle before it; 0: before the first
-    kind: str  # the name of its class in `cat.events`, or of the error that ended the loop
+    serial: int  # number of the event, counted from 1
+    number: int  # number of the last cycle before the event; 0: before the first cycle
+    kind: str  # name of the class in `cat.events`, or of the error that ended the loop
     message: str
-    time: float  # of the loop's clock [s]
-    position: int | None  # of the device; None: about the segment
+    time: float  # on the clock of the loop [s]
+    position: int | None  # of the device; None: the event concerns the segment
     details: Mapping[str, object]
 
     def __str__(self) -> str:
@@ -29,7 +29,15 @@ class SharedEvent(msgspec.Struct, frozen=True):
 
 
 def encode_event(incident: Incident, serial: int, number: int) -> bytes:
-    """Encode an event into one row. If it is too long, drop details, then truncate the message."""
+    """Encode an event into one row of at most EVENT_SIZE bytes.
+
+    If the event is too long, drop its details, and then truncate its message.
+
+    Args:
+        incident: the event.
+        serial: serial number of the event.
+        number: number of the last cycle.
+    """
     event = SharedEvent(
         serial,
         number,
@@ -44,19 +52,19 @@ def encode_event(incident: Incident, serial: int, number: int) -> bytes:
         event = msgspec.structs.replace(event, details={})
         line = msgspec.json.encode(event)
     while len(line) > EVENT_SIZE:
-        kept = max(len(event.message) - (len(line) - EVENT_SIZE) - len(CUT_OFF), 0)
-        event = msgspec.structs.replace(event, message=event.message[:kept] + CUT_OFF)
+        kept = max(len(event.message) - (len(line) - EVENT_SIZE) - len(ELLIPSIS), 0)
+        event = msgspec.structs.replace(event, message=event.message[:kept] + ELLIPSIS)
         line = msgspec.json.encode(event)
     return line
 
 
 def encodable(value: object) -> object:
-    """Replace characters that UTF-8 cannot encode by '?': a device's text must not stop a loop."""
+    """Replace characters that UTF-8 cannot encode by '?'. A device's text must not stop a loop."""
     return value.encode(errors="replace").decode() if isinstance(value, str) else value
 
 
 def decode_event(row: bytes | bytearray) -> SharedEvent:
-    """Return the event of a row. Raises ShareError if the row is damaged."""
+    """Decode the event in a row. Raises ShareError if the row is damaged."""
     try:
         return msgspec.json.decode(row.rstrip(b"\0"), type=SharedEvent)
     except (msgspec.MsgspecError, ValueError, RecursionError) as error:

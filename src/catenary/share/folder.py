@@ -1,9 +1,9 @@
-"""Folders of shares and mutexes: /run/catenary for a group of users, else one for each user.
+"""Folders of shares and mutexes: /run/catenary for a group of users, or one folder for each user.
 
-/run/catenary belongs to root; one group may create files there (mode 3771: setgid, sticky).
-`catenary doctor --apply` creates it. Without it, or outside of its group, a user's files are in
-/dev/shm/catenary-UID, where only this user can list, create or lock. Others can pass through this
-folder once one of its files grants them access.
+/run/catenary belongs to root, and one group can create files there (mode 3771: setgid, sticky).
+`catenary doctor --apply` creates it. Without it, or outside of its group, the files of a user are
+in /dev/shm/catenary-UID. Only this user can list, create or lock files there. Other users can
+traverse the folder as soon as one of its files grants them access.
 """
 
 from __future__ import annotations
@@ -24,19 +24,27 @@ GROUP_FOLDER = Path("/run/catenary")
 USER_FOLDERS = Path("/dev/shm")
 USER_IDS = Path("/proc/self/uid_map")
 NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,63}")
-STATE, SOCKET, MUTEX = "share", "socket", "mutex"  # a file's name begins with its kind
+STATE, SOCKET, MUTEX = "share", "socket", "mutex"  # prefixes of file names
 DRAFT = ".draft-"
-DRAFT_AGE = 60.0  # [s] a draft exists for milliseconds
-LOCK_PATIENCE = 2.0  # [s] a lock lasts as briefly
-LOCK_PAUSE = 0.005
+DRAFT_AGE = 60.0  # [s]; a draft normally exists for milliseconds
+LOCK_TIMEOUT = 2.0  # [s]; a lock is normally held for milliseconds
+LOCK_PAUSE = 0.005  # [s] between two attempts
 
 
 def file_name(kind: str, name: str) -> str:
-    """Return the name of a file in a folder. Raises ValueError if `name` is invalid."""
+    """Return the file name of a share, socket or mutex.
+
+    Args:
+        kind: STATE, SOCKET or MUTEX.
+        name: name that the user has chosen.
+
+    Raises:
+        ValueError: the name is invalid.
+    """
     if not NAME.fullmatch(name):
         raise ValueError(
-            f"share {name!r}: a name has up to 64 letters, digits, '.', '_' and '-', and begins "
-            "with a letter or digit"
+            f"invalid name {name!r}: use 1 to 64 letters, digits, '.', '_' or '-', and begin with "
+            "a letter or digit"
         )
     return f"{kind}-{name}"
 
@@ -49,47 +57,56 @@ def own_folder() -> Path:
 
 
 def user_folder(uid: int) -> Path:
-    """Return the folder of a user, named after the id outside of this user namespace.
+    """Return the folder of a user. Its name contains the id outside of this user namespace.
 
-    An ordinary user is root in the user namespace of a private network.
+    In the user namespace of a private network, an ordinary user appears as root.
     """
     return USER_FOLDERS / f"catenary-{_outside(uid)}"
 
 
 def prepare(folder: Path, mode: int) -> None:
-    """Create this user's folder if it is missing, for files of `mode`.
+    """Create the folder of this user if it is missing.
 
-    Raises ShareError if another user has created it: all users can write in /dev/shm.
+    Args:
+        folder: the folder.
+        mode: mode of the files to be created in it, which determines the mode of the folder.
+
+    Raises:
+        ShareError: another user has created the folder; all users can write to /dev/shm.
     """
     if folder == GROUP_FOLDER:
         return
     with suppress(FileExistsError):
         folder.mkdir(0o700)
     status = folder.lstat()
-    kind = "" if stat.S_ISDIR(status.st_mode) else ", and is not a folder"
+    kind = "" if stat.S_ISDIR(status.st_mode) else " and is not a folder"
     if kind or status.st_uid != os.geteuid():
         raise ShareError(
-            f"{folder} belongs to user {status.st_uid} (you are {os.geteuid()}){kind}",
-            hint="remove it as root; `sudo catenary doctor --apply` creates /run/catenary instead",
+            f"{folder} belongs to user {status.st_uid} (you are user {os.geteuid()}){kind}",
+            hint="remove it as root, or use /run/catenary: `sudo catenary doctor --apply`",
         )
     present = stat.S_IMODE(status.st_mode)
-    wanted = 0o700 | present & 0o011 | _passage(mode)
-    if present != wanted:
-        folder.chmod(wanted)
+    required = 0o700 | present & 0o011 | _search_permissions(mode)
+    if present != required:
+        folder.chmod(required)
 
 
 def trusted_owners(uid: int | None) -> tuple[int, ...]:
-    """Return the users whose files are opened: the one asked for, else this user and root."""
+    """Return the users whose files may be opened: user `uid`, or for None this user and root."""
     return (os.geteuid(), 0) if uid is None else (uid,)
 
 
 def find(file: str, uid: int | None) -> Path:
-    """Return the path of an existing file of a trusted owner.
+    """Return the path of an existing file that a trusted user owns.
+
+    Args:
+        file: name of the file.
+        uid: owner of the file; None: this user or root.
 
     Raises:
-        FileNotFoundError: there is no such file.
-        PermissionError: the folder of the user asked for cannot be entered.
-        ShareError: there is one, and its owner is not trusted.
+        FileNotFoundError: no such file exists.
+        PermissionError: the folder of user `uid` is not accessible.
+        ShareError: the file exists, but its owner is not trusted.
     """
     owners = trusted_owners(uid)
     group = [GROUP_FOLDER] if _is_group_folder() else []
@@ -113,9 +130,10 @@ def find(file: str, uid: int | None) -> Path:
 
 
 def not_trusted(path: Path, owner: int) -> ShareError:
+    """Return the error for a file of a user that is not trusted."""
     return ShareError(
         f"{path} belongs to another user ({owner})",
-        hint=f"uid={owner} opens it, if you trust that user",
+        hint=f"pass uid={owner} if you trust that user",
     )
 
 
@@ -130,9 +148,9 @@ def names(uid: int | None) -> list[str]:
 
 @contextmanager
 def deciding(folder: Path) -> Iterator[None]:
-    """Keep other processes from creating or removing files of this folder meanwhile.
+    """Lock the folder: in the block, no other process creates or removes files of it.
 
-    Raises ShareError if another process has the lock for longer than `LOCK_PATIENCE`.
+    Raises ShareError if another process holds the lock for longer than `LOCK_TIMEOUT`.
     """
     flags = os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC | os.O_NOFOLLOW
     descriptor = os.open(folder, flags)
@@ -144,7 +162,7 @@ def deciding(folder: Path) -> Iterator[None]:
 
 
 def draft_path(folder: Path) -> Path:
-    """Return a name that readers do not open. A socket's path has at most 107 bytes."""
+    """Return a new path that readers ignore. It is short: a socket path has at most 107 bytes."""
     return folder / f"{DRAFT}{os.getpid()}-{os.urandom(4).hex()}"
 
 
@@ -154,13 +172,13 @@ def remove_old_drafts(folder: Path) -> None:
         pid = path.name.removeprefix(DRAFT).partition("-")[0]
         if not pid.isdecimal() or is_running(int(pid)):
             continue
-        with suppress(OSError):  # another user's, or already removed
+        with suppress(OSError):  # it belongs to another user, or was already removed
             if time.time() - path.lstat().st_mtime > DRAFT_AGE:
                 path.unlink()
 
 
 def _outside(uid: int) -> int:
-    """Return a user's id in the parent of this user namespace: user_namespaces(7)."""
+    """Return the id of a user in the parent of this user namespace, user_namespaces(7)."""
     with suppress(OSError):
         for line in USER_IDS.read_text().splitlines():
             inside, outside, count = map(int, line.split())
@@ -170,9 +188,9 @@ def _outside(uid: int) -> int:
 
 
 def _is_group_folder() -> bool:
-    """Return True if the folder belongs to root, is sticky, and not all users can write in it.
+    """Return True if /run/catenary belongs to root, is sticky, and is not writable for all users.
 
-    Without the sticky bit, its group could rename and remove the files of others.
+    Without the sticky bit, members of its group could rename and remove the files of others.
     """
     try:
         status = GROUP_FOLDER.lstat()
@@ -183,16 +201,16 @@ def _is_group_folder() -> bool:
     return stat.S_ISDIR(mode) and status.st_uid == 0 and bool(closed)
 
 
-def _passage(mode: int) -> int:
-    """Return the search permissions that files of `mode` need from their folder.
+def _search_permissions(mode: int) -> int:
+    """Return the search permissions that a folder needs for files of `mode`.
 
-    All users pass: the group of a file can be another one than that of its folder (newgrp(1)).
+    All users may traverse it, because file and folder can have different groups (newgrp(1)).
     """
     return 0o011 if mode & 0o077 else 0
 
 
 def _lock(descriptor: int, folder: Path) -> None:
-    deadline = time.monotonic() + LOCK_PATIENCE
+    deadline = time.monotonic() + LOCK_TIMEOUT
     while True:
         try:
             fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
@@ -201,14 +219,15 @@ def _lock(descriptor: int, folder: Path) -> None:
             if time.monotonic() >= deadline:
                 holder = _lock_holder(os.fstat(descriptor).st_ino)
                 raise ShareError(
-                    f"{folder} has been locked for {LOCK_PATIENCE:g} s by {holder}",
-                    hint="a lock lasts milliseconds: that process was stopped, or is hostile",
+                    f"{folder} has been locked for {LOCK_TIMEOUT:g} s by {holder}",
+                    hint="the lock is normally held for milliseconds: continue that process if it "
+                    "was stopped, or end it",
                 ) from error
         time.sleep(LOCK_PAUSE)
 
 
 def _lock_holder(inode: int) -> str:
-    """Name the process that has a lock of this inode: proc_locks(5)."""
+    """Return a description of the process that holds a lock on this inode, proc_locks(5)."""
     pid = None
     with suppress(OSError):
         lines: Sequence[str] = Path("/proc/locks").read_text().splitlines()

@@ -1,11 +1,11 @@
-"""Layout of a segment, described by the segment itself.
+"""Layout of a shared segment. The segment begins with a description of itself.
 
 0   8 bytes  "CATSHARE"
 8   u32      version of the format
 12  u32      bytes of the description
 16  u64      bytes of the segment
-24           the description: a ShareLayout as JSON
-...          the ring of cycles and the ring of events (ring.h), at the offsets in the description
+24           description: a ShareLayout as JSON
+...          ring of cycles and ring of events (ring.h), at the offsets in the description
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ ALIGNMENT = 4096
 EVENT_SIZE = 1024  # bytes of an event
 EVENT_COUNT = 256
 ROWS_MIN = 64
-NUMBERS = frozenset("biuf")  # kinds of NumPy's types
+NUMBERS = frozenset("biuf")  # kinds of NumPy types
 # Errors of msgspec and NumPy for an invalid description.
 DAMAGE = (
     msgspec.MsgspecError,
@@ -47,21 +47,21 @@ Clock = Literal["monotonic", "virtual"]
 
 
 class ShareField(msgspec.Struct, frozen=True):
-    """A field of a cycle's record."""
+    """Field of the record of a cycle."""
 
     name: str
-    dtype: str  # of one number, NumPy's: "<f8"
-    shape: tuple[int, ...]  # (): a single number
-    unit: str  # "rad", "rad/s", "N·m", "ns"; "": a count, a code, or the device's own unit
+    dtype: str  # NumPy type of one number: "<f8"
+    shape: tuple[int, ...]  # (): a scalar
+    unit: str  # "rad", "rad/s", "N·m", "ns"; "": a count, a code, or a unit of the device
     offset: int  # in the row [bytes]
-    per_axis: bool  # one number for each of the layout's axes
+    per_axis: bool  # True if the field has one number for each axis of the layout
 
 
 class RingPlace(msgspec.Struct, frozen=True):
-    """A ring in the segment."""
+    """Location of a ring in the segment."""
 
     offset: int  # [bytes]
-    count: int
+    count: int  # number of rows
     size: int  # of a row [bytes]
 
 
@@ -72,18 +72,18 @@ class ShareLayout(msgspec.Struct, frozen=True):
     version: int
     run: str  # unique identifier of this run of a loop
     period: float  # [s]
-    axes: tuple[str, ...]  # names, in the order of the fields that are per axis
+    axes: tuple[str, ...]  # names, in the order of the per-axis fields
     fields: tuple[ShareField, ...]
     clock: Clock  # of scheduled_ns and wake_ns
-    utc_offset_ns: int  # UTC less that clock
-    opened: float  # [s] UTC
+    utc_offset_ns: int  # UTC minus that clock
+    opened: float  # UTC [s]
     writer: Process
     rows: RingPlace
     events: RingPlace
 
     @property
     def dtype(self) -> np.dtype[np.void]:
-        """NumPy type of a cycle's record."""
+        """NumPy type of the record of a cycle."""
         return np.dtype(
             {
                 "names": [field.name for field in self.fields],
@@ -102,13 +102,13 @@ class ShareLayout(msgspec.Struct, frozen=True):
 def make_layout(
     name: str, sink: SinkLayout, *, history: float, opened: float, writer: Process
 ) -> ShareLayout:
-    """Return a layout for a loop.
+    """Return the layout of a segment for a loop.
 
     Args:
         name: name of the share.
-        sink: the loop's description of its data.
-        history: time whose cycles the ring keeps [s].
-        opened: time of opening, UTC [s].
+        sink: description of the data of the loop.
+        history: time span of the cycles that the ring keeps [s].
+        opened: time at which the share was opened, UTC [s].
         writer: process of the loop.
     """
     blocks = (sink.record_size, sink.actual_size, sink.target_size)
@@ -139,6 +139,7 @@ def make_layout(
 
 
 def make_field(field: SinkField, start: int) -> ShareField:
+    """Return the description of a field whose block begins at byte `start` of the row."""
     shape = () if field.count is None else (field.count,)
     return ShareField(
         field.name, field.format, shape, field.unit, start + field.offset, field.per_axis
@@ -154,7 +155,7 @@ def power_of_two(least: int) -> int:
 
 
 def encode_head(layout: ShareLayout) -> bytes:
-    """Return the first bytes of a segment: header and description."""
+    """Return the header and the description, with which a segment begins."""
     description = msgspec.json.encode(layout)
     return HEADER.pack(MAGIC, layout.version, len(description), layout.size) + description
 
@@ -162,7 +163,7 @@ def encode_head(layout: ShareLayout) -> bytes:
 def decode_head(memory: mmap.mmap | bytes, size: int) -> ShareLayout:
     """Return the layout of a segment of `size` bytes.
 
-    Raises ShareError if it is not a share, is damaged, or has another version.
+    Raises ShareError if the segment is not a share, is damaged, or has another version.
     """
     head = memory[: HEADER.size]
     if len(head) < HEADER.size or not head.startswith(MAGIC):
@@ -170,19 +171,21 @@ def decode_head(memory: mmap.mmap | bytes, size: int) -> ShareLayout:
     _, version, length, whole = HEADER.unpack(head)
     if version != VERSION:
         raise ShareError(
-            f"its layout has version {version}, this program reads version {VERSION}",
-            hint="use the same release of catenary in both programs",
+            f"its layout has version {version}, but this program reads version {VERSION}",
+            hint="use the same release of Catenary in both programs",
         )
     if whole > size or HEADER.size + length > size:
-        raise ShareError(f"it is truncated: {size} bytes of {whole}")
+        raise ShareError(f"it is truncated to {size} of {whole} bytes")
     try:
         layout = msgspec.json.decode(memory[HEADER.size : HEADER.size + length], type=ShareLayout)
         fits = layout.size <= size and layout.dtype.itemsize == layout.rows.size
         plain = {np.dtype(field.dtype).kind for field in layout.fields} <= NUMBERS
     except DAMAGE as error:
-        raise ShareError(f"its description is broken: {error}") from error
+        raise ShareError(f"its description is invalid: {error}") from error
     if not fits:
-        raise ShareError("its description does not fit its size")
+        raise ShareError("its description does not match its size")
     if not plain or not 0.0 < layout.period < math.inf:
-        raise ShareError("its description is broken: fields are not numbers, or a wrong period")
+        raise ShareError(
+            "its description is invalid: a field is not numeric, or the period is not positive"
+        )
     return layout

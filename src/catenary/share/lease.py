@@ -1,4 +1,4 @@
-"""Lease: the right to command some axes of a loop in another process, for a limited time."""
+"""Leases: the right to command axes of a loop in another process for a limited time."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from catenary.share.command_table import COMMANDS, PLACES, QUANTITIES, Desk, Rea
 from catenary.share.layout import ShareLayout
 from catenary.share.process import this_process
 
-PATIENCE_NS = 2_000_000_000  # a dead owner's lock is recovered; a living owner is quick
+LOCK_TIMEOUT_NS = 2_000_000_000  # a running owner unlocks much earlier; a dead one is recovered
 
 
 class Lease:
@@ -25,7 +25,7 @@ class Lease:
     It ends when it is released, when it is not renewed in time, or when its process ends.
 
         with arm.lease(axes=["1 Servo"], for_=0.5) as command:
-            command.send(position=[0.3])       # renews it, too
+            command.send(position=[0.3])       # also renews the lease
     """
 
     def __init__(self, desk: Desk, layout: ShareLayout, axes: Sequence[int], for_: float) -> None:
@@ -42,7 +42,7 @@ class Lease:
             except (ValueError, OverflowError) as error:
                 raise LeaseError(
                     f"the desk of the share {layout.name!r} is damaged: {error}",
-                    hint="another client has written into it; open the loop again",
+                    hint="another client has overwritten it; restart the loop",
                 ) from error
 
     def send(
@@ -54,17 +54,17 @@ class Lease:
     ) -> None:
         """Send set-points for the axes of the lease, and renew the lease.
 
-        The loop applies them in its next cycle that reads commands. Each value is a scalar or has
-        shape (axes,), in the order of the lease.
+        The loop applies the set-points in the next cycle in which it reads commands. Each value is
+        a scalar or has shape (axes,), in the order of the lease. None: not commanded.
 
         Args:
-            position: positions [rad]; None: not commanded.
-            velocity: velocities [rad/s]; None: not commanded.
-            torque: torques [N·m]; None: not commanded.
+            position: positions [rad].
+            velocity: velocities [rad/s].
+            torque: torques [N·m].
 
         Raises:
-            LeaseError: the lease is over, or the loop does not read commands.
-            ValueError: another shape, NaN or infinity, or nothing to send.
+            LeaseError: the lease has ended, or the loop does not read commands.
+            ValueError: a value has the wrong shape or is not finite, or no value is given.
         """
         row = np.zeros((), self._desk.row)
         given_values = zip(QUANTITIES, (position, velocity, torque), strict=True)
@@ -74,16 +74,16 @@ class Lease:
                 row[name][self._numbers] = self._checked(name, given)
                 row["quantities"] |= np.uint64(1 << bit)
         if not row["quantities"]:
-            raise ValueError("nothing to send: position=, velocity= or torque=")
+            raise ValueError("nothing to send; pass position=, velocity= or torque=")
         row["lease"] = self._serial
         self._renew(row.tobytes())
 
     def renew(self) -> None:
-        """Renew the lease for its full time. Raises LeaseError if it is over."""
+        """Renew the lease for its full duration. Raises LeaseError if it has ended."""
         self._renew(None)
 
     def release(self) -> None:
-        """Release the axes. A no-op if the lease is over, or in a forked child."""
+        """Release the axes. A no-op if the lease has ended, or in a forked child."""
         if os.getpid() != self._pid:
             return
         with locked(self._desk):
@@ -102,16 +102,16 @@ class Lease:
         self.release()
 
     def _renew(self, row: bytes | None) -> None:
-        """Renew the lease and write a row; the mutex ensures that the place is still its own."""
+        """Renew the lease and write a row. The mutex protects the place against reassignment."""
         desk, place = self._desk, self._place
         with locked(desk):
             now = time.monotonic_ns()
             if not self._is_valid() or desk.deadlines_ns.load(place) <= now:
                 raise LeaseError(
-                    f"the lease on {', '.join(self.axes)} is over: "
+                    f"the lease on {', '.join(self.axes)} has ended: "
                     f"{desk.reason(place, self._serial)}",
-                    hint="take it again; send() or renew() more often than every "
-                    f"{self._for_ns * 1e-9:g} s, or ask for longer",
+                    hint="take a new lease; call send() or renew() at least every "
+                    f"{self._for_ns * 1e-9:g} s, or pass a longer for_=",
                 )
             desk.deadlines_ns.store(place, now + self._for_ns)
             if row is None:
@@ -122,15 +122,15 @@ class Lease:
     def _check_taken(self) -> None:
         """Raise LeaseError if the loop does not read commands.
 
-        Check the loop's process only if commands are waiting.
+        The process of the loop is checked only if commands are waiting.
         """
         waiting = self._desk.rings[self._place].newest - self._desk.taken.load(self._place)
         if waiting and not self._layout.writer.is_alive:
             raise LeaseError(f"the loop's process has died: {self._layout.writer}")
         if waiting >= COMMANDS:
             raise LeaseError(
-                f"the loop has not taken the last {COMMANDS} commands",
-                hint="its body has to call share.apply(drives) or share.commands()",
+                f"the loop has not read the last {COMMANDS} commands",
+                hint="its body must call share.apply(drives) or share.commands()",
             )
 
     def _is_valid(self) -> bool:
@@ -139,13 +139,15 @@ class Lease:
     def _checked(self, name: str, given: npt.ArrayLike) -> npt.NDArray[np.float64]:
         values = np.asarray(given, dtype=np.float64)
         if values.shape not in ((), (len(self.axes),)):
-            raise ValueError(f"{name}: one for each of {len(self.axes)} axes, not {values.shape}")
+            raise ValueError(
+                f"{name} has shape {values.shape}; pass a scalar or shape ({len(self.axes)},)"
+            )
         if not np.isfinite(values).all():
-            raise ValueError(f"{name}: NaN or infinity is not a set-point")
+            raise ValueError(f"{name} contains NaN or infinity; set-points must be finite")
         return values
 
     def _take_place(self) -> int:
-        """Return a free place, or one whose lease is over. The caller holds the mutex."""
+        """Return a free place, or one whose lease has ended. The caller holds the mutex."""
         desk, now = self._desk, time.monotonic_ns()
         for place, serial in enumerate(desk.leases.load_all()):
             if serial and not desk.is_valid(place, serial):
@@ -153,11 +155,13 @@ class Lease:
             elif serial and (reason := desk.ending(place, now)):
                 free(desk, place, reason)
         leases = desk.leases.load_all()
-        orphans = ~np.isin(desk.holders, leases)  # of a client killed meanwhile
+        orphans = ~np.isin(desk.holders, leases)  # entries of a client that was killed
         desk.holders[orphans] = 0
         if 0 in leases:
             return leases.index(0)
-        raise LeaseError(f"{PLACES} clients command the share {self._layout.name!r} already")
+        raise LeaseError(
+            f"the share {self._layout.name!r} already has {PLACES} clients with a lease"
+        )
 
     def _take_axes(self) -> int:
         """Take the axes and return the serial of the new lease. The caller holds the mutex."""
@@ -169,7 +173,7 @@ class Lease:
                 raise LeaseError(
                     f"axis {self._layout.axes[axis]!r} is leased to {desk.client(place)} for "
                     f"another {max(left, 0.0):.3f} s",
-                    hint="wait until that lease is released or over",
+                    hint="wait until that lease is released or expires",
                 )
         serial = max(*desk.leases.load_all(), int(desk.places["last"].max())) + 1
         me, entry = this_process(), desk.places[self._place]
@@ -183,15 +187,15 @@ class Lease:
 
 @contextmanager
 def locked(desk: Desk) -> Iterator[None]:
-    """Lock the desk. Raises LeaseError if a client that was stopped holds the lock."""
+    """Lock the desk for a block. Raises LeaseError if the lock is not free in time."""
     try:
-        taken = desk.mutex.lock(PATIENCE_NS)
+        taken = desk.mutex.lock(LOCK_TIMEOUT_NS)
     except OSError as error:
         raise LeaseError(f"the mutex of the desk is damaged: {error.strerror}") from error
     if taken is None:
         raise LeaseError(
-            f"another client has held the desk for {PATIENCE_NS * 1e-9:g} s",
-            hint="it was stopped by a debugger or SIGSTOP: continue or end it",
+            f"another client has locked the desk for {LOCK_TIMEOUT_NS * 1e-9:g} s",
+            hint="a debugger or SIGSTOP has stopped that client: continue or end it",
         )
     try:
         yield
@@ -204,7 +208,7 @@ def free(desk: Desk, place: int, reason: Reason) -> None:
     entry, serial = desk.places[place], desk.leases.load(place)
     entry["reason"] = reason
     entry["last"] = serial
-    desk.leases.store(place, 0)  # before the axes: a reader of the axes checks this again
+    desk.leases.store(place, 0)  # before the holders: their reader checks this word afterwards
     desk.holders[desk.holders == serial] = 0
 
 
@@ -213,23 +217,33 @@ def axis_numbers(layout: ShareLayout, axes: Sequence[str | int] | None) -> list[
     if axes is None:
         return list(range(len(layout.axes)))
     if isinstance(axes, str):
-        raise ValueError(f"axes={axes!r}: a list of names")
+        raise ValueError(f"axes must be a list of names, not the string {axes!r}")
     known = {name: number for number, name in enumerate(layout.axes)}
     numbers = []
     for axis in axes:
         number = known.get(axis) if isinstance(axis, str) else axis
         if number is None or not 0 <= number < len(layout.axes):
-            there = ", ".join(map(repr, layout.axes))
-            raise ValueError(f"no axis {axis!r} in the share {layout.name!r}; there are: {there}")
+            existing = ", ".join(map(repr, layout.axes))
+            raise ValueError(
+                f"the share {layout.name!r} has no axis {axis!r}; its axes are {existing}"
+            )
         numbers.append(number)
     if not numbers or len(set(numbers)) != len(numbers):
-        raise ValueError(f"axes={list(axes)!r}: each once, at least one")
+        raise ValueError(f"axes={list(axes)!r}: pass at least one axis, and each axis only once")
     return numbers
 
 
 def lease_of(
     desk: Desk, layout: ShareLayout, axes: Sequence[str | int] | None, for_: float
 ) -> Lease:
+    """Take a lease on axes. See `Reader.lease` for the arguments and errors.
+
+    Args:
+        desk: desk of the loop.
+        layout: layout of the share.
+        axes: names or numbers of the axes; None: all axes.
+        for_: time until the lease expires [s].
+    """
     if not 0 < for_ <= 3600:
-        raise ValueError(f"for_={for_} s: more than 0, at most an hour")
+        raise ValueError(f"for_={for_} s: must be positive and at most 3600 s")
     return Lease(desk, layout, axis_numbers(layout, axes), for_)

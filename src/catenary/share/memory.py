@@ -1,6 +1,7 @@
-"""Shared memory: files that are complete before they get their name, and sealed memory.
+"""Shared memory: files that are complete before they are visible by name, and sealed memory.
 
-Not multiprocessing.shared_memory, whose readers remove the segment when they end (until 3.13).
+multiprocessing.shared_memory is not suitable: before Python 3.13, a reader that exits removes the
+segment.
 """
 
 from __future__ import annotations
@@ -17,12 +18,12 @@ from pathlib import Path
 from catenary.errors import ShareError
 from catenary.share.folder import deciding, draft_path, not_trusted, remove_old_drafts
 
-MFD_NOEXEC_SEAL = 0x0008  # linux/memfd.h, from Linux 6.3: asked for where vm.memfd_noexec is 2
+MFD_NOEXEC_SEAL = 0x0008  # linux/memfd.h, since Linux 6.3; required if vm.memfd_noexec is 2
 SEALS = fcntl.F_SEAL_SHRINK | fcntl.F_SEAL_GROW | fcntl.F_SEAL_SEAL
 
 
 class Segment:
-    """Owner of a mapping of a file; has the file's size, inode and owner."""
+    """Owner of the mapping of a file, with the file's size, inode and user id."""
 
     def __init__(self, path: Path, descriptor: int, *, writable: bool) -> None:
         try:
@@ -39,32 +40,41 @@ class Segment:
 
     @property
     def is_published(self) -> bool:
-        """True if the name still belongs to this file."""
+        """True if the path still refers to this file."""
         try:
             return os.stat(self.path).st_ino == self.inode
         except FileNotFoundError:
             return False
 
     def publish(self, under: Path) -> None:
-        """Rename the draft. It replaces a file of this name; readers of that file keep it."""
+        """Rename the draft to `under`. Readers of a file that it replaces keep their mapping."""
         self.path.rename(under)
         self.path = under
 
     def unlink(self) -> None:
-        """Remove the name if it still belongs to this file."""
-        # If another process keeps the lock, the file stays, as after a kill.
+        """Remove the file if the path still refers to it."""
+        # If another process holds the lock for too long, the file remains, as after a kill.
         with suppress(ShareError), deciding(self.path.parent):
             if self.is_published:
                 self.path.unlink()
 
 
 def create(folder: Path, size: int, mode: int) -> Segment:
-    """Create a draft of zeros in a prepared folder. Raises ShareError if the memory is full."""
+    """Create a draft file of zeros in a prepared folder.
+
+    Args:
+        folder: the folder.
+        size: size of the file [bytes].
+        mode: permissions as for chmod.
+
+    Raises:
+        ShareError: the file system is full.
+    """
     remove_old_drafts(folder)
     draft = draft_path(folder)
     descriptor = os.open(draft, os.O_RDWR | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, 0o600)
     try:
-        os.posix_fallocate(descriptor, 0, size)  # a missing page would be a SIGBUS in a cycle
+        os.posix_fallocate(descriptor, 0, size)  # a missing page would raise SIGBUS in a cycle
         os.fchmod(descriptor, mode)
     except OSError as error:
         os.close(descriptor)
@@ -72,8 +82,9 @@ def create(folder: Path, size: int, mode: int) -> Segment:
         if error.errno != errno.ENOSPC:
             raise
         raise ShareError(
-            f"{folder} has no room for {size / 2**20:.1f} MiB",
-            hint="less history=, or `mount -o remount,size=...`; in a container --shm-size",
+            f"{folder} has not enough space for {size / 2**20:.1f} MiB",
+            hint="reduce history=, or enlarge the file system with `mount -o remount,size=...` (in "
+            "a container: --shm-size)",
         ) from error
     return Segment(draft, descriptor, writable=True)
 
@@ -86,12 +97,13 @@ def open_segment(
     Args:
         path: the file.
         owners: user ids whose files are accepted.
-        writable: map it for writing, too.
-        granted: permissions of others that are accepted; None: any.
+        writable: True maps the file for writing, too.
+        granted: mode with the largest accepted write permissions of other users; None: any.
 
     Raises:
         FileNotFoundError, PermissionError: from the kernel.
-        ShareError: not a file of these owners, more users than `granted` may write, or empty.
+        ShareError: the file is empty or not a regular file, has another owner, or is writable for
+            more users than `granted` permits.
     """
     access = os.O_RDWR if writable else os.O_RDONLY
     try:
@@ -111,7 +123,17 @@ def open_segment(
 def check_status(
     path: Path, status: os.stat_result, owners: Collection[int], granted: int | None
 ) -> None:
-    """Refuse a file before anything in it is trusted."""
+    """Check owner, type, size and mode of a file before its content is trusted.
+
+    Args:
+        path: the file, for messages.
+        status: its status.
+        owners: user ids whose files are accepted.
+        granted: mode with the largest accepted write permissions of other users; None: any.
+
+    Raises:
+        ShareError: the file is not accepted.
+    """
     if status.st_uid not in owners:
         raise not_trusted(path, status.st_uid)
     if not stat.S_ISREG(status.st_mode) or status.st_size == 0:
@@ -120,15 +142,20 @@ def check_status(
     mode = stat.S_IMODE(status.st_mode)
     if granted is not None and mode & 0o022 & ~granted:
         raise ShareError(
-            f"{path} has mode {mode:#o}: more users can write there than you asked for",
-            hint=f"mode={mode:#o}, if you trust them",
+            f"{path} has mode {mode:#o}: more users can write to it than mode={granted:#o} allows",
+            hint=f"pass mode={mode:#o} if you trust these users",
         )
 
 
 def make_sealed(name: str, size: int) -> tuple[int, mmap.mmap]:
-    """Create anonymous memory that no process can shrink or grow: reading it cannot fault.
+    """Create anonymous memory that no process can resize, so that an access cannot fault.
 
-    Returns its descriptor, which the caller owns, and a mapping.
+    Args:
+        name: name of the memory in /proc.
+        size: size [bytes].
+
+    Returns:
+        The descriptor, which the caller owns, and a mapping.
     """
     descriptor = _memfd(name)
     try:
@@ -142,9 +169,14 @@ def make_sealed(name: str, size: int) -> tuple[int, mmap.mmap]:
 
 
 def map_sealed(descriptor: int, size: int) -> mmap.mmap:
-    """Map memory that another process has made, and close the descriptor.
+    """Map sealed memory of another process, and close the descriptor.
 
-    Raises ShareError if it is not sealed or has another size.
+    Args:
+        descriptor: descriptor of the memory.
+        size: expected size [bytes].
+
+    Raises:
+        ShareError: the memory is not sealed or has another size.
     """
     try:
         seals = fcntl.fcntl(descriptor, fcntl.F_GET_SEALS)
@@ -155,8 +187,8 @@ def map_sealed(descriptor: int, size: int) -> mmap.mmap:
                 f"expected {size} bytes and seals {SEALS:#x}"
             )
         return mmap.mmap(descriptor, size, flags=mmap.MAP_SHARED | mmap.MAP_POPULATE)
-    except OSError as error:  # F_GET_SEALS of another kind of file
-        raise ShareError(f"no memory for commands: {error.strerror}") from error
+    except OSError as error:  # F_GET_SEALS fails for other kinds of files
+        raise ShareError(f"cannot map the memory for commands: {error.strerror}") from error
     finally:
         os.close(descriptor)
 

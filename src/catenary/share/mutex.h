@@ -1,6 +1,7 @@
-/* A mutex in shared memory for slow paths: robust (the next waiter gets a dead owner's lock), with
- * priority inheritance (the owner inherits the priority of its waiters), error-checking.
- * pthread_mutexattr_setrobust(3), _setprotocol(3). 20 ns to lock and unlock without contention. */
+/* A mutex in shared memory, for slow paths. It is robust (the next waiter acquires the lock of a dead
+ * owner), error-checking, and has priority inheritance (the owner inherits the priority of its
+ * waiters): pthread_mutexattr_setrobust(3), _setprotocol(3).
+ * Locking and unlocking take 20 ns without contention. */
 #ifndef CATENARY_MUTEX_H
 #define CATENARY_MUTEX_H
 
@@ -13,14 +14,14 @@
 typedef struct share_mutex {
     char magic[8];
     uint32_t version;
-    uint32_t size;                    /* of the library's mutex: must be the same in all processes */
+    uint32_t size;                    /* of pthread_mutex_t: must be the same in all processes */
     pthread_mutex_t mutex;
 } share_mutex;
 
 #define MUTEX_MAGIC "CATMUTEX"
 #define MUTEX_VERSION 1u
 
-/* Initialise once, before other processes map it. Return 0 or -errno. */
+/* Initialise a mutex, before other processes map it. Return 0 or -errno. */
 static int mutex_init(share_mutex *m) {
     pthread_mutexattr_t attributes;
     int rc = pthread_mutexattr_init(&attributes);
@@ -41,7 +42,7 @@ static int mutex_is_ours(const share_mutex *m) {
 }
 
 /* Wait at most `timeout` [ns]. Return 0 if acquired, 1 if acquired from an owner that died,
- * -ETIMEDOUT, -EDEADLK (this thread already has it) or -ENOTRECOVERABLE. */
+ * -ETIMEDOUT, -EDEADLK (this thread already holds it) or -ENOTRECOVERABLE. */
 static int mutex_lock(share_mutex *m, int64_t timeout) {
     struct timespec until;
     int rc = pthread_mutex_trylock(&m->mutex);

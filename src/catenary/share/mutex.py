@@ -1,4 +1,4 @@
-"""Mutex: mutual exclusion among processes, for slow paths."""
+"""Mutual exclusion between processes, for slow paths."""
 
 from __future__ import annotations
 
@@ -9,23 +9,33 @@ from catenary.errors import ShareError
 from catenary.share import folder, memory
 from catenary.share._mutex import MUTEX_SIZE, SharedMutex
 
-FOR_EVER_NS = 1 << 62
+NO_TIMEOUT_NS = 1 << 62
 
 
 class Mutex:
-    """A lock that all threads of all processes share by its name.
+    """A named lock that threads of any process can share.
 
         with share.Mutex("tool") as mutex:
-            if mutex.recovered:       # the owner died in its block: its work may be half done
+            if mutex.recovered:       # the previous owner died inside its block
                 ...
 
-    The owner inherits the priority of its waiters. If the owner dies, the next one gets the lock,
-    and `recovered` is True. It is for slow paths: a loop never waits for it. The first process that
-    names it creates it; it stays until `unlink`.
+    The owner inherits the priority of its waiters. If the owner dies, the next waiter acquires the
+    lock, and `recovered` is True: the work of the owner may be incomplete. Use the mutex on slow
+    paths only; a loop never waits for it. The first process that uses the name creates the mutex.
+    It exists until `unlink`.
 
-    A process that has a mutex can crash the others, because it holds pointers of the C library.
-    Share it only with users whom you trust. It is refused if another user owns it, or if more users
-    may write in it than `mode` grants. `uid`: open the existing mutex of this user.
+    A process that can write to a mutex can crash the others, because the mutex contains pointers
+    of the C library. Share it only with users whom you trust.
+
+    Args:
+        name: name of the mutex.
+        mode: permissions as for chmod.
+        uid: the user whose existing mutex to open; None: this user.
+
+    Raises:
+        ShareError: another user owns the mutex, more users can write to it than `mode` grants, or
+            user `uid` has no such mutex.
+        ValueError: the name is invalid.
     """
 
     def __init__(self, name: str, *, mode: int = 0o600, uid: int | None = None) -> None:
@@ -40,27 +50,27 @@ class Mutex:
                 hint="its owner can allow it: Mutex(..., mode=0o660) for the group",
             ) from error
         except FileNotFoundError as error:
-            raise ShareError(f"there is no mutex {name!r} of user {uid}") from error
+            raise ShareError(f"user {uid} has no mutex {name!r}") from error
         except ValueError as error:
             raise ShareError(f"the mutex {name!r}: {error}") from error
 
     def acquire(self, timeout: float | None = None) -> bool:
         """Acquire the lock. Return False after `timeout` [s].
 
-        Raises RuntimeError if this thread already has it.
+        Raises RuntimeError if this thread already holds it.
         """
-        recovered = self._mutex.lock(FOR_EVER_NS if timeout is None else round(timeout * 1e9))
+        recovered = self._mutex.lock(NO_TIMEOUT_NS if timeout is None else round(timeout * 1e9))
         if recovered is None:
             return False
         self.recovered = recovered
         return True
 
     def release(self) -> None:
-        """Release the lock. Raises RuntimeError if this thread does not have it."""
+        """Release the lock. Raises RuntimeError if this thread does not hold it."""
         self._mutex.unlock()
 
     def unlink(self) -> None:
-        """Remove the name. Processes that have the mutex keep it."""
+        """Remove the name. Processes that have opened the mutex can still use it."""
         self.path.unlink(missing_ok=True)
 
     def __enter__(self) -> Mutex:

@@ -1,4 +1,4 @@
-"""Identity of a process, distinguished from a later process with the same number."""
+"""Identity of a process, distinct from that of a later process with the same PID."""
 
 from __future__ import annotations
 
@@ -22,27 +22,28 @@ class Process(msgspec.Struct, frozen=True):
 
     @property
     def is_alive(self) -> bool:
-        """True if this same process still runs; False in another PID namespace."""
+        """True if this process still runs. Always False in another PID namespace."""
         return _start_time(self.pid) == self.start_time and self.boot_id == _boot_id()
 
     def __str__(self) -> str:
-        """Return number and command. Control characters in the command become '?'."""
+        """Return the PID and the command, with control characters replaced by '?'."""
         command = "".join(c if c.isprintable() else "?" for c in self.command)
         return f"process {self.pid} ({command})" if command else f"process {self.pid}"
 
 
 def is_running(pid: int) -> bool:
-    """Return True if a process has this number now."""
+    """Return True if a process with this PID runs."""
     return _start_time(pid) is not None
 
 
 def this_process() -> Process:
+    """Return the identity of the calling process."""
     pid = os.getpid()
     return Process(pid, _start_time(pid) or 0, _boot_id(), _command(pid))
 
 
 def _start_time(pid: int) -> int | None:
-    """Return the start time of a process; None if there is none, or if it is a zombie."""
+    """Return the start time of a process; None if it does not exist or is a zombie."""
     try:
         # A process chooses its name, which need not be UTF-8: prctl(2), PR_SET_NAME.
         stat = Path(f"/proc/{pid}/stat").read_text(errors="replace")
@@ -60,7 +61,7 @@ def _boot_id() -> str:
 
 
 def _command(pid: int) -> str:
-    """Return the name of its program; for Python, of the script or module."""
+    """Return the name of the program; for Python, that of the script or module."""
     try:
         words = Path(f"/proc/{pid}/cmdline").read_bytes().decode(errors="replace").split("\0")
     except OSError:

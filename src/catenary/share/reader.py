@@ -1,4 +1,4 @@
-"""Reader: the cycles and events of a loop in another process."""
+"""Reader of the cycles and events of a loop in another process."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ from catenary.share.layout import ShareLayout, decode_head
 from catenary.share.lease import Lease, lease_of
 from catenary.share.memory import Segment
 
-LOOK_NS = 250_000_000  # between two checks whether the writer is alive
-FOR_EVER = 1 << 62
+ALIVE_CHECK_NS = 250_000_000  # interval at which the writer process is checked
+NO_DEADLINE_NS = 1 << 62
 CYCLES, EVENTS = 0, 1
 END = object()
 
@@ -31,18 +31,22 @@ State = Literal["running", "ended", "dead"]
 def attach(
     name: str, *, stale: bool = False, uid: int | None = None, patience: Iterable[object] = ()
 ) -> Reader:
-    """Map the cycles that another process shares as `name`, for reading. Use it in a `with` block.
+    """Open the share `name` of another process for reading. Use the result in a `with` block.
 
     Args:
         name: name of the share.
         stale: accept a share whose writer has died, to read its last cycles.
-        uid: the user whose share it is. None: this user or root; others are refused, because the
+        uid: owner of the share; None: this user or root. Shares of others are refused, because the
             owner of a share can crash its readers.
-        patience: try again after each item, such as a task's jobs (`attach(name, patience=task)`).
+        patience: retry once for each item of this iterable, for example the jobs of a task:
+            `attach(name, patience=task)`.
+
+    Returns:
+        The reader of the share.
 
     Raises:
-        ShareError: the share does not exist, may not be read, belongs to another user, has a dead
-            writer, or has the layout of another version.
+        ShareError: the share does not exist, cannot be read, belongs to another user, has a dead
+            writer, or was written by another version.
     """
     waiting = iter(patience)
     while True:
@@ -61,13 +65,13 @@ def _attached(name: str, stale: bool, uid: int | None) -> Reader:
     except FileNotFoundError as error:
         others = ", ".join(map(repr, folder.names(uid))) or "none"
         raise ShareError(
-            f"there is no share {name!r}; there are: {others}",
-            hint="it exists while a Loop with sink=cat.Share(...) is open; for another user's "
-            "share, pass uid= (--uid)",
+            f"there is no share {name!r}; existing shares: {others}",
+            hint="a share exists while a Loop with sink=cat.Share(...) is open; for the share of "
+            "another user, pass uid= (--uid)",
         ) from error
     except PermissionError as error:
         raise ShareError(
-            f"the share {name!r} may not be read: {error.filename} belongs to another user",
+            f"no permission to read the share {name!r}: {error.filename} belongs to another user",
             hint="its writer can allow it: cat.Share(..., mode=0o640) for the group",
         ) from error
     except ShareError as error:
@@ -75,25 +79,25 @@ def _attached(name: str, stale: bool, uid: int | None) -> Reader:
     try:
         reader = Reader(segment, layout)
     except (ValueError, OverflowError) as error:
-        raise ShareError(f"the share {name!r}: its description is broken: {error}") from error
+        raise ShareError(f"the description of the share {name!r} is invalid: {error}") from error
     if reader.state == "dead" and not stale:
         raise ShareError(
             f"the share {name!r} is stale: {layout.writer} has died",
-            hint=f"its last cycles are still there: cat.attach({name!r}, stale=True); a new "
-            "writer replaces it",
+            hint=f"read its last cycles with cat.attach({name!r}, stale=True); a new writer "
+            "replaces the share",
         )
     return reader
 
 
 class Reader:
-    """One process's read-only view of a share; `catenary.attach` creates it.
+    """Read-only view of a share. `catenary.attach` creates it.
 
         with cat.attach("arm") as arm:
             while arm.wait(timeout=1.0):
                 now = arm.read()
                 print(now["number"], now["position"])
 
-    The memory is mapped for reading only: nothing here can delay or change the loop.
+    The memory is mapped read-only, so a reader can neither delay nor change the loop.
     """
 
     def __init__(self, segment: Segment, layout: ShareLayout) -> None:
@@ -122,12 +126,12 @@ class Reader:
         self.close()
 
     def close(self) -> None:
-        """Unmap the memory. Data already read stays valid, and the share stays for others."""
+        """Unmap the memory. Data already read stays valid; other readers are not affected."""
         self._rings = None
 
     @property
     def state(self) -> State:
-        """State of the writer: "running"; "ended": its loop ended; "dead": killed or crashed."""
+        """State of the writer: "running", "ended" (loop closed) or "dead" (killed or crashed)."""
         if self._ring(CYCLES).ended:
             return "ended"
         return "running" if self.layout.writer.is_alive else "dead"
@@ -139,16 +143,16 @@ class Reader:
 
     @property
     def number(self) -> int:
-        """Number of the newest cycle; 0 before the first."""
+        """Number of the newest cycle; 0 before the first cycle."""
         return self._ring(CYCLES).newest
 
     def wait(self, timeout: float | None = None) -> bool:
-        """Sleep until there is a cycle newer than the last one that `read` or `wait` has seen.
+        """Wait for a cycle that is newer than those `read` and `wait` have already returned.
 
-        Return False if `timeout` [s] has passed, or if no more cycles will come (see `alive`).
+        Return False after `timeout` [s], or if no more cycles will come (see `alive`).
         """
-        deadline = FOR_EVER if timeout is None else time.monotonic_ns() + round(timeout * 1e9)
-        while not self._has_news(min(deadline, time.monotonic_ns() + LOOK_NS)):
+        deadline = NO_DEADLINE_NS if timeout is None else time.monotonic_ns() + round(timeout * 1e9)
+        while not self._has_news(min(deadline, time.monotonic_ns() + ALIVE_CHECK_NS)):
             if time.monotonic_ns() >= deadline:
                 return False
             if not self.alive:
@@ -156,9 +160,9 @@ class Reader:
         return True
 
     def read(self) -> np.void:
-        """Return a consistent copy of the newest cycle, a record of `dtype`.
+        """Return a consistent copy of the newest cycle: a record of type `dtype`.
 
-        Raises ShareError if there is none yet.
+        Raises ShareError before the first cycle.
         """
         number, row = self._ring(CYCLES).copy()
         if number == 0:
@@ -170,17 +174,18 @@ class Reader:
         return record
 
     def rows(self, after: int) -> tuple[Rows, int]:
-        """Return every cycle after number `after` that still exists, oldest first.
+        """Return the cycles after cycle `after` that still exist, oldest first.
 
-        The result is an array of `dtype`, and the number of overwritten cycles before its last.
+        The result is an array of type `dtype`, and the number of cycles between `after` and the
+        last returned cycle that were overwritten.
         """
         rows, lost = self._ring(CYCLES).copy_after(after)
         return np.frombuffer(rows, self.dtype), lost
 
     def events(self, after: int = 0) -> tuple[list[SharedEvent], int]:
-        """Return every event after serial `after` that still exists, oldest first.
+        """Return the events after serial `after` that still exist, oldest first.
 
-        The result also has the number of overwritten events before the last of them.
+        Also return how many events between `after` and the last returned event were overwritten.
         """
         rows, lost = self._ring(EVENTS).copy_after(after)
         size = self.layout.events.size
@@ -190,12 +195,12 @@ class Reader:
         """Return a lease: the right to command some axes.
 
         Args:
-            axes: names or numbers of the axes; None: all.
-            for_: time that the lease lasts after each command [s].
+            axes: names or numbers of the axes; None: all axes.
+            for_: time until the lease expires, counted from the last command [s].
 
         Raises:
-            LeaseError: another client has one of the axes.
-            ShareError: the loop has ended, or may not be commanded.
+            LeaseError: another client has leased one of the axes.
+            ShareError: the loop has ended, or does not accept commands from this user.
             ValueError: unknown axes, or `for_` out of range.
         """
         if not self.alive:

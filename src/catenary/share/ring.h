@@ -1,14 +1,14 @@
-/* The last rows of a writer, for any number of readers in any process.
+/* Ring buffer with the last rows of one writer, for any number of readers in any process.
  *
- * Row `number` is in slot number % count, after a sequence number that is odd while it is written
- * (a seqlock). A reader copies the row and then checks whether it was overwritten meanwhile. The
- * writer never reads from readers. Readers map the memory read-only, so they can neither delay nor
- * damage the writer. A writer that is killed during a write leaves an odd number in that slot; all
- * other rows stay valid.
+ * Row `number` is in slot number % count, after a sequence number that is odd during a write (a
+ * seqlock). A reader copies the row and then checks that the writer has not overwritten it during the
+ * copy. The writer never reads data of readers. Readers map the memory read-only, so they can neither
+ * delay nor damage the writer. A writer that is killed during a write leaves an odd number in that
+ * slot. All other rows remain valid.
  *
- * Waking: one system call of the writer wakes one sleeper, and each reader with a new row wakes two
- * more. The cost for the writer does not depend on the number of readers. If a reader dies with its
- * wake-up, the others sleep one row longer.
+ * Wake-ups: the writer wakes one sleeping reader with one system call. Each reader that finds a new
+ * row wakes two more. The cost for the writer does not depend on the number of readers. If a reader
+ * dies after it was woken, the others sleep until the next row.
  */
 #ifndef CATENARY_RING_H
 #define CATENARY_RING_H
@@ -24,11 +24,11 @@ enum { RING_WOKEN_BY_READER = 2, RING_TRIES = 1000 };
 typedef struct share_ring {           /* shared */
     uint64_t newest;                  /* number of the last row; 0: none yet */
     uint32_t tick;                    /* futex word: counts rows */
-    uint32_t ended;                   /* no more rows will come */
+    uint32_t ended;                   /* set when no more rows will come */
     uint8_t slots[] __attribute__((aligned(64)));
 } share_ring;
 
-typedef struct ring_view {            /* private: values that one process has checked */
+typedef struct ring_view {            /* private to a process, which has checked the values */
     share_ring *ring;
     uint64_t count;                   /* of slots, a power of two */
     uint64_t stride;                  /* from slot to slot [bytes] */
@@ -48,8 +48,8 @@ static inline uint64_t ring_newest(const ring_view *v) {
 /* Read this before `newest`: if it is set, `newest` is the last row. */
 static inline int ring_is_ended(const ring_view *v) { return cat_load_acquire32(&v->ring->ended) != 0; }
 
-/* Begin row `number`, and return the address for its bytes (cat_copy_to_shared). A reader discards
- * any copy that it makes between this and ring_publish. */
+/* Begin row `number` and return the address of its bytes, for cat_copy_to_shared. A reader discards
+ * any copy that it makes between this call and ring_publish. */
 static inline uint8_t *ring_begin(const ring_view *v, uint64_t number) {
     uint64_t *slot = ring_slot(v, number);
     __atomic_store_n(slot, 2 * number + 1, __ATOMIC_RELAXED);
@@ -80,8 +80,8 @@ static inline int ring_copy(const ring_view *v, uint64_t number, uint8_t *bytes)
     return __atomic_load_n(slot, __ATOMIC_RELAXED) == whole;
 }
 
-/* Copy the newest row. Return its number, or 0 if there is none. A second attempt is only necessary
- * if the writer writes `count` rows during one copy. */
+/* Copy the newest row. Return its number, or 0 before the first row. A second attempt is necessary
+ * only if the writer writes `count` rows during one copy. */
 static inline uint64_t ring_copy_newest(const ring_view *v, uint8_t *bytes) {
     for (int k = 0; k < RING_TRIES; k++) {
         uint64_t number = ring_newest(v);
@@ -90,9 +90,9 @@ static inline uint64_t ring_copy_newest(const ring_view *v, uint8_t *bytes) {
     return 0;
 }
 
-/* Copy those of the rows `first` to `first + rows - 1` that still exist, and return their count.
- * `end`: the number of the last row copied, or first - 1. A count bounds the loop, because `number`
- * comes from shared memory, where a client can write 2^64 - 1. */
+/* Copy the rows `first` to `first + rows - 1` that still exist, and return their count. `end` receives
+ * the number of the last row copied, or first - 1. The loop counts rows instead of comparing numbers,
+ * because numbers come from shared memory: a client can write 2^64 - 1 there. */
 static inline uint64_t ring_copy_rows(const ring_view *v, uint64_t first, uint64_t rows, uint8_t *bytes,
                                       uint64_t *end) {
     uint64_t copied = 0;
@@ -106,8 +106,8 @@ static inline uint64_t ring_copy_rows(const ring_view *v, uint64_t first, uint64
     return copied;
 }
 
-/* Wait for a row after `seen`, until `deadline` [ns, CLOCK_MONOTONIC]. Return 1 if it exists, 0 if
- * the deadline has passed or no more rows will come, or -EINTR. */
+/* Wait for a row after row `seen`, until `deadline` [ns, CLOCK_MONOTONIC]. Return 1 if it exists, 0
+ * if the deadline has passed or no more rows will come, or -EINTR. */
 static inline int ring_wait(const ring_view *v, uint64_t seen, int64_t deadline) {
     for (;;) {
         uint32_t tick = __atomic_load_n(&v->ring->tick, __ATOMIC_SEQ_CST);

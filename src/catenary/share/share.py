@@ -1,4 +1,4 @@
-"""Share: publish the cycles of a loop for other processes."""
+"""Publication of the cycles of a loop for other processes."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from catenary.share.memory import Segment
 from catenary.share.process import this_process
 
 HISTORY = 2.0  # [s]
-OTHERS_WRITE = 0o022  # of the cycles: a reader that could truncate them would end the loop
+OTHERS_WRITE = 0o022  # never granted: a user who truncates the file would crash the loop
 
 
 class Share:
@@ -32,27 +32,34 @@ class Share:
         with cat.Share("arm") as share, cat.Loop(arm, period=1e-3, sink=share) as loop:
             for cycle in loop: ...
 
-    Others call `cat.attach("arm")`. Readers cannot delay the loop. `history`: cycles kept [s].
-    `mode`: permissions as of chmod: 0o600, this user alone; 0o640, the group may read; 0o660, and
-    command. Only this user can write into the file of the cycles, whatever `mode` is.
+    Other processes call `cat.attach("arm")`. Readers cannot delay the loop.
 
-    One loop at a time. Each loop that is opened with the share begins a new segment, whose cycles
-    count from 1. Readers of the previous segment see its end, and attach again.
-    Raises ShareError if the name belongs to a running process.
+    A share serves one loop at a time. Each loop that opens it creates a new segment, whose cycles
+    are numbered from 1. Readers of the previous segment detect its end and must attach again.
+
+    Args:
+        name: name of the share.
+        history: time span of the cycles that readers can access [s].
+        mode: permissions as for chmod. 0o600: this user only. 0o640: the group can read.
+            0o660: the group can read and command. Only this user can ever write to the cycles.
+
+    Raises:
+        ShareError: on entry, if the name belongs to a running process.
+        ValueError: an argument is out of range.
     """
 
     def __init__(self, name: str, *, history: float = HISTORY, mode: int = 0o600) -> None:
         if not history > 0:
             raise ValueError(f"history={history} s: must be positive")
         if not 0 <= mode <= 0o777:
-            raise ValueError(f"mode={mode:#o}: permissions as of chmod, such as 0o600")
+            raise ValueError(f"mode={mode:#o}: must be permissions as for chmod, such as 0o600")
         self.name = name
         self._file = folder.file_name(folder.STATE, name)
         self._socket_file = folder.file_name(folder.SOCKET, name)
         self._history = history
         self._mode = mode
         self._entered = False
-        self._pid = 0  # of the process that entered it
+        self._pid = 0  # process that entered the block
         self._segment: Segment | None = None
         self._desk: Desk | None = None
         self._socket: DeskSocket | None = None
@@ -82,17 +89,17 @@ class Share:
             self._segment.unlink()
         self._segment = self._desk = None
 
-    # Commands of other processes, for the thread that iterates
+    # Commands of other processes. Only the thread that iterates the loop calls these methods.
 
     def apply(self, *drives: Commanded) -> list[LeaseEnd]:
-        """Write the newest command of each axis into the targets of drives. Never waits.
+        """Write the newest command of each axis into the targets of drives. Never blocks.
 
             for cycle in loop:
                 for end in share.apply(arm):
                     print(end)
 
-        Axes whose lease has ended hold their commanded position. The method returns these leases;
-        the application decides what else to do with their axes.
+        Axes whose lease has ended hold their commanded position. Return these leases, so that the
+        application can react.
         """
         reader = self._reader()
         commands, ended = reader.commands(), reader.ended()
@@ -101,19 +108,21 @@ class Share:
         return ended
 
     def commands(self) -> list[AxisCommand]:
-        """Return the commands of valid leases since the last call; by client, oldest first.
+        """Return the new commands of valid leases, grouped by client, oldest first.
 
-        Never waits.
+        Never blocks.
         """
         return self._reader().commands()
 
     def ended(self) -> list[LeaseEnd]:
-        """Return the leases whose end the last `commands` has detected."""
+        """Return the leases that `commands` has found ended since the last call."""
         return self._reader().ended()
 
     def _reader(self) -> CommandReader:
         if self._commands is None:
-            raise RuntimeError(f"the share {self.name!r} takes no commands before a Loop is open")
+            raise RuntimeError(
+                f"the share {self.name!r} cannot read commands before a Loop is open"
+            )
         return self._commands
 
     def _commanded_position(self) -> Values:
@@ -126,7 +135,7 @@ class Share:
 
     @property
     def layout(self) -> ShareLayout:
-        """Layout of the loop that is, or was last, open."""
+        """Layout of the current loop, or of the last one."""
         if self._layout is None:
             raise RuntimeError(f"the share {self.name!r} has no layout before a Loop is open")
         return self._layout
@@ -134,12 +143,14 @@ class Share:
     # plan.sink.Sink
 
     def open(self, layout: SinkLayout) -> object:
-        """Create the segment of a loop, and return its sink capsule. Called by the loop."""
+        """Create the segment of a loop and return its sink capsule. Called by the loop."""
         if not self._entered:
-            raise RuntimeError(f"use the share in a with block: with cat.Share({self.name!r}) ...")
+            raise RuntimeError(
+                f"the share is not entered; use a with block: with cat.Share({self.name!r}) ..."
+            )
         if self._cycles is not None:
             raise RuntimeError(
-                f"the share {self.name!r} already belongs to a loop: use one share for each loop"
+                f"the share {self.name!r} already belongs to a loop; use one share for each loop"
             )
         made = make_layout(
             self.name,
@@ -163,7 +174,7 @@ class Share:
         return cycles.capsule
 
     def report(self, incident: Incident) -> None:
-        """Append an event. Called by the loop, from any thread."""
+        """Append an event. Called by the loop from any thread."""
         with self._reporting:
             if self._events is not None and self._cycles is not None:
                 number = self._events.newest + 1
@@ -172,7 +183,7 @@ class Share:
     def close(self) -> None:
         """End the segment. Called by the loop.
 
-        Its data stays readable until the next loop opens, or until the end of the block.
+        Its data remains readable until the next loop opens or the `with` block ends.
         """
         if self._is_a_copy():
             return
@@ -192,7 +203,7 @@ class Share:
         return self._pid != os.getpid()
 
     def _make_files(self, made: ShareLayout) -> tuple[Segment, Desk, DeskSocket]:
-        """Create files and socket as drafts. Raises ShareError if the memory is full."""
+        """Create the file and the socket as drafts. Raises ShareError if the memory is full."""
         where = folder.own_folder()
         mode = self._mode & ~OTHERS_WRITE
         folder.prepare(where, mode)
@@ -207,7 +218,7 @@ class Share:
             raise
 
     def _publish(self, segment: Segment, listening: DeskSocket) -> None:
-        """Rename both, the socket first: a reader that finds the segment can connect."""
+        """Rename the drafts, the socket first, so that a reader of the segment can connect."""
         where = segment.path.parent
         try:
             with folder.deciding(where):
@@ -217,12 +228,12 @@ class Share:
         except BaseException as error:
             segment.path.unlink(missing_ok=True)
             listening.close()
-            if isinstance(error, PermissionError):  # in a sticky folder only owners replace files
+            if isinstance(error, PermissionError):  # the sticky bit protects files of other users
                 raise self._belongs_to_another(where / self._file) from error
             raise
 
     def _refuse_taken(self) -> None:
-        """Refuse the name of a running writer. That of a dead writer can be replaced."""
+        """Raise ShareError if a running writer uses the name. A dead writer is replaced."""
         if self._segment is not None and self._segment.is_published:
             return
         path = folder.own_folder() / self._file
@@ -241,8 +252,11 @@ class Share:
         if layout.writer.is_alive:
             raise ShareError(
                 f"the share {self.name!r} belongs to {layout.writer}, which is running",
-                hint="choose another name, or end that process",
+                hint="choose another name, or end that process first",
             )
 
     def _belongs_to_another(self, path: Path) -> ShareError:
-        return ShareError(f"the share {self.name!r} belongs to another user", hint=f"see {path}")
+        return ShareError(
+            f"the share {self.name!r} belongs to another user: {path}",
+            hint="choose another name",
+        )

@@ -1,4 +1,4 @@
-"""Virtual EtherCAT segments at register level: in this process, in virtual time, or on a NIC."""
+"""Virtual EtherCAT segments at register level: in virtual time, in real time, or on a NIC."""
 
 from catenary.virtual import faults
 from catenary.virtual.coe.quirks import MailboxQuirks

@@ -1,4 +1,4 @@
-"""SyncManagers seen from the application: mailboxes, buffers, and the PDI's switch of each."""
+"""Application side of SyncManagers: mailboxes, buffers, and their activation by the PDI."""
 
 from cpython.bytes cimport PyBytes_FromStringAndSize
 from libc.stdint cimport uint8_t
@@ -21,7 +21,7 @@ from catenary.virtual._segment cimport (
 
 
 cdef class Buffers:
-    """SyncManagers of the controllers of `core`. `position`: the device; `n`: its SyncManager."""
+    """SyncManagers of all controllers. `position`: the device; `n`: number of the SyncManager."""
 
     cdef Core _core
     cdef cat_segment *_segment
@@ -36,7 +36,7 @@ cdef class Buffers:
         return sm.start, sm.length, sm_registers(c, n)[4], bool(sm.enabled), bool(sm.full)
 
     def block(self, int position, int n, bint blocked):
-        """Set the PDI's switch: a blocked SyncManager refuses all access."""
+        """Block or release a SyncManager from the PDI side. A blocked one refuses all access."""
         cdef controller *c = self._core._at(position)
         cdef uint8_t *r
         self._core._sync_manager_at(position, n)
@@ -47,7 +47,7 @@ cdef class Buffers:
         unlock(self._segment)
 
     def acknowledge_repeat(self, int position, int n):
-        """Acknowledge a repeat request: the last answer is available again."""
+        """Acknowledge a repeat request, after the last answer was put into the mailbox again."""
         cdef controller *c = self._core._at(position)
         cdef uint8_t *r
         self._core._sync_manager_at(position, n)
@@ -57,7 +57,7 @@ cdef class Buffers:
         unlock(self._segment)
 
     def read(self, int position, int n):
-        """Return a complete buffer from the MainDevice (this empties a mailbox), or None."""
+        """Return complete data from the MainDevice, or None. This empties a mailbox."""
         cdef uint8_t buffer[4096]
         cdef controller *c = self._core._at(position)
         cdef int size
@@ -78,8 +78,7 @@ cdef class Buffers:
         return size >= 0
 
     def take_back(self, int position, int n):
-        """Take back an answer that is still in a mailbox for the MainDevice; None if there is
-        none."""
+        """Remove and return an answer that the MainDevice has not read; None if there is none."""
         cdef controller *c = self._core._at(position)
         cdef sync_manager *sm = self._core._sync_manager_at(position, n)
         data = None

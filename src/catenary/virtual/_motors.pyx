@@ -1,4 +1,4 @@
-"""Motors of virtual servos: parameters, state, and injected loads and faults (servo.h)."""
+"""Motors of virtual servos (servo.h): parameters, state, injected loads and faults."""
 
 from catenary.virtual._segment cimport (
     Core,
@@ -11,7 +11,7 @@ from catenary.virtual._segment cimport (
 
 
 cdef class Motors:
-    """Motors of the devices of `core`, by the device's position and the number of its axis."""
+    """Motors of all devices of `core`. `position`: position of the device; `axis`: axis number."""
 
     cdef Core _core
     cdef cat_segment *_segment
@@ -35,7 +35,7 @@ cdef class Motors:
     def set_quirks(self, int position, int axis, *, double mode_delay, unsigned int refused_modes,
                    bint never_bit_12, bint follows_without_bit_12, bint ignores_quick_stop,
                    bint ignores_disable):
-        """Set differences of the drive from the profile (devices/servo_quirks.py)."""
+        """Set the differences of the drive from the profile (see devices/servo_quirks.py)."""
         cdef servo_axis *a = self._core._axis(position, axis)
         a.quirks.mode_delay, a.quirks.refused_modes = mode_delay, refused_modes
         a.quirks.never_bit_12 = never_bit_12
@@ -43,7 +43,7 @@ cdef class Motors:
         a.quirks.ignores_quick_stop, a.quirks.ignores_disable = ignores_quick_stop, ignores_disable
 
     def hide_bit_12(self, int position, int axis, double seconds):
-        """Hide bit 12 of the statusword from the next step on, for this time."""
+        """Hide bit 12 of the statusword for `seconds`, from the next step on."""
         self._core._axis(position, axis).bit_12_hidden = seconds
 
     def state(self, int position, int axis):
@@ -52,25 +52,25 @@ cdef class Motors:
         return a.position, a.velocity, a.torque, a.state
 
     def tune(self, int position, int axis, *, double velocity_gain, double integral_gain):
-        """Set the velocity loop's gains [N m s/rad], [N m/rad]."""
+        """Set the gains of the velocity loop: proportional [N m s/rad], integral [N m/rad]."""
         cdef servo_axis *a = self._core._axis(position, axis)
         a.velocity_gain, a.integral_gain = velocity_gain, integral_gain
 
     def place(self, int position, int axis, double to):
-        """Turn the shaft to a position [rad]."""
+        """Move the shaft to a position [rad]."""
         cdef servo_axis *a = self._core._axis(position, axis)
         lock(self._segment)
         servo_place(a, to)
         unlock(self._segment)
 
     def load(self, int position, int axis, double load):
-        """Apply an external torque [N m]."""
+        """Apply an external torque to the shaft [N m]."""
         self._core._axis(position, axis).load = load
 
     def inject(self, int position, int axis, int code):
-        """Inject a fault with this code; 0 ends its cause."""
+        """Inject a fault with this error code. 0 removes the cause."""
         self._core._axis(position, axis).injected = code
 
     def stop_torque(self, int position, int axis, bint active):
-        """Switch safe torque off on or off."""
+        """Activate or deactivate safe torque off (STO)."""
         self._core._axis(position, axis).sto = active

@@ -1,4 +1,4 @@
-"""Compiled side of a plant: arrays and step function of a MuJoCo model, by address (plant.h)."""
+"""Compiled side of a plant (plant.h): it accesses a MuJoCo model and its arrays by address."""
 
 from libc.stdint cimport int64_t, uintptr_t
 from libc.stdlib cimport calloc
@@ -26,7 +26,7 @@ cdef extern from "<time.h>" nogil:
     int clock_nanosleep(int clock, int flags, const timespec *until, timespec *left)
 
 cdef enum:
-    LONGEST_SLEEP = 20000000             # maximum time until its thread ends [ns]
+    LONGEST_SLEEP = 20000000             # maximum delay until the thread notices `end` [ns]
 
 
 cdef void _sleep(int64_t until) noexcept nogil:
@@ -36,23 +36,31 @@ cdef void _sleep(int64_t until) noexcept nogil:
 
 
 cdef class CompiledPlant:
-    """View of the plant of `core`, which owns it."""
+    """View of the plant of `core`. After `begin`, the core owns the plant."""
 
     cdef Core _core
     cdef plant *_plant
 
     def __init__(self, Core core, int joints, *, uintptr_t step, uintptr_t set_handler, uintptr_t model,
                  uintptr_t data, int64_t period_ns, keep):
-        """Connect a plant to the segment.
+        """Create a plant for the segment.
 
-        `step`, `set_handler`, `model`, `data`: addresses of mj_step, of the function that sets a thread's
-        message handler (0: none), of an mjModel and of an mjData. `keep` owns them.
+        Args:
+            core: The compiled segment.
+            joints: Number of joints with a motor.
+            step: Address of mj_step.
+            set_handler: Address of the function that sets the message handler of a thread; 0: none.
+            model: Address of an mjModel.
+            data: Address of an mjData.
+            period_ns: Time step [ns].
+            keep: Owner of the model and its data, which the core keeps alive.
         """
         cdef plant *p
         if core._segment.plant != NULL:
-            raise ValueError("the segment has a plant already")
+            raise ValueError("the segment already has a plant")
         if not (0 < joints <= 4096 and period_ns >= 1000 and step and model and data):
-            raise ValueError("impossible plant")
+            raise ValueError(f"invalid plant: {joints} joints, period {period_ns} ns; all addresses must"
+                             " be non-zero")
         p = <plant *>calloc(1, sizeof(plant))
         self._core, self._plant = core, p
         if p != NULL:
@@ -67,7 +75,7 @@ cdef class CompiledPlant:
 
     def __dealloc__(self):
         if self._core is not None and self._core._segment.plant != self._plant:
-            plant_free(self._plant)          # the plant was never started
+            plant_free(self._plant)          # `begin` was never called
 
     cdef plant_joint *_joint(self, int n) except NULL:
         if not 0 <= n < self._plant.count:
@@ -76,17 +84,35 @@ cdef class CompiledPlant:
 
     def make_joint(self, int n, *, uintptr_t q, uintptr_t v, uintptr_t force, uintptr_t friction,
                    double ratio, double zero, double dry, double brake, int64_t brake_delay_ns):
-        """`q` to `friction`: addresses of its values in qpos, qvel, qfrc_applied,
-        dof_frictionloss."""
+        """Set the parameters of joint n.
+
+        Args:
+            n: Number of the joint.
+            q: Address of its value in qpos.
+            v: Address of its value in qvel.
+            force: Address of its value in qfrc_applied.
+            friction: Address of its value in dof_frictionloss.
+            ratio: Motor angle per joint angle, signed.
+            zero: Joint position at which the motor angle is 0.
+            dry: Dry friction at the joint.
+            brake: Additional friction of the closed brake.
+            brake_delay_ns: Closing time of the brake [ns].
+        """
         cdef plant_joint *j = self._joint(n)
         if not (q and v and force and friction and ratio):
-            raise ValueError(f"impossible joint {n}")
+            raise ValueError(f"invalid joint {n}: the addresses and the ratio must be non-zero")
         j.q, j.v, j.force, j.friction = <double *>q, <double *>v, <double *>force, <double *>friction
         j.ratio, j.zero, j.dry, j.brake = ratio, zero, dry, brake
         j.brake_delay = brake_delay_ns
 
     def hang(self, int n, int position, int axis):
-        """Connect the motor of this axis to joint n."""
+        """Connect the motor of an axis to joint n.
+
+        Args:
+            n: Number of the joint.
+            position: Position of the device.
+            axis: Axis number.
+        """
         cdef plant_joint *j = self._joint(n)
         lock(self._core._segment)
         try:
@@ -95,7 +121,7 @@ cdef class CompiledPlant:
             unlock(self._core._segment)
 
     def begin(self):
-        """Start stepping; all joints are made."""
+        """Start to step the plant. Call this after `make_joint` for all joints."""
         lock(self._core._segment)
         self._plant.due = self._core._segment.now + self._plant.period
         self._core._segment.plant = self._plant
@@ -104,7 +130,7 @@ cdef class CompiledPlant:
         unlock(self._core._segment)
 
     def run(self):
-        """Step the plant and do due work in real time, until `end` or a failed step."""
+        """Step the plant and do due work in real time, until `end` is called or a step fails."""
         cdef cat_segment *s = self._core._segment
         cdef plant *p = self._plant
         cdef int64_t now, due
@@ -132,10 +158,10 @@ cdef class CompiledPlant:
 
     @property
     def wild(self) -> int:
-        """Joint that exceeded all bounds, -1: none. If any, the plant has stopped."""
+        """Number of the joint that exceeded the maximum velocity and stopped the plant; -1: none."""
         return self._plant.wild - 1
 
     @property
     def complaint(self) -> str:
-        """Error message of MuJoCo. If any, the plant has stopped."""
+        """Error message of MuJoCo, which stopped the plant; empty: none."""
         return (<bytes>self._plant.words).decode("utf-8", "replace")

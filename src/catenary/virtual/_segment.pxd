@@ -177,7 +177,7 @@ cdef class Core:
     cdef cat_segment *_segment
     cdef object _service
     cdef object _clock
-    cdef object _plant               # owner of the plant's addresses
+    cdef object _plant               # owner of the plant's model and data
     cdef readonly object failure
     cdef readonly int count
     cdef controller *_at(self, int position) except NULL

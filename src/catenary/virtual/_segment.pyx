@@ -1,7 +1,7 @@
-"""The compiled segment: controllers, clock, and accessors for the application's side.
+"""Compiled segment: controllers, clock, and access from the application side.
 
-The frame path is in the headers, one per mechanism; none of it needs the GIL. Access to
-SyncManagers from the application is in `_buffers.pyx`, motors are in `_motors.pyx`.
+The headers contain the frame path, with one file for each mechanism. It does not need the GIL.
+`_buffers.pyx` gives the application access to SyncManagers, and `_motors.pyx` to motors.
 """
 
 from cpython.bytes cimport PyBytes_FromStringAndSize
@@ -55,12 +55,11 @@ cdef int _serve_application(void *owner) noexcept with gil:
 
 
 cdef class Core:
-    """Owns the controllers' memory. `position` counts devices from the MainDevice, starting at
-    0."""
+    """Owner of the memory of all controllers. `position`: position of a device, from 0."""
 
     def __cinit__(self, int count, bint is_virtual, *, bint ring=False, int64_t detection_ns=0):
         if not 0 <= count <= 65535:
-            raise ValueError(f"a segment has 0 to 65535 devices, not {count}")
+            raise ValueError(f"a segment can have 0 to 65535 devices, not {count}")
         self._segment = segment_make(count, is_virtual, ring, detection_ns)
         if self._segment == NULL:
             raise MemoryError("no memory for the segment")
@@ -73,13 +72,13 @@ cdef class Core:
 
     cdef controller *_at(self, int position) except NULL:
         if not 0 <= position < self.count:
-            raise IndexError(f"no device at position {position}")
+            raise IndexError(f"no device at position {position}; the segment has {self.count} devices")
         return &self._segment.controllers[position]
 
     cdef sync_manager *_sync_manager_at(self, int position, int n) except NULL:
         cdef controller *c = self._at(position)
         if not 0 <= n < c.sm_count:
-            raise IndexError(f"no SyncManager {n} at position {position}")
+            raise IndexError(f"the device at position {position} has no SyncManager {n}")
         return &c.sm[n]
 
     cdef servo_axis *_axis(self, int position, int axis) except NULL:
@@ -92,15 +91,29 @@ cdef class Core:
 
     def make_controller(self, int position, *, int ram, bytes sii, int slots, int axes, int fmmus,
                         int sync_managers, int clock_bits, bint lrw, int identification, ports):
-        """Make a controller without power. `ports`: the numbers of its ports."""
+        """Create a controller without power.
+
+        Args:
+            position: Position of the device.
+            ram: Size of the process RAM [bytes].
+            sii: Content of the EEPROM.
+            slots: Number of slots.
+            axes: Number of servo axes.
+            fmmus: Number of FMMUs.
+            sync_managers: Number of SyncManagers.
+            clock_bits: Width of the clock: 0 (none), 32 or 64.
+            lrw: True if the device supports LRW.
+            identification: Explicit device ID; 0: none.
+            ports: Numbers of the ports.
+        """
         cdef controller *c = self._at(position)
         cdef int made
         if c.memory != NULL:
-            raise ValueError(f"the controller at position {position} is made already")
+            raise ValueError(f"position {position} already has a controller")
         if not (0 < ram <= 61440 and 0 <= axes <= 8 and 0 <= slots <= 65535 and len(sii) % 2 == 0
                 and clock_bits in (0, 32, 64) and 0 < fmmus <= 8 and 0 < sync_managers <= 8
                 and slots >= axes * AXIS_SLOTS and all(0 <= p < PORTS for p in ports)):
-            raise ValueError(f"impossible controller at position {position}")
+            raise ValueError(f"invalid parameters of the controller at position {position}")
         lock(self._segment)
         made = controller_make(c, ram, len(sii) // 2, slots, axes)
         unlock(self._segment)
@@ -113,7 +126,7 @@ cdef class Core:
         memcpy(c.sii.image, <const char *>sii, len(sii))
 
     def remove_controller(self, int position):
-        """Remove the device; its position and cables stay."""
+        """Remove a device. Its position and its cables remain."""
         cdef controller *c = self._at(position)
         lock(self._segment)
         controller_remove(c)
@@ -121,7 +134,7 @@ cdef class Core:
         unlock(self._segment)
 
     def exchange_controllers(self, int one, int other):
-        """Exchange two devices with their complete state; both are without power."""
+        """Exchange two devices with their complete state. A no-op if one of them has power."""
         cdef controller *a = self._at(one)
         cdef controller *b = self._at(other)
         lock(self._segment)
@@ -130,11 +143,14 @@ cdef class Core:
         unlock(self._segment)
 
     def switch_power(self, int position, bint on):
-        """Switch the power. Off: all but EEPROM, crystal and shafts is lost, and the neighbours'
-        light."""
+        """Switch the power of a device on or off.
+
+        Without power, the device loses all data except its EEPROM, crystal and shaft positions, and
+        its neighbours lose light.
+        """
         cdef controller *c = self._at(position)
         if c.memory == NULL:
-            raise ValueError(f"no controller at position {position}")
+            raise ValueError(f"position {position} has no controller")
         lock(self._segment)
         if on:
             controller_power_on(c)
@@ -147,12 +163,12 @@ cdef class Core:
         return bool(self._at(position).powered)
 
     def ports(self, int position):
-        """Return the numbers of the device's ports."""
+        """Return the port numbers of a device."""
         cdef controller *c = self._at(position)
         return tuple([p for p in range(PORTS) if c.ports[<int>p].exists])
 
     def mute(self, int position, bint muted):
-        """Make the device ignore logical datagrams: neither answered nor counted."""
+        """Make a device ignore logical datagrams, or process them again."""
         self._at(position).mute = muted
 
     # -- time and service -----------------------------------------------------------------------
@@ -163,7 +179,7 @@ cdef class Core:
 
     @property
     def epoch(self) -> int:
-        """Zero of the faults' time [ns]; -1: real time, before the first frame."""
+        """Start time of the fault clock [ns]; -1 in real time before the first frame."""
         return self._segment.epoch
 
     @property
@@ -171,20 +187,20 @@ cdef class Core:
         return bool(self._segment.is_virtual)
 
     def use_clock(self, clock):
-        """Use the shared virtual time of `clock.capsule` (native/clock.h)."""
+        """Use the virtual time of a shared clock, `clock.capsule` (native/clock.h)."""
         cdef const cat_clock *table
         capsule = clock.capsule
         if not PyCapsule_IsValid(capsule, CAT_CLOCK_CAPSULE):
-            raise ValueError("clock.capsule is no capsule of a clock")
+            raise ValueError("clock.capsule is not a capsule of a clock")
         table = <const cat_clock *>PyCapsule_GetPointer(capsule, CAT_CLOCK_CAPSULE)
         if table.version != CAT_CLOCK_VERSION or not table.flags & CAT_CLOCK_VIRTUAL:
-            raise ValueError("the clock is not virtual, or of another version")
-        self._clock = clock, capsule       # keep the owner of the table alive
+            raise ValueError("the clock is not virtual, or has another version")
+        self._clock = clock, capsule       # keeps the owner of the table alive
         self._segment.clock = table
         self._segment.now = self._segment.epoch = table.now(table.self)
 
     def use_service(self, service):
-        """Set the service: it runs the application side and returns its next due time [ns]."""
+        """Set the service: a function that runs the applications and returns its next due time [ns]."""
         self._service = service
 
     def wake_at(self, int64_t when):
@@ -199,7 +215,7 @@ cdef class Core:
         try:
             self._segment.service_due = self._service()
             return 0
-        except KeyboardInterrupt:          # at the start or end of the service: the caller gets it back
+        except KeyboardInterrupt:          # before or after the service ran: pass it to the caller
             self._segment.service_due = self._segment.now
             PyErr_SetInterrupt()
             return -EINTR
@@ -208,13 +224,13 @@ cdef class Core:
             return -EIO
 
     def raise_failure(self):
-        """Raise an exception of the application side in the caller."""
+        """Raise the exception that the service has raised, if any."""
         failure, self.failure = self.failure, None
         if failure is not None:
             raise failure
 
     def advance(self):
-        """Do the compiled work up to now, in real time."""
+        """Do the compiled work up to now. A no-op in virtual time."""
         if not self._segment.is_virtual:
             with nogil:
                 lock(self._segment)
@@ -222,13 +238,13 @@ cdef class Core:
                 unlock(self._segment)
 
     def take_events(self):
-        """Return [(position, events)] and clear them."""
+        """Return the pending events as [(position, events)], and clear them."""
         cdef int k
         cdef uint32_t events
         taken = []
         if not self._segment.pending:
             return taken
-        self._segment.pending = 0          # before the check: a new event sets it again
+        self._segment.pending = 0          # first, because a new event sets it again
         for k in range(self.count):
             if self._segment.controllers[k].events:
                 lock(self._segment)
@@ -241,26 +257,44 @@ cdef class Core:
     # -- the PDI side ---------------------------------------------------------------------------
 
     def peek(self, int position, int address, int size):
-        """Return bytes of the controller's memory, without side effects."""
+        """Return bytes of a controller's memory without side effects.
+
+        Args:
+            position: Position of the device.
+            address: First address.
+            size: Number of bytes.
+
+        Raises:
+            ValueError: The range is outside of the memory.
+        """
         cdef controller *c = self._at(position)
         if address < 0 or size < 0 or address + size > <int64_t>c.memory_size:
-            raise ValueError(f"no memory at 0x{address:04X}, {size} bytes")
+            raise ValueError(f"{size} bytes at 0x{address:04X} are outside of the memory")
         lock(self._segment)
         inputs_flush(self._segment)
         unlock(self._segment)
         return PyBytes_FromStringAndSize(<char *>c.memory + address, size)
 
     def poke(self, int position, int address, bytes data):
-        """Set memory directly, without any rules: for error counters and injected faults."""
+        """Write bytes into a controller's memory without checks, for error counters and faults.
+
+        Args:
+            position: Position of the device.
+            address: First address.
+            data: Bytes to write.
+
+        Raises:
+            ValueError: The range is outside of the memory.
+        """
         cdef controller *c = self._at(position)
         if address < 0 or address + len(data) > <int64_t>c.memory_size:
-            raise ValueError(f"no memory at 0x{address:04X}, {len(data)} bytes")
+            raise ValueError(f"{len(data)} bytes at 0x{address:04X} are outside of the memory")
         lock(self._segment)
         memcpy(c.memory + address, <const char *>data, len(data))
         unlock(self._segment)
 
     def fetch_al_control(self, int position):
-        """Return the requested state. This opens the register for the next request."""
+        """Return the requested state, and unlock the register for the next request."""
         cdef controller *c = self._at(position)
         lock(self._segment)
         c.al_unread = 0
@@ -281,14 +315,14 @@ cdef class Core:
         self._at(position).outputs_valid = valid
 
     def expect_outputs(self, int position):
-        """Raise EVENT_OUTPUTS at the next complete process data."""
+        """Raise EVENT_OUTPUTS when the next complete process data arrives."""
         self._at(position).outputs_seen = 0
 
     def outputs_seen(self, int position):
         return bool(self._at(position).outputs_seen)
 
     def outputs_at(self, int position):
-        """Return the segment time [ns] of the last update of the outputs; `FOREVER`: not yet."""
+        """Return the segment time of the last output update [ns]; `FOREVER` before the first."""
         cdef controller *c = self._at(position)
         cdef int64_t when
         lock(self._segment)
@@ -297,7 +331,7 @@ cdef class Core:
         return when
 
     def output_image(self, int position, int n):
-        """Return the last complete outputs without taking them; empty before the first ones."""
+        """Return the last complete outputs without side effects; empty before the first outputs."""
         cdef controller *c = self._at(position)
         cdef sync_manager *sm = self._sync_manager_at(position, n)
         if not (sm.enabled and sm.written) or sm.mailbox:
@@ -307,15 +341,25 @@ cdef class Core:
     # -- process data and models ----------------------------------------------------------------
 
     def map_process_data(self, int position, bint outputs, int n, list entries):
-        """Set the mapping. `entries`: (bit, bits, slot, is_signed); n -1: nothing is mapped."""
+        """Set the mapping of one direction.
+
+        Args:
+            position: Position of the device.
+            outputs: True for outputs, False for inputs.
+            n: Number of the SyncManager; -1: nothing is mapped.
+            entries: Mapped slots, as (bit, bits, slot, is_signed).
+
+        Raises:
+            ValueError: The SyncManager or an entry is out of range.
+        """
         cdef controller *c = self._at(position)
         cdef mapping *m = &c.outputs if outputs else &c.inputs
         cdef int k = 0
         if len(entries) > MAX_MAPPED or not -1 <= n < c.sm_count:
-            raise ValueError("impossible process data")
+            raise ValueError(f"invalid mapping: {len(entries)} entries in SyncManager {n}")
         for bit, bits, slot, is_signed in entries:
             if not (0 < bits <= 64 and 0 <= slot < c.slot_count and 0 <= bit <= 65536):
-                raise ValueError("impossible process data")
+                raise ValueError(f"invalid mapping entry: {bits} bits at bit {bit}, slot {slot}")
         lock(self._segment)
         m.sm = n
         m.count = len(entries)
@@ -333,7 +377,7 @@ cdef class Core:
         unlock(self._segment)
 
     def run_model(self, int position, int64_t period_ns):
-        """Step the device's model every `period_ns` from now on."""
+        """Step the model of a device every `period_ns` from now on."""
         cdef controller *c = self._at(position)
         if period_ns < 1000:
             raise ValueError(f"a device cycle of {period_ns} ns is shorter than 1 us")
@@ -343,18 +387,24 @@ cdef class Core:
         unlock(self._segment)
 
     def ignore_loop_control(self, int position):
-        """Make the ports follow their links, regardless of DL control."""
+        """Let the ports of a device follow their links, regardless of DL control."""
         self._at(position).fixed_loops = 1
 
     def run_model_by_pulses(self, int position, int signal, int64_t cycle_ns,
                             int64_t longest_step_ns):
-        """Step the device's model at the pulses of `signal`, a bit in 0x0981, with period
-        `cycle_ns`. Between the pulses it takes equal steps of at most `longest_step_ns`.
+        """Step the model of a device at SYNC pulses, and at equal intervals between them.
+
+        Args:
+            position: Position of the device.
+            signal: Bit of the pulses in 0x0981.
+            cycle_ns: Period of the pulses [ns].
+            longest_step_ns: Maximum interval between steps [ns].
         """
         cdef controller *c = self._at(position)
         cdef int64_t steps
         if not 1000 <= cycle_ns < 1 << 32 or longest_step_ns < 1000:
-            raise ValueError(f"a device cycle of {cycle_ns} ns is shorter than 1 us, or no SYNC cycle")
+            raise ValueError(f"cycle_ns must be 1000 to 2^32 - 1, not {cycle_ns}, and longest_step_ns at"
+                             f" least 1000, not {longest_step_ns}")
         steps = (cycle_ns + longest_step_ns - 1) // longest_step_ns
         lock(self._segment)
         synchronous_begin(c, cycle_ns, steps, <uint8_t>signal)
@@ -362,22 +412,28 @@ cdef class Core:
         unlock(self._segment)
 
     def tune_synchronous(self, int position, *, int64_t minimum_ns, int64_t copy_ns, int limit):
-        """Set the shortest SYNC0 cycle, how long before a pulse outputs must arrive, and how many
-        consecutive pulses without new outputs are an error.
+        """Set the parameters of the synchronous mode.
+
+        Args:
+            position: Position of the device.
+            minimum_ns: Shortest SYNC0 cycle [ns].
+            copy_ns: Minimum time from the arrival of outputs to the pulse [ns].
+            limit: Number of consecutive pulses without new outputs that is an error.
         """
         cdef controller *c = self._at(position)
         if not (0 <= minimum_ns and 0 <= copy_ns and 1 <= limit <= 0xFFFF):
-            raise ValueError(f"impossible synchronisation at position {position}")
+            raise ValueError(f"invalid synchronisation at position {position}: minimum_ns={minimum_ns},"
+                             f" copy_ns={copy_ns}, limit={limit}")
         c.synchronous.minimum, c.synchronous.copy_time = minimum_ns, copy_ns
         c.synchronous.limit = limit
 
     def synchronous(self, int position):
-        """Return (synchronised to SYNC0, pulses seen, missed, exceeded, shift too short, error)."""
+        """Return (synchronised to pulses, pulses seen, missed, exceeded, shift too short, error)."""
         cdef synchronous_cycle *d = &self._at(position).synchronous
         return bool(d.active), bool(d.seen), d.missed, d.exceeded, d.shift_short, bool(d.error)
 
     def system_time(self, int position):
-        """Return the exact time of the device's clock [ns], which no frame can read."""
+        """Return the exact time of a device's clock [ns], without the scatter that frames read."""
         cdef int64_t time
         lock(self._segment)
         time = dc_system_time(self._at(position), self._segment.now)
@@ -392,7 +448,7 @@ cdef class Core:
     def slot(self, int position, int number):
         cdef controller *c = self._at(position)
         if not 0 <= number < c.slot_count:
-            raise IndexError(f"no slot {number}")
+            raise IndexError(f"the device at position {position} has no slot {number}")
         lock(self._segment)
         slots_refresh(c)
         unlock(self._segment)
@@ -401,7 +457,7 @@ cdef class Core:
     def put_slot(self, int position, int number, int64_t value):
         cdef controller *c = self._at(position)
         if not 0 <= number < c.slot_count:
-            raise IndexError(f"no slot {number}")
+            raise IndexError(f"the device at position {position} has no slot {number}")
         c.slots[number] = value
 
     def emergency(self, int position):
@@ -411,8 +467,14 @@ cdef class Core:
         self._at(position).frozen = frozen
 
     def tune_crystal(self, int position, double error, double swing, double period_s, double scatter_ns):
-        """Set frequency error and slow swing of the crystal (relative values), and the scatter of
-        time stamps.
+        """Set the errors of a device's crystal.
+
+        Args:
+            position: Position of the device.
+            error: Relative frequency error.
+            swing: Amplitude of the slow change of the frequency, relative.
+            period_s: Period of this change [s].
+            scatter_ns: Width of the scatter of time stamps [ns].
         """
         cdef controller *c = self._at(position)
         cdef double turn = 2e-9 * pi / period_s if swing != 0 else 0
@@ -438,12 +500,12 @@ cdef class Core:
         return f.frames, f.datagrams, f.malformed, f.foreign, f.lost, f.expired
 
     def pass_frame(self, bytes frame):
-        """Process one frame at once and return it; None if it is lost."""
+        """Process one frame without delay and return it; None if it is lost."""
         cdef uint8_t buffer[2048]
         cdef int exit = -LOSS_NO_LIGHT
         cdef int size = len(frame)
         if size > <int>CAT_FRAME_MAX:
-            raise ValueError(f"a frame has at most {CAT_FRAME_MAX} bytes")
+            raise ValueError(f"a frame can have at most {CAT_FRAME_MAX} bytes, not {size}")
         memcpy(buffer, <const char *>frame, size)
         lock(self._segment)
         routes_refresh(self._segment)
@@ -456,11 +518,16 @@ cdef class Core:
         return PyBytes_FromStringAndSize(<char *>buffer, size) if exit >= 0 else None
 
     def answer_packets(self, int fd, int second_fd, int stop_fd, int64_t max_age_ns):
-        """Run the packet loop on AF_PACKET sockets until `stop_fd` is readable. Return 0 or -errno.
+        """Run the packet loop on AF_PACKET sockets until `stop_fd` is readable.
 
         Args:
-            second_fd: Socket of the other end of a ring; -1: none.
-            max_age_ns: Frames that waited in their socket for longer are dropped.
+            fd: Socket of the first end.
+            second_fd: Socket of the second end of a ring; -1: none.
+            stop_fd: Descriptor that ends the loop when it is readable.
+            max_age_ns: Maximum time that a frame may wait in its socket [ns].
+
+        Returns:
+            0 or -errno.
         """
         cdef int result
         with nogil:

@@ -1,4 +1,4 @@
-"""Link tables into a segment: they pass frames of a MainDevice in this process."""
+"""Links of a segment, which connect a MainDevice in the same process to it."""
 
 from cpython.bytes cimport PyBytes_FromStringAndSize
 from cpython.pycapsule cimport PyCapsule_New
@@ -32,7 +32,7 @@ cdef extern from "link.h":
 
 
 cdef class SegmentLink:
-    """Owns a link table into the segment's line. Keep it alive while its capsule is used."""
+    """Link to one end of a segment. Keep it alive while its capsule is in use."""
 
     cdef cat_link _table
     cdef Core _core
@@ -44,14 +44,14 @@ cdef class SegmentLink:
 
     def __init__(self, Core core, str name, ended, *, bint second=False):
         if second and not core._segment.ring:
-            raise ValueError("only a ring has a second link")
+            raise ValueError("only a ring has a second link; use Segment(..., ring=True)")
         self._core = core
         self._end = &core._segment.ends[1 if second else 0]
         self._ended = ended
         self._open = True
         self.name = name
         self._table.version = CAT_LINK_VERSION
-        self._table.flags = CAT_LINK_FORETELLS   # in real time too: returning frames are our own
+        self._table.flags = CAT_LINK_FORETELLS   # also in real time: arrival times are computed
         self._table.due = line_due
         if core._segment.is_virtual:
             self._table.flags |= CAT_LINK_VIRTUAL_TIME
@@ -68,7 +68,7 @@ cdef class SegmentLink:
     def _check(self, int result):
         if result < 0:
             self._core.raise_failure()
-            raise OSError(-result, "the virtual segment's line refused")
+            raise OSError(-result, "the virtual segment refused the frame or the wait")
         return result
 
     def send(self, bytes frame not None):
@@ -92,7 +92,7 @@ cdef class SegmentLink:
         with nogil:
             result = line_wait_until(self._end, deadline_ns, wake_on_frame)
         if result == -EINTR:
-            return False                   # a signal came first: Python handles it after the return
+            return False                   # interrupted by a signal, which Python handles after the return
         return bool(self._check(result))
 
     def close(self):

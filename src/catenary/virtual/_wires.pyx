@@ -1,4 +1,4 @@
-"""Wires of a segment: cables, routes of frames, frame faults, and lost frames."""
+"""Wires of a segment: cables, routes of frames, frame faults and lost frames."""
 
 from libc.stdint cimport int64_t, uint32_t, uint64_t
 
@@ -25,7 +25,7 @@ FRAME_FAULTS_MAX = MAX_FRAME_FAULTS
 
 
 cdef class Wires:
-    """View of the cables of `core`; it owns nothing."""
+    """View of the cables of `core`, which owns them."""
 
     cdef Core _core
 
@@ -33,26 +33,32 @@ cdef class Wires:
         self._core = core
 
     def lay_cable(self, int n, tuple up, tuple down):
-        """Connect cable n to two (device, port); devices -1 and -2 are the MainDevice's
-        interfaces."""
+        """Connect cable n.
+
+        Args:
+            n: Number of the cable.
+            up: (device, port) of the end closer to the first interface of the MainDevice. Devices
+                -1 and -2 are the interfaces of the MainDevice.
+            down: (device, port) of the other end.
+        """
         cdef cable_end above, below
         above.device, above.port = up
         below.device, below.port = down
         for end in (above, below):
             if not (0 <= n < self._core._segment.cable_count and -2 <= end.device < self._core.count
                     and 0 <= end.port < PORTS):
-                raise ValueError(f"impossible cable {n}")
+                raise ValueError(f"invalid cable {n}: no such number, device or port ({up}, {down})")
         lock(self._core._segment)
         cable_lay(self._core._segment, n, above, below)
         unlock(self._core._segment)
 
     cdef cable *_cable(self, int n) except NULL:
         if not 0 <= n < self._core._segment.cable_count:
-            raise IndexError(f"no cable {n}")
+            raise IndexError(f"the segment has no cable {n}")
         return &self._core._segment.cables[n]
 
     def plug_cable(self, int n, bint plugged, bint at_once=False):
-        """Plug or unplug a cable. `at_once`: without the controllers' detection time."""
+        """Plug or unplug a cable. `at_once`: skip the detection time of the controllers."""
         cdef cable *k = self._cable(n)
         lock(self._core._segment)
         if not self._core._segment.is_virtual:
@@ -62,9 +68,9 @@ cdef class Wires:
         unlock(self._core._segment)
 
     def raise_end(self, int end, bint up):
-        """Switch an interface of the MainDevice on or off, like a network card."""
+        """Activate or deactivate an interface of the MainDevice, and thus its light."""
         if not 0 <= end <= self._core._segment.ring:
-            raise IndexError(f"no end {end}")
+            raise IndexError(f"the segment has no end {end}")
         lock(self._core._segment)
         self._core._segment.ends[end].up = up
         segment_light(self._core._segment, True)
@@ -74,14 +80,14 @@ cdef class Wires:
         return bool(self._cable(n).light)
 
     def delay_cable(self, int n, int64_t delay_ns):
-        """Set the delay of a cable, one way."""
+        """Set the one-way delay of a cable [ns]."""
         lock(self._core._segment)
         self._cable(n).delay = delay_ns
         segment_light(self._core._segment, False)
         unlock(self._core._segment)
 
     def processed(self, int end):
-        """Return the positions of the devices that process a frame from an interface, in order."""
+        """Return the positions of the devices that process frames of one interface, in order."""
         cdef uint32_t k
         cdef route *r = &self._core._segment.routes[end]
         lock(self._core._segment)
@@ -91,12 +97,20 @@ cdef class Wires:
         unlock(self._core._segment)
         return positions
 
-    # -- faults that hit frames -----------------------------------------------------------------
+    # -- frame faults ---------------------------------------------------------------------------
 
     def add_frame_fault(self, int kind, *, int64_t frames, uint32_t every, int64_t delay_ns,
                         int cable, int offset):
-        """Add a fault and return its number. `frames` -1: unlimited. Kinds are in frame_faults.h's
-        order."""
+        """Add a frame fault and return its number.
+
+        Args:
+            kind: `frame_fault_kind` (frame_faults.h).
+            frames: Number of frames to affect; -1: unlimited.
+            every: Interval in frames; 1: every frame.
+            delay_ns: Delay of FAULT_DELAY [ns].
+            cable: Cable of FAULT_CORRUPT.
+            offset: Offset of the byte for FAULT_GARBLE; -1: a random bit.
+        """
         cdef int n
         cdef frame_fault *f
         for n in range(MAX_FRAME_FAULTS):
@@ -109,7 +123,7 @@ cdef class Wires:
             self._core._segment.fault_count += 1
             unlock(self._core._segment)
             return n
-        raise ValueError(f"at most {MAX_FRAME_FAULTS} faults can hit frames at a time")
+        raise ValueError(f"at most {MAX_FRAME_FAULTS} frame faults can be active at once")
 
     def frame_fault_left(self, int n):
         return self._core._segment.faults[n].left if self._core._segment.faults[n].used else 0
@@ -122,8 +136,9 @@ cdef class Wires:
         unlock(self._core._segment)
 
     def losses(self, uint64_t since):
-        """Return [(sent [ns], cause, interface)] of the frames lost from number `since` on, as far
-        as the log (LOSS_LOG) goes back, and the total number of lost frames.
+        """Return the lost frames from number `since` on, and the total number of lost frames.
+
+        Each lost frame is (time of sending [ns], cause, interface). The log keeps LOSS_LOG frames.
         """
         cdef uint64_t k
         cdef loss *x

@@ -1,6 +1,7 @@
 """Segments in TOML files.
 
-`[[device]]` tables in the order of the line, `[[fault]]` tables, and a `[plant]` for their motors.
+A file contains `[[device]]` tables in the order of the line. It can also contain `[[fault]]`
+tables, and a `[plant]` table for the motors.
 
 ring = true
 
@@ -218,7 +219,7 @@ class PlantTable(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
     contacts: bool = True
 
     def plant(self, path: str | Path) -> Plant:
-        """Make the plant. The path of the model is relative to the folder of the file `path`."""
+        """Create the plant. The path of its model is relative to the folder of the file `path`."""
         return Plant(
             Path(path).parent / self.model,
             self.joint,
@@ -238,14 +239,14 @@ class SegmentFile(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
 
 OUT_OF_RANGE = (ArithmeticError, LookupError, ValueError, struct.error)
 HINT = (
-    "see docs/explanation/virtual_segment.md for the fields of devices and plants, "
-    "docs/how_to/faults.md for those of faults"
+    "docs/explanation/virtual_segment.md lists the fields of devices and plants, "
+    "docs/how_to/faults.md those of faults"
 )
 
 
 @contextmanager
 def _named(where: str) -> Iterator[None]:
-    """Name the place in the file if a value is out of range, whatever a constructor raises."""
+    """Convert errors of constructors into ConfigurationError that names the place in the file."""
     try:
         yield
     except OUT_OF_RANGE as error:
@@ -253,7 +254,7 @@ def _named(where: str) -> Iterator[None]:
 
 
 def _device_in_fault(kind: type, given: Any) -> Any:
-    """Return the device of `with = {kind = "servo", ...}` in a fault."""
+    """Create the device of `with = {kind = "servo", ...}` in a fault."""
     if kind is not Device:
         raise NotImplementedError
     try:
@@ -277,12 +278,12 @@ def _read(path: str | Path) -> SegmentFile:
 
 
 def read_segment(path: str | Path, *, clock: ClockKind = "virtual", ring: bool = False) -> Segment:
-    """Read a segment with its faults from a file.
+    """Read a segment and its faults from a TOML file.
 
     Args:
-        path: The TOML file.
+        path: Path of the file.
         clock: See `Segment`.
-        ring: True makes it a ring, regardless of the file.
+        ring: True makes the segment a ring, regardless of the file.
 
     Raises:
         ConfigurationError: The file is invalid. The message names the file and the field.

@@ -1,4 +1,4 @@
-"""A controller's crystal with the frequency error, drift and jitter of a real one."""
+"""Crystal of a controller, with the frequency error, drift and jitter of a real one."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from dataclasses import dataclass, fields
 from typing import Literal
 
 ClockBits = Literal[32, 64]
-PPM_LIMIT = 500.0  # beyond this a time control loop cannot follow
+PPM_LIMIT = 500.0  # a time control loop cannot compensate for larger errors
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -16,10 +16,11 @@ class Crystal:
 
     Attributes:
         ppm: Constant frequency error [ppm]. Positive: the clock runs fast.
-        drift_ppm: Amplitude of a slow sine added to the frequency error, as from temperature [ppm].
+        drift_ppm: Amplitude of a slow sine that is added to the frequency error [ppm]. It models
+            the influence of temperature.
         drift_period: Period of this sine [s].
-        jitter: Width of the uniform scatter of time stamps (receive times, system times read or
-            compared) [s], half of it in either direction. The sequence is the same in every run.
+        jitter: Peak-to-peak width of the uniform scatter of time stamps [s]. It affects receive
+            times and the system time. The random sequence is the same in every run.
     """
 
     ppm: float = 0.0

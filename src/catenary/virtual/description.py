@@ -1,4 +1,4 @@
-"""Description of a virtual device, the source of its SII image and its objects."""
+"""Description of a virtual device, from which its SII image and its objects are made."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ VENDOR_ID = 0x43544E59
 
 @dataclass(frozen=True, slots=True)
 class MappedEntry:
-    """One entry of a PDO. Index 0 is a gap of `bits`."""
+    """Entry of a PDO. Index 0 denotes a gap of `bits`."""
 
     index: int
     subindex: int
@@ -46,7 +46,7 @@ class SyncManagerDefault:
 
 @dataclass(frozen=True, slots=True)
 class MailboxDefault:
-    """Offsets and sizes of the standard mailbox as the MainDevice names them: `receive` is SM0."""
+    """Offsets and sizes of the standard mailbox, named as in the SII: `receive` is SM0."""
 
     receive_offset: int
     receive_size: int
@@ -70,7 +70,7 @@ class Description:
     fmmus: tuple[int, ...]  # usage: 1 outputs, 2 inputs, 3 mailbox status
     rx_pdos: tuple[Pdo, ...]
     tx_pdos: tuple[Pdo, ...]
-    clock: bool
+    clock: bool  # True if the device has distributed clocks
     axes: int = 0
     ram: int = 0x2000  # bytes from 0x1000 on
     slots: int = 0
@@ -79,16 +79,17 @@ class Description:
     ports: tuple[int, ...] = (0, 1)
     mapping_quirks: MappingQuirks = NO_MAPPING_QUIRKS
     op_modes: tuple[OpMode, ...] = STANDARD  # for devices with a clock and axes
-    loop_control: bool = True  # the ports can be closed (0x0101)
+    loop_control: bool = True  # True if 0x0101 can close the ports
     lrw: bool = True
-    sii_variant: str = ""  # describes how the SII differs from the device
+    sii_variant: str = ""  # differences of the SII from the device
 
     @property
     def revision(self) -> int:
-        """Revision number: upper word 1, lower word a checksum of all fields except the names.
+        """Revision number: 1 in the upper word, a checksum of the description in the lower word.
 
-        Devices with different SIIs have different revisions. SOEM copies the SII of the first
-        device of an identity to all others (src/ec_config.c, ecx_lookup_prev_sii).
+        The checksum ensures that devices with different SIIs have different revisions. SOEM reads
+        the SII only once for all devices with the same identity (src/ec_config.c,
+        ecx_lookup_prev_sii).
         """
         kind = replace(self, name="", order="", group="", serial=0, alias=0, identification=0)
         return 0x0001_0000 | zlib.crc32(repr(kind).encode()) & 0xFFFF

@@ -1,8 +1,8 @@
-/* Steps of a device's model and exchange of its process data: at its own cycle ("free run"), by
- * SYNC0 pulses ("DC Sync0", ETG.1020 §0x1C32), or in the same way by SYNC1 ("DC Sync1").
+/* Steps of a device's model and exchange of its process data: in its internal cycle ("free run"), at
+ * SYNC0 pulses ("DC Sync0", ETG.1020 §0x1C32), or likewise at SYNC1 pulses ("DC Sync1").
  *
- * With SYNC0 the device latches its inputs and updates its outputs at the pulse. Its own cycle is a
- * fraction of the SYNC0 cycle and locked to it: a pulse restarts the count. Without pulses its own
+ * With SYNC0, the device latches its inputs and updates its outputs at the pulse. Its internal cycle
+ * is a fraction of the SYNC0 cycle, and each pulse restarts it. If the pulses stop, the internal
  * cycle continues, half a step later than expected, until the device detects the loss. */
 #ifndef CATENARY_VIRTUAL_DEVICE_CYCLE_H
 #define CATENARY_VIRTUAL_DEVICE_CYCLE_H
@@ -11,7 +11,7 @@
 #include "servo.h"
 #include "controller/sync_unit.h"
 
-enum { CATCH_UP_STEPS = 4000 };       /* limit of catching up after a jump of the clock */
+enum { CATCH_UP_STEPS = 4000 };       /* maximum number of steps to catch up after a clock jump */
 
 static void model_axes(controller *c, int fresh) {
     for (int k = 0; k < c->axis_count; k++)
@@ -40,7 +40,7 @@ static inline void outputs_accept(controller *c) {
     outputs_take(c);
 }
 
-/* One step of the device's own cycle. */
+/* Take one step of the internal cycle. */
 static void model_step_free(controller *c) {
     int fresh = 0;
     if (c->outputs.sm >= 0 && c->outputs_valid) {
@@ -53,7 +53,7 @@ static void model_step_free(controller *c) {
     model_inputs(c);
 }
 
-/* The pulses have stopped: end the synchronisation of the device. */
+/* End the synchronisation of the device if the pulses have stopped. */
 static void pulses_lost(controller *c) {
     synchronous_cycle *d = &c->synchronous;
     if (!d->seen || c->segment->now - d->last <= (int64_t)(d->limit + 1) * d->cycle)
@@ -66,14 +66,14 @@ static void pulses_lost(controller *c) {
     raise_event(c, EVENT_SYNC_LOST);
 }
 
-/* One step between two pulses, or after the last one. */
+/* Take one step between two pulses, or after the last pulse. */
 static void model_step_between(controller *c) {
     synchronous_cycle *d = &c->synchronous;
     model_axes(c, 0);
     if (d->left >= 0)
         d->left--;
     if (d->left == 0)
-        c->step_due += c->step_period / 2;                   /* the next pulse must come first */
+        c->step_due += c->step_period / 2;                   /* the next pulse comes first */
     if (d->left >= 0)
         return;
     pulses_lost(c);
@@ -90,7 +90,7 @@ static void model_step(controller *c) {
         model_step_free(c);
 }
 
-/* Return 1 if new outputs arrived since the last pulse, early enough to be copied for this one. */
+/* Return 1 if new outputs have arrived since the last pulse, in time to be copied for this pulse. */
 static int outputs_in_time(controller *c) {
     synchronous_cycle *d = &c->synchronous;
     if (c->outputs.sm < 0 || !(*outputs_status(c) & SM_STATUS_WRITTEN))
@@ -112,15 +112,14 @@ static void outputs_missed(controller *c) {
     raise_event(c, EVENT_SYNC_MISSED);
 }
 
-/* A terminal without microcontroller: its controller updates the output pins at SYNC0 by itself
- * (Beckhoff, EtherCAT Slave Controller, section II, 0x0150 digital I/O: "outputs updated at
- * SYNC0"). */
+/* Update the output pins of a terminal without a microcontroller at SYNC0 (Beckhoff, EtherCAT Slave
+ * Controller, section II, 0x0150 digital I/O: "outputs updated at SYNC0"). */
 static void pins_sync0(controller *c) {
     if (c->outputs.sm >= 0 && c->outputs_valid)
         outputs_accept(c);
 }
 
-/* A pulse that the device synchronises to occurs now. */
+/* Handle a pulse of the signal to which the device synchronises. */
 static void model_pulse(controller *c) {
     synchronous_cycle *d = &c->synchronous;
     int64_t now = c->segment->now;
@@ -147,8 +146,8 @@ static void model_pulse(controller *c) {
     c->step_due = now + c->step_period + (d->left == 0 ? c->step_period / 2 : 0);
 }
 
-/* Synchronise the device to pulses of `signal` (SYNC_PULSE_0 or _1) with period `cycle`, divided
- * into `steps` steps of its own. */
+/* Synchronise the device to the pulses of `signal` (SYNC_PULSE_0 or _1). Their period `cycle` is
+ * divided into `steps` internal cycles. */
 static void synchronous_begin(controller *c, int64_t cycle, int steps, uint8_t signal) {
     synchronous_cycle *d = &c->synchronous;
     d->cycle = cycle;
@@ -173,7 +172,7 @@ static inline void model_period(controller *c, int64_t period) {
     due_at(c, c->step_due);
 }
 
-/* Do all work of the model that is due now: a pulse before a step. */
+/* Do all work of the model that is due now. A pulse is handled before a step. */
 static inline void device_advance(controller *c) {
     int64_t now = c->segment->now;
     int pulses = c->sync.due <= now ? sync_advance(c) : 0;

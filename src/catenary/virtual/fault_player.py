@@ -1,4 +1,4 @@
-"""Playback of faults: start and end each fault at its time, and log it."""
+"""Playback of faults: each fault starts and ends at its time, and is logged."""
 
 from __future__ import annotations
 
@@ -17,39 +17,39 @@ from catenary.virtual.scheduler import Agenda
 from catenary.virtual.wiring import Wiring
 
 SECOND = 1_000_000_000
-# Same order as in the compiled code (frame_faults.h).
+# In the order of `frame_fault_kind` (frame_faults.h).
 FRAME_KINDS = ("lose_out", "lose_back", "corrupt", "garble", "delay", "duplicate")
 LOSS_CAUSES = {
-    1: "no light",  # entered a dark cable before the controllers detected the loss
+    1: "no light",  # the frame entered a dark cable before the controllers detected the loss
     2: "closed port",
     3: "circulating",
     4: "in flight",  # a cable went dark while the frame was on it
     5: "injected",
     6: "corrupt",
-    7: "expired",  # waited in the socket of a served segment for longer than `max_age`
+    7: "expired",  # the frame waited in the socket of a served segment for more than `max_age`
 }
 
 End: TypeAlias = Callable[[], None]
 
 
 class FaultEvent(NamedTuple):
-    """Entry of the fault log: time on the segment's clock [s], the fault, and what happened."""
+    """Entry of the fault log."""
 
-    time: float
+    time: float  # on the segment's clock [s]
     fault: f.Fault
-    what: Literal["begins", "ends", "misses"]  # misses: its target has disappeared
+    what: Literal["begins", "ends", "misses"]  # "misses": the target no longer exists
 
 
 class Loss(NamedTuple):
-    """A lost frame: when it was sent [s], why it was lost, and on which link (0, 1)."""
+    """A lost frame."""
 
-    time: float
-    cause: str
-    link: int
+    time: float  # time of sending [s]
+    cause: str  # one of LOSS_CAUSES
+    link: int  # 0 or 1
 
 
 class FaultPlayer:
-    """Owns the planned and active faults, and their log."""
+    """Planned and active faults of a segment, and their log."""
 
     def __init__(
         self,
@@ -66,7 +66,7 @@ class FaultPlayer:
         self.wiring = wiring
         self._agenda = agenda
         self._replaced = replaced
-        self._waiting: list[f.Fault] = []  # real time: wait for the first frame
+        self._waiting: list[f.Fault] = []  # until the first frame, in real time
         self._planned = 0
         self._frame_faults: list[tuple[int, f.FrameFault]] = []
         self._losses_seen = 0
@@ -74,17 +74,17 @@ class FaultPlayer:
 
     @property
     def now(self) -> float:
-        """The segment's time [s]; 0 before the first frame of real time."""
+        """Time of the segment [s]. In real time, it is 0 until the first frame."""
         return (self._core.now - self._core.epoch) / SECOND if self._core.epoch >= 0 else 0.0
 
     @property
     def done(self) -> bool:
-        """True if no fault is still to begin or to end."""
+        """True if no fault has yet to begin or to end."""
         left = any(self._wires.frame_fault_left(n) > 0 for n, _fault in self._frame_faults)
         return not (self._waiting or self._planned or left)
 
     def add(self, fault: f.Fault) -> None:
-        """Plan a fault.
+        """Schedule a fault.
 
         Raises:
             ValueError: The fault does not fit this segment. The message names the field.
@@ -100,7 +100,7 @@ class FaultPlayer:
     def _now(self, fault: f.Fault) -> None:
         if self._core.is_virtual:
             self._begin(fault)
-        else:  # the service's thread owns the devices
+        else:  # only the service thread may change devices
             self._planned += 1
             self._agenda.after(0, partial(self._due, fault))
 
@@ -122,7 +122,7 @@ class FaultPlayer:
         try:
             self._check_kind(fault)
             self._check_room(fault)
-        except ValueError:  # the device was replaced meanwhile
+        except ValueError:  # the device has been replaced
             self.log.append(FaultEvent(self.now, fault, "misses"))
             return
         self.log.append(FaultEvent(self.now, fault, "begins"))
@@ -141,7 +141,7 @@ class FaultPlayer:
         end()
 
     def take_losses(self) -> list[Loss]:
-        """Return the frames lost since the last call, at most the latest 4096."""
+        """Return the frames lost since the last call, up to the last 4096."""
         found, self._losses_seen = self._wires.losses(self._losses_seen)
         epoch = max(self._core.epoch, 0)
         return [Loss((sent - epoch) / SECOND, LOSS_CAUSES[why], end) for sent, why, end in found]
@@ -182,35 +182,37 @@ class FaultPlayer:
 
     def _check_room(self, fault: f.Fault) -> None:
         if isinstance(fault, f.FrameFault):
-            self._drop_used_up()
+            self._remove_used_faults()
             if len(self._frame_faults) >= FRAME_FAULTS_MAX:
-                raise ValueError(f"at most {FRAME_FAULTS_MAX} frame faults can be active at a time")
+                raise ValueError(f"at most {FRAME_FAULTS_MAX} frame faults can be active at once")
 
     def _check_ports(self, name: str, device: Device, position: int) -> None:
         for port in range(4):
             if self.wiring.at_port(position, port) and port not in device.ports:
-                raise ValueError(f"{name}: {device.name} has no port {port}, but a cable is there")
+                raise ValueError(
+                    f"{name}: {device.name} has no port {port}, but a cable is connected there"
+                )
 
     def _applied(self, position: int) -> AppliedDevice:
         device = self._devices[position]
         if not isinstance(device, AppliedDevice):
-            raise ValueError(f"device: device {position}, {device.kind}, has no application")
+            raise ValueError(f"device: device {position} ({device.kind}) has no application")
         return device
 
     def _servo(self, position: int) -> Servo:
         device = self._devices[position]
         if not isinstance(device, Servo):
-            raise ValueError(f"device: device {position}, {device.kind}, is not a servo")
+            raise ValueError(f"device: device {position} ({device.kind}) is not a servo")
         return device
 
     # -- injection -----------------------------------------------------------------------------
 
     def _inject(self, fault: f.Fault) -> End | None:
-        """Begin the fault and return the function that ends it, if any."""
+        """Begin the fault, and return the function that ends it, if any."""
         core, wires = self._core, self._wires
         match fault:
             case f.LoseFrames() | f.Corrupt() | f.Garble() | f.Delay() | f.Duplicate():
-                return self._spoil_frames(fault)
+                return self._add_frame_fault(fault)
             case f.Cut():
                 cable = self.wiring.between(*fault.between)
                 wires.plug_cable(cable, False)
@@ -226,7 +228,7 @@ class FaultPlayer:
                 return self._switch_off([fault.device])
             case f.Swap():
                 self._switch_off([fault.device])
-                return partial(self._put_in, fault.device, fault.with_)
+                return partial(self._replace_device, fault.device, fault.with_)
             case f.Exchange():
                 self._exchange(fault.device, fault.other)
                 return self._switch_off([fault.device, fault.other])
@@ -283,14 +285,14 @@ class FaultPlayer:
         return lambda: undo() if device in self._devices else None
 
     def _while_running(self, device: AppliedDevice, undo: End) -> End:
-        """Return `undo`, skipped if the device was off meanwhile and has lost the fault anyway."""
+        """Return `undo`, which is skipped if the device has lost its power and thus the fault."""
         application = device.application
         return lambda: undo() if device.application is application else None
 
-    def _spoil_frames(self, fault: f.FrameFault) -> End:
-        way = f"lose_{fault.way}" if isinstance(fault, f.LoseFrames) else fault.kind
+    def _add_frame_fault(self, fault: f.FrameFault) -> End:
+        kind = f"lose_{fault.way}" if isinstance(fault, f.LoseFrames) else fault.kind
         number = self._wires.add_frame_fault(
-            FRAME_KINDS.index(way),
+            FRAME_KINDS.index(kind),
             frames=-1 if fault.frames is None else fault.frames,
             every=fault.every,
             delay_ns=round(fault.by * SECOND) if isinstance(fault, f.Delay) else 0,
@@ -298,15 +300,15 @@ class FaultPlayer:
             offset=-1 if not isinstance(fault, f.Garble) or fault.offset is None else fault.offset,
         )
         self._frame_faults.append((number, fault))
-        return partial(self._spoil_no_longer, fault)
+        return partial(self._remove_frame_fault, fault)
 
-    def _drop_used_up(self) -> None:
+    def _remove_used_faults(self) -> None:
         used_up = [n for n, _ in self._frame_faults if self._wires.frame_fault_left(n) == 0]
         self._frame_faults = [held for held in self._frame_faults if held[0] not in used_up]
         for number in used_up:
             self._wires.remove_frame_fault(number)
 
-    def _spoil_no_longer(self, fault: f.FrameFault) -> None:
+    def _remove_frame_fault(self, fault: f.FrameFault) -> None:
         for held in self._frame_faults:
             if held[1] is fault:
                 self._wires.remove_frame_fault(held[0])
@@ -329,7 +331,7 @@ class FaultPlayer:
         device.crystal = replace(before, ppm=fault.ppm)
         return lambda: setattr(device, "crystal", before)
 
-    def _put_in(self, position: int, device: Device) -> None:
+    def _replace_device(self, position: int, device: Device) -> None:
         old = self._devices[position]
         old.detach()
         self._core.remove_controller(position)

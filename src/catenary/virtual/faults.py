@@ -1,12 +1,12 @@
-"""Faults: frozen values to inject into a segment, in Python or as `[[fault]]` tables.
+"""Faults to inject into a segment, in Python or as `[[fault]]` tables.
 
     Segment(devices, faults=[lose_frames(3, at=2.0), power_cycle(2, at=1.5, for_=0.8)])
-    segment.inject(cut(between=(4, 5)))          # no `at`: at once
+    segment.inject(cut(between=(4, 5)))          # without `at`: immediately
 
-Every fault has a start time `at` [s] on the segment's clock; docs/how_to/faults.md defines its
-zero. Without `at` the fault starts at once. `for_` is its duration [s]; without it the fault never
-ends.
-In TOML the field `kind` names the fault, and `for_` and `with_` are written `for` and `with`.
+Every fault has a start time `at` [s] on the clock of the segment; docs/how_to/faults.md defines its
+zero. Without `at`, the fault starts immediately. `for_` is its duration [s]; without it, the fault
+lasts. In TOML, the field `kind` names the fault, and `for_` and `with_` are written `for` and
+`with`.
 """
 
 from __future__ import annotations
@@ -55,9 +55,9 @@ class _Lasting(_Fault, frozen=True, kw_only=True):
 
 
 class _OfFrames(_Lasting, frozen=True, kw_only=True):
-    """Fault that hits the first frame from `at` on, then every `every`-th, `n` frames in total.
+    """Fault of frames: of the first frame from `at` on, and of every `every`-th frame after it.
 
-    Without `n` it hits one frame, or all frames within `for_`.
+    The fault affects `n` frames. Without `n`, it affects one frame, or all frames within `for_`.
     """
 
     every: int = 1
@@ -69,13 +69,13 @@ class _OfFrames(_Lasting, frozen=True, kw_only=True):
 
     @property
     def frames(self) -> int | None:
-        """Maximum number of frames to hit; None: unlimited."""
+        """Maximum number of affected frames; None: unlimited."""
         n: int | None = getattr(self, "n", None)
         return 1 if n is None and self.for_ is None else n
 
 
 class LoseFrames(_OfFrames, tag="lose_frames", frozen=True):
-    """Frames are lost on the way "out" (before the first device) or on the way "back"."""
+    """Loss of frames on the way "out" (before the first device) or "back" (after the last)."""
 
     n: int | None = None
     way: Literal["out", "back"] = msgspec.field(default="out")
@@ -87,10 +87,10 @@ class LoseFrames(_OfFrames, tag="lose_frames", frozen=True):
 
 
 class Corrupt(_OfFrames, tag="corrupt", frozen=True):
-    """Bits flip on the cable between two neighbours.
+    """Bit errors on the cable between two neighbours.
 
     The controllers behind the cable count the error and ignore the frame. The MainDevice's
-    interface drops it.
+    interface drops the frame.
     """
 
     n: int | None = None
@@ -98,9 +98,9 @@ class Corrupt(_OfFrames, tag="corrupt", frozen=True):
 
 
 class Garble(_OfFrames, tag="garble", frozen=True):
-    """Frames return with wrong bytes but a valid check sequence.
+    """Corruption of frames that leaves the frame check sequence valid.
 
-    The byte at `offset` is inverted; without `offset` one random bit is.
+    The fault inverts the byte at `offset`, or one random bit if `offset` is None.
     """
 
     n: int | None = None
@@ -112,7 +112,7 @@ class Garble(_OfFrames, tag="garble", frozen=True):
 
 
 class Delay(_OfFrames, tag="delay", frozen=True):
-    """Frames return `by` [s] later."""
+    """Delay of returning frames by `by` [s]."""
 
     n: int | None = None
     by: float = 1e-3
@@ -123,13 +123,13 @@ class Delay(_OfFrames, tag="delay", frozen=True):
 
 
 class Duplicate(_OfFrames, tag="duplicate", frozen=True):
-    """Frames return twice."""
+    """Duplication of returning frames."""
 
     n: int | None = None
 
 
 class Cut(_Lasting, tag="cut", frozen=True):
-    """Broken cable between two neighbours ("main": the MainDevice); repaired after `for_`."""
+    """Break of the cable between two neighbours ("main": the MainDevice), repaired after `for_`."""
 
     between: tuple[Neighbour, Neighbour]
 
@@ -154,48 +154,48 @@ class _LastingOfDevice(_Lasting, frozen=True, kw_only=True):
 
 
 class Unplug(_LastingOfDevice, tag="unplug", frozen=True):
-    """The uplink cable of a device is unplugged. The device keeps its power."""
+    """Disconnection of a device's uplink cable. The device keeps its power."""
 
     device: int
 
 
 class Replug(_OfDevice, tag="replug", frozen=True):
-    """The uplink cable of a device is plugged in again."""
+    """Reconnection of a device's uplink cable."""
 
     device: int
 
 
 class PowerCycle(_LastingOfDevice, tag="power_cycle", frozen=True):
-    """A device loses power for `for_`. Without a ring, all devices behind it are unreachable too.
+    """Loss of a device's power for `for_`. Without a ring, the devices behind it are lost, too.
 
-    The device returns in INIT, without station address and with default object values.
+    The device returns in INIT, without a station address and with default object values.
     """
 
     device: int
 
 
 class Swap(_LastingOfDevice, tag="swap", frozen=True):
-    """A device is removed and replaced by `with_`, at once or after `for_`."""
+    """Removal of a device and its replacement by `with_`, immediately or after `for_`."""
 
     device: int
     with_: Device = msgspec.field(name="with")
 
 
 class Exchange(_LastingOfDevice, tag="exchange", frozen=True):
-    """Two devices change places, as after a repair. Both are without power for `for_`."""
+    """Exchange of the positions of two devices. Both have no power for `for_`."""
 
     device: int
     other: int
 
 
 class MailboxSilent(_LastingOfDevice, tag="mailbox_silent", frozen=True):
-    """A device stops reading its mailbox: SM0 stays full and SM1 stays empty."""
+    """Stop of a device's mailbox: SM0 stays full and SM1 stays empty."""
 
     device: int
 
 
 class LateMailbox(_LastingOfDevice, tag="late_mailbox", frozen=True):
-    """A device takes `by` [s] longer to answer mailbox requests."""
+    """Delay of a device's mailbox answers by `by` [s]."""
 
     device: int
     by: float = 0.05
@@ -206,7 +206,7 @@ class LateMailbox(_LastingOfDevice, tag="late_mailbox", frozen=True):
 
 
 class RefuseState(_LastingOfDevice, tag="refuse_state", frozen=True):
-    """A device refuses a state with an AL status code, `times` times or always."""
+    """Refusal of a state with an AL status code, `times` times or always."""
 
     device: int
     state: int | str
@@ -221,7 +221,7 @@ class RefuseState(_LastingOfDevice, tag="refuse_state", frozen=True):
 
 
 class LeaveState(_OfDevice, tag="leave_state", frozen=True):
-    """A device falls back to a lower state by itself and shows an AL status code."""
+    """Unrequested change of a device to a lower state, with an AL status code."""
 
     device: int
     state: int | str = "SAFE-OP"
@@ -234,19 +234,19 @@ class LeaveState(_OfDevice, tag="leave_state", frozen=True):
 
 
 class WrongWorkingCounter(_LastingOfDevice, tag="wrong_working_counter", frozen=True):
-    """A device ignores logical datagrams: it neither reads, writes nor counts them."""
+    """Failure of a device to process logical datagrams or to increment their working counters."""
 
     device: int
 
 
 class Freeze(_LastingOfDevice, tag="freeze", frozen=True):
-    """A device's model stops; its controller continues to answer with old inputs."""
+    """Stop of a device's model. Its controller continues to answer with old inputs."""
 
     device: int
 
 
 class DriveFault(_LastingOfDevice, tag="drive_fault", frozen=True):
-    """A servo's axis enters fault with this error code (0x603F). The cause ends after `for_`."""
+    """Fault of a servo axis with this error code (0x603F). The cause ends after `for_`."""
 
     device: int
     code: int = 0x2310
@@ -254,14 +254,14 @@ class DriveFault(_LastingOfDevice, tag="drive_fault", frozen=True):
 
 
 class SafeTorqueOff(_LastingOfDevice, tag="safe_torque_off", frozen=True):
-    """Safe torque off of a servo's axis."""
+    """Safe torque off of a servo axis."""
 
     device: int
     axis: int = 0
 
 
 class Drift(_LastingOfDevice, tag="drift", frozen=True):
-    """A device's crystal runs fast by `ppm` [ppm] (negative: slow)."""
+    """Frequency error `ppm` of a device's crystal [ppm]. Positive: the clock runs fast."""
 
     device: int
     ppm: float

@@ -1,17 +1,18 @@
-/* Faults that hit frames: selection, effect, and the log of lost frames. Without such a fault, a
- * frame costs at most one additional comparison. */
+/* Faults of frames: their selection and effect, and the log of lost frames. Without such a fault,
+ * the cost is at most one comparison per frame. */
 #ifndef CATENARY_VIRTUAL_FRAME_FAULTS_H
 #define CATENARY_VIRTUAL_FRAME_FAULTS_H
 
 #include "route.h"
 
-/* Same order as fault_player.FRAME_KINDS. LOSE_OUT: before the first device; LOSE_BACK: after the
- * last. CORRUPT: bits flip on a cable; GARBLE: wrong bytes with a valid check sequence. */
+/* In the order of fault_player.FRAME_KINDS. LOSE_OUT: lost before the first device; LOSE_BACK: lost
+ * after the last device. CORRUPT: bit errors on a cable; GARBLE: wrong bytes with a valid check
+ * sequence. */
 enum frame_fault_kind { FAULT_LOSE_OUT, FAULT_LOSE_BACK, FAULT_CORRUPT, FAULT_GARBLE, FAULT_DELAY, FAULT_DUPLICATE };
 
 typedef struct {
     int lose_out, lose_back, garble, offset, duplicate;
-    const arrival *corrupt;          /* arrival at which the bits had flipped */
+    const arrival *corrupt;          /* first arrival with bit errors */
     int64_t delay;
 } fate;
 
@@ -43,7 +44,7 @@ static void fate_add(cat_segment *s, const frame_fault *f, const arrival *where,
     }
 }
 
-/* Return the effect of faults on the frame that takes this route; count it. */
+/* Return the effect of all faults on a frame that takes this route, and count the frame. */
 static fate fate_of(cat_segment *s, const route *r) {
     fate result = NO_FATE;
     for (int n = 0; s->fault_count && n < MAX_FRAME_FAULTS; n++) {
@@ -59,7 +60,7 @@ static fate fate_of(cat_segment *s, const route *r) {
     return result;
 }
 
-/* Invert the byte at `offset`, or one bit anywhere after the Ethernet header. */
+/* Invert the byte at `offset`; if it is negative, invert a random bit after the Ethernet header. */
 static void frame_garble(cat_segment *s, uint8_t *frame, uint32_t length, int offset) {
     if (offset >= 0 && (uint32_t)offset < length)
         frame[offset] ^= 0xFF;
@@ -69,7 +70,7 @@ static void frame_garble(cat_segment *s, uint8_t *frame, uint32_t length, int of
     frame[14 + bit / 8] ^= (uint8_t)(1u << (bit & 7));
 }
 
-/* Count bad bits: at the port where they arrived, and at all later controllers as forwarded errors. */
+/* Count a corrupt frame: an RX error at the port of arrival, forwarded errors at later controllers. */
 static void frame_corrupted(cat_segment *s, const route *r, const arrival *where) {
     for (const arrival *a = where; a < r->arrivals + r->arrival_count; a++) {
         if (a->device < 0)

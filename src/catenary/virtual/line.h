@@ -1,7 +1,7 @@
-/* The line: frames on their way, due work, and the two clocks.
+/* The line: frames in transit, due work, and virtual or real time.
  *
- * A frame is processed in all controllers when it is sent. It returns after its own length on the
- * wire and the delay of its route, unless a cable on it goes dark before. In virtual time only
+ * All controllers process a frame when it is sent. The frame returns after its transmission time and
+ * the delay of its route, unless a cable on the route goes dark before. In virtual time, only
  * `wait_until` advances `now`. */
 #ifndef CATENARY_VIRTUAL_LINE_H
 #define CATENARY_VIRTUAL_LINE_H
@@ -18,7 +18,7 @@
 enum {
     BYTE_NS = 80,                     /* 100 Mbit/s */
     FRAME_OVERHEAD = 8 + 4 + 12,      /* preamble, check sequence, gap */
-    INSTANTS_MAX = 10000              /* limit of due times processed before the next frame, in real time */
+    INSTANTS_MAX = 10000              /* maximum number of due times before the next frame in real time */
 };
 
 static int64_t monotonic_now(void) {
@@ -30,7 +30,7 @@ static int64_t monotonic_now(void) {
 static void wake_service(cat_segment *s) {
     if (s->event_fd >= 0) {
         uint64_t one = 1;
-        ssize_t written = write(s->event_fd, &one, sizeof one);   /* full: the thread is awake already */
+        ssize_t written = write(s->event_fd, &one, sizeof one);   /* if it fails, the thread is already awake */
         (void)written;
     }
 }
@@ -38,7 +38,7 @@ static void wake_service(cat_segment *s) {
 static inline void lock(cat_segment *s) { pthread_mutex_lock(&s->mutex); }
 static inline void unlock(cat_segment *s) { pthread_mutex_unlock(&s->mutex); }
 
-/* Do all compiled work of one controller that is due at `now`; return the next due time. */
+/* Do all compiled work of one controller that is due now. Return its next due time. */
 static int64_t controller_advance(controller *c) {
     int64_t *due = c->segment->dues + c->position;
     *due = NEVER;
@@ -53,8 +53,8 @@ static int64_t controller_advance(controller *c) {
     return *due;
 }
 
-/* Lose the frames that are on a cable when it goes dark, although controllers after it have already
- * processed them. These are at most the frames of some microseconds. */
+/* Drop the frames that are on a cable when it goes dark. Later controllers have already processed
+ * them, but these are only the frames of a few microseconds. */
 static void lose_in_flight(cat_segment *s, segment_end *e) {
     uint32_t kept = e->head;
     for (uint32_t k = e->head; k != e->tail; k++) {
@@ -75,7 +75,7 @@ static void lose_in_flight(cat_segment *s, segment_end *e) {
     e->tail = kept;
 }
 
-/* Handle a change of cables or power. `at_once`: without the controllers' detection time. */
+/* Handle a change of cables or power. `at_once`: skip the detection time of the controllers. */
 static void segment_light(cat_segment *s, int at_once) {
     int64_t detection = s->detection;
     routes_refresh(s);
@@ -89,11 +89,11 @@ static void segment_light(cat_segment *s, int at_once) {
         links_check(s);
 }
 
-/* Do compiled work up to `until`, in the order of its times. In virtual time stop when an event
- * needs the application. With a plant every due time is processed separately, so that motors and
- * joints stay in step even when late. Joints come first, because encoders show the earlier state.
- * In real time work beyond INSTANTS_MAX waits: no number of SYNC0 pulses requested by frames can
- * delay frames. */
+/* Do the compiled work up to `until`, in the order of due times. In virtual time, stop when an event
+ * needs the application. With a plant, process every due time separately, so that motors and joints
+ * stay synchronous even after a delay. Joints come first, because encoders show the earlier state.
+ * In real time, INSTANTS_MAX limits the work, because frames can request any number of SYNC0 pulses
+ * and these must not delay later frames. */
 static void segment_work(cat_segment *s, int64_t until, int steps_plant) {
     int64_t bound = plant_bound(s, until, steps_plant);
     for (uint32_t left = INSTANTS_MAX; s->next_due <= bound && (s->is_virtual || left > 0); left--) {
@@ -121,15 +121,16 @@ static void segment_work(cat_segment *s, int64_t until, int steps_plant) {
         s->now = until;
 }
 
-/* In real time a plant is stepped by its own thread. Other threads stop at its next step. */
+/* Do the compiled work up to `until`. In real time, a separate thread steps the plant, and other
+ * threads stop before its next step. */
 static inline void segment_advance(cat_segment *s, int64_t until) { segment_work(s, until, s->is_virtual); }
 
-/* Return the next place in the queue of frames towards an interface. */
+/* Return the next free place in the queue of frames towards an interface. */
 static inline queued_frame *queue_place(segment_end *e) {
     return &e->queue[e->order[e->tail & (QUEUE_SIZE - 1)]];
 }
 
-/* Put the complete frame into the queue, before those that arrive later. */
+/* Insert the frame in the next free place into the queue, ahead of frames that arrive later. */
 static void queue_put(segment_end *e) {
     uint32_t k = e->tail++;
     uint16_t place = e->order[k & (QUEUE_SIZE - 1)];
@@ -145,7 +146,7 @@ static void queue_put(segment_end *e) {
 
 static inline int queue_full(const segment_end *e) { return e->tail - e->head >= QUEUE_SIZE; }
 
-/* Put the frame a second time, directly after the first. */
+/* Insert a copy of the frame, directly after the first. */
 static void queue_twice(segment_end *e, const queued_frame *first) {
     if (queue_full(e))
         return;
@@ -155,7 +156,7 @@ static void queue_twice(segment_end *e, const queued_frame *first) {
     queue_put(e);
 }
 
-/* Process a frame of `length` in `q` that starts at q->sent; queue it for its return, or lose it. */
+/* Process the frame in `q`, which starts at q->sent. Queue it for its return, or drop it. */
 static void line_take(cat_segment *s, queued_frame *q, const route *r) {
     fate fate = s->fault_count ? fate_of(s, r) : NO_FATE;
     s->passage = q->sent;
@@ -174,7 +175,7 @@ static void line_take(cat_segment *s, queued_frame *q, const route *r) {
 
 static int wait_in_virtual_time(segment_end *e, int64_t deadline, int wake_on_frame);
 
-/* On a shared clock, time may have passed during a wait on another segment's link. */
+/* Process the time that has passed on a shared clock, during a wait on the link of another segment. */
 static inline void catch_up(segment_end *e) {
     cat_segment *s = e->segment;
     if (s->clock) {
@@ -250,7 +251,7 @@ static int line_receive(void *self, const uint8_t **frame) {
 
 static inline int64_t earlier(int64_t a, int64_t b) { return a < b ? a : b; }
 
-/* Return the time of the next frame to receive. */
+/* Return the arrival time of the next frame. */
 static int64_t line_due(void *self) {
     const queued_frame *q = queue_first(self);
     return q ? q->arrival : NEVER;
@@ -286,7 +287,7 @@ static int wait_in_virtual_time(segment_end *e, int64_t deadline, int wake_on_fr
     }
 }
 
-/* Let execution time of the thread that uses the link pass; then do the work that is due. */
+/* Let execution time of the thread that uses the link pass, and then do the due work. */
 static int line_spend(void *self, int64_t duration) {
     segment_end *e = self;
     cat_segment *s = e->segment;

@@ -1,6 +1,6 @@
-"""Mailbox of a device, ETG.1000.4 §5.6: requests arrive in SM0, answers leave by SM1.
+"""Mailbox of a device, ETG.1000.4 §5.6: requests arrive in SM0, and answers leave through SM1.
 
-One message at a time, with repeat on request.
+Each mailbox holds one message at a time. The last answer is repeated on request.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ ERROR_SYNTAX, ERROR_UNSUPPORTED_PROTOCOL, ERROR_TOO_SHORT, ERROR_SIZE = 0x01, 0x
 
 
 class MailboxPorts(Protocol):
-    """The two mailbox SyncManagers, seen from the PDI side."""
+    """PDI side of the two mailbox SyncManagers."""
 
     def fetch_request(self) -> bytes | None: ...
 
@@ -31,7 +31,7 @@ class MailboxPorts(Protocol):
 
 
 class Mailbox:
-    """Owns the answers that wait for the MainDevice."""
+    """Device side of a mailbox, with the answers that wait for the MainDevice."""
 
     def __init__(
         self,
@@ -52,7 +52,7 @@ class Mailbox:
         self.reset()
 
     def reset(self) -> None:
-        """Discard all pending messages and restart the counter, on entry to PRE-OP."""
+        """Discard all pending messages and restart the counter. Called on entry to PRE-OP."""
         self._waiting: deque[bytes] = deque()
         self._in_buffer: bytes | None = None
         self._last_read: bytes | None = None
@@ -61,13 +61,13 @@ class Mailbox:
         self._fetching = False
 
     def silence(self, silent: bool) -> None:
-        """Stop or resume the mailbox. Waiting answers are delivered on resume."""
+        """Stop the mailbox, or resume it and deliver the waiting answers."""
         self.silent = silent
         self.request_written()
         self._deliver()
 
     def delay(self, nanoseconds: int) -> None:
-        """Change the time until a request is fetched by `nanoseconds`; the result is at least 0."""
+        """Add `nanoseconds` to the time until a request is fetched. The sum is at least 0."""
         self._delay_ns = max(0, self._delay_ns + nanoseconds)
 
     def request_written(self) -> None:
@@ -112,7 +112,7 @@ class Mailbox:
         return given.get(self._quirks.counter, self._counter)
 
     def send(self, payload: bytes) -> None:
-        """Queue an unsolicited CoE message (an emergency). It is dropped if 16 messages wait."""
+        """Queue an unsolicited CoE message (an emergency). Drop it if 16 messages are waiting."""
         if len(self._waiting) < 16:
             self._queue((COE_PROTOCOL, payload))
             self._deliver()
@@ -127,7 +127,7 @@ class Mailbox:
         self._deliver()
 
     def repeat_requested(self) -> None:
-        """Put the last answer into SM1 again, before any waiting one, and acknowledge."""
+        """Put the last answer into SM1 again, ahead of all others, and acknowledge the request."""
         if self._last_read is not None:
             if self._in_buffer is not None and self._ports.take_back_answer() is not None:
                 self._waiting.appendleft(self._in_buffer)

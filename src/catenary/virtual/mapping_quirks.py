@@ -13,43 +13,43 @@ Fixed = Literal["no", "declared", "silent"]
 
 
 class MappingQuirks(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """Differences of one device's PDO objects from freely mappable ones. The default has none."""
+    """Restrictions of a device's PDO objects. The default has none."""
 
     # PDO entries (0x16xx, 0x1Axx) cannot be written. "declared": SII flag 0x0010 and the access
-    # rights of the dictionary say so, as in Kollmorgen's AKD for 0x1701 to 0x1B26 (AKD EtherCAT
-    # manual, "Fixed PDO Mappings"). "silent": only the write is refused;
-    # OpenEtherCATsociety/SOEM#924 and #598 (0x1600 cannot be written, 0x1C12 can).
+    # rights in the dictionary indicate this, as in Kollmorgen's AKD for 0x1701 to 0x1B26 (AKD
+    # EtherCAT manual, "Fixed PDO Mappings"). "silent": nothing indicates it, but writes are refused
+    # (OpenEtherCATsociety/SOEM#924 and #598: 0x1600 cannot be written, 0x1C12 can).
     fixed_pdos: Fixed = "no"
 
-    # The lists of PDOs (0x1C12, 0x1C13) cannot be written: constants (ATYPE_RO) in
+    # The PDO assignments (0x1C12, 0x1C13) cannot be written. They are constants (ATYPE_RO) in
     # OpenEtherCATsociety/SOES, applications/raspberry_lan9252demo/slave_objectlist.c.
     fixed_lists: Fixed = "no"
 
-    # Abort code of a refused write that is not declared. 0x06010002 is usual. Beckhoff's EL2535
-    # answers 0x08000021 (OpenEtherCATsociety/SOEM#311).
+    # Abort code of an undeclared refusal. Most devices use 0x06010002; Beckhoff's EL2535 uses
+    # 0x08000021 (OpenEtherCATsociety/SOEM#311).
     abort_code: int = 0x0601_0002
 
-    # PDOs that the dictionary assigns at power-up, instead of those of the SII.
-    # sittner/linuxcnc-ethercat#97: the PDOs of an EL6900 differ from its description.
+    # PDOs that the dictionary assigns at power-up, instead of those in the SII. The PDOs of an
+    # EL6900 differ from its description (sittner/linuxcnc-ethercat#97).
     power_up: tuple[int, ...] | None = None
 
-    # PDOs that contain the same object cannot be assigned together, like the standard and compact
-    # PDOs of Beckhoff's EL30xx (infosys.beckhoff.com, el30xx, "Changeover of process data sets").
-    # The abort code is 0x08000021 (SOEM#311).
+    # PDOs that contain the same object cannot be assigned together. Examples are the standard and
+    # compact PDOs of Beckhoff's EL30xx (infosys.beckhoff.com, el30xx, "Changeover of process data
+    # sets"). The abort code is 0x08000021 (SOEM#311).
     exclusive: bool = False
 
     # Objects that cannot be mapped (0x06040041), although the dictionary marks them as mappable.
     refused_objects: tuple[int, ...] = ()
 
-    # CoE details of the SII, ETG.2010 table 5: 0x2F has all. Without bit 2 the SII excludes changes
-    # of the PDO assignment, without bit 3 changes of the PDO entries.
+    # CoE details in the SII, ETG.2010 table 5. 0x2F sets all bits. If bit 2 is clear, the PDO
+    # assignment cannot be changed; if bit 3 is clear, the PDO entries cannot be changed.
     coe_details: int = 0x2F
 
     def __post_init__(self) -> None:
         if not 0 <= self.abort_code <= 0xFFFF_FFFF:
-            raise ValueError(f"abort_code {self.abort_code}: use a 32-bit number")
+            raise ValueError(f"abort_code must be a 32-bit number, not {self.abort_code}")
         if not 0 <= self.coe_details <= 0x3F:
-            raise ValueError(f"coe_details {self.coe_details}: use 0 to 0x3F")
+            raise ValueError(f"coe_details must be 0 to 0x3F, not {self.coe_details:#x}")
 
 
 NO_MAPPING_QUIRKS = MappingQuirks()

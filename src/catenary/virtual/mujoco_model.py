@@ -1,9 +1,10 @@
-"""MuJoCo model of a plant: read from MJCF or URDF, joints by name, addresses of its arrays.
+"""MuJoCo model of a plant: reading MJCF and URDF, joints by name, and addresses of its arrays.
 
-Only this module imports MuJoCo, and only when a plant is made.
+Only this module imports MuJoCo, and only when a plant is created.
 
-Friction: under load, MuJoCo's dry friction creeps. `SOLIMP` and the shortest time constant that
-the step allows make it stiff: the arm of examples/cobot creeps 1e-6 rad/s on its brakes.
+Under load, MuJoCo's dry friction creeps. To make it stiff, the model uses `SOLIMP` and the shortest
+time constant that the step allows. The arm of examples/cobot then creeps by 1e-6 rad/s on its
+brakes.
 """
 
 from __future__ import annotations
@@ -22,7 +23,7 @@ if TYPE_CHECKING:
 
 ROOTS = ("mujoco", "robot")
 SOLIMP = (0.9999, 0.9999, 0.001, 0.5, 2.0)
-TIME_CONSTANT_STEPS, DAMPING_RATIO = 2.0, 1.0  # MuJoCo's documentation: at least two steps
+TIME_CONSTANT_STEPS, DAMPING_RATIO = 2.0, 1.0  # at least two steps, as MuJoCo's manual requires
 DEEPEST = 1e-3  # maximum penetration of bodies at the start [m]
 
 
@@ -39,7 +40,7 @@ def read_model(path: str | Path, *, step: float, contacts: bool) -> Model:
     """Read an MJCF or URDF file.
 
     Args:
-        path: The file.
+        path: Path of the file.
         step: Time step of the simulation [s].
         contacts: False disables contacts and ignores collision shapes.
 
@@ -53,13 +54,13 @@ def read_model(path: str | Path, *, step: float, contacts: bool) -> Model:
         if root.tag == "mujoco":
             model = mujoco.MjModel.from_xml_path(str(path))
         else:
-            meshes = _leave_out_shapes(root, path) if contacts else _leave_out_shapes(root)
+            meshes = _remove_shapes(root, path) if contacts else _remove_shapes(root)
             model = mujoco.MjModel.from_xml_string(ElementTree.tostring(root, "unicode"), meshes)
     except (ValueError, mujoco.FatalError) as error:
         raise ConfigurationError(f"{path}: MuJoCo rejects the model: {error}") from error
     model.opt.timestep = step
     flags = mujoco.mjtDisableBit
-    # the motors are the only actuators; a failed simulation must not reset itself
+    # Only the virtual motors act on the joints, and a failed simulation must not reset itself.
     model.opt.disableflags |= flags.mjDSBL_ACTUATION | flags.mjDSBL_AUTORESET
     if not contacts:
         model.opt.disableflags |= flags.mjDSBL_CONTACT
@@ -81,24 +82,24 @@ def _root(path: Path) -> ElementTree.Element:
     try:
         root = ElementTree.fromstring(path.read_bytes())
     except OSError as error:
-        raise ConfigurationError(f"{path}: {error.strerror}: cannot read the model") from error
+        raise ConfigurationError(f"cannot read the model {path}: {error.strerror}") from error
     except ElementTree.ParseError as error:
         raise ConfigurationError(f"{path} is not valid XML: {error}") from error
     if root.tag not in ROOTS:
         raise ConfigurationError(
             f"{path}: <{root.tag}> is neither MJCF (<mujoco>) nor URDF (<robot>)",
-            hint="expand xacro files first: xacro robot.urdf.xacro > robot.urdf"
+            hint="expand the xacro file first: xacro robot.urdf.xacro > robot.urdf"
             if path.suffix == ".xacro"
             else "",
         )
     return root
 
 
-def _leave_out_shapes(root: ElementTree.Element, path: Path | None = None) -> dict[str, bytes]:
-    """Remove visual shapes from a URDF, and without `path` also collision shapes.
+def _remove_shapes(root: ElementTree.Element, path: Path | None = None) -> dict[str, bytes]:
+    """Remove the visual shapes of a URDF. Without `path`, also remove the collision shapes.
 
     Returns:
-        The files of the remaining meshes by name, found from `path` upwards.
+        Contents of the remaining mesh files by name, searched from `path` upwards.
     """
     for link in root.iter("link"):
         for shape in [*link.iter("visual"), *([] if path else link.iter("collision"))]:
@@ -110,7 +111,7 @@ def _leave_out_shapes(root: ElementTree.Element, path: Path | None = None) -> di
 def _mesh(name: str, path: Path) -> Path:
     """Return the path of a mesh.
 
-    `package://name/meshes/x.stl` is searched in the folders above the URDF file.
+    The function searches `package://name/meshes/x.stl` in the folders above the URDF file.
     """
     below = name.removeprefix("package://").removeprefix("file://")
     parts = Path(below).parts
@@ -120,12 +121,12 @@ def _mesh(name: str, path: Path) -> Path:
                 return folder / Path(*parts[start:])
     raise ConfigurationError(
         f"{path}: the mesh {name} does not exist",
-        hint="with contacts=False (in TOML: contacts = false) no meshes are needed",
+        hint="or pass contacts=False (in TOML: contacts = false), which does not need meshes",
     )
 
 
 class Model:
-    """Owns a MuJoCo model and its state."""
+    """MuJoCo model and its state."""
 
     def __init__(self, path: Path, model: mujoco.MjModel) -> None:
         import mujoco
@@ -138,7 +139,7 @@ class Model:
 
     @property
     def joints(self) -> tuple[str, ...]:
-        """Names of the joints that a motor can drive: hinges and slides."""
+        """Names of the joints that a motor can drive (hinges and slides)."""
         kinds = self._mujoco.mjtJoint
         turnable = int(kinds.mjJNT_HINGE), int(kinds.mjJNT_SLIDE)
         return tuple(
@@ -148,7 +149,11 @@ class Model:
         )
 
     def check_joints(self, turned: Sequence[str], passive: Sequence[str]) -> None:
-        """Check that every joint has one motor or is passive.
+        """Check that every joint either has one motor or is passive.
+
+        Args:
+            turned: Names of the joints with a motor.
+            passive: Names of the joints without a motor.
 
         Raises:
             ConfigurationError: A name is unknown, used twice or missing. The message lists the
@@ -164,7 +169,7 @@ class Model:
         if left:
             raise ConfigurationError(
                 f"{self.path}: {', '.join(map(repr, left))} has no motor; {there}",
-                hint=f"give each a joint of the plant, or passive={left!r}",
+                hint=f"add a Joint for each of them, or pass passive={left!r}",
             )
 
     def _id(self, name: str) -> int:
@@ -174,11 +179,19 @@ class Model:
         return int(self.model.jnt_dofadr[self._id(name)])
 
     def place(self, name: str, position: float) -> None:
-        """Set the initial position of a joint [rad or m]."""
+        """Set the initial position of a joint.
+
+        Args:
+            name: Name of the joint.
+            position: Initial position [rad or m].
+
+        Raises:
+            ConfigurationError: The position is outside of the range of the joint.
+        """
         low, high = self.model.jnt_range[self._id(name)].tolist()
         if self.model.jnt_limited[self._id(name)] and not low <= position <= high:
             raise ConfigurationError(
-                f"{self.path}: joint {name!r} cannot start at {position:g}: its range is {low:g} to"
+                f"{self.path}: joint {name!r} cannot start at {position:g}; its range is {low:g} to"
                 f" {high:g}"
             )
         self._starts[name] = position
@@ -190,7 +203,7 @@ class Model:
         self._mujoco.mj_forward(self.model, self.data)
 
     def check_start(self) -> None:
-        """Raise ConfigurationError if bodies overlap at the start: contact forces would be huge."""
+        """Raise ConfigurationError if bodies overlap at the start, as contact forces explode."""
         self._start()
         for contact in self.data.contact:
             if contact.dist > -DEEPEST:
@@ -198,16 +211,22 @@ class Model:
             one, other = (self._body(geom) for geom in (contact.geom1, contact.geom2))
             raise ConfigurationError(
                 f"{self.path}: {one} and {other} overlap by {-1e3 * contact.dist:.1f} mm at the"
-                " start: their contact would block or overload the joints",
+                " start; their contact would block or overload the joints",
                 hint="exclude the pair (MJCF: <contact><exclude body1=... body2=.../></contact>),"
-                " use another start position, or contacts=False",
+                " use another start position, or pass contacts=False",
             )
 
     def _body(self, geom: int) -> str:
         return f"body {self.model.body(self.model.geom_bodyid[geom]).name!r}"
 
     def add_motor(self, name: str, *, inertia: float, viscous: float) -> None:
-        """Add a motor's inertia [kg·m²] and viscous friction [N·m·s/rad] at the joint."""
+        """Add the inertia and friction of a motor to a joint.
+
+        Args:
+            name: Name of the joint.
+            inertia: Inertia at the joint [kg·m²].
+            viscous: Viscous friction at the joint [N·m·s/rad].
+        """
         dof = self._dof(name)
         self.model.dof_armature[dof] += inertia
         self.model.dof_damping[dof] += viscous
@@ -216,11 +235,11 @@ class Model:
         self.model.dof_solimp[dof] = SOLIMP
 
     def settle(self) -> None:
-        """Recompute derived values after all motors were added, and return to the start."""
+        """Recompute the derived values after all motors were added, and reset to the start."""
         self._mujoco.mj_setConst(self.model, self.data)
         self._start()
         try:
-            self._mujoco.mj_step(self.model, self.data)  # fails here rather than in compiled code
+            self._mujoco.mj_step(self.model, self.data)  # raises, unlike in compiled code
         except self._mujoco.FatalError as error:
             raise ConfigurationError(
                 f"{self.path}: MuJoCo cannot simulate the model: {error}"
@@ -228,16 +247,16 @@ class Model:
         self._start()
 
     def inertia(self, name: str) -> float:
-        """Return the inertia at the joint in the start position, motor included [kg·m²]."""
+        """Return the inertia at the joint in the start position, including the motor [kg·m²]."""
         dof = self._dof(name)
-        import numpy as np  # installed with MuJoCo, needed for plants only
+        import numpy as np  # only plants need NumPy, which MuJoCo installs
 
         dense = np.zeros((self.model.nv, self.model.nv))
         self._mujoco.mj_fullM(self.model, self.data, dense)
         return float(dense[dof, dof])
 
     def dry_friction(self, name: str) -> float:
-        """Return the dry friction of the joint in the model [N·m]."""
+        """Return the dry friction that the model specifies for the joint [N·m]."""
         return float(self.model.dof_frictionloss[self._dof(name)])
 
     # -- for compiled code ---------------------------------------------------------------------
@@ -252,7 +271,7 @@ class Model:
         )
 
     def function(self, name: str) -> int:
-        """Return the address of a function in the mujoco package's library; 0 if missing."""
+        """Return the address of a function in the MuJoCo library; 0 if it does not exist."""
         [library] = Path(str(self._mujoco.__file__)).parent.glob("libmujoco.so*")
         function = getattr(ctypes.CDLL(str(library)), name, None)
         return 0 if function is None else ctypes.cast(function, ctypes.c_void_p).value or 0

@@ -1,11 +1,11 @@
-/* The segment on one NIC, or on two for a ring: its own small packet loop. It is independent of
- * `link`, so that each tests the other. It blocks in poll; the models are stepped after the answer
- * was sent. Budget from frame in to frame out: 10 us on an idle core.
+/* Packet loop that serves a segment on one NIC, or on two for a ring. It is independent of `link`, so
+ * that each tests the other. The loop blocks in poll, and steps the models after it has sent the
+ * answer. Time budget from the arrival of a frame to its answer: 10 us on an idle core.
  *
- * A cable does not store frames: a frame that was in the socket for longer than `max_age` is
- * dropped. Its age is the difference between CLOCK_REALTIME and the kernel's receive time
- * (SO_TIMESTAMPNS, socket(7)). If that clock is set meanwhile, frames in the socket are dropped or
- * count as new. */
+ * A cable does not store frames. Therefore the loop drops a frame that was in the socket for longer
+ * than `max_age`. The age of a frame is the difference between CLOCK_REALTIME and the receive time
+ * from the kernel (SO_TIMESTAMPNS, socket(7)). If this clock is set, frames in the socket can be
+ * dropped or appear to be new. */
 #ifndef CATENARY_VIRTUAL_PACKET_LOOP_H
 #define CATENARY_VIRTUAL_PACKET_LOOP_H
 
@@ -19,7 +19,7 @@
 
 #include "line.h"
 
-/* EEPROM accesses end before the frame that reads them; all other models may be stepped later. */
+/* Complete EEPROM accesses before the frame that reads their result. All other models can run later. */
 static void finish_sii(cat_segment *s) {
     s->sii_due = NEVER;
     for (int n = 0; n < s->count; n++) {
@@ -30,14 +30,14 @@ static void finish_sii(cat_segment *s) {
     }
 }
 
-/* Send a frame at the interface where it leaves. An interface with a full queue loses it. */
+/* Send a frame on its interface. If the queue of the interface is full, the frame is lost. */
 static int packet_send(const int *fds, int end, const uint8_t *frame, uint32_t length) {
     if (fds[end] < 0 || send(fds[end], frame, length, 0) >= 0)
         return 0;
     return errno == ENOBUFS || errno == EAGAIN ? 0 : -errno;
 }
 
-/* Queue a frame that a fault delays at the interface where it leaves. */
+/* Queue a frame that a fault delays, for its interface. */
 static void packet_delay(cat_segment *s, int end, const uint8_t *frame, uint32_t length, int64_t delay) {
     segment_end *e = &s->ends[end];
     if (queue_full(e))
@@ -78,7 +78,7 @@ static int packet_through(cat_segment *s, const int *fds, int from, uint8_t *fra
     return result == 0 && fate.duplicate ? packet_send(fds, end, frame, length) : result;
 }
 
-/* Return the time a received frame spent in the socket [ns]; 0: it has no time stamp. */
+/* Return the time that a received frame spent in the socket [ns]; 0 if it has no time stamp. */
 static int64_t packet_age(struct msghdr *message) {
     for (struct cmsghdr *c = CMSG_FIRSTHDR(message); c; c = CMSG_NXTHDR(message, c)) {
         if (c->cmsg_level != SOL_SOCKET || c->cmsg_type != SCM_TIMESTAMPNS)
@@ -98,7 +98,7 @@ static void packet_expired(cat_segment *s, int from, int64_t age) {
     unlock(s);
 }
 
-/* Return 1: answered or ignored, 0: no frame, or -errno. */
+/* Answer one frame. Return 1 if it was answered or ignored, 0 if there is no frame, or -errno. */
 static int packet_answer(cat_segment *s, const int *fds, int from, int64_t max_age) {
     static __thread uint8_t frame[65536 + 64];
     union { struct cmsghdr align; uint8_t bytes[CMSG_SPACE(sizeof(struct timespec))]; } control;
@@ -127,7 +127,7 @@ static int packet_answer(cat_segment *s, const int *fds, int from, int64_t max_a
     return 1;
 }
 
-/* Send frames after their delay; return 0 or -errno. *next: time of the next one. */
+/* Send frames whose delay has passed; return 0 or -errno. *next receives the time of the next one. */
 static int packets_due(cat_segment *s, const int *fds, int64_t *next) {
     *next = NEVER;
     for (int n = 0; n <= s->ring; n++) {
@@ -143,7 +143,7 @@ static int packets_due(cat_segment *s, const int *fds, int64_t *next) {
     return 0;
 }
 
-/* Answer at both interfaces in turn, at most 64 frames, so that the models can run. */
+/* Answer up to 64 frames from each interface in turn, and then let the models run. */
 static int packets_answer(cat_segment *s, const int *fds, int64_t max_age) {
     int answered = 1;
     for (int burst = 0; burst < 64 && answered; burst++) {

@@ -1,14 +1,15 @@
-/* A plant: one MuJoCo model driven by the motors of several servos, instead of a shaft for each.
+/* Plant: one MuJoCo model that the motors of several servos drive, instead of a separate shaft for
+ * each motor.
  *
- * At its own fixed step, on the segment's clock: motor torques in, one mj_step, joint states out.
- * The torque that a servo computed at t acts from t on; the servos read the state of t + step at t
- * + step. MuJoCo is called by a function pointer and its arrays are used by their addresses: no
- * Python, no allocation. It never runs in the path of frames. In real time only one thread steps
- * it, and releases the segment while MuJoCo computes. Budget: 10 us per step of a six-axis arm,
- * nearly all in mj_step.
+ * The plant has a fixed step on the segment's clock. Each step writes the motor torques, calls
+ * mj_step, and reads the joint states. A torque that a servo computes at time t acts from t on. At
+ * t + step, the servos read the state of t + step. The code calls MuJoCo through a function pointer
+ * and accesses its arrays by address, without Python and without allocation. It never runs in the
+ * frame path. In real time, only one thread steps the plant, and it releases the segment while
+ * MuJoCo computes. Time budget: 10 us per step of a six-axis arm, nearly all of it in mj_step.
  *
- * Motor inertia, viscous and dry friction are in the model (armature, damping, frictionloss). A
- * brake is dry friction that is switched on and off. */
+ * The model includes the inertia, viscous friction and dry friction of the motors (armature, damping
+ * and frictionloss). A brake is additional dry friction that is switched on and off. */
 #ifndef CATENARY_VIRTUAL_PLANT_H
 #define CATENARY_VIRTUAL_PLANT_H
 
@@ -18,31 +19,31 @@
 
 #define WILD 1e6                      /* maximum plausible velocity of a motor [rad/s] */
 
-/* A joint of the model and the motor on it: motor angle = ratio (q - zero). */
+/* Joint of the model, and its motor: motor angle = ratio (q - zero). */
 typedef struct plant_joint {
     servo_axis *axis;                 /* NULL: no motor is connected */
     double *q, *v, *force, *friction; /* in qpos, qvel, qfrc_applied, dof_frictionloss */
     double ratio, zero;               /* motor turns per joint turn, signed; zero position [rad] */
     double dry, brake;                /* dry friction at the joint; additional friction of the closed brake */
-    int64_t brake_delay, closes;      /* delay from the end of the motor's torque; closing time [ns] */
-    double place;                     /* position to which the shaft was turned by hand */
+    int64_t brake_delay, closes;      /* delay after the motor torque has ended; time of closing [ns] */
+    double place;                     /* position to which the joint was moved by hand */
     uint8_t placed;
 } plant_joint;
 
-/* Start of an mjLogMessage (MuJoCo 4). */
+/* First fields of mjLogMessage (MuJoCo 4). */
 typedef struct { int level, topic; char subject[1024]; } mujoco_message;
 enum { MUJOCO_WARNING = 2, MUJOCO_ERROR = 3 };
 
 typedef struct plant {
     void (*step)(const void *model, void *data);
-    void (*set_handler)(void (*)(const mujoco_message *));   /* sets this thread's message handler; NULL: not available */
+    void (*set_handler)(void (*)(const mujoco_message *));   /* sets the message handler of this thread; NULL: not available */
     const void *model;
     void *data;
     plant_joint *joints;
     int count;
     int64_t period, due;              /* [ns] */
-    int wild;                         /* number, from 1, of the joint that exceeded all bounds */
-    int ending;                       /* real time: its thread must end */
+    int wild;                         /* number, from 1, of the joint that exceeded WILD; 0: none */
+    int ending;                       /* real time: the thread must end */
     uint64_t steps;
     char words[256];                  /* error message of MuJoCo */
     jmp_buf escape;                   /* exit from a failed step */
@@ -84,7 +85,8 @@ static void plant_show(plant *p) {
 
 static __thread plant *plant_stepped;  /* the plant that this thread is stepping */
 
-/* After an error MuJoCo would end the process. Leave the step; its state is not used again. */
+/* Handle a message of MuJoCo. After an error, MuJoCo would end the process. Therefore leave the step
+ * with longjmp; its state is not used again. */
 static void plant_message(const mujoco_message *m) {
     plant *p = plant_stepped;
     if (m->level < MUJOCO_WARNING)
@@ -107,8 +109,8 @@ static void plant_simulate(plant *p) {
     p->set_handler(NULL);
 }
 
-/* Do the step that is due. In real time other threads run while MuJoCo computes; they stop before
- * p->due. */
+/* Do the step that is due. In real time, other threads can run while MuJoCo computes, but they do not
+ * pass p->due. */
 static void plant_step(cat_segment *s) {
     plant *p = s->plant;
     plant_apply(p, s->now);
@@ -129,7 +131,8 @@ static void plant_step(cat_segment *s) {
     wake_service(s);
 }
 
-/* Return how far the caller may work: only the thread that steps the plant may pass its steps. */
+/* Return the time up to which the caller may work. Only the thread that steps the plant may pass the
+ * due time of a step. */
 static inline int64_t plant_bound(const cat_segment *s, int64_t until, int steps_plant) {
     return !s->plant || steps_plant || until < s->plant->due ? until : s->plant->due - 1;
 }
@@ -149,7 +152,7 @@ static void plant_forget(plant *p, const controller *c) {
                 p->joints[k].axis = NULL;
 }
 
-/* Turn the shaft by hand [rad of the motor]. */
+/* Move the shaft by hand to a position [rad at the motor]. */
 static inline void servo_place(servo_axis *a, double position) {
     plant_joint *j = a->joint;
     a->position = position;

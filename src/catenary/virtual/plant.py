@@ -1,11 +1,11 @@
-"""A simulated arm behind virtual servos: their motors turn the joints of one MuJoCo model.
+"""Simulated arm behind virtual servos, whose motors drive the joints of one MuJoCo model.
 
     Segment(
         [Servo(axes=2, inertia=2e-5, rated_torque=0.6)],
         plant=Plant("arm.xml", [Joint("shoulder", gear=101), Joint("elbow", gear=50)]),
     )
 
-The compiled segment steps the model (`plant.h`). This module connects motors and joints.
+The compiled segment steps the model (`plant.h`). This module connects the motors to the joints.
 """
 
 from __future__ import annotations
@@ -28,29 +28,29 @@ from catenary.virtual.mujoco_model import read_model
 if TYPE_CHECKING:
     import mujoco
 
-# The servos' own cycle: their torques change this often. A shorter step adds nothing that they
-# could measure. A longer step is a dead time in their velocity loops (80 Hz).
+# Equal to the internal cycle of the servos. A shorter step has no effect on their torques. A longer
+# step adds dead time to their velocity loops (80 Hz).
 STEP = 250e-6
 SHORTEST_STEP, LONGEST_STEP = 20e-6, 1e-3
 SECOND = 1e9
 
 
 class Joint(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """A joint of the model and the motor that drives it.
+    """Joint of the model, and the motor that drives it.
 
-    Motor angle = direction · gear · (joint angle - zero) [rad]. For a slide, `gear` is [rad/m] and
-    motor angle = direction · gear · (position - zero).
+    Motor angle [rad] = direction · gear · (joint position - zero).
 
-    The brake closes `brake_delay` [s] after the drive's torque ends. It opens when the drive enters
-    operation enabled, and it is closed without power.
+    The brake closes `brake_delay` [s] after the drive removes the torque. It opens when the drive
+    enters operation enabled. Without power it is closed.
 
     Attributes:
         name: Name of the joint in the model.
-        gear: Gear ratio, motor angle per joint angle (slide: [rad/m]).
+        gear: Gear ratio, motor angle per joint angle. For a slide joint, the unit is [rad/m].
         direction: 1 or -1.
         zero: Joint position at which the motor angle is 0 [rad or m].
-        start: Initial position of the joint [rad or m]; None: that of the model.
-        brake: Holding torque at the joint [N·m]; None: the motor's maximum, 0: no brake.
+        start: Initial position of the joint [rad or m]; None: the position in the model.
+        brake: Holding torque of the brake at the joint [N·m]; None: the motor's maximum torque, 0:
+            no brake.
         brake_delay: Closing time of the brake [s].
         axis: (position of the servo, axis number); None: the next axis on the line.
     """
@@ -72,11 +72,16 @@ class Joint(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
                 f"joint {self.name!r}: direction must be 1 or -1, not {self.direction}"
             )
         if not math.isfinite(self.zero) or not math.isfinite(self.start or 0.0):
-            raise ValueError(f"joint {self.name!r}: zero and start must be finite numbers")
+            raise ValueError(
+                f"joint {self.name!r}: zero and start must be finite, "
+                f"not {self.zero} and {self.start}"
+            )
         if self.brake is not None and not 0 <= self.brake < math.inf:
-            raise ValueError(f"joint {self.name!r}: brake must be 0 or more N·m, not {self.brake}")
+            raise ValueError(f"joint {self.name!r}: brake must be at least 0 N·m, not {self.brake}")
         if not 0 <= self.brake_delay <= 10:
-            raise ValueError(f"joint {self.name!r}: brake_delay must be 0 to 10 s")
+            raise ValueError(
+                f"joint {self.name!r}: brake_delay must be 0 to 10 s, not {self.brake_delay}"
+            )
 
     @property
     def ratio(self) -> float:
@@ -84,20 +89,19 @@ class Joint(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Plant:
-    """Owns a MuJoCo model with joints that the servos of one segment drive.
+    """MuJoCo model whose joints are driven by the servos of one segment.
 
     Args:
-        path: An MJCF or URDF file.
-        joints: The joints with motors, in the order of the axes on the line. None: all joints of
-            the model, in its order, without gears.
+        path: Path of an MJCF or URDF file.
+        joints: Joints with motors, in the order of the axes on the line. None: all joints of the
+            model, in their order and without gears.
         passive: Names of the joints without a motor.
         step: Time step of the simulation [s].
         contacts: False lets bodies pass through each other.
 
     Raises:
-        ConfigurationError: MuJoCo or the file is missing, the model is invalid or starts in
-            contact, or the joints do not match the model. The message lists the joints of the
-            model.
+        ConfigurationError: MuJoCo or the file is missing, the model is invalid, bodies overlap at
+            the start, or the joints do not match the model.
         ValueError: The step is out of range.
     """
 
@@ -112,18 +116,20 @@ class Plant:
     ) -> None:
         if not SHORTEST_STEP <= step <= LONGEST_STEP:
             raise ValueError(
-                f"a plant's step must be {SHORTEST_STEP:g} to {LONGEST_STEP:g} s, not {step}:"
-                " a longer step is a dead time in the drives' velocity loops"
+                f"the step of a plant must be {SHORTEST_STEP:g} to {LONGEST_STEP:g} s, not {step};"
+                " a longer step adds dead time to the velocity loops of the drives"
             )
         self.step = step
         self._model = read_model(path, step=step, contacts=contacts)
-        self.joints = self._chosen(joints, passive)
+        self.joints = self._select_joints(joints, passive)
         self._compiled: CompiledPlant | None = None
         self._wired: list[tuple[Device, int]] = []  # motor (servo, axis) of each joint
         self._inertias: list[float] = []  # initial inertia at each motor shaft
         self._thread: threading.Thread | None = None
 
-    def _chosen(self, joints: Sequence[Joint] | None, passive: Sequence[str]) -> tuple[Joint, ...]:
+    def _select_joints(
+        self, joints: Sequence[Joint] | None, passive: Sequence[str]
+    ) -> tuple[Joint, ...]:
         if joints is None:
             joints = [Joint(name) for name in self._model.joints if name not in passive]
         self._model.check_joints([joint.name for joint in joints], passive)
@@ -139,23 +145,32 @@ class Plant:
 
     @property
     def model(self) -> mujoco.MjModel:
-        """MuJoCo's model. It contains the motors once the segment is made."""
+        """MuJoCo model. It includes the motors after the segment has been created."""
         return self._model.model
 
     @property
     def data(self) -> mujoco.MjData:
-        """MuJoCo's state. Read it in virtual time only; in real time a thread changes it."""
+        """MuJoCo state. Read it in virtual time only: in real time, a thread changes it."""
         return self._model.data
 
     # -- motors and joints ---------------------------------------------------------------------
 
     def attach(self, core: Core, devices: Sequence[Device]) -> None:
-        """Connect the joints to the servos. The segment calls this when it is made."""
+        """Connect the joints to the servos. Called by the segment when it is created.
+
+        Args:
+            core: The compiled segment.
+            devices: The devices of the segment.
+
+        Raises:
+            ValueError: The plant already belongs to a segment.
+            ConfigurationError: The joints do not match the axes of the servos.
+        """
         if self._compiled is not None:
             raise ValueError(
                 f"{self.path.name} already belongs to another segment; make a new Plant"
             )
-        motors = self._paired(devices)
+        motors = self._pair_motors(devices)
         for joint, (servo, _axis) in zip(self.joints, motors, strict=True):
             self._model.add_motor(
                 joint.name,
@@ -176,38 +191,38 @@ class Plant:
         )
         for n, (servo, axis) in enumerate(motors):
             self._make_joint(compiled, n, servo)
-            self._hang(compiled, n, servo, axis)
+            self._connect_motor(compiled, n, servo, axis)
         self._wired = [*motors]
         self._compiled = compiled
         compiled.begin()
 
-    def _paired(self, devices: Sequence[Device]) -> list[tuple[Servo, int]]:
-        """Return the (servo, axis) of each joint."""
-        there = {
+    def _pair_motors(self, devices: Sequence[Device]) -> list[tuple[Servo, int]]:
+        """Return the (servo, axis) that drives each joint."""
+        present = {
             (position, axis): device
             for position, device in enumerate(devices)
             if isinstance(device, Servo)
             for axis in range(device.axes)
         }
-        rest = iter(sorted(there.keys() - {joint.axis for joint in self.joints}))
+        rest = iter(sorted(present.keys() - {joint.axis for joint in self.joints}))
         places = [joint.axis or next(rest, None) for joint in self.joints]
-        axes = ", ".join(f"({position}, {axis})" for position, axis in there) or "none"
+        axes = ", ".join(f"({position}, {axis})" for position, axis in present) or "none"
         for joint, place in zip(self.joints, places, strict=True):
-            if place is None or place not in there:
-                asked = "axis" if place is None else f"axis {place}"
+            if place is None or place not in present:
+                missing = "axis" if place is None else f"axis {place}"
                 raise ConfigurationError(
-                    f"{self.path.name}: no {asked} for joint {joint.name!r}; the axes are {axes}"
+                    f"{self.path.name}: no {missing} for joint {joint.name!r}; the axes are {axes}"
                 )
             if places.count(place) > 1:
-                raise ConfigurationError(f"{self.path.name}: two joints use the axis {place}")
+                raise ConfigurationError(f"{self.path.name}: two joints use axis {place}")
         if any(rest) and not any(joint.axis for joint in self.joints):
             raise ConfigurationError(
                 f"{self.path.name}: {len(self.joints)} joints have motors, but the segment has"
-                f" {len(there)} axes",
+                f" {len(present)} axes",
                 hint="if some axes do not drive the model, give each joint its"
                 " axis=(position, axis)",
             )
-        return [(there[place], place[1]) for place in places if place is not None]
+        return [(present[place], place[1]) for place in places if place is not None]
 
     def _make_joint(self, compiled: CompiledPlant, n: int, servo: Servo) -> None:
         joint = self.joints[n]
@@ -226,35 +241,41 @@ class Plant:
             brake_delay_ns=round(joint.brake_delay * SECOND),
         )
 
-    def _hang(self, compiled: CompiledPlant, n: int, servo: Servo, axis: int) -> None:
-        """Connect a motor to joint `n` and tune its loops for the joint's inertia."""
+    def _connect_motor(self, compiled: CompiledPlant, n: int, servo: Servo, axis: int) -> None:
+        """Connect a motor to joint `n`, and tune its loops for the inertia of the joint."""
         compiled.hang(n, servo.position, axis)
         servo.tune(self._inertias[n], axis)
 
     def replaced(self, old: Device, new: Device) -> None:
-        """Connect the motors of a replaced device to the new one."""
+        """Connect the joints that `old` drove to the motors of `new`.
+
+        Args:
+            old: The device that was replaced.
+            new: The device in its place.
+        """
         for n, (device, axis) in enumerate(self._wired):
             if device is not old:
                 continue
             self._wired[n] = new, axis
             if isinstance(new, Servo) and axis < new.axes and self._compiled is not None:
-                self._hang(self._compiled, n, new, axis)
+                self._connect_motor(self._compiled, n, new, axis)
 
     # -- time ----------------------------------------------------------------------------------
 
     def check(self) -> None:
-        """Raise ConfigurationError if the simulation diverged and therefore stopped."""
+        """Raise ConfigurationError if the simulation has diverged or failed, and thus stopped."""
         if self._compiled is None or (self._compiled.wild < 0 and not self._compiled.complaint):
             return
         what = [f"MuJoCo reports: {self._compiled.complaint}"] if self._compiled.complaint else []
         if self._compiled.wild >= 0:
             name = self.joints[self._compiled.wild].name
-            what.insert(0, f"joint {name!r} exceeded all bounds")
+            what.insert(0, f"joint {name!r} exceeded 1e6 rad/s at its motor")
         raise ConfigurationError(
             f"{self.path.name}: the simulation stopped after {self.data.time:.4f} s:"
             f" {'; '.join(what)}",
-            hint="check for masses and inertias near zero, overlapping bodies, a step (now"
-            f" {self.step:g} s) that is too long, and too little memory (MJCF: <size memory>)",
+            hint="check the model for masses and inertias near zero, overlapping bodies, a step"
+            f" that is too long (now {self.step:g} s), and insufficient memory (MJCF: <size"
+            " memory>)",
         )
 
     @property
@@ -272,10 +293,10 @@ class Plant:
 
     def _run(self, compiled: CompiledPlant) -> None:
         compiled.run()
-        self.check()  # the thread prints this error; frames are still answered
+        self.check()  # the thread prints this error and ends; frames are still answered
 
     def stop(self) -> None:
-        """Stop the thread. The plant stands still until `start`."""
+        """Stop the thread. The plant does not move until `start`."""
         if self._compiled is not None and self._thread is not None:
             self._compiled.end()
             self._thread.join()

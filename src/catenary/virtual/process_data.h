@@ -1,6 +1,6 @@
-/* Process data of a device: bits of its SyncManager buffers to and from slots, one 64-bit number
- * for each object that can be mapped. The application makes the tables on the way to SAFE-OP and
- * checks them against the buffers; every bit is checked again here. */
+/* Process data of a device: copies between its SyncManager buffers and its slots. A slot is a 64-bit
+ * number for an object that can be mapped. The application creates the mapping tables on entry to
+ * SAFE-OP and checks them against the buffers. The functions here check every range again. */
 #ifndef CATENARY_VIRTUAL_PROCESS_DATA_H
 #define CATENARY_VIRTUAL_PROCESS_DATA_H
 
@@ -14,7 +14,7 @@ static inline uint64_t bits_load(const uint8_t *p, uint32_t bit, uint32_t count)
     uint64_t value = 0;
     if ((bit & 7) == 0 && (count & 7) == 0) {
         p += bit / 8;
-        switch (count) {                                     /* the sizes of nearly all objects */
+        switch (count) {                                     /* nearly all objects have these sizes */
         case 8: return p[0];
         case 16: return load16(p);
         case 32: return load32(p);
@@ -90,8 +90,8 @@ static void inputs_put(controller *c) {
     sm_pdi_written(c, m->sm, which);
 }
 
-/* Write the models' new inputs where the next frame reads them. A model that steps four times
- * between two frames is written only once. */
+/* Write the new inputs of the models into the buffers for the next frame. Even if a model takes
+ * several steps between two frames, its inputs are written only once. */
 static inline void inputs_flush(cat_segment *s) {
     if (!s->inputs_stale)
         return;

@@ -1,26 +1,27 @@
-/* The route of a frame through the controllers in the present state of loops and light (ET1100
+/* Route of a frame through the controllers, in the present state of loops and light (ET1100
  * datasheet, section I, 3.2 to 3.5): 0 → processing unit → 3, 3 → 1, 1 → 2, 2 → 0. A closed or
- * missing port passes the frame on to the next. Only frames that reach port 0's loop, from its own
- * side or because it is closed, are processed. In a closed ring a frame from the second interface
- * passes all devices unprocessed. At a break it turns round and is processed on its way back.
+ * missing port forwards the frame to the next port. The processing unit follows port 0: it processes
+ * frames that arrive at port 0, and frames that a closed loop at port 0 forwards. In a closed ring,
+ * a frame from the second interface passes all devices without being processed. At a break, it turns
+ * around and is processed on its way back.
  *
- * Routes are made when something changes, not for each frame. */
+ * Routes are computed when something changes, not for each frame. */
 #ifndef CATENARY_VIRTUAL_ROUTE_H
 #define CATENARY_VIRTUAL_ROUTE_H
 
 #include "controller/ports.h"
 
 enum {
-    FORWARDING_NS = 300,               /* through a controller without its processing unit */
-    PROCESSING_NS = 40,                /* additional time of the processing unit */
-    CABLE_NS = 50                      /* about ten metres */
+    FORWARDING_NS = 300,               /* delay of a controller without its processing unit */
+    PROCESSING_NS = 40,                /* additional delay of the processing unit */
+    CABLE_NS = 50                      /* delay of a cable of about ten metres */
 };
 
 static const uint8_t NEXT_PORT[PORTS] = {3, 2, 0, 1};
 
 static inline uint32_t route_room(const cat_segment *s) { return 2 * (uint32_t)s->count + 2; }
 
-/* Pass the processing unit. Return 0 if the frame has circulated before and is destroyed. */
+/* Pass the processing unit. Return 0 if the frame has already circulated and must be destroyed. */
 static int route_process(route *r, controller *c, int64_t offset, int turned, uint32_t room) {
     if (turned && loop_mode_of(c, 0) < LOOP_OPEN) {
         if (r->circulates)
@@ -28,13 +29,14 @@ static int route_process(route *r, controller *c, int64_t offset, int turned, ui
         r->circulates = r->stop_count + 1;
     }
     if (r->stop_count == room)
-        return 0;                      /* it would circulate for ever in a loop closed by hand */
+        return 0;                      /* in a manually closed loop, the frame would circulate without end */
     r->stops[r->stop_count].controller = c;
     r->stops[r->stop_count++].offset = offset;
     return 1;
 }
 
-/* Enter at port p. Return the port at which it leaves, or -1: destroyed. *offset accumulates. */
+/* Enter at port p. Return the port through which the frame leaves, or -1 if it is destroyed. Add the
+ * delay to *offset. */
 static int route_through(route *r, controller *c, int p, int64_t *offset, uint32_t room) {
     for (int turned = 0;; turned = 1) {
         if (p == 0) {

@@ -1,4 +1,4 @@
-"""Delayed actions of the application side: a heap ordered by due time, then by insertion."""
+"""Delayed actions of the application side, ordered by due time and then by insertion."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ class Clock(Protocol):
 
 
 class Agenda:
-    """Owns the delayed actions of a segment, on its clock [ns]."""
+    """Delayed actions of a segment. Times are on its clock [ns]."""
 
     def __init__(self, clock: Clock) -> None:
         self._clock = clock
@@ -47,7 +47,7 @@ class Agenda:
 
 
 class Scheduler:
-    """Owns the delayed actions of one device. When its power goes off, they are dropped."""
+    """Delayed actions of one device. They are dropped when the device loses power."""
 
     def __init__(self, agenda: Agenda) -> None:
         self._agenda = agenda

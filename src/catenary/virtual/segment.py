@@ -1,4 +1,4 @@
-"""A virtual segment: devices in a tree or a ring, a clock, faults, and links to it."""
+"""Virtual segment: devices in a tree or ring, with a clock, faults and links."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ from catenary.virtual.service import Service, ServiceThread
 from catenary.virtual.wiring import Place, Wiring
 
 ClockKind = Literal["virtual", "monotonic"]
-# Time from the loss of light to the closed loop [s]: enhanced link detection of the ET1100
-# (datasheet, section I, chapter 6: about 15 us), and an ordinary PHY.
+# Time from the loss of light until the loop is closed [s], with enhanced link detection of the
+# ET1100 (about 15 us: datasheet, section I, chapter 6) and with an ordinary PHY.
 LINK_LOSS_DETECTION: Mapping[str, float] = {"enhanced": 15e-6, "standard": 3e-3}
 
 
 @runtime_checkable
 class SharedClock(Protocol):
-    """A virtual clock that a segment shares with other participants."""
+    """Virtual clock that a segment shares with other participants."""
 
     @property
     def capsule(self) -> object:
@@ -34,16 +34,18 @@ class SharedClock(Protocol):
 
 
 class FrameCounters(NamedTuple):
+    """Numbers of frames and datagrams since the creation of the segment."""
+
     frames: int
     datagrams: int
     malformed: int
-    foreign: int
+    foreign: int  # not EtherCAT
     lost: int
-    expired: int  # lost because served too late (`max_age`)
+    expired: int  # lost because they waited for longer than `max_age`
 
 
 class SegmentEnd:
-    """One end of a segment, to which a MainDevice connects."""
+    """End of a segment, to which a MainDevice connects."""
 
     def __init__(self, segment: Segment, *, second: bool) -> None:
         self._segment = segment
@@ -51,32 +53,32 @@ class SegmentEnd:
 
     @property
     def segment(self) -> Segment:
-        """Segment of this end."""
+        """Segment to which this end belongs."""
         return self._segment
 
     def open_link(self) -> SegmentLink:
-        """Open a link at this end of the segment; one at a time."""
+        """Open a link at this end of the segment. Only one link can be open at a time."""
         return self._segment.open_end(second=self._second)
 
 
 class Segment:
-    """Owns virtual devices and their cables. `segment[i]` is the device at position i.
+    """Virtual devices and their cables. `segment[i]` is the device at position i.
 
     Args:
-        devices: The devices, in the order in which frames are processed.
-        clock: "virtual": a discrete-event clock; time advances only while the link waits.
+        devices: Devices, in the order in which they process frames.
+        clock: "virtual": a discrete-event clock, which advances only while the link waits.
             "monotonic": the machine's clock, for real time in this process and for `serve`.
-            A `realtime.VirtualClock`, or a place on one (`clock.participate()`): virtual time
-            shared with tasks. The loop on this segment takes that place, in the thread of the
-            place.
-        plant: A simulated mechanism that the motors of the servos drive.
-        faults: Faults to inject, on the segment's own time (`time`).
-        behind: Maps a device to the (device, port) it is connected to. The default is port 1 of the
-            previous device.
-        ring: True if the last device leads back to a second interface of the MainDevice. Until that
-            end is opened, the segment is a line.
+            A `realtime.VirtualClock`, or a participant of it (`clock.participate()`): virtual time
+            that is shared with tasks. The loop on this segment then runs as this participant, and
+            in its thread.
+        plant: Simulated mechanism that the motors of the servos drive.
+        faults: Faults to inject. Their times are on the segment's clock (`time`).
+        behind: Mapping from a device to the (device, port) that it is connected to. The default is
+            port 1 of the previous device.
+        ring: True if a cable connects the last device to a second interface of the MainDevice.
+            Until a link is opened at that end, the segment is a line.
         link_loss_detection: Time until controllers detect a dark cable: "enhanced" (15 us),
-            "standard" (3 ms) or seconds.
+            "standard" (3 ms) or a number of seconds.
 
     Raises:
         ValueError: An option is out of range or does not fit the devices.
@@ -139,12 +141,12 @@ class Segment:
 
     @property
     def core(self) -> Core:
-        """The compiled segment, for `serve` and tests at register level."""
+        """Compiled segment, for `serve` and for tests at register level."""
         return self._core
 
     @property
     def wires(self) -> Wires:
-        """The compiled cables, for tests of routes."""
+        """Compiled cables, for tests of routes."""
         return self._wires
 
     @property
@@ -172,19 +174,19 @@ class Segment:
 
     @property
     def second(self) -> SegmentEnd:
-        """Other end of a ring: `MainDevice(segment.first, segment.second)`."""
+        """Second end of a ring, for `MainDevice(segment.first, segment.second)`."""
         if not self.ring:
-            raise ValueError("only a ring has a second end: Segment(..., ring=True)")
+            raise ValueError("only a ring has a second end; use Segment(..., ring=True)")
         return SegmentEnd(self, second=True)
 
     def open_link(self) -> SegmentLink:
-        """Open a link at the first end of the segment; one at a time."""
+        """Open a link at the first end of the segment. Only one link can be open at a time."""
         return self.open_end(second=False)
 
     def open_end(self, *, second: bool) -> SegmentLink:
-        """Open a link at one end: the first, or with `second` the other end of a ring."""
+        """Open a link at the first end, or with `second` at the second end of a ring."""
         if second in self._links:
-            raise ValueError("the segment already has an open link at this end: close it first")
+            raise ValueError("the segment already has an open link at this end; close it first")
         name = "virtual, second end" if second else "virtual"
         link = SegmentLink(self._core, name, lambda: self._link_closed(second), second=second)
         if self.clock == "monotonic" and not self._links:
@@ -207,16 +209,16 @@ class Segment:
 
     @property
     def time(self) -> float:
-        """Time of the segment, to which faults refer [s].
+        """Time on the segment's clock, which faults use [s].
 
-        Virtual time counts from the construction of the segment, real time from its first frame.
+        Virtual time starts when the segment is created, real time with its first frame.
         """
         return self._faults.now
 
     def inject(self, fault: Fault) -> None:
-        """Plan a fault for `fault.at` on the segment's time.
+        """Schedule a fault for the time `fault.at`.
 
-        Without a time, or with one that has passed, it begins at once.
+        Without a time, or if the time has passed, the fault begins immediately.
 
         Raises:
             ValueError: The fault does not fit this segment. The message names the field.
@@ -225,7 +227,7 @@ class Segment:
 
     @property
     def faults_done(self) -> bool:
-        """True if no fault is still to begin or to end. Faults without an end are not counted."""
+        """True if no fault has yet to begin or to end. Faults without an end are not counted."""
         return self._faults.done
 
     @property
@@ -234,18 +236,18 @@ class Segment:
         return tuple(self._faults.log)
 
     def take_losses(self) -> list[Loss]:
-        """Return the frames lost since the last call, at most the latest 4096."""
+        """Return the frames lost since the last call, up to the last 4096."""
         return self._faults.take_losses()
 
     def unplug(self) -> None:
-        """Pull the cable between MainDevice and first device: no frame returns.
+        """Unplug the cable between the MainDevice and the first device, so that no frame returns.
 
-        Unlike with a fault, the controllers detect it at once.
+        Unlike with a fault, the controllers detect this immediately.
         """
         self._plug_first(0)
 
     def plug(self, devices: int | None = None) -> None:
-        """Plug all cables in. With `devices`, the line ends after this number of devices."""
+        """Plug in all cables. With `devices`, the line ends after this number of devices."""
         self._plug_first(len(self._devices) if devices is None else devices)
 
     def _plug_first(self, devices: int) -> None:
@@ -263,7 +265,12 @@ def _detection_ns(given: float | str) -> int:
 
 
 def demo_segment(*, clock: ClockKind = "virtual", ring: bool = False) -> Segment:
-    """Return a segment of a coupler, a digital output, three servo drives and a digital output."""
+    """Create a segment with a coupler, a digital output, three servo drives and a digital output.
+
+    Args:
+        clock: See `Segment`.
+        ring: See `Segment`.
+    """
     devices: list[Device] = [Coupler(), DigitalOutputs()]
     devices += [Servo(name=f"Catenary virtual servo {k}", serial=k) for k in (1, 2, 3)]
     return Segment([*devices, DigitalOutputs()], clock=clock, ring=ring)

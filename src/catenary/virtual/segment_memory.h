@@ -1,4 +1,4 @@
-/* Creation and end of a segment: the only place that allocates. */
+/* Creation and destruction of a segment. Only these functions allocate memory. */
 #ifndef CATENARY_VIRTUAL_SEGMENT_MEMORY_H
 #define CATENARY_VIRTUAL_SEGMENT_MEMORY_H
 
@@ -16,7 +16,7 @@ static int controller_make(controller *c, uint32_t ram, uint32_t sii_words, int 
     return c->memory && c->sii.image && c->slots && c->axes;
 }
 
-/* Forget what is lost without power: all but the device's properties, EEPROM, crystal and shafts. */
+/* Clear all that is lost without power. Properties of the device, EEPROM, crystal and shafts remain. */
 static void controller_forget(controller *c) {
     memset(c->memory, 0, c->memory_size);
     memset(c->slots, 0, (size_t)c->slot_count * sizeof *c->slots);
@@ -95,7 +95,7 @@ static void controller_free(controller *c) {
     free(c->axes);
 }
 
-/* Initialise an empty position: no work is due, and no port has a cable. */
+/* Initialise an empty position, at which no work is due. */
 static void controller_blank(controller *c) {
     c->sync.due = c->segment->dues[c->position] = NEVER;
     c->outputs.sm = c->inputs.sm = -1;
@@ -105,7 +105,7 @@ static void controller_blank(controller *c) {
     ports_reset(c);
 }
 
-/* Remove a device; its position in the line stays. */
+/* Remove a device. Its position and its cables remain. */
 static void controller_remove(controller *c) {
     controller empty = {.segment = c->segment, .position = c->position};
     memcpy(empty.ports, c->ports, sizeof empty.ports);
@@ -151,7 +151,7 @@ static void segment_free(cat_segment *s) {
     free(s);
 }
 
-/* Make an interface of the MainDevice and its route. Return 0 if out of memory. */
+/* Create an interface of the MainDevice and its route. Return 0 if out of memory. */
 static int end_make(cat_segment *s, int number) {
     segment_end *e = &s->ends[number];
     route *r = &s->routes[number];

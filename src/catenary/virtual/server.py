@@ -1,4 +1,4 @@
-"""A segment served on a NIC, for any MainDevice at the other end of the cable."""
+"""Server of a segment on a NIC, for any MainDevice at the other end of the cable."""
 
 from __future__ import annotations
 
@@ -25,12 +25,12 @@ IFF_UP = 1
 PR_SET_PDEATHSIG = 1
 SIOCGIFFLAGS = 0x8913
 SO_TIMESTAMPNS = 35  # asm-generic/socket.h
-MAX_AGE = 2e-3  # [s]; SOEM gives up a frame after the same time (EC_TIMEOUTRET)
+MAX_AGE = 2e-3  # [s]; SOEM abandons a frame after the same time (EC_TIMEOUTRET)
 NEVER_NS = (1 << 63) - 1
 
 
 def _interface_flags(interface: str) -> int:
-    """Return the flags from the kernel. /sys may show another network namespace."""
+    """Return the flags of an interface. Ask the kernel: /sys may show another network namespace."""
     request = struct.pack("16sH14x", interface.encode(), 0)
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as anything:
         try:
@@ -45,7 +45,7 @@ def _interface_flags(interface: str) -> int:
 
 def _open_socket(interface: str) -> socket.socket:
     if "/" in interface or not interface or len(interface) > 15:
-        raise LinkError(f"invalid name of a network interface: {interface!r}")
+        raise LinkError(f"invalid network interface name {interface!r}")
     if not _interface_flags(interface) & IFF_UP:
         raise LinkError(f"{interface} is down", hint=f"sudo ip link set {interface} up")
     try:
@@ -66,7 +66,7 @@ def _open_socket(interface: str) -> socket.socket:
 
 
 def stamp_arrivals(packet: socket.socket) -> None:
-    """Enable kernel receive time stamps, from which the packet loop computes the age of frames."""
+    """Enable receive time stamps, from which the packet loop computes the age of frames."""
     packet.setsockopt(socket.SOL_SOCKET, SO_TIMESTAMPNS, 1)
 
 
@@ -74,7 +74,7 @@ def _age_ns(max_age: float | None) -> int:
     if max_age is None:
         return NEVER_NS
     if not 0 <= max_age < 1e9:
-        raise ValueError(f"max_age must be 0 to 1e9 seconds, or None for no limit; not {max_age}")
+        raise ValueError(f"max_age must be 0 to 1e9 s, or None for no limit, not {max_age}")
     return round(max_age * 1e9)
 
 
@@ -89,15 +89,16 @@ def _raise_priority(interface: str, priority: int) -> None:
 
 
 class Server:
-    """Owns a served segment: its sockets, the thread of the packet loop and that of the service.
+    """Server of a segment: sockets, the packet-loop thread and the service thread.
 
     Args:
         segment: The segment, with clock="monotonic".
         interface: The network interface.
-        second: The interface of a ring's other end.
+        second: The interface at the other end of a ring.
         priority: SCHED_FIFO priority of the packet loop, 1 to 99; None: unchanged.
-        max_age: Frames that waited for the packet loop longer than this [s] are dropped and counted
-            in `frames.expired`, because a cable does not store frames. None: answer all frames.
+        max_age: Maximum time for which a frame may wait for the packet loop [s]. Older frames are
+            dropped and counted in `frames.expired`, because a cable does not store frames. None:
+            answer all frames.
 
     Raises:
         LinkError: The interface does not exist, is down, or access is not permitted.
@@ -115,12 +116,12 @@ class Server:
     ) -> None:
         if segment.clock != "monotonic":
             raise ValueError(
-                'a served segment runs in real time: use Segment(..., clock="monotonic")'
+                'a served segment must run in real time; use Segment(..., clock="monotonic")'
             )
         if priority is not None and not 1 <= priority <= 99:
             raise ValueError(f"priority must be 1 to 99 (SCHED_FIFO), not {priority}")
         if second is not None and not segment.ring:
-            raise ValueError("a second interface needs a ring: use Segment(..., ring=True)")
+            raise ValueError("a second interface requires a ring; use Segment(..., ring=True)")
         self.segment = segment
         self.interface = interface
         self._priority = priority
@@ -138,7 +139,9 @@ class Server:
     def _open_second(self, interface: str) -> socket.socket:
         try:
             if interface == self.interface:
-                raise LinkError(f"{interface} cannot be both ends of a ring")
+                raise LinkError(
+                    f"{interface} cannot be both ends of a ring; use two different interfaces"
+                )
             return _open_socket(interface)
         except LinkError:
             self._socket.close()
@@ -173,7 +176,7 @@ class Server:
             self._started.set()
 
     def wait(self, timeout: float | None = None) -> bool:
-        """Wait up to `timeout` [s] for the end of the packet loop; return True if it has ended."""
+        """Wait up to `timeout` [s] for the end of the packet loop. Return True if it has ended."""
         return self._ended.wait(timeout)
 
     def raise_failure(self) -> None:
@@ -185,7 +188,7 @@ class Server:
             self.segment.plant.check()
 
     def stop(self) -> None:
-        """End the packet loop and release the interfaces. A forked child only closes its copies."""
+        """End the packet loop and release the interfaces. A forked child closes only its copies."""
         if self._socket.fileno() < 0:
             return
         if self._process != os.getpid():
@@ -211,10 +214,10 @@ class Server:
 
 
 def die_with_parent() -> None:
-    """Request SIGTERM for this process when its parent ends."""
+    """Request a SIGTERM for this process when its parent process ends."""
     libc = ctypes.CDLL(None, use_errno=True)
     if libc.prctl(PR_SET_PDEATHSIG, signal.SIGTERM, 0, 0, 0) != 0:
-        raise OSError(ctypes.get_errno(), "prctl(PR_SET_PDEATHSIG) was refused")
+        raise OSError(ctypes.get_errno(), "prctl(PR_SET_PDEATHSIG) failed")
 
 
 def serve(
@@ -228,7 +231,7 @@ def serve(
     ready: Callable[[], None] | None = None,
     on_fault: Callable[[FaultEvent], None] | None = None,
 ) -> None:
-    """Answer on `interface` until SIGINT or SIGTERM. Call this in the main thread.
+    """Serve a segment until SIGINT or SIGTERM. Call this in the main thread.
 
     Args:
         segment: The segment, with clock="monotonic".
@@ -236,20 +239,21 @@ def serve(
         second: See `Server`.
         priority: See `Server`.
         max_age: See `Server`.
-        with_parent: End when the parent process ends, too.
-        ready: Called once when frames are being answered.
-        on_fault: Called with each entry of the fault log.
+        with_parent: True also ends the server when the parent process ends.
+        ready: Function to call once when the server answers frames.
+        on_fault: Function to call with each entry of the fault log.
 
     Raises:
         LinkError: The interface does not exist, is down, or access is not permitted.
+        ValueError: An option does not fit the segment or is out of range.
     """
     if with_parent:
         die_with_parent()
     server = Server(segment, interface, second=second, priority=priority, max_age=max_age)
-    asked_to_end = threading.Event()
+    stop_requested = threading.Event()
 
     def end(_signal: int, _frame: FrameType | None) -> None:
-        asked_to_end.set()
+        stop_requested.set()
 
     before = {number: signal.signal(number, end) for number in (signal.SIGINT, signal.SIGTERM)}
     try:
@@ -257,7 +261,7 @@ def serve(
             if ready is not None:
                 ready()
             reported = 0
-            while not asked_to_end.wait(0.2) and not server.wait(0):
+            while not stop_requested.wait(0.2) and not server.wait(0):
                 server.raise_failure()
                 if on_fault is not None:
                     news = segment.fault_log[reported:]

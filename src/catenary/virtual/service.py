@@ -1,7 +1,7 @@
-"""The service: runs the applications of all devices, outside the path of frames.
+"""Service of a segment: it runs the applications of all devices, outside the frame path.
 
-In virtual time the compiled clock calls it when an event is pending or an action is due. In real
-time a thread runs it, woken by an event descriptor.
+In virtual time, the compiled clock calls the service when an event is pending or an action is due.
+In real time, a thread runs it. An event descriptor wakes this thread.
 """
 
 from __future__ import annotations
@@ -19,11 +19,11 @@ from catenary.virtual.scheduler import FOREVER, Agenda
 
 STOP_SIGNALS = {signal.SIGINT, signal.SIGTERM}
 SELECTABLE = 1024
-IDLE_SECONDS = 0.02  # step device models at least this often while no frame arrives
+IDLE_SECONDS = 0.02  # maximum interval between steps of device models without frames
 
 
 class Service:
-    """Owns the agenda of a segment and dispatches events to its devices."""
+    """Application side of a segment: its agenda, and the dispatch of events to its devices."""
 
     def __init__(self, core: Core, devices: Sequence[Device], plant: Plant | None = None) -> None:
         self.core = core
@@ -38,14 +38,14 @@ class Service:
         core.use_service(self.run)
 
     def at_first_frame(self, action: Callable[[], None]) -> None:
-        """Run `action` once, when the segment's time starts to count."""
+        """Run `action` once, when the time of the segment starts."""
         self._at_first_frame = action
 
     def run(self) -> int:
         """Run all pending work and return the time of the next action [ns].
 
-        Stop signals are blocked meanwhile. Otherwise an interrupt of the MainDevice's program could
-        lose a request inside a device.
+        Stop signals are blocked during the call. Otherwise a KeyboardInterrupt in the MainDevice's
+        program could lose a request inside a device.
         """
         before = signal.pthread_sigmask(signal.SIG_BLOCK, ())
         try:
@@ -73,7 +73,7 @@ class Service:
 
 
 class ServiceThread:
-    """Owns the thread that runs a service in real time."""
+    """Thread that runs a service in real time."""
 
     def __init__(self, service: Service) -> None:
         self._service = service
@@ -107,7 +107,7 @@ class ServiceThread:
     def _woken(self, wait: float) -> bool:
         """Return True if an event arrived within `wait` [s].
 
-        select() is preferred: poll() rounds the timeout up to milliseconds, and a mailbox answers
+        Prefer select(), because poll() rounds the timeout up to milliseconds and a mailbox answers
         within 0.3 ms. select() does not accept descriptors above 1023.
         """
         if self._event < SELECTABLE:

@@ -1,9 +1,9 @@
-/* A servo axis: motor, control loops and the CiA 402 state machine of the drive's side
- * (IEC 61800-7-201 §10 state machine, §12 to §14 modes), stepped at the device's own cycle.
+/* Servo axis: motor, control loops, and the drive side of the CiA 402 state machine (IEC 61800-7-201
+ * §10 state machine, §12 to §14 modes). The axis runs in the internal cycle of the device.
  *
- * Written from the profile, independently of the MainDevice's side, so that each tests the other.
- * Motor: J dv/dt = T + T_load - b v - T_c sign(v), semi-implicit Euler; or a joint of a plant
- * (plant.h). Budget: 0.1 us per step. */
+ * The code follows the profile and is independent of the MainDevice side, so that each tests the
+ * other. Motor: J dv/dt = T + T_load - b v - T_c sign(v), semi-implicit Euler; or a joint of a plant
+ * (plant.h). Time budget: 0.1 us per step. */
 #ifndef CATENARY_VIRTUAL_SERVO_H
 #define CATENARY_VIRTUAL_SERVO_H
 
@@ -11,7 +11,7 @@
 
 #include "controller/controller.h"
 
-/* Slots of one axis, by object. `AXIS_SLOTS * axis + slot`; named for Python in devices/servo.py. */
+/* Slots of one axis, at `AXIS_SLOTS * axis + slot`. devices/servo_objects.py maps objects to them. */
 enum servo_slot {
     SLOT_CONTROLWORD, SLOT_STATUSWORD, SLOT_MODE, SLOT_MODE_DISPLAY,
     SLOT_TARGET_POSITION, SLOT_TARGET_VELOCITY, SLOT_TARGET_TORQUE,
@@ -36,7 +36,7 @@ enum {
 
 enum { PP = 1, PV = 3, HM = 6, CSP = 8, CSV = 9, CST = 10 };
 
-/* 0x6007, the drive's reaction to a loss of process data. */
+/* Values of 0x6007, the reaction to a loss of process data. */
 enum { ABORT_NOTHING = 0, ABORT_FAULT = 1, ABORT_DISABLE_VOLTAGE = 2, ABORT_QUICK_STOP = 3 };
 
 enum {
@@ -49,19 +49,19 @@ typedef enum { RAMP_NONE, RAMP_TO_DISABLED, RAMP_AND_STAY, RAMP_TO_READY, RAMP_T
 
 struct plant_joint;
 
-/* Differences of real drives from the profile; devices/servo_quirks.py has the sources. */
+/* Differences of real drives from the profile. devices/servo_quirks.py lists the sources. */
 typedef struct servo_quirks {
-    double mode_delay;                                /* seconds from 0x6060 to 0x6061 */
+    double mode_delay;                                /* delay from 0x6060 to 0x6061 [s] */
     uint32_t refused_modes;                           /* bit n: 0x6061 never shows mode n */
     uint8_t never_bit_12, follows_without_bit_12, ignores_quick_stop, ignores_disable;
 } servo_quirks;
 
-/* Set-points other than the position, as last followed, in units of their objects. */
+/* Set-points that the drive last followed, except the position, in the units of their objects. */
 typedef struct servo_targets {
     int64_t velocity, velocity_offset, torque, torque_offset;
 } servo_targets;
 
-/* Profile modes, servo_profile.h: counts unwrapped; seconds within the window of bit 10. */
+/* State of the profile modes (servo_profile.h): unwrapped counts; seconds within the window of bit 10. */
 typedef struct servo_profile {
     int64_t goal, next;
     double in_window;
@@ -69,34 +69,34 @@ typedef struct servo_profile {
 } servo_profile;
 
 typedef struct servo_axis {
-    /* the machine, SI */
+    /* parameters, SI units */
     double inertia, viscous, coulomb, load;           /* kg m2, N m s/rad, N m, N m */
     double rated_torque, velocity_limit;              /* N m, rad/s */
     double counts_per_radian, velocity_per_radian;    /* units of 0x6064 per rad; of 0x606C per rad/s */
-    double radian_per_count, radian_per_velocity, per_inertia, per_torque;  /* inverse values, because division is slow */
+    double radian_per_count, radian_per_velocity, per_inertia, per_torque;  /* reciprocals, because division is slow */
     double position_gain, velocity_gain, integral_gain;
-    /* its state */
+    /* state */
     double position, velocity, torque, integral;      /* rad, rad/s, N m, N m */
     struct plant_joint *joint;                        /* the driven joint; NULL: the motor's own shaft */
     /* set-points */
     int64_t target;                                   /* unwrapped target position, counts */
     double command, command_velocity, ramp;           /* counts; rad/s; rad/s */
-    double interpolated;                              /* seconds left until the target is reached */
-    double following_time;                            /* seconds outside the window */
-    int64_t zero;                                     /* position at which the axis shows 0, counts of the shaft */
-    double pressed;                                   /* seconds pressed against a stop while homing */
+    double interpolated;                              /* remaining time until the target is reached [s] */
+    double following_time;                            /* time outside the following error window [s] */
+    int64_t zero;                                     /* shaft position at which the axis shows 0, counts */
+    double pressed;                                   /* time of pressing against a stop while homing [s] */
     int homing;
     uint8_t homing_asked;
     int state, mode;
     ramp_end ramping;
     uint16_t last_controlword, injected;
     uint8_t sto, fed;                                 /* safe torque off; process data is valid */
-    double boot;                                      /* seconds until the drive is ready */
+    double boot;                                      /* remaining time until the drive is ready [s] */
     servo_quirks quirks;
     servo_targets targets;
     servo_profile profile;
-    double bit_12_hidden;                             /* seconds for which bit 12 is not shown */
-    double mode_wait;                                 /* seconds until the requested mode applies */
+    double bit_12_hidden;                             /* remaining time for which bit 12 is hidden [s] */
+    double mode_wait;                                 /* remaining time until the requested mode applies [s] */
     int mode_requested;
 } servo_axis;
 
@@ -115,17 +115,17 @@ static inline int64_t servo_counts(const servo_axis *a) {
     return llrint(a->position * a->counts_per_radian) - a->zero;
 }
 
-/* Return 1 if the drive follows its targets. While bit 12 is not shown, it holds its last demand. */
+/* Return 1 if the drive follows its targets. While bit 12 is hidden, it holds its last demand. */
 static inline int servo_follows(const servo_axis *a) {
     return a->quirks.follows_without_bit_12 || !(a->quirks.never_bit_12 || a->bit_12_hidden > 0);
 }
 
-/* The same, without quantisation. */
+/* Return the position in counts, without quantisation. */
 static inline double servo_exact(const servo_axis *a) {
     return a->position * a->counts_per_radian - (double)a->zero;
 }
 
-/* Restart the loops at the motor's position; earlier commands are forgotten. */
+/* Restart the loops at the motor's position, and discard earlier commands. */
 static void servo_hold(servo_axis *a) {
     a->target = servo_counts(a);
     a->command = (double)a->target;
@@ -150,7 +150,7 @@ static void servo_fault(controller *c, servo_axis *a, int64_t *slots, uint16_t c
     a->state = gentle ? FAULT_REACTION_ACTIVE : FAULT;
 }
 
-/* 0x605A. A negative code disables the quick stop: the drive continues as before. */
+/* Start a quick stop as 0x605A selects. A negative code disables it: the drive continues as before. */
 static void servo_quick_stop(servo_axis *a, int64_t option) {
     if (option < 0)
         return;
@@ -164,7 +164,7 @@ static void servo_quick_stop(servo_axis *a, int64_t option) {
     a->ramping = option >= 5 ? RAMP_AND_STAY : RAMP_TO_DISABLED;
 }
 
-/* Leave OPERATION_ENABLED for `state`, at once or after a ramp. */
+/* Leave OPERATION_ENABLED for `state`, immediately or after a ramp. */
 static void servo_leave(servo_axis *a, int64_t option, int state, ramp_end ramp) {
     a->ramp = a->velocity;
     a->ramping = option == 0 ? RAMP_NONE : ramp;
@@ -172,7 +172,7 @@ static void servo_leave(servo_axis *a, int64_t option, int state, ramp_end ramp)
         a->state = state;
 }
 
-/* Process a controlword: commands are patterns of bits 0 to 3 and an edge of bit 7. */
+/* Process the controlword. Commands are patterns of bits 0 to 3, and a rising edge of bit 7. */
 static void servo_command(controller *c, servo_axis *a, int64_t *slots) {
     uint16_t word = (uint16_t)slots[SLOT_CONTROLWORD];
     int reset = (word & 0x80) && !(a->last_controlword & 0x80);
@@ -239,7 +239,7 @@ static void servo_command(controller *c, servo_axis *a, int64_t *slots) {
     }
 }
 
-/* End a ramp at standstill. */
+/* End a ramp when the axis is at standstill. */
 static void servo_standstill(servo_axis *a) {
     static const int after[] = {[RAMP_TO_DISABLED] = SWITCH_ON_DISABLED, [RAMP_TO_READY] = READY_TO_SWITCH_ON,
                                 [RAMP_TO_SWITCHED_ON] = SWITCHED_ON, [RAMP_TO_FAULT] = FAULT};
@@ -309,8 +309,8 @@ static double servo_velocity_loop(servo_axis *a, double velocity, double feed_fo
     return torque;
 }
 
-/* Return 1 for the ramp of 0x6085, 0 for that of 0x6084. Options 1 and 5 of 0x605A, and 1 of
- * 0x605E, slow down by 0x6084. Options that brake at the current or voltage limit use the steeper
+/* Return 1 for the ramp 0x6085, or 0 for the ramp 0x6084. Options 1 and 5 of 0x605A and option 1 of
+ * 0x605E use 0x6084. Options that brake at the current or voltage limit use the steeper ramp
  * 0x6085. */
 static int servo_ramps_quickly(const servo_axis *a, const int64_t *slots) {
     int64_t option = slots[SLOT_QUICK_STOP_OPTION];
@@ -331,7 +331,7 @@ static double servo_ramp(servo_axis *a, const int64_t *slots, double limit, doub
 #include "servo_homing.h"
 #include "servo_profile.h"
 
-/* Take over the set-points, or hold the demand of the last ones followed. */
+/* Accept the set-points, or hold the last demand if the drive does not follow them. */
 static void servo_take_targets(servo_axis *a, const int64_t *slots, int fresh, double dt, double rate) {
     if (!is_profile_mode(a->mode) && !servo_follows(a)) {
         a->command_velocity = 0;
@@ -379,7 +379,7 @@ static void servo_motor(servo_axis *a, double dt) {
     double net = a->torque + a->load - a->viscous * a->velocity;
     double friction = a->coulomb * dt * a->per_inertia;
     double velocity = a->velocity + net * dt * a->per_inertia;
-    /* dry friction stops a motor; it never reverses it */
+    /* dry friction can stop a motor, but never reverses it */
     velocity = fabs(velocity) <= friction ? 0 : velocity - copysign(friction, velocity);
     a->velocity = velocity;
     a->position += velocity * dt;
@@ -387,7 +387,7 @@ static void servo_motor(servo_axis *a, double dt) {
 
 static uint16_t servo_statusword(const servo_axis *a, const int64_t *slots) {
     uint16_t word = statuswords[a->state];
-    word |= 0x0200;                                          /* remote: the controlword is accepted */
+    word |= 0x0200;                                          /* remote: the drive accepts the controlword */
     if (!a->sto)
         word |= 0x0010;
     if (a->state == READY_TO_SWITCH_ON || a->state == SWITCHED_ON || a->state == OPERATION_ENABLED)
@@ -400,7 +400,7 @@ static uint16_t servo_statusword(const servo_axis *a, const int64_t *slots) {
         return word | profile_status(a, slots);
     int cyclic = a->mode == CSP || a->mode == CSV || a->mode == CST;
     if (cyclic && a->ramping == RAMP_NONE && a->fed && !a->quirks.never_bit_12 && a->bit_12_hidden <= 0)
-        word |= 0x1000;                                      /* follows the set-point */
+        word |= 0x1000;                                      /* the drive follows the set-point */
     if (a->mode == CSP && a->following_time > 0)
         word |= 0x2000;
     int64_t least = slots[SLOT_LIMIT_MIN], most = slots[SLOT_LIMIT_MAX];
@@ -429,9 +429,9 @@ static inline int servo_knows_mode(const servo_axis *a, int mode) {
     return known && !(a->quirks.refused_modes >> mode & 1);
 }
 
-/* Change the mode at standstill of the set-point; the loops restart without a bump. The display
- * shows the old mode, which stays active, while an unknown one is requested and until the delay has
- * passed. */
+/* Change the mode. The loops restart at the present position and keep their integral term, so that
+ * the torque does not jump. The old mode stays active and displayed until the delay has passed, and
+ * while an unsupported mode is requested. */
 static void servo_change_mode(servo_axis *a, const int64_t *slots, double dt) {
     int mode = (int)slots[SLOT_MODE];
     if (mode != a->mode_requested)
@@ -449,7 +449,7 @@ static void servo_change_mode(servo_axis *a, const int64_t *slots, double dt) {
     a->mode = mode;
 }
 
-/* React to a loss of process data while the axis is enabled: 0x6007. */
+/* React to a loss of process data while the axis is enabled, as 0x6007 selects. */
 static void servo_abort_connection(controller *c, servo_axis *a, int64_t *slots) {
     switch (slots[SLOT_ABORT_CONNECTION_OPTION]) {
     case ABORT_NOTHING:
@@ -467,8 +467,8 @@ static void servo_abort_connection(controller *c, servo_axis *a, int64_t *slots)
 
 static inline double counted_down(double seconds, double dt) { return seconds > 1.5 * dt ? seconds - dt : 0; }
 
-/* `fed`: the process data is valid (OPERATIONAL, watchdog fed); `fresh`: it arrived since the last
- * step. */
+/* Take one step. `fed`: the process data is valid (OP, and the watchdog has not expired). `fresh`:
+ * new process data has arrived since the last step. */
 static void servo_step(controller *c, servo_axis *a, int64_t *slots, int fed, int fresh, double dt, double rate) {
     if (a->state == NOT_READY && (a->boot -= dt) <= 0)
         a->state = SWITCH_ON_DISABLED;                       /* 0, 1 */
@@ -487,7 +487,7 @@ static void servo_step(controller *c, servo_axis *a, int64_t *slots, int fed, in
     a->bit_12_hidden = counted_down(a->bit_12_hidden, dt);
 }
 
-/* Update the objects with the state of the axes before they are read. */
+/* Update the slots from the state of the axes, before they are read. */
 static inline void slots_refresh(controller *c) {
     if (!c->slots_stale)
         return;

@@ -1,15 +1,15 @@
 /* Homing of a servo axis, mode 6 (CiA 402-2 / IEC 61800-7-201 §13): the drive finds its home
  * position.
  *
- * Methods: 37 (and its old number 35): the present position is home. Two manufacturer-specific
- * ones, numbered as in Maxon's EPOS4: -3 and -4, against a hard stop in positive and in negative
- * direction. The stop is detected by the torque (0x2110, also the maximum torque of the search).
- * Zero is home + home offset (0x607C), as in the profile: at home the axis shows -offset. Bit 4
- * starts the search; clearing it stops the search. Included by servo.h. */
+ * With method 37 (formerly 35), the present position is the home position. Two manufacturer-specific
+ * methods, numbered as in Maxon's EPOS4, search for a hard stop: -3 in positive direction and -4 in
+ * negative direction. 0x2110 is the torque that indicates the stop, and the maximum torque of the
+ * search. As the profile specifies, zero = home + home offset (0x607C): at home, the axis shows
+ * -offset. Setting bit 4 starts the search, and clearing it stops the search. Included by servo.h. */
 #ifndef CATENARY_VIRTUAL_SERVO_HOMING_H
 #define CATENARY_VIRTUAL_SERVO_HOMING_H
 
-#define HOMING_PRESSED 0.02           /* time at full torque and standstill that means a stop [s] */
+#define HOMING_PRESSED 0.02           /* time at full torque and standstill that indicates a stop [s] */
 
 typedef enum { HOMING_NOT_STARTED, HOMING_SEARCHES, HOMING_ATTAINED, HOMING_FAILED } homing_state;
 
@@ -34,7 +34,7 @@ static void homing_start(servo_axis *a, const int64_t *slots) {
         a->homing = HOMING_FAILED;
 }
 
-/* Handle bit 4 of the controlword, and the mode. */
+/* Start or stop homing, according to the mode and bit 4 of the controlword. */
 static void homing_command(servo_axis *a, const int64_t *slots) {
     int asked = a->mode == HM && a->state == OPERATION_ENABLED && (slots[SLOT_CONTROLWORD] & 0x10);
     if (a->mode != HM)
@@ -46,7 +46,7 @@ static void homing_command(servo_axis *a, const int64_t *slots) {
     a->homing_asked = (uint8_t)asked;
 }
 
-/* Return the torque of mode 6: towards the stop at 0x6099:01 with the ramp of 0x609A, or standing. */
+/* Return the torque of mode 6. A search moves at 0x6099:01 with the ramp 0x609A; otherwise hold. */
 static double homing_drive(servo_axis *a, const int64_t *slots, double limit, double dt) {
     double speed = 0, step = larger(1e-3, (double)slots[SLOT_HOMING_ACCELERATION] * a->radian_per_velocity) * dt;
     if (a->homing == HOMING_SEARCHES) {

@@ -1,14 +1,17 @@
 /* Profile modes of a servo axis: profile position (1) and profile velocity (3), IEC 61800-7-201 /
- * CiA 402-2. The drive makes the trajectory: trapezoids (0x6086 = 0) of 0x6081, 0x6083 and 0x6084.
+ * CiA 402-2. The drive computes a trapezoidal trajectory (0x6086 = 0) with the velocity 0x6081, the
+ * acceleration 0x6083 and the deceleration 0x6084.
  *
- * Profile position. A rising edge of bit 4 of the controlword takes 0x607A as a new set-point: at once
- * with bit 5, or if no set-point is in process; else into the buffer of one. Bit 6: relative to the
- * last target. Bit 12 of the statusword acknowledges; it falls when bit 4 is 0 and the buffer is free.
- * Bit 10: within 0x6067 of the target for 0x6068. Bit 9 (blend into the next set-point) is ignored.
- * Profile velocity. 0x60FF is the target. Bit 10: within 0x606D of it for 0x606E; bit 12: the speed is
- * below 0x606F.
- * Both. Halt (bit 8) slows down by 0x605D and holds; bit 10 then shows standstill. Without the bit the
- * motion goes on. Included by servo.h. */
+ * Profile position. A rising edge of controlword bit 4 accepts 0x607A as a new set-point. The drive
+ * uses it immediately if bit 5 is set or if no set-point is active. Otherwise it stores the set-point
+ * in a buffer for one. With bit 6, the set-point is relative to the last target. Statusword bit 12
+ * acknowledges the set-point. It is cleared when controlword bit 4 is 0 and the buffer is free.
+ * Statusword bit 10: the position was within 0x6067 of the target for the time 0x6068. Controlword
+ * bit 9 (blending into the next set-point) is ignored.
+ * Profile velocity. 0x60FF is the target. Statusword bit 10: the velocity was within 0x606D of the
+ * target for the time 0x606E. Statusword bit 12: the speed is below 0x606F.
+ * Both modes. Halt (controlword bit 8) slows down as 0x605D selects and then holds. Bit 10 then means
+ * standstill. When halt is cleared, the motion continues. Included by servo.h. */
 #ifndef CATENARY_VIRTUAL_SERVO_PROFILE_H
 #define CATENARY_VIRTUAL_SERVO_PROFILE_H
 
@@ -34,7 +37,7 @@ static void profile_begin(servo_axis *a, int64_t goal) {
     a->profile.in_window = 0;
 }
 
-/* The set-point handshake. */
+/* Process the set-point handshake. */
 static void profile_command(servo_axis *a, const int64_t *slots) {
     uint16_t word = (uint16_t)slots[SLOT_CONTROLWORD];
     int asked = (word & NEW_SET_POINT) != 0, rises = asked && !a->profile.asked;
@@ -58,7 +61,7 @@ static inline double profile_step(const servo_axis *a, int64_t raw, double dt) {
     return larger(1e-3, (double)raw * a->radian_per_velocity) * dt;
 }
 
-/* Return the velocity of the next step [rad/s]: towards `wanted` within the ramps. */
+/* Return the velocity of the next step [rad/s], which approaches `wanted` within the ramps. */
 static double profile_ramp(const servo_axis *a, const int64_t *slots, double wanted, double dt) {
     int halted = (slots[SLOT_CONTROLWORD] & HALT) != 0;
     int quick = halted && slots[SLOT_HALT_OPTION] == HALT_QUICK_STOP_RAMP;
@@ -68,7 +71,7 @@ static double profile_ramp(const servo_axis *a, const int64_t *slots, double wan
     return now + clamp(wanted - now, profile_step(a, raw, dt));
 }
 
-/* Return the velocity from which the axis can still stop at the target, one ramp step ahead. */
+/* Return the maximum velocity at which the axis can still stop at the target, after one more step. */
 static double profile_approach(const servo_axis *a, const int64_t *slots, double distance, double dt) {
     double step = profile_step(a, slots[SLOT_DECELERATION], dt);
     double braking = sqrt(0.25 * step * step + 2 * step / dt * fabs(distance)) - 0.5 * step;
@@ -88,7 +91,7 @@ static void profile_position(servo_axis *a, const int64_t *slots, double dt) {
     }
 }
 
-/* Bit 10: return 1 if the motor has been in the window for long enough. */
+/* Return 1 (bit 10) if the motor has been in the window for the required time. */
 static int profile_in_window(servo_axis *a, int inside, int64_t milliseconds, double dt) {
     a->profile.in_window = inside ? a->profile.in_window + dt : 0;
     return inside && a->profile.in_window * 1e3 >= (double)milliseconds;
@@ -117,7 +120,7 @@ static void profile_reached(servo_axis *a, const int64_t *slots, double dt) {
     a->profile.reached = (uint8_t)(reached && !a->profile.in_process);
 }
 
-/* Compute the trajectory of one step: command and command_velocity. */
+/* Compute command and command_velocity for one step of the trajectory. */
 static void profile_drive(servo_axis *a, const int64_t *slots, double dt) {
     if (a->mode == PP)
         profile_position(a, slots, dt);

@@ -1,5 +1,6 @@
-"""SII images made from a description, ETG.2010: header, strings, general, FMMU, SyncManagers, PDOs,
-clocks. Written independently of the decoder `catenary.wire.sii`, so that each tests the other.
+"""SII images, ETG.2010, encoded from the description of a device.
+
+The code is independent of the decoder `catenary.wire.sii`, so that each tests the other.
 """
 
 from __future__ import annotations
@@ -23,14 +24,14 @@ STRINGS, GENERAL, FMMU, SYNC_MANAGER, TX_PDO, RX_PDO, CLOCK, END = (
 )
 FIXED_CONTENT = 0x0010  # PDO flag
 COE_PROTOCOL = 0x0004
-# Flags of the general category, byte 0x0B
+# Flags in byte 0x0B of the general category
 NO_LRW, IDENTIFICATION_IN_MEMORY = 0x02, 0x10
 HEADER_BYTES = 128
 UNUSED = SyncManagerDefault(0, 0, 0, 0, 0)
 
 
 class _Strings:
-    """Owns the string category: each string once, numbered from 1; 0 means no string."""
+    """String category. Each string is stored once and numbered from 1; 0 means no string."""
 
     def __init__(self, prefix: str) -> None:
         self.texts: list[bytes] = []
@@ -49,7 +50,7 @@ class _Strings:
 
 
 def checksum(configuration: bytes) -> int:
-    """Return the CRC-8 of the first 14 bytes: x^8 + x^2 + x + 1, initial value 0xFF."""
+    """Return the CRC-8 of the first 14 bytes (x^8 + x^2 + x + 1, initial value 0xFF)."""
     crc = 0xFF
     for byte in configuration[:14]:
         crc ^= byte
@@ -63,7 +64,7 @@ def _header(device: Description, size: int, mailbox_size: int | None) -> bytes:
     configuration = struct.pack("<HHHHH4x", pdi_control, 0, 100, 0, device.alias)
     words = configuration + struct.pack("<H", checksum(configuration))
     words += struct.pack("<4I", VENDOR_ID, device.product_code, device.revision, device.serial)
-    words += bytes(8 + 8)  # delays, bootstrap mailbox
+    words += bytes(8 + 8)  # delays and bootstrap mailbox
     box = device.mailbox
     if box is None:
         words += bytes(10)
@@ -129,7 +130,12 @@ def _category(kind: int, content: bytes) -> bytes:
 
 
 def make_sii_image(device: Description, quirks: SiiQuirks = NO_SII_QUIRKS) -> bytes:
-    """Return the whole EEPROM content: a power of two of at least 2 KiB, padded with 0xFF."""
+    """Return the complete EEPROM content, padded with 0xFF to a power of two of at least 2 KiB.
+
+    Args:
+        device: Description of the device.
+        quirks: Differences of the SII from the description.
+    """
     strings = _Strings(quirks.text_prefix)
     sync_managers = device.sync_managers
     if quirks.sync_managers is not None:
@@ -141,7 +147,7 @@ def make_sii_image(device: Description, quirks: SiiQuirks = NO_SII_QUIRKS) -> by
         for s in sync_managers
     )
     parts.append((SYNC_MANAGER, managers))
-    # All PDOs of a direction share one category, as in real terminals. SOEM reads only the first.
+    # All PDOs of a direction share one category, as in real terminals: SOEM reads only the first.
     flags = FIXED_CONTENT if device.mapping_quirks.fixed_pdos == "declared" else 0
     parts.append((TX_PDO, _pdos(device.tx_pdos, strings, quirks, flags)))
     parts.append((RX_PDO, _pdos(device.rx_pdos, strings, quirks, flags)))

@@ -11,18 +11,18 @@ import msgspec
 
 
 class SiiQuirks(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """Differences of one device's SII from the device itself. The default has none."""
+    """Differences between the SII of a device and the device itself. The default has none."""
 
-    # Size of both mailboxes in the SII header, different from the device's. An EEPROM that is
-    # erased beyond its identity contains 65535.
+    # Size of both mailboxes in the SII header, if it differs from that of the device. An EEPROM
+    # that is erased after the identity contains 65535.
     mailbox_size: int | None = None
 
-    # Number of entries in the SyncManager category, padded with unused entries. A controller has at
-    # most 16 SyncManagers (ESC data sheet, register 0x0800).
+    # Number of entries in the SyncManager category, which is padded with unused entries. A
+    # controller has at most 16 SyncManagers (ESC data sheet, register 0x0800).
     sync_managers: int | None = None
 
-    # Categories 50 and 51. "absent": only the object dictionary lists the PDOs (MetalMusings
-    # EaserCAT 2000 and 6000). "unnamed": the names of PDOs and entries are string 0.
+    # Content of categories 50 and 51. "absent": only the object dictionary lists the PDOs
+    # (MetalMusings EaserCAT 2000 and 6000). "unnamed": PDOs and entries have no names (string 0).
     pdos: Literal["named", "unnamed", "absent"] = "named"
 
     # Prefix of every string, to test how a terminal displays it.

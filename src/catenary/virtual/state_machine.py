@@ -1,8 +1,8 @@
-"""The EtherCAT state machine of a device with a microcontroller, ETG.1000.6 §6.4.
+"""EtherCAT state machine of a device with a microcontroller, ETG.1000.6 §6.4.
 
-A request is checked at once and answered after a typical transition time. In an error state only
-INIT is accepted without an acknowledgement, as in Beckhoff's slave stack code (SSC 5.11 to 5.13,
-ecatslv.c, AL_ControlInd) and in SOES (soes/esc.c, ESC_state).
+A request is checked immediately and answered after a typical transition time. In an error state,
+only a request for INIT is accepted without an acknowledgement. This is the behaviour of Beckhoff's
+slave stack code (SSC 5.11 to 5.13, ecatslv.c, AL_ControlInd) and of SOES (soes/esc.c, ESC_state).
 """
 
 from __future__ import annotations
@@ -34,43 +34,43 @@ DC_SYNC0_CYCLE_TIME = 0x0036
 
 UPWARDS = {(INIT, PRE_OP), (PRE_OP, SAFE_OP), (SAFE_OP, OP)}
 MILLISECOND = 1_000_000
-# Time limits of SAFE-OP → OP, by the AL status code of what is missing. SYNC pulses start 100 ms
-# after activation with SOEM and IgH, and later with other masters.
+# Time limits of SAFE-OP → OP, by the AL status code of the missing condition. With SOEM and IgH,
+# SYNC pulses start 100 ms after activation; other masters need longer.
 TIMEOUTS_NS = {NO_VALID_OUTPUTS: 200 * MILLISECOND, NO_SYNC_ERROR: 1000 * MILLISECOND}
 
 
 class Controlled(Protocol):
-    """The controller and application that a state machine controls."""
+    """Controller and application of a device, as used by its state machine."""
 
     def fetch_al_control(self) -> int: ...
 
     def show_al_status(self, status: int, code: int) -> None: ...
 
     def check_state(self, state: int) -> int:
-        """Return 0, or the AL status code for which `state` cannot be entered."""
+        """Return 0, or the AL status code of the reason why `state` cannot be entered."""
         ...
 
     def enter_state(self, before: int, state: int) -> None: ...
 
     def lacks_for_op(self) -> int:
-        """Return 0, or the AL status code of a condition that is missing for OP."""
+        """Return 0, or the AL status code of a missing condition for OP."""
         ...
 
 
 class StateMachine:
-    """Owns the AL state of one device and the state faults injected into it."""
+    """AL state of one device, and the state faults injected into it."""
 
     def __init__(self, device: Controlled, scheduler: Scheduler, identification: int) -> None:
         self._device = device
         self._scheduler = scheduler
         self._identification = identification
-        self._request = 0  # counts requests; a newer one cancels an older one
-        self._pending: int | None = None  # requested state that is not answered yet
-        self._waiting: tuple[bool, int] | None = None  # for OP: identify flag, request
+        self._request = 0  # number of the last request, which cancels earlier ones
+        self._pending: int | None = None  # requested state without an answer
+        self._waiting: tuple[bool, int] | None = None  # delayed OP: identification flag, request
         self.state = INIT
         self.code = 0
         self.transition_ns = MILLISECOND
-        self.refused: dict[int, tuple[int, int | None]] = {}  # state → AL status code, times
+        self.refused: dict[int, tuple[int, int | None]] = {}  # state → AL status code, count
         self.delays: dict[int, int | None] = {}  # state → delay [ns]; None: never reached
 
     def obey(self) -> None:
@@ -85,7 +85,7 @@ class StateMachine:
         delay = self.delays.get(requested, self.transition_ns)
         if delay is None:
             return
-        refusal = self._judge(requested)
+        refusal = self._check_request(requested)
         if refusal:
             self._later(delay, lambda: self._refuse_with(refusal))
             return
@@ -96,7 +96,7 @@ class StateMachine:
         request = self._request
         self._scheduler.after(delay_ns, lambda: action() if request == self._request else None)
 
-    def _judge(self, requested: int) -> int:
+    def _check_request(self, requested: int) -> int:
         if requested in self.refused:
             return self._refuse(requested)
         if requested == BOOT:
@@ -120,7 +120,7 @@ class StateMachine:
     def _enter(self, state: int, identify: bool) -> None:
         lack = self._device.lacks_for_op() if (self.state, state) == (SAFE_OP, OP) else 0
         if lack:
-            # wait for process data or pulses; `something_arrived` or the time limit ends the wait
+            # Wait for process data or pulses, until `something_arrived` or the time limit.
             self._waiting = identify, self._request
             self._later(TIMEOUTS_NS[lack], lambda: self.fail(SAFE_OP, lack))
             return
@@ -130,18 +130,19 @@ class StateMachine:
         self._device.show_al_status(state | shown, self._identification if shown else 0)
 
     def something_arrived(self) -> None:
-        """Complete a waiting request for OP: the first process data or SYNC pulse has arrived."""
+        """Complete a waiting request for OP, after the first process data or SYNC pulse."""
         waiting, self._waiting = self._waiting, None
         if waiting is not None and waiting[1] == self._request:
             self._request += 1
             self._enter(OP, waiting[0])
 
     def fail(self, state: int, code: int) -> None:
-        """Enter a lower state, or stay in `state`, and show an error.
+        """Enter a lower state, or stay in `state`, and indicate an error.
 
-        A pending request for `state` or a lower one is still answered. Real stacks go down at once
-        (SSC, ecatslv.c, AL_ControlInd, OP_2_INIT), so that a local error cannot come between. IgH
-        would wait 5 s for a lost INIT (master/fsm_change.c, ec_fsm_change_state_status).
+        A pending request for `state` or a lower state is still answered. Real stacks change to a
+        lower state immediately (SSC, ecatslv.c, AL_ControlInd, OP_2_INIT), so a local error cannot
+        intervene. If the answer to INIT were lost, IgH would wait 5 s (master/fsm_change.c,
+        ec_fsm_change_state_status).
 
         Args:
             state: The AL state to show.

@@ -1,7 +1,7 @@
 """Topology of a segment: a tree in the order in which frames are processed, or a ring.
 
-A frame leaves a controller by port 3, then 1, then 2, skipping unconnected ports, and returns
-by port 0 (ET1100 datasheet, section I, 3.2). The positions of devices follow from this order.
+A frame leaves a controller through port 3, then 1, then 2. It skips unconnected ports, and returns
+through port 0 (ET1100 datasheet, section I, 3.2). This order determines the positions of devices.
 """
 
 from __future__ import annotations
@@ -17,7 +17,10 @@ PORT_ORDER = (3, 1, 2)
 
 
 class Cable(NamedTuple):
-    """Cable n: the uplink of device n. In a ring the last cable returns to the MainDevice."""
+    """Cable between two ports.
+
+    Cable n is the uplink of device n. In a ring, one more cable returns to the MainDevice.
+    """
 
     up: Place
     down: Place
@@ -28,10 +31,12 @@ class Wiring:
 
     Args:
         ports: Port numbers of each device.
-        behind: Maps a device to the (device, port) it is connected to. The default is port 1 of the
-            previous device.
-        ring: True if port 1 of the last device leads back to the MainDevice. A frame from the first
-            interface has then passed all devices.
+        behind: Mapping from a device to the (device, port) that it is connected to. The default is
+            port 1 of the previous device.
+        ring: True if port 1 of the last device leads back to the MainDevice.
+
+    Raises:
+        ValueError: The devices cannot be connected in this way.
     """
 
     def __init__(
@@ -41,12 +46,12 @@ class Wiring:
         for device in behind:
             if not 0 < device < len(ports):
                 raise ValueError(
-                    f"behind: device {device} cannot be placed; use 1 to {len(ports) - 1}"
+                    f"behind: device {device} cannot be placed; use devices 1 to {len(ports) - 1}"
                 )
         cables = [Cable((FIRST, 0), (0, 0))] if ports else []
         for device in range(1, len(ports)):
             up = tuple(behind.get(device, (device - 1, 1)))
-            self._hang(device, (up[0], up[1]), ports)
+            self._connect(device, (up[0], up[1]), ports)
             cables.append(Cable((up[0], up[1]), (device, 0)))
         self._check_order(len(ports))
         if ring:
@@ -54,11 +59,12 @@ class Wiring:
         self.ring = ring
         self.cables = tuple(cables)
 
-    def _hang(self, device: int, up: Place, ports: Sequence[Sequence[int]]) -> None:
+    def _connect(self, device: int, up: Place, ports: Sequence[Sequence[int]]) -> None:
         above, port = up
         if not 0 <= above < device:
             raise ValueError(
-                f"behind: device {device} must be behind one of 0 to {device - 1}, not {above}"
+                f"behind: device {device} must be behind one of the devices 0 to {device - 1}, "
+                f"not {above}"
             )
         if port not in PORT_ORDER or port not in ports[above]:
             raise ValueError(f"behind: device {above} has no port {port} for device {device}")
@@ -79,7 +85,7 @@ class Wiring:
             waiting += [child for child in reversed(below) if child >= 0]
         if order != list(range(count)):
             raise ValueError(
-                f"behind: frames reach the devices in the order {order} (ports 3, 1, 2): "
+                f"behind: frames reach the devices in the order {order} (ports 3, 1, 2); "
                 "list the devices in this order"
             )
 
@@ -91,13 +97,13 @@ class Wiring:
             other: The device at the other end of the cable, or "main".
 
         Raises:
-            ValueError: No cable connects the two. The message lists the cables.
+            ValueError: No cable connects the two neighbours. The message lists the cables.
         """
         for number, cable in enumerate(self.cables):
             if {_name(cable.up), _name(cable.down)} == {one, other}:
                 return number
         known = ", ".join(f"{_name(c.up)}-{_name(c.down)}" for c in self.cables[:40])
-        raise ValueError(f"between: {one} and {other} are not neighbours (cables: {known})")
+        raise ValueError(f"between: {one} and {other} are not neighbours; the cables are {known}")
 
     def at_port(self, device: int, port: int) -> bool:
         """Return True if a cable is connected to this port."""
@@ -108,7 +114,9 @@ def _last_port(ports: Sequence[Sequence[int]]) -> Place:
     if not ports:
         raise ValueError("ring: a ring needs at least one device")
     if 1 not in ports[-1]:
-        raise ValueError(f"ring: device {len(ports) - 1} has no port 1 for the cable back")
+        raise ValueError(
+            f"ring: the last device, {len(ports) - 1}, has no port 1 for the returning cable"
+        )
     return len(ports) - 1, 1
 
 

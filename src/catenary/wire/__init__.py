@@ -1,4 +1,4 @@
-"""Conversion between bytes and frozen values, one file per chapter of the standard.
+"""Conversion between bytes and frozen values, one module per chapter of the standard.
 
-Decoders raise `DecodeError` and no other error.
+Decoders raise only `DecodeError`.
 """

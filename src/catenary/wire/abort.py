@@ -1,4 +1,4 @@
-"""SDO abort codes, ETG.1000.6 §5.6.2.7 table 41 and ETG.1020. The hints are ours."""
+"""SDO abort codes, ETG.1000.6 §5.6.2.7 table 41 and ETG.1020. The hints are our own."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, slots=True)
 class AbortCode:
-    """An SDO abort code: the text of the standard, and a hint."""
+    """An SDO abort code with the text of the standard and a hint."""
 
     code: int
     text: str
@@ -24,7 +24,7 @@ _CODES = (
     AbortCode(
         0x06010002,
         "Attempt to write a read-only object",
-        "some objects are writable in PRE-OP only",
+        "some objects are writable only in PRE-OP",
     ),
     AbortCode(
         0x06010003,
@@ -40,7 +40,7 @@ _CODES = (
     AbortCode(
         0x06010006,
         "Object mapped to RxPDO, SDO download blocked",
-        "write it in the process data, or take it out of the mapping",
+        "write it as process data, or remove it from the mapping",
     ),
     AbortCode(0x06020000, "The object does not exist in the object dictionary", "check the index"),
     AbortCode(0x06040041, "The object cannot be mapped into the PDO"),
@@ -74,7 +74,7 @@ _CODES = (
     AbortCode(
         0x06090033,
         "Detected and configured module ident lists (0xF050 and 0xF030) do not match",
-        "check the plugged modules",
+        "check which modules are plugged in",
     ),
     AbortCode(0x06090036, "Maximum value is less than minimum value"),
     AbortCode(0x08000000, "General error"),
@@ -87,7 +87,7 @@ _CODES = (
     AbortCode(
         0x08000022,
         "Data cannot be transferred or stored to the application in the present device state",
-        "try in PRE-OP",
+        "try again in PRE-OP",
     ),
     AbortCode(
         0x08000023,
@@ -99,7 +99,7 @@ ABORT_CODES = {entry.code: entry for entry in _CODES}
 
 
 def abort_code(code: int) -> AbortCode:
-    """Return the meaning of an SDO abort code; the text of an unknown code says so."""
+    """Return the meaning of an SDO abort code. Unknown codes have a generic text."""
     return ABORT_CODES.get(code) or AbortCode(
         code, "Unknown abort code", "see the manual of the device"
     )

@@ -1,5 +1,4 @@
-"""The EtherCAT state machine in the application layer registers, ETG.1000.6 §5.3, and the AL status
-codes, ETG.1020."""
+"""AL control and AL status, ETG.1000.6 §5.3, and AL status codes, ETG.1020."""
 
 from __future__ import annotations
 
@@ -27,10 +26,10 @@ class AlState(IntEnum):
 
     @classmethod
     def from_name(cls, text: str) -> AlState:
-        """Return the state with a name: "SAFE_OP", "SAFE-OP", "safeop", "OPERATIONAL".
+        """Return the state with a name such as "SAFE_OP", "SAFE-OP", "safeop" or "OPERATIONAL".
 
         Raises:
-            ValueError: The text is not the name of a state; the error lists the names.
+            ValueError: The text is not the name of a state. The message lists the names.
         """
         key = "".join(letter for letter in text.upper() if letter.isalpha())
         key = _LONG_NAMES.get(key, key)
@@ -94,13 +93,16 @@ class AlStatus:
         """Return the decoded register. Raises DecodeError if the state is invalid.
 
         Bits 6 to 15 are ignored. A broadcast read combines the states of all devices with OR. The
-        result may not be a valid state; use `states_in`.
+        result may not be a valid state; decode it with `states_in`.
         """
         return cls(_state(word), bool(word & ERROR_FLAG), bool(word & _IDENTIFICATION))
 
 
 def states_in(word: int) -> frozenset[AlState]:
-    """Return the states that the OR of many AL status words can contain. BOOT = INIT | PRE-OP."""
+    """Return the states that the OR of several AL status words can contain.
+
+    INIT and PRE-OP together also look like BOOT, because BOOT = INIT | PRE-OP.
+    """
     return frozenset(state for state in AlState if word & state == state)
 
 
@@ -114,7 +116,7 @@ class StatusCode:
 
 
 def status_code(code: int) -> StatusCode:
-    """Return the meaning of an AL status code; the text of an unknown code says so."""
+    """Return the meaning of an AL status code. Unknown codes have a generic text."""
     if known := STATUS_CODES.get(code):
         return known
     text = "Vendor specific" if code >= 0x8000 else "Unknown"
@@ -131,7 +133,7 @@ def _state(word: int) -> AlState:
 
 
 _CODES = (
-    # ETG.1000.6 table 11 and ETG.1020 table "AL Status Codes"; the causes are ours.
+    # ETG.1000.6 table 11 and ETG.1020 table "AL Status Codes"; the causes are our own.
     StatusCode(0x0000, "No error"),
     StatusCode(0x0001, "Unspecified error", "the device gives no details; see its manual"),
     StatusCode(0x0002, "No memory", "the mapping is larger than the device can hold"),
@@ -147,7 +149,9 @@ _CODES = (
     ),
     StatusCode(0x000E, "License error", "the licence is missing or has expired"),
     StatusCode(
-        0x0011, "Invalid requested state change", "a state was skipped: INIT, PRE-OP, SAFE-OP, OP"
+        0x0011,
+        "Invalid requested state change",
+        "a state was skipped; the order is INIT, PRE-OP, SAFE-OP, OP",
     ),
     StatusCode(0x0012, "Unknown requested state", "AL control contained no valid state"),
     StatusCode(0x0013, "Bootstrap not supported", "the device has no BOOT state"),
@@ -169,7 +173,7 @@ _CODES = (
     ),
     StatusCode(0x0018, "No valid inputs available", "the application has no inputs yet"),
     StatusCode(
-        0x0019, "No valid outputs", "no outputs arrived before or in OP: is the loop running?"
+        0x0019, "No valid outputs", "no outputs arrived before or in OP: check that the loop runs"
     ),
     StatusCode(
         0x001A, "Synchronization error", "process data and SYNC0 do not arrive at the agreed times"
@@ -177,7 +181,7 @@ _CODES = (
     StatusCode(
         0x001B,
         "SyncManager watchdog",
-        "no outputs within the watchdog time: the loop stalled, or a cable before the device broke",
+        "no outputs within the watchdog time: the loop stalled, or a cable to the device broke",
     ),
     StatusCode(0x001C, "Invalid SyncManager types", "a SyncManager has the wrong direction or use"),
     StatusCode(
@@ -190,16 +194,22 @@ _CODES = (
         "Invalid input configuration",
         "the length of SyncManager 3 (inputs) differs from the mapping",
     ),
-    StatusCode(0x001F, "Invalid watchdog configuration", "check registers 0x0400, 0x0410, 0x0420"),
-    StatusCode(0x0020, "Device needs cold start", "switch its power off and on"),
-    StatusCode(0x0021, "Device needs INIT", "go through INIT"),
-    StatusCode(0x0022, "Device needs PRE-OP", "go through PRE-OP"),
-    StatusCode(0x0023, "Device needs SAFE-OP", "go through SAFE-OP"),
     StatusCode(
-        0x0024, "Invalid input mapping", "check 0x1A00 and following, and the assignment 0x1C13"
+        0x001F, "Invalid watchdog configuration", "check registers 0x0400, 0x0410 and 0x0420"
+    ),
+    StatusCode(0x0020, "Device needs cold start", "power-cycle the device"),
+    StatusCode(0x0021, "Device needs INIT", "bring it to INIT first"),
+    StatusCode(0x0022, "Device needs PRE-OP", "bring it to PRE-OP first"),
+    StatusCode(0x0023, "Device needs SAFE-OP", "bring it to SAFE-OP first"),
+    StatusCode(
+        0x0024,
+        "Invalid input mapping",
+        "check the PDOs (0x1A00 and above) and their assignment (0x1C13)",
     ),
     StatusCode(
-        0x0025, "Invalid output mapping", "check 0x1600 and following, and the assignment 0x1C12"
+        0x0025,
+        "Invalid output mapping",
+        "check the PDOs (0x1600 and above) and their assignment (0x1C12)",
     ),
     StatusCode(
         0x0026, "Inconsistent settings", "mapping, modes or cycle times contradict each other"
@@ -215,25 +225,29 @@ _CODES = (
     ),
     StatusCode(0x002A, "Background watchdog", "the application inside the device hangs"),
     StatusCode(
-        0x002B, "No valid inputs and outputs", "no process data arrived: is the loop running?"
+        0x002B, "No valid inputs and outputs", "no process data arrived: check that the loop runs"
     ),
     StatusCode(
-        0x002C, "Fatal synchronization error", "SYNC0 missing, or process data without SYNC0"
+        0x002C,
+        "Fatal synchronization error",
+        "SYNC0 is missing, or process data arrives without it",
     ),
     StatusCode(
         0x002D, "No synchronization error", "the SYNC signal or the process data did not arrive"
     ),
     StatusCode(0x002E, "Cycle time too small", "choose a longer period"),
     StatusCode(
-        0x0030, "Invalid DC SYNC configuration", "check activation 0x0981, and 0x1C32, 0x1C33"
+        0x0030,
+        "Invalid DC SYNC configuration",
+        "check register 0x0981, and objects 0x1C32 and 0x1C33",
     ),
-    StatusCode(0x0031, "Invalid DC latch configuration", "check latch registers 0x09A8, 0x09A9"),
-    StatusCode(0x0032, "PLL error", "the loop's jitter or start is outside the device's tolerance"),
+    StatusCode(0x0031, "Invalid DC latch configuration", "check registers 0x09A8 and 0x09A9"),
+    StatusCode(
+        0x0032, "PLL error", "the loop's jitter or start time is outside the device's tolerance"
+    ),
     StatusCode(0x0033, "DC sync I/O error", "the device failed at a SYNC event"),
     StatusCode(0x0034, "DC sync timeout error", "SYNC0 or process data stopped"),
-    StatusCode(
-        0x0035, "DC invalid sync cycle time", "the period is not a multiple that the device accepts"
-    ),
+    StatusCode(0x0035, "DC invalid sync cycle time", "the device does not support this period"),
     StatusCode(0x0036, "DC SYNC0 cycle time", "the device rejects the SYNC0 cycle time 0x09A0"),
     StatusCode(0x0037, "DC SYNC1 cycle time", "the device rejects the SYNC1 cycle time 0x09A4"),
     StatusCode(0x0041, "Mailbox AoE", "ADS over EtherCAT failed"),
@@ -241,19 +255,23 @@ _CODES = (
     StatusCode(0x0043, "Mailbox CoE", "a start-up object was refused or is missing"),
     StatusCode(0x0044, "Mailbox FoE", "file access failed"),
     StatusCode(0x0045, "Mailbox SoE", "servo profile access failed"),
-    StatusCode(0x004F, "Mailbox VoE", "vendor specific mailbox failed"),
-    StatusCode(0x0050, "EEPROM no access", "give the EEPROM to the PDI: register 0x0500"),
+    StatusCode(0x004F, "Mailbox VoE", "the vendor-specific mailbox protocol failed"),
+    StatusCode(0x0050, "EEPROM no access", "assign the EEPROM to the PDI (register 0x0500)"),
     StatusCode(0x0051, "EEPROM error", "the device could not read its EEPROM"),
-    StatusCode(0x0052, "External hardware not ready", "is the device's power stage supplied?"),
-    StatusCode(0x0060, "Device restarted locally", "a power dip, or the device's own watchdog"),
-    StatusCode(0x0061, "Device identification value updated", "the selector switch was turned"),
+    StatusCode(0x0052, "External hardware not ready", "check the supply of its power stage"),
+    StatusCode(
+        0x0060,
+        "Device restarted locally",
+        "its power failed for a moment, or its own watchdog expired",
+    ),
+    StatusCode(0x0061, "Device identification value updated", "its selector switch was changed"),
     StatusCode(
         0x0070,
         "Detected module ident list does not match",
         "0xF030 (configured) and 0xF050 (detected) differ",
     ),
     StatusCode(0x0080, "Supply voltage too low", "check the supply"),
-    StatusCode(0x0081, "Supply voltage too high", "check the supply; braking energy"),
+    StatusCode(0x0081, "Supply voltage too high", "check the supply; braking energy raises it"),
     StatusCode(0x0082, "Temperature too low"),
     StatusCode(0x0083, "Temperature too high", "check cooling and load"),
     StatusCode(0x00F0, "Application controller available"),

@@ -8,9 +8,9 @@ from catenary.wire.pcapng import Capture, decode_pcapng
 
 
 def decode_capture(data: bytes) -> Capture:
-    """Return the capture in the bytes of a file. Raises DecodeError if the format is unknown.
+    """Decode a file. Raises DecodeError if the format is unknown.
 
-    A truncated last packet is left out.
+    A truncated last packet is omitted.
     """
     if is_pcap(data):
         return decode_pcap(data)

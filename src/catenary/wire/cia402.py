@@ -1,6 +1,6 @@
 """CiA 402 drives: states, controlword, statusword and modes, IEC 61800-7-201 / CiA 402-2.
 
-The index of an object of axis k is the index given here + k * SLOT_OFFSET.
+The object indices are those of axis 0. For axis k, add k * SLOT_OFFSET.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ IN_FAULT = (AxisState.FAULT_REACTION_ACTIVE, AxisState.FAULT)
 
 
 def state_of(statusword: int) -> AxisState | None:
-    """Return the state in a statusword; None if its bits do not encode a state."""
+    """Return the state that a statusword encodes; None if it encodes no valid state."""
     for state, (mask, value) in STATE_CODING.items():
         if statusword & mask == value:
             return state
@@ -54,7 +54,7 @@ class Status(IntFlag):
     OPERATION_ENABLED = 1 << 2
     FAULT = 1 << 3
     VOLTAGE_ENABLED = 1 << 4
-    QUICK_STOP = 1 << 5  # 0: a quick stop is active
+    QUICK_STOP = 1 << 5  # 0 while a quick stop is active
     SWITCH_ON_DISABLED = 1 << 6
     WARNING = 1 << 7
     MANUFACTURER_8 = 1 << 8
@@ -77,7 +77,7 @@ class Control(IntFlag):
 
     SWITCH_ON = 1 << 0
     ENABLE_VOLTAGE = 1 << 1
-    QUICK_STOP = 1 << 2  # 0: quick stop
+    QUICK_STOP = 1 << 2  # 0 requests a quick stop
     ENABLE_OPERATION = 1 << 3
     MODE_4 = 1 << 4  # PP: new set-point; HM: start homing
     MODE_5 = 1 << 5  # PP: change set immediately
@@ -94,7 +94,7 @@ class Control(IntFlag):
 
 
 QUICK_STOP_COMMAND = (0x0086, 0x0002)  # (mask, value) of the controlword, IEC 61800-7-201 table 28
-MODE_CONTROL_BITS = 0xFA70  # bits 4, 5, 6, 9, 11 to 15: not used by the state machine and halt
+MODE_CONTROL_BITS = 0xFA70  # bits 4, 5, 6, 9, 11 to 15: not for the state machine or halt
 
 
 @dataclass(frozen=True, slots=True)
@@ -130,10 +130,10 @@ COMMANDS = (
 
 @dataclass(frozen=True, slots=True)
 class Transition:
-    """One transition of the state machine. Without a command, it is automatic."""
+    """One transition of the state machine. It is automatic if it has no commands."""
 
     number: int
-    source: AxisState | None  # None: switched off (0) or any state (13)
+    source: AxisState | None  # None: power-up (number 0) or any state (number 13)
     target: AxisState
     commands: tuple[Controlword, ...] = ()
 
@@ -155,12 +155,12 @@ TRANSITIONS = (
         10, AxisState.SWITCHED_ON, AxisState.SWITCH_ON_DISABLED, (DISABLE_VOLTAGE, QUICK_STOP)
     ),
     Transition(11, AxisState.OPERATION_ENABLED, AxisState.QUICK_STOP_ACTIVE, (QUICK_STOP,)),
-    # 12 is also automatic, when the drive has stopped and 0x605A is 1 to 4
+    # Transition 12 is also automatic when the drive has stopped and 0x605A is 1 to 4.
     Transition(12, AxisState.QUICK_STOP_ACTIVE, AxisState.SWITCH_ON_DISABLED, (DISABLE_VOLTAGE,)),
     Transition(13, None, AxisState.FAULT_REACTION_ACTIVE),
     Transition(14, AxisState.FAULT_REACTION_ACTIVE, AxisState.FAULT),
     Transition(15, AxisState.FAULT, AxisState.SWITCH_ON_DISABLED, (FAULT_RESET,)),
-    # 16 only if 0x605A is 5 to 8
+    # Transition 16 is possible only if 0x605A is 5 to 8.
     Transition(16, AxisState.QUICK_STOP_ACTIVE, AxisState.OPERATION_ENABLED, (ENABLE_OPERATION,)),
 )
 
@@ -182,7 +182,7 @@ class Mode(IntEnum):
 
     @property
     def supported_bit(self) -> int:
-        """Bit in the supported drive modes, object 0x6502; 0 for NONE."""
+        """Bit mask of the mode in the supported drive modes, object 0x6502; 0 for NONE."""
         return 1 << self - 1 if self else 0
 
 
@@ -232,5 +232,5 @@ class Object(IntEnum):
     SUPPORTED_DRIVE_MODES = 0x6502
 
 
-SLOT_OFFSET = 0x800  # between the objects of one axis and the next
+SLOT_OFFSET = 0x800  # index distance between the same object of two adjacent axes
 PROFILE = 402  # low word of the device type, object 0x1000

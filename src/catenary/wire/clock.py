@@ -1,5 +1,7 @@
-"""Distributed clocks, registers 0x0900 to 0x09FF, ETG.1000.4 §6.8: receive times, time loop, and
-activation of the SYNC unit."""
+"""Distributed clocks, registers 0x0900 to 0x09FF, ETG.1000.4 §6.8.
+
+The module covers receive times, the time loop, and the activation of the SYNC unit.
+"""
 
 from __future__ import annotations
 
@@ -16,7 +18,10 @@ _SIGN = 1 << 31
 
 
 class CyclicUnit(IntFlag):
-    """Control of SYNC and LATCH (0x0980): by the PDI, or by EtherCAT if the bit is clear."""
+    """Bits of the cyclic unit control register (0x0980).
+
+    The PDI controls a unit if its bit is set; otherwise EtherCAT controls it.
+    """
 
     SYNC_BY_PDI = 0x01
     LATCH0_BY_PDI = 0x10
@@ -24,7 +29,7 @@ class CyclicUnit(IntFlag):
 
 
 class Activation(IntFlag):
-    """The SYNC activation register (0x0981)."""
+    """Bits of the SYNC activation register (0x0981)."""
 
     CYCLIC_OPERATION = 0x01
     SYNC0 = 0x02
@@ -38,9 +43,9 @@ class Activation(IntFlag):
 
 @dataclass(frozen=True, slots=True)
 class Clock:
-    """The time loop of one device. All times in ns."""
+    """State of the time loop of one device. All times are in ns."""
 
-    receive_times_ns: tuple[int, int, int, int]  # per port, local
+    receive_times_ns: tuple[int, int, int, int]  # by port, in local time
     system_time_ns: int
     receive_time_processing_unit_ns: int
     offset_ns: int  # modulo 2**64
@@ -67,7 +72,7 @@ class Clock:
 
 
 def decode_clock(data: bytes) -> Clock:
-    """Return the time loop in the 56 bytes from 0x0900."""
+    """Decode the 56 bytes of the time loop, from 0x0900 on."""
     if len(data) != SIZE:
         raise DecodeError(f"distributed clock: needs {SIZE} bytes, received {len(data)}")
     time_0, time_1, time_2, time_3, *rest = _BLOCK.unpack(data)
@@ -80,7 +85,7 @@ def decode_clock(data: bytes) -> Clock:
 
 
 def decode_receive_times(data: bytes) -> tuple[int, int, int, int]:
-    """Return when the latching write arrived at the four ports [ns, local time, 32 bits]."""
+    """Return the arrival times of the latching write at the four ports [ns, local, 32 bits]."""
     if len(data) != _RECEIVE_TIMES.size:
         raise DecodeError(f"receive times: needs {_RECEIVE_TIMES.size} bytes, received {len(data)}")
     port_0, port_1, port_2, port_3 = _RECEIVE_TIMES.unpack(data)
@@ -88,7 +93,7 @@ def decode_receive_times(data: bytes) -> tuple[int, int, int, int]:
 
 
 def encode_receive_times(times: tuple[int, int, int, int]) -> bytes:
-    """Return the 16 bytes of four receive times [ns]. Raises ValueError if one does not fit."""
+    """Encode four receive times [ns] in 16 bytes. Raises ValueError if one does not fit."""
     try:
         return _RECEIVE_TIMES.pack(*times)
     except struct.error as error:
@@ -96,19 +101,19 @@ def encode_receive_times(times: tuple[int, int, int, int]) -> bytes:
 
 
 def decode_difference(raw: int) -> int:
-    """Return the system time difference [ns] in a value of register 0x092C.
+    """Return the system time difference [ns] for a raw value of register 0x092C.
 
-    The register is sign-magnitude. If bit 31 is set, the local copy of the system time is behind.
-    Negative zero is zero.
+    The register is sign-magnitude. If bit 31 is set, the local copy of the system time lags behind.
+    Negative zero is decoded as 0.
     """
     if not 0 <= raw <= 0xFFFF_FFFF:
-        raise DecodeError(f"system time difference: {raw} has more than 32 bits")
+        raise DecodeError(f"system time difference: {raw} does not fit into 32 bits")
     magnitude = raw & ~_SIGN
     return -magnitude if raw & _SIGN else magnitude
 
 
 def encode_difference(difference_ns: int) -> int:
-    """Return the raw value of register 0x092C. Raises ValueError beyond ±(2**31 - 1) ns."""
+    """Return the raw value of register 0x092C. Raises ValueError if it does not fit."""
     if abs(difference_ns) >= _SIGN:
-        raise ValueError(f"system time difference: {difference_ns} ns is beyond ±{_SIGN - 1}")
+        raise ValueError(f"system time difference: {difference_ns} ns is beyond ±{_SIGN - 1} ns")
     return -difference_ns | _SIGN if difference_ns < 0 else difference_ns

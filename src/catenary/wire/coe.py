@@ -15,7 +15,7 @@ from catenary.errors import DecodeError
 from catenary.wire.sdo_information import SdoInformation, decode_sdo_information
 
 HEADER_SIZE = 2
-SDO_SIZE = 10  # the shortest SDO message: CoE header, command, index, subindex, 4 bytes
+SDO_SIZE = 10  # the shortest SDO message: CoE header, command, index, subindex, 4 bytes of data
 SEGMENT_HEADER_SIZE = 3  # CoE header, command
 SEGMENT_MINIMUM = 7  # a segment has at least 7 bytes of data, padded with zeros
 EXPEDITED_MAXIMUM = 4
@@ -72,21 +72,21 @@ def _pack_initiate(
     if message.expedited:
         if not 1 <= len(data) <= EXPEDITED_MAXIMUM or size != len(data):
             raise ValueError(
-                f"expedited SDO: needs all data in 1 to 4 bytes, got {len(data)} of {size}"
+                f"expedited SDO: needs the whole data, 1 to 4 bytes; got {len(data)} of {size}"
             )
         command |= _EXPEDITED | (EXPEDITED_MAXIMUM - size) << 2
         return _pack_sdo(service, command, message.index, message.subindex, data)
     if not len(data) <= size <= 0xFFFF_FFFF:
-        raise ValueError(f"SDO: complete size is {size} bytes, but the message has {len(data)}")
+        raise ValueError(f"SDO: the complete size is {size} bytes, but the message has {len(data)}")
     size_bytes = size.to_bytes(4, "little")
     return _pack_sdo(service, command, message.index, message.subindex, size_bytes, data)
 
 
 @dataclass(frozen=True, slots=True)
 class DownloadRequest:
-    """Initiate download, §5.6.2.1 and §5.6.2.2: write an object.
+    """Initiate download request, §5.6.2.1 and §5.6.2.2. It writes an object.
 
-    `size` is the size of the whole object. If it exceeds `data`, segments with the rest follow.
+    `size` is the size of the whole object. If `data` is shorter, segments with the rest follow.
     """
 
     index: int
@@ -117,7 +117,7 @@ class DownloadResponse:
 
 @dataclass(frozen=True, slots=True)
 class UploadRequest:
-    """Initiate upload, §5.6.2.4 and §5.6.2.5: read an object."""
+    """Initiate upload request, §5.6.2.4 and §5.6.2.5. It reads an object."""
 
     index: int
     subindex: int
@@ -131,7 +131,10 @@ class UploadRequest:
 
 @dataclass(frozen=True, slots=True)
 class UploadResponse:
-    """Initiate upload response, §5.6.2.4, §5.6.2.5. If `size` exceeds `data`, segments follow."""
+    """Initiate upload response, §5.6.2.4 and §5.6.2.5.
+
+    `size` is the size of the whole object. If `data` is shorter, segments with the rest follow.
+    """
 
     index: int
     subindex: int
@@ -148,7 +151,7 @@ class UploadResponse:
 def _pack_segment(
     service: Service, specifier: int, message: DownloadSegment | UploadSegment
 ) -> bytes:
-    """Return a segment, §5.6.2.3. Less than 7 bytes of data are padded; the command counts them."""
+    """Return a segment, §5.6.2.3. Short data is padded; the command holds the padding length."""
     command = specifier << 5 | (_TOGGLE if message.toggle else 0)
     command |= _LAST_SEGMENT if message.last else 0
     missing = max(SEGMENT_MINIMUM - len(message.data), 0)
@@ -208,7 +211,10 @@ class UploadSegment:
 
 @dataclass(frozen=True, slots=True)
 class Abort:
-    """Abort SDO transfer, §5.6.2.7, an SDO request in both directions. Texts: abort.py."""
+    """Abort SDO transfer, §5.6.2.7. It is an SDO request in both directions.
+
+    The meanings of the codes are in abort.py.
+    """
 
     index: int
     subindex: int
@@ -217,14 +223,14 @@ class Abort:
     def encode(self) -> bytes:
         """Return the encoded bytes. Raises ValueError if a field does not fit."""
         if not 0 <= self.code <= 0xFFFF_FFFF:
-            raise ValueError(f"SDO abort: code {self.code} has more than 32 bits")
+            raise ValueError(f"SDO abort: code {self.code} does not fit into 32 bits")
         code = self.code.to_bytes(4, "little")
         return _pack_sdo(Service.SDO_REQUEST, _ABORT << 5, self.index, self.subindex, code)
 
 
 @dataclass(frozen=True, slots=True)
 class Emergency:
-    """Emergency, §5.6.4: a device reports a fault, or with code 0 that the fault is gone."""
+    """Emergency message of a device, §5.6.4. Error code 0 means that the fault is cleared."""
 
     error_code: int
     error_register: int
@@ -233,7 +239,7 @@ class Emergency:
     def encode(self) -> bytes:
         """Return the encoded bytes. Raises ValueError if a field does not fit."""
         if len(self.data) != 5:
-            raise ValueError(f"emergency: carries 5 bytes, got {len(self.data)}")
+            raise ValueError(f"emergency: needs 5 bytes of data, got {len(self.data)}")
         try:
             return _EMERGENCY.pack(
                 _header(Service.EMERGENCY), self.error_code, self.error_register, self.data
@@ -252,14 +258,14 @@ Message: TypeAlias = Request | Response | Emergency | SdoInformation
 
 
 def decode_coe(data: bytes) -> Message:
-    """Return the CoE message in the data of a mailbox message.
+    """Decode the CoE message in the data of a mailbox message.
 
     Raises:
         DecodeError: The message is invalid, or it is a PDO service. PDO services over the mailbox
             are not supported; they are not used in practice.
     """
     if len(data) < HEADER_SIZE:
-        raise DecodeError(f"CoE: {len(data)} bytes, the header needs {HEADER_SIZE}")
+        raise DecodeError(f"CoE header: needs {HEADER_SIZE} bytes, received {len(data)}")
     service = int.from_bytes(data[:HEADER_SIZE], "little") >> 12
     if service == Service.SDO_REQUEST:
         return _decode_request(data)
@@ -319,7 +325,7 @@ def _unpack_initiate(command: int, last: bytes, rest: bytes) -> tuple[bytes, int
         payload = last[: EXPEDITED_MAXIMUM - missing]
         return payload, len(payload), True
     size = int.from_bytes(last, "little")
-    # A message may be longer than its data: bytes beyond the size are ignored.
+    # Ignore bytes beyond the size: a message may be longer than its data.
     return rest[:size], size, False
 
 

@@ -10,10 +10,10 @@ from catenary.errors import DecodeError
 
 
 class EcatCommand(IntEnum):
-    """Command of a datagram for the controllers on its way, ETG.1000.4 §5.4.1."""
+    """Command of a datagram, ETG.1000.4 §5.4.1."""
 
     NOP = 0
-    APRD = 1  # auto-increment: read, write, both
+    APRD = 1  # auto-increment address: read, write, read and write
     APWR = 2
     APRW = 3
     FPRD = 4  # configured station address
@@ -30,12 +30,12 @@ class EcatCommand(IntEnum):
 
     @property
     def reads(self) -> bool:
-        """True if a device puts data into the datagram."""
+        """True if an addressed device inserts data into the datagram."""
         return self in _READS
 
     @property
     def writes(self) -> bool:
-        """True if a device takes data from the datagram."""
+        """True if an addressed device stores data from the datagram."""
         return self in _WRITES
 
     @property
@@ -85,10 +85,11 @@ _MORE_FOLLOWS = 0x8000
 
 @dataclass(frozen=True, slots=True)
 class Datagram:
-    """One datagram. `address`: the 32 bits as on the wire, ADP | ADO << 16 or the logical address.
+    """One datagram.
 
-    `circulating`: it passed a controller twice (a broken ring). `interrupt`: the ECAT event
-    requests of all devices, combined with OR.
+    `address` has 32 bits, as on the wire: ADP | ADO << 16, or the logical address. `circulating` is
+    True if the datagram passed a controller twice, which indicates a broken ring. `interrupt` is
+    the OR of the ECAT event requests of all devices.
     """
 
     command: EcatCommand
@@ -106,7 +107,7 @@ class Datagram:
 
     @property
     def ado(self) -> int:
-        """Address in the memory of the device."""
+        """Address in the device's memory."""
         return self.address >> 16
 
     @property
@@ -117,7 +118,9 @@ class Datagram:
     def encode(self, *, more_follows: bool = False) -> bytes:
         """Return the encoded bytes. Raises ValueError if a field does not fit."""
         if len(self.data) > MAXIMUM_DATA_SIZE:
-            raise ValueError(f"datagram of {len(self.data)} bytes: at most {MAXIMUM_DATA_SIZE}")
+            raise ValueError(
+                f"datagram data: {len(self.data)} bytes, at most {MAXIMUM_DATA_SIZE} fit"
+            )
         length = len(self.data)
         length |= _CIRCULATING if self.circulating else 0
         length |= _MORE_FOLLOWS if more_follows else 0
@@ -129,18 +132,18 @@ class Datagram:
 
 
 def decode_datagram(data: bytes, offset: int = 0) -> tuple[Datagram, bool]:
-    """Return the datagram at `offset`, and True if another one follows.
+    """Decode the datagram at `offset`. Return it, and True if another one follows.
 
     Args:
         data: The bytes of a frame.
-        offset: The first byte of the datagram.
+        offset: Position of the first byte of the datagram.
 
     Raises:
         DecodeError: The datagram is invalid or incomplete.
     """
     if not 0 <= offset <= len(data) - OVERHEAD:
         raise DecodeError(
-            f"datagram at byte {offset}: {max(len(data) - offset, 0)} bytes left, needs {OVERHEAD}"
+            f"datagram at byte {offset}: needs {OVERHEAD} bytes, {max(len(data) - offset, 0)} left"
         )
     command, index, address, length, interrupt = _HEADER.unpack_from(data, offset)
     if command > EcatCommand.FRMW:

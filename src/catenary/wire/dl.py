@@ -1,4 +1,4 @@
-"""DL control and DL status: forwarding, loops and links of the ports, ETG.1000.4 §6.2."""
+"""DL control and DL status: frame forwarding, port loops and links, ETG.1000.4 §6.2."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ class Loop(IntEnum):
     """Loop setting of a port: its behaviour when the link comes up or goes down."""
 
     AUTO = 0  # open while the link is up
-    AUTO_CLOSE = 1  # closes when the link goes down, opens only by a write
+    AUTO_CLOSE = 1  # closes when the link goes down; only a write opens it
     OPEN = 2
     CLOSED = 3
 
@@ -22,9 +22,9 @@ _AUTO = (Loop.AUTO, Loop.AUTO, Loop.AUTO, Loop.AUTO)
 
 @dataclass(frozen=True, slots=True)
 class DlControl:
-    """DL control (0x0100)."""
+    """The DL control register (0x0100)."""
 
-    destroy_alien_frames: bool = True  # frames that are not EtherCAT; False: forwarded
+    destroy_alien_frames: bool = True  # non-EtherCAT frames; if False, they are forwarded
     temporary: bool = False  # the settings are valid for about one second
     loops: tuple[Loop, Loop, Loop, Loop] = _AUTO
     receive_fifo: int = 7  # 0 to 7; a smaller FIFO has less delay
@@ -35,7 +35,7 @@ class DlControl:
     def word(self) -> int:
         """Value of the register. Raises ValueError if the FIFO size does not fit."""
         if not 0 <= self.receive_fifo <= 7:
-            raise ValueError(f"DL control: receive FIFO is 0 to 7, got {self.receive_fifo}")
+            raise ValueError(f"DL control: receive FIFO must be 0 to 7, got {self.receive_fifo}")
         word = self.destroy_alien_frames | self.temporary << 1
         for port in PORTS:
             word |= self.loops[port] << 8 + 2 * port
@@ -59,9 +59,9 @@ class DlControl:
 class Port:
     """DL status of one port."""
 
-    link: bool = False  # the PHY has a signal
-    loop_closed: bool = True  # frames return here
-    communication: bool = False  # a stable connection
+    link: bool = False  # the PHY detects a signal
+    loop_closed: bool = True  # frames turn back at this port
+    communication: bool = False  # the connection is stable
 
 
 _CLOSED = Port()
@@ -69,10 +69,10 @@ _CLOSED = Port()
 
 @dataclass(frozen=True, slots=True)
 class DlStatus:
-    """DL status (0x0110)."""
+    """The DL status register (0x0110)."""
 
     pdi_operational: bool  # the EEPROM is loaded and the PDI is active
-    pdi_watchdog: bool  # True if it is triggered in time
+    pdi_watchdog: bool  # the PDI watchdog has not expired
     enhanced_link_detection: bool = False
     ports: tuple[Port, Port, Port, Port] = (_CLOSED, _CLOSED, _CLOSED, _CLOSED)
 

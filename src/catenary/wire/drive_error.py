@@ -1,7 +1,7 @@
 """Error codes of drives: object 0x603F and emergencies, IEC 61800-7-201 §"Error codes" (CiA 402-1).
-CiA 301 defines 0x8200 to 0x82FF, EtherCAT defines 0xA000 to 0xA0FF (ETG.1000.6 §5.6.4).
 
-0xFF00 to 0xFFFF are manufacturer specific; see the manual of the drive.
+CiA 301 defines 0x8200 to 0x82FF, and EtherCAT defines 0xA000 to 0xA0FF (ETG.1000.6 §5.6.4). Codes
+0xFF00 to 0xFFFF are manufacturer-specific; see the manual of the drive.
 """
 
 from __future__ import annotations

@@ -1,5 +1,8 @@
-"""Error counters, registers 0x0300 to 0x0313; Beckhoff, ESC data sheet I, §14 (what each one
-counts) and II, §3.33 to §3.38. All stop at 255; a write clears them."""
+"""Error counters, registers 0x0300 to 0x0313. Each counter stops at 255; a write clears it.
+
+Source: Beckhoff, ESC data sheet, section I §14 (meaning of the counters) and section II §3.33 to
+§3.38 (registers).
+"""
 
 from __future__ import annotations
 
@@ -10,7 +13,7 @@ from operator import attrgetter
 from catenary.errors import DecodeError
 from catenary.wire.register import ERROR_COUNTERS, PORT_COUNT
 
-FULL = 255  # a counter stops here
+FULL = 255  # the value at which a counter stops
 _BLOCK = struct.Struct("<8B4BBBxx4B")
 
 
@@ -18,9 +21,9 @@ _BLOCK = struct.Struct("<8B4BBBxx4B")
 class PortErrors:
     """Error counts of one port."""
 
-    invalid_frames: int = 0  # broken frames first detected here: broken on the way to this port
+    invalid_frames: int = 0  # broken frames detected first at this port: its cable is suspect
     symbol_errors: int = 0  # physical layer errors (RX_ER), also between frames
-    forwarded: int = 0  # broken frames already marked by an earlier device
+    forwarded: int = 0  # broken frames that an earlier device has already marked
     lost_links: int = 0
 
     def __bool__(self) -> bool:
@@ -37,7 +40,7 @@ class ErrorCounters:
     """Error counts of one device since its power-up or the last write."""
 
     ports: Ports = (_NONE, _NONE, _NONE, _NONE)
-    processing_unit: int = 0  # broken or malformed frames that arrived by port 0
+    processing_unit: int = 0  # broken or malformed frames that arrived at port 0
     pdi: int = 0  # errors of the interface to the device's processor
 
     def __bool__(self) -> bool:
@@ -54,7 +57,7 @@ class ErrorCounters:
             raise ValueError(f"error counters: {error}") from None
 
     def since(self, before: ErrorCounters) -> ErrorCounters:
-        """Return the counts since `before`. If a counter decreased, all had restarted at 0."""
+        """Return the counts since `before`. If one decreased, all are assumed to have restarted."""
         if self.restarted(before):
             return self
         one, two, three, four = (
@@ -68,12 +71,12 @@ class ErrorCounters:
         )
 
     def restarted(self, before: ErrorCounters) -> bool:
-        """Return True if a counter decreased: a power cycle, or the counters were cleared."""
+        """Return True if a counter decreased, which shows a power cycle or cleared counters."""
         return any(a < b for a, b in zip(self.encode(), before.encode(), strict=True))
 
 
 def decode_error_counters(data: bytes) -> ErrorCounters:
-    """Return the counters in the 20 bytes from 0x0300."""
+    """Decode the 20 bytes of the counters, from 0x0300 on."""
     if len(data) != ERROR_COUNTERS.size:
         raise DecodeError(f"{ERROR_COUNTERS}: needs {ERROR_COUNTERS.size} bytes, got {len(data)}")
     numbers = _BLOCK.unpack(data)

@@ -13,7 +13,7 @@ _BLOCK = struct.Struct("<BBHBBBBH")
 
 
 class Feature(IntFlag):
-    """The ESC features register (0x0008). NO_LRW and NO_READ_WRITE denote missing features."""
+    """Bits of the ESC features register (0x0008). NO_... bits mark missing features."""
 
     FMMU_BYTE_ORIENTED = 0x0001
     UNUSED_REGISTER_ACCESS = 0x0002
@@ -30,7 +30,7 @@ class Feature(IntFlag):
 
 
 class PortKind(IntEnum):
-    """Kind of a port, two bits of the port descriptor (0x0007)."""
+    """Kind of a port: two bits of the port descriptor (0x0007)."""
 
     ABSENT = 0
     NOT_CONFIGURED = 1
@@ -53,17 +53,17 @@ class Information:
 
     @property
     def supports_lrw(self) -> bool:
-        """True if one datagram can read and write its process data (LRW)."""
+        """True if one datagram can both read and write the process data (LRW)."""
         return not self.features & Feature.NO_LRW
 
     @property
     def supports_clocks(self) -> bool:
-        """True if it has distributed clocks."""
+        """True if the controller has a distributed clock."""
         return bool(self.features & Feature.DISTRIBUTED_CLOCKS)
 
     @property
     def clock_bits(self) -> int:
-        """Width of its system time in bits; 0 without distributed clocks."""
+        """Width of the system time [bits]; 0 without a distributed clock."""
         if not self.supports_clocks:
             return 0
         return 64 if self.features & Feature.DISTRIBUTED_CLOCKS_64_BIT else 32
@@ -81,7 +81,7 @@ class Information:
 
 
 def decode_information(data: bytes) -> Information:
-    """Return the information in the first ten bytes of the registers."""
+    """Decode the first ten bytes of the registers."""
     if len(data) != SIZE:
         raise DecodeError(f"ESC information: needs {SIZE} bytes, received {len(data)}")
     kind, revision, build, fmmus, sync_managers, ram_size, descriptor, features = _BLOCK.unpack(

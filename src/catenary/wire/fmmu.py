@@ -1,5 +1,7 @@
-"""FMMU blocks, registers 0x0600 + 16·k, ETG.1000.4 §6.6. They map bits of the logical address space
-to bits of the device's memory."""
+"""FMMU blocks, registers 0x0600 + 16·k, ETG.1000.4 §6.6.
+
+An FMMU maps bits of the logical address space to bits of the device's memory.
+"""
 
 from __future__ import annotations
 
@@ -14,8 +16,10 @@ _BLOCK = struct.Struct("<IHBBHBBB3x")
 
 @dataclass(frozen=True, slots=True)
 class Fmmu:
-    """One FMMU. It maps bit `logical_start_bit` of the first byte to bit `logical_end_bit` of the
-    last byte, both included. `length` is the number of logical bytes, partial ones included.
+    """One FMMU.
+
+    It maps all bits from `logical_start_bit` of the first byte to `logical_end_bit` of the last
+    byte. `length` is the number of logical bytes, including partial ones.
     """
 
     logical_address: int
@@ -24,8 +28,8 @@ class Fmmu:
     logical_end_bit: int
     physical_address: int
     physical_start_bit: int
-    reads: bool = False  # from the device into the frame
-    writes: bool = False  # from the frame into the device
+    reads: bool = False  # data goes from the device into the frame
+    writes: bool = False  # data goes from the frame into the device
     enabled: bool = True
 
     @property
@@ -50,7 +54,7 @@ class Fmmu:
 
 
 def decode_fmmu(data: bytes) -> Fmmu:
-    """Return the FMMU in a block of 16 bytes. Reserved bits are ignored, as in controllers."""
+    """Decode an FMMU block of 16 bytes. Reserved bits are ignored, as in controllers."""
     if len(data) != SIZE:
         raise DecodeError(f"FMMU: needs {SIZE} bytes, received {len(data)}")
     logical, length, first, last, physical, start, kind, enabled = _BLOCK.unpack(data)
@@ -74,10 +78,10 @@ def bits(
 
     Args:
         logical_bit: First logical bit, counted from address 0.
-        physical_bit: First bit of the device's memory, counted from address 0.
+        physical_bit: First bit in the device's memory, counted from address 0.
         bit_length: Number of bits, at least 1.
-        reads: True for inputs, from the device into the frame.
-        writes: True for outputs, from the frame into the device.
+        reads: True for inputs (from the device into the frame).
+        writes: True for outputs (from the frame into the device).
 
     Raises:
         ValueError: `bit_length` is less than 1.

@@ -1,8 +1,10 @@
-"""EtherCAT frames in Ethernet, ETG.1000.4 §5.1 to §5.3: Ethernet header, EtherCAT header of type 1,
-datagrams, padding. The network interface adds and checks the frame check sequence.
+"""EtherCAT frames in Ethernet, ETG.1000.4 §5.1 to §5.3.
 
-EtherCAT in UDP (EtherType 0x0800) and VLAN-tagged frames are rejected: a raw link to a segment does
-not need them.
+A frame consists of an Ethernet header, an EtherCAT header of type 1, datagrams and padding. The
+network interface adds and checks the frame check sequence.
+
+EtherCAT over UDP (EtherType 0x0800) and VLAN-tagged frames are rejected: a direct link to a segment
+does not need them.
 """
 
 from __future__ import annotations
@@ -42,10 +44,10 @@ def wire_time_ns(size: int) -> int:
 
 @dataclass(frozen=True, slots=True)
 class Frame:
-    """One frame. `padding` contains the bytes after the last datagram; encode restores them.
+    """One frame. `padding` contains the bytes after the last datagram; `encode` restores them.
 
-    `counted_padding` is the part of the padding that the length in the EtherCAT header includes.
-    Usually it is 0. TwinCAT counts to an even length, other masters to Ethernet's minimum.
+    `counted_padding` is the part of the padding that the length in the EtherCAT header includes. It
+    is usually 0. TwinCAT includes padding to an even length, some masters all of the padding.
     """
 
     datagrams: tuple[Datagram, ...]
@@ -56,9 +58,10 @@ class Frame:
 
     @property
     def has_passed_controller(self) -> bool:
-        """True if a controller processed it: the first one sets a bit of the source address.
+        """True if a controller has processed the frame.
 
-        A frame that returns without this bit did not pass any device, for instance on `lo`.
+        The first controller sets a bit of the source address. A frame that returns without this
+        bit did not pass any device, for instance on `lo`.
         """
         return bool(self.source[0] & PASSED_CONTROLLER)
 
@@ -76,18 +79,18 @@ class Frame:
         if not self.datagrams:
             raise ValueError("a frame needs at least one datagram")
         if len(self.source) != 6 or len(self.destination) != 6:
-            raise ValueError("a MAC address has 6 bytes")
+            raise ValueError("source and destination must have 6 bytes (MAC addresses)")
         last = len(self.datagrams) - 1
         payload = b"".join(
             datagram.encode(more_follows=i < last) for i, datagram in enumerate(self.datagrams)
         )
         if len(payload) + len(self.padding) > MAXIMUM_PAYLOAD:
             raise ValueError(
-                f"datagrams of {len(payload)} bytes: a frame holds at most {MAXIMUM_PAYLOAD}"
+                f"datagrams of {len(payload)} bytes exceed a frame, at most {MAXIMUM_PAYLOAD} fit"
             )
         if not 0 <= self.counted_padding <= len(self.padding):
             raise ValueError(
-                f"counted_padding is {self.counted_padding}, padding has {len(self.padding)} bytes"
+                f"counted_padding must be 0 to {len(self.padding)}, got {self.counted_padding}"
             )
         length = len(payload) + self.counted_padding
         header = struct.pack("<H", length | _TYPE_COMMAND << 12)
@@ -112,14 +115,14 @@ def encode_frame(
 
 
 def decode_frame(data: bytes) -> Frame:
-    """Return the frame in `data`. Raises DecodeError with the reason if it is not EtherCAT."""
+    """Decode a frame. Raises DecodeError with the reason if it is not an EtherCAT frame."""
     if reason := _why_alien(data):
         raise DecodeError(f"not an EtherCAT frame: {reason}")
     length = int.from_bytes(data[ETHERNET_HEADER_SIZE:HEADER_SIZE], "little") & 0x07FF
     end = HEADER_SIZE + length
     if end > len(data):
         raise DecodeError(
-            f"EtherCAT header specifies {length} bytes, {len(data) - HEADER_SIZE} received"
+            f"EtherCAT header specifies {length} bytes, but {len(data) - HEADER_SIZE} were received"
         )
     datagrams, rest = _decode_datagrams(bytes(data[:end]))
     return Frame(
@@ -132,16 +135,16 @@ def decode_frame(data: bytes) -> Frame:
 
 
 def is_alien(data: bytes) -> bool:
-    """Return True if the bytes are not an EtherCAT command frame, but other traffic."""
+    """Return True if the bytes are not an EtherCAT command frame."""
     return _why_alien(data) is not None
 
 
 def is_own(data: bytes, source: bytes) -> bool:
-    """Return True if a frame was sent from a MAC address, even if controllers processed it.
+    """Return True if a frame was sent by `source`, even if controllers have processed it.
 
     Args:
-        data: The frame, from the destination address on.
-        source: The MAC address, 6 bytes.
+        data: The frame, starting with the destination address.
+        source: The MAC address of the sender, 6 bytes.
     """
     mask = 0xFF & ~PASSED_CONTROLLER
     return len(data) >= 12 and data[6] & mask == source[0] & mask and data[7:12] == source[1:]
@@ -149,24 +152,24 @@ def is_own(data: bytes, source: bytes) -> bool:
 
 def _why_alien(data: bytes) -> str | None:
     if len(data) < HEADER_SIZE + OVERHEAD:
-        return f"{len(data)} bytes, needs {HEADER_SIZE + OVERHEAD}"
+        return f"{len(data)} bytes, needs at least {HEADER_SIZE + OVERHEAD}"
     if len(data) > MAXIMUM_SIZE:
         return f"{len(data)} bytes, at most {MAXIMUM_SIZE}"
     ethertype = int.from_bytes(data[12:14], "big")
     if ethertype in _VLAN_ETHERTYPES:
         return f"VLAN-tagged (EtherType 0x{ethertype:04X}); use untagged frames"
     if ethertype != ETHERTYPE:
-        return f"EtherType 0x{ethertype:04X}, needs 0x{ETHERTYPE:04X}"
+        return f"EtherType 0x{ethertype:04X} instead of 0x{ETHERTYPE:04X}"
     header = int.from_bytes(data[ETHERNET_HEADER_SIZE:HEADER_SIZE], "little")
     if header >> 12 != _TYPE_COMMAND:
-        return f"EtherCAT header of type {header >> 12}, needs {_TYPE_COMMAND} (commands)"
+        return f"EtherCAT header of type {header >> 12} instead of {_TYPE_COMMAND} (commands)"
     if header & 0x0800:
         return "reserved bit 11 of the EtherCAT header is set"
     return None
 
 
 def _decode_datagrams(data: bytes) -> tuple[tuple[Datagram, ...], int]:
-    """Return the datagrams, and the offset of the end of the last one."""
+    """Return the datagrams, and the offset at which the last one ends."""
     datagrams: list[Datagram] = []
     offset, more_follows = HEADER_SIZE, True
     while more_follows:

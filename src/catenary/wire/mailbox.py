@@ -9,14 +9,14 @@ from enum import IntEnum
 from catenary.errors import DecodeError
 
 HEADER_SIZE = 6
-COUNTERS = range(1, 8)  # 0 is reserved: "no counter"
+COUNTERS = range(1, 8)  # 0 means no counter
 _HEADER = struct.Struct("<HHBB")
 _ERROR = struct.Struct("<HH")
 _ERROR_TYPE = 0x0001
 
 
 class Type(IntEnum):
-    """The protocol of a mailbox message."""
+    """Protocol of a mailbox message."""
 
     ERROR = 0
     AOE = 1
@@ -34,15 +34,15 @@ class Mailbox:
     type: Type
     data: bytes
     counter: int = 0  # 1 to 7, incremented with each new message; 1 follows 7
-    address: int = 0  # station address of the partner; 0: the MainDevice
+    address: int = 0  # station address of the partner; 0 is the MainDevice
     priority: int = 0  # 0 to 3
     channel: int = 0
 
     def encode(self, size: int | None = None) -> bytes:
         """Return the encoded bytes, padded with zeros to the `size` of the mailbox.
 
-        The device receives the mailbox only when its last byte is written. Raises ValueError if
-        the message does not fit.
+        The padding is required: a device receives a message when the last byte of its mailbox is
+        written. Raises ValueError if the message does not fit.
         """
         if not (0 <= self.counter <= 7 and 0 <= self.priority <= 3 and 0 <= self.channel < 64):
             raise ValueError(f"mailbox: counter, priority or channel out of range in {self}")
@@ -62,9 +62,9 @@ class Mailbox:
 
 
 def decode_mailbox(data: bytes) -> Mailbox:
-    """Return the message at the start of a mailbox buffer."""
+    """Decode the message at the start of a mailbox buffer."""
     if len(data) < HEADER_SIZE:
-        raise DecodeError(f"mailbox: {len(data)} bytes, the header needs {HEADER_SIZE}")
+        raise DecodeError(f"mailbox header: needs {HEADER_SIZE} bytes, received {len(data)}")
     length, address, channel, kind = _HEADER.unpack_from(data)
     if HEADER_SIZE + length > len(data):
         raise DecodeError(
@@ -79,7 +79,7 @@ def decode_mailbox(data: bytes) -> Mailbox:
 
 
 def next_counter(counter: int) -> int:
-    """Return the counter of the next message after `counter`: 1 to 7, then 1 again."""
+    """Return the counter that follows `counter`: 1 to 7, then 1 again."""
     return counter % 7 + 1
 
 
@@ -112,7 +112,7 @@ ERROR_TEXTS = {
 
 @dataclass(frozen=True, slots=True)
 class ErrorReply:
-    """The data of a message of type ERROR. `code` may be one that the standard does not define."""
+    """Data of a message of type ERROR. `code` may be a value that the standard does not define."""
 
     code: int
 
@@ -125,15 +125,15 @@ class ErrorReply:
     def encode(self) -> bytes:
         """Return the encoded bytes. Raises ValueError if the code does not fit."""
         if not 0 <= self.code <= 0xFFFF:
-            raise ValueError(f"mailbox error: code {self.code} has more than 16 bits")
+            raise ValueError(f"mailbox error: code {self.code} does not fit into 16 bits")
         return _ERROR.pack(_ERROR_TYPE, self.code)
 
 
 def decode_error(data: bytes) -> ErrorReply:
-    """Return the mailbox error in the data of a message of type ERROR."""
+    """Decode the data of a message of type ERROR."""
     if len(data) < _ERROR.size:
         raise DecodeError(f"mailbox error: needs {_ERROR.size} bytes, received {len(data)}")
     kind, code = _ERROR.unpack_from(data)
     if kind != _ERROR_TYPE:
-        raise DecodeError(f"mailbox error: type {kind}, needs {_ERROR_TYPE}")
+        raise DecodeError(f"mailbox error: type {kind} instead of {_ERROR_TYPE}")
     return ErrorReply(code)

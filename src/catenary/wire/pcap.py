@@ -1,7 +1,7 @@
-"""Captures of Ethernet frames in pcap (draft-ietf-opsawg-pcap), which `tcpdump -w` writes.
+"""Captures of Ethernet frames in pcap format (draft-ietf-opsawg-pcap), as `tcpdump -w` writes it.
 
-Both byte orders can be read, with times in microseconds or nanoseconds. A truncated last record is
-left out; `Capture.cut` counts its bytes.
+The decoder accepts both byte orders, and time stamps in microseconds or nanoseconds. It omits a
+truncated last record; `Capture.cut` is the number of its bytes.
 """
 
 from __future__ import annotations
@@ -15,8 +15,8 @@ from catenary.wire.pcapng import Capture, Interface, Packet
 _HEADER = "IHHiIII"  # magic, version, time zone, accuracy, snap length, link type
 _RECORD = "IIII"  # seconds, fraction, bytes captured, bytes on the wire
 _HEADER_SIZE, _RECORD_SIZE = 24, 16
-_UNITS = {0xA1B2C3D4: (1000, 6), 0xA1B23C4D: (1, 9)}  # magic: ns in a tick, resolution
-_LINK_TYPE = 0xFFFF  # the upper half describes check sequences
+_UNITS = {0xA1B2C3D4: (1000, 6), 0xA1B23C4D: (1, 9)}  # magic: (ns per tick, decimal exponent)
+_LINK_TYPE = 0xFFFF  # mask; the upper half describes the frame check sequence
 
 
 class _Format(NamedTuple):
@@ -26,17 +26,17 @@ class _Format(NamedTuple):
 
 
 def is_pcap(data: bytes) -> bool:
-    """Return True if the bytes begin with the magic number of pcap."""
+    """Return True if the bytes begin with a pcap magic number."""
     return _format(data) is not None
 
 
 def decode_pcap(data: bytes) -> Capture:
-    """Return the capture in the bytes of a file. Raises DecodeError if it is not pcap."""
+    """Decode a file. Raises DecodeError if it is not a pcap file."""
     form = _format(data)
     if form is None:
         raise DecodeError(f"not a pcap file: magic number {data[:4].hex() or 'missing'}")
     if len(data) < _HEADER_SIZE:
-        raise DecodeError(f"pcap: {len(data)} bytes, the header needs {_HEADER_SIZE}")
+        raise DecodeError(f"pcap header: needs {_HEADER_SIZE} bytes, received {len(data)}")
     link_type = struct.unpack_from(form.order + _HEADER, data)[-1] & _LINK_TYPE
     packets: list[Packet] = []
     offset = _HEADER_SIZE

@@ -1,11 +1,12 @@
-"""Captures of Ethernet frames in pcapng (draft-ietf-opsawg-pcapng): reading in both byte orders,
-writing with one interface and times in ns.
+"""Captures of Ethernet frames in pcapng format (draft-ietf-opsawg-pcapng).
+
+The decoder accepts both byte orders. The encoder writes one interface, with times in ns.
 
     capture = encode_header("eth0") + b"".join(encode_packet(packet) for packet in packets)
     decode_pcapng(capture).packets == tuple(packets)
 
-A truncated last block (killed program, full disk) is left out; `Capture.cut` counts its bytes.
-Wireshark reads such files in the same way.
+The decoder omits a last block that is truncated (killed program, full disk), like Wireshark.
+`Capture.cut` is the number of its bytes.
 """
 
 from __future__ import annotations
@@ -20,7 +21,7 @@ from catenary.errors import DecodeError
 
 ETHERNET = 1  # LINKTYPE_ETHERNET
 
-_SECTION = 0x0A0D0D0A  # reads the same in both byte orders
+_SECTION = 0x0A0D0D0A  # the same in both byte orders
 _MAGIC = 0x1A2B3C4D
 _INTERFACE = 1
 _SIMPLE_PACKET = 3
@@ -32,7 +33,7 @@ _OPTION_END = 0
 _OPTION_COMMENT = 1
 _OPTION_NAME = 2
 _OPTION_FLAGS = 2  # of a packet
-_OPTION_RECEIVED = 4  # of statistics
+_OPTION_RECEIVED = 4  # of a statistics block
 _OPTION_DROPPED = 5
 _OPTION_RESOLUTION = 9
 _OPTION_TIME_OFFSET = 14
@@ -42,7 +43,10 @@ _NANOSECONDS = 9
 
 @dataclass(frozen=True, slots=True)
 class Interface:
-    """Interface of a capture. `resolution` is a power of 2 if bit 7 is set, else of 10."""
+    """Interface of a capture.
+
+    A tick is 2^-n s if bit 7 of `resolution` is set, else 10^-n s; n is the value of bits 0 to 6.
+    """
 
     name: str = ""
     link_type: int = ETHERNET
@@ -66,13 +70,13 @@ class Packet:
     data: bytes
     comment: str = ""
     interface: int = 0  # index in Capture.interfaces
-    original_length: int | None = None  # None: not truncated
+    original_length: int | None = None  # None if `data` is not truncated
     direction: Direction = Direction.UNKNOWN
 
 
 @dataclass(frozen=True, slots=True)
 class Capture:
-    """A whole file. Blocks of other kinds (names, statistics) are left out."""
+    """Content of a capture file, without blocks of other kinds (names, statistics)."""
 
     interfaces: tuple[Interface, ...]
     packets: tuple[Packet, ...]
@@ -80,7 +84,7 @@ class Capture:
 
 
 def encode_header(interface_name: str = "") -> bytes:
-    """Return the beginning of a file: a section and its one interface, with times in ns."""
+    """Return the start of a file: a section header and one interface, with times in ns."""
     section = struct.pack("<IHHq", _MAGIC, 1, 0, -1)
     options = _option(_OPTION_NAME, interface_name.encode()) if interface_name else b""
     options += _option(_OPTION_RESOLUTION, bytes((_NANOSECONDS,))) + _option(_OPTION_END, b"")
@@ -92,7 +96,7 @@ def encode_packet(packet: Packet) -> bytes:
     """Return the block of a packet. Raises ValueError if a field is out of range."""
     original = len(packet.data) if packet.original_length is None else packet.original_length
     if not 0 <= packet.time_ns < 1 << 64:
-        raise ValueError(f"pcapng: time {packet.time_ns} ns is not in 0 to 2**64 - 1")
+        raise ValueError(f"pcapng: time {packet.time_ns} ns is out of range; use 0 to 2**64 - 1")
     if packet.interface or not len(packet.data) <= original < 1 << 32:
         raise ValueError(
             f"pcapng: invalid interface {packet.interface} or original length {original}"
@@ -109,7 +113,7 @@ def encode_packet(packet: Packet) -> bytes:
 
 
 def encode_statistics(time_ns: int, *, received: int, dropped: int) -> bytes:
-    """Return the block at the end of a file.
+    """Return the statistics block, the last block of a file.
 
     Args:
         time_ns: Time of the statistics [ns].
@@ -123,9 +127,9 @@ def encode_statistics(time_ns: int, *, received: int, dropped: int) -> bytes:
 
 
 def decode_pcapng(data: bytes) -> Capture:
-    """Return the capture in the bytes of a file. Raises DecodeError if it is not pcapng.
+    """Decode a file. Raises DecodeError if it is not a pcapng file.
 
-    A truncated last block is left out.
+    A truncated last block is omitted.
     """
     state = _State()
     end = 0
@@ -144,18 +148,18 @@ def decode_pcapng(data: bytes) -> Capture:
 
 @dataclass(slots=True)
 class _State:
-    """Owner of the interfaces and packets found so far."""
+    """Owner of the interfaces and packets that were decoded so far."""
 
     interfaces: list[Interface] = field(default_factory=list)
     packets: list[Packet] = field(default_factory=list)
-    first_interface: int = 0  # first interface of the section; its packets count from here
+    first_interface: int = 0  # index of the first interface of the present section
 
     def interface(self, number: int) -> int:
-        """Return the index in the file of an interface of the section."""
+        """Return the index in the file of interface `number` of the section."""
         found = self.first_interface + number
         if found >= len(self.interfaces):
             raise DecodeError(
-                f"pcapng: a packet names interface {number}, which the file does not describe"
+                f"pcapng: a packet refers to interface {number}, which the file does not describe"
             )
         return found
 
@@ -164,7 +168,7 @@ class _Block(NamedTuple):
     kind: int
     order: str  # "<" or ">"
     body: bytes
-    end: int  # offset of its end in the file
+    end: int  # offset in the file
 
     def unpack(self, layout: str) -> tuple[int, ...]:
         """Return the fields at the start of the body."""
@@ -181,11 +185,11 @@ def _blocks(data: bytes) -> Iterator[_Block]:
         if offset + _MINIMUM_BLOCK > len(data):
             if offset:
                 return
-            raise DecodeError(f"pcapng: {len(data)} bytes, a block needs at least {_MINIMUM_BLOCK}")
+            raise DecodeError(f"pcapng block: needs {_MINIMUM_BLOCK} bytes, received {len(data)}")
         if data[offset : offset + 4] == b"\x0a\x0d\x0d\x0a":
             order = _byte_order(data[offset + 8 : offset + 12])
         if not order:
-            raise DecodeError("pcapng: does not begin with a section header")
+            raise DecodeError("pcapng: the file does not begin with a section header")
         kind, length = struct.unpack_from(order + "II", data, offset)
         end = offset + length
         if length < _MINIMUM_BLOCK or length % 4 or (end > len(data) and not offset):
@@ -226,19 +230,19 @@ def _decode_enhanced(block: _Block, state: _State) -> Packet:
     end = 20 + captured
     if end > len(block.body):
         raise DecodeError(
-            f"pcapng: a packet specifies {captured} bytes, its block has {len(block.body) - 20}"
+            f"pcapng: a packet specifies {captured} bytes, but its block has {len(block.body) - 20}"
         )
     options = _decode_options(block, end + -end % 4)
     comment = options.get(_OPTION_COMMENT, b"").decode("utf-8", "replace")
     time_ns = _time_ns(high << 32 | low, state.interfaces[interface])
-    cut = original if original != captured else None
+    original_length = original if original != captured else None
     direction = _direction(block, options.get(_OPTION_FLAGS, bytes(4)))
-    return Packet(time_ns, block.body[20:end], comment, interface, cut, direction)
+    return Packet(time_ns, block.body[20:end], comment, interface, original_length, direction)
 
 
 def _direction(block: _Block, flags: bytes) -> Direction:
     if len(flags) != 4:
-        raise DecodeError(f"pcapng: flags of a packet have {len(flags)} bytes, not 4")
+        raise DecodeError(f"pcapng: the flags of a packet have {len(flags)} bytes instead of 4")
     bits = struct.unpack(block.order + "I", flags)[0] & 3
     return Direction(bits) if bits < 3 else Direction.UNKNOWN
 
@@ -246,8 +250,8 @@ def _direction(block: _Block, flags: bytes) -> Direction:
 def _decode_simple(block: _Block, state: _State) -> Packet:
     (original,) = block.unpack("I")
     data = block.body[4 : 4 + original]
-    cut = original if original != len(data) else None
-    return Packet(0, data, "", state.interface(0), cut)
+    original_length = original if original != len(data) else None
+    return Packet(0, data, "", state.interface(0), original_length)
 
 
 def _time_ns(ticks: int, interface: Interface) -> int:
@@ -264,7 +268,7 @@ def _decode_options(block: _Block, offset: int) -> dict[int, bytes]:
             break
         start = offset + 4
         if start + length > len(block.body):
-            raise DecodeError(f"pcapng: option {code} with {length} bytes exceeds its block")
+            raise DecodeError(f"pcapng: option {code} of {length} bytes exceeds its block")
         options.setdefault(code, block.body[start : start + length])
         offset = start + length + -length % 4
     return options
@@ -277,7 +281,7 @@ def _block(kind: int, body: bytes) -> bytes:
 
 def _option(code: int, value: bytes) -> bytes:
     if len(value) > 0xFFFF:
-        raise ValueError(f"pcapng: an option has at most 65535 bytes, got {len(value)}")
+        raise ValueError(f"pcapng: an option can have at most 65535 bytes, got {len(value)}")
     return struct.pack("<HH", code, len(value)) + _pad(value)
 
 

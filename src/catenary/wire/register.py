@@ -1,6 +1,6 @@
-"""The register map of an EtherCAT SubDevice Controller, ETG.1000.4 §6 and Beckhoff's ESC data sheet
-(section II, register descriptions). Each register is defined once, with its format.
+"""Register map of an EtherCAT SubDevice Controller (ESC). Each register is defined once.
 
+The sources are ETG.1000.4 §6 and Beckhoff's ESC data sheet, section II (register descriptions).
 Indexed registers are functions: `fmmu(k)`, `sync_manager(k)`, `receive_time(port)`.
 """
 
@@ -23,9 +23,9 @@ PROCESS_RAM = 0x1000  # start of the memory for mailboxes and process data
 # No slots: `Register[int](...)` of a frozen class with slots fails in Python 3.11 (cpython#105332).
 @dataclass(frozen=True)
 class Register(Generic[T]):
-    """One register: address, format (one value, in the notation of `struct`) and name.
+    """One register: its address, its name, and its format, a `struct` format of a single value.
 
-    A register with several fields is a `Register[bytes]`; its own file encodes and decodes it.
+    A register with several fields is a `Register[bytes]`. A separate module converts its fields.
     """
 
     address: int
@@ -40,7 +40,7 @@ class Register(Generic[T]):
     def pack(self, value: T) -> bytes:
         """Return the encoded value. Raises ValueError if it does not fit."""
         if isinstance(value, bytes) and len(value) != self.size:
-            raise ValueError(f"{self}: needs exactly {self.size} bytes, got {len(value)}")
+            raise ValueError(f"{self}: needs {self.size} bytes, got {len(value)}")
         try:
             return struct.pack(self.format, value)
         except struct.error as error:
@@ -65,7 +65,7 @@ SYNC_MANAGERS_SUPPORTED = Register[int](0x0005, "<B", "SyncManagers supported")
 RAM_SIZE = Register[int](0x0006, "<B", "RAM size in kbyte")
 PORT_DESCRIPTOR = Register[int](0x0007, "<B", "port descriptor")
 FEATURES = Register[int](0x0008, "<H", "ESC features supported")
-INFORMATION = Register[bytes](0x0000, "10s", "ESC information")  # the eight above, features.py
+INFORMATION = Register[bytes](0x0000, "10s", "ESC information")  # all eight above; see features.py
 
 # Station address
 STATION_ADDRESS = Register[int](0x0010, "<H", "configured station address")
@@ -105,14 +105,14 @@ AL_EVENT_MASK = Register[int](0x0204, "<I", "PDI AL event mask")
 ECAT_EVENT_REQUEST = Register[int](0x0210, "<H", "ECAT event request")
 AL_EVENT_REQUEST = Register[int](0x0220, "<I", "AL event request")
 
-# Error counters (the blocks hold the four ports in a row)
+# Error counters; each block contains the counters of ports 0 to 3
 RX_ERROR_COUNTERS = Register[bytes](0x0300, "8s", "RX error counters")
 FORWARDED_RX_ERROR_COUNTERS = Register[bytes](0x0308, "4s", "forwarded RX error counters")
 PROCESSING_UNIT_ERROR_COUNTER = Register[int](0x030C, "<B", "ECAT processing unit error counter")
 PDI_ERROR_COUNTER = Register[int](0x030D, "<B", "PDI error counter")
 PDI_ERROR_CODE = Register[int](0x030E, "<B", "PDI error code")
 LOST_LINK_COUNTERS = Register[bytes](0x0310, "4s", "lost link counters")
-ERROR_COUNTERS = Register[bytes](0x0300, "20s", "error counters")  # all of them
+ERROR_COUNTERS = Register[bytes](0x0300, "20s", "error counters")  # all error counters
 
 # Watchdogs
 WATCHDOG_DIVIDER = Register[int](0x0400, "<H", "watchdog divider")
@@ -140,7 +140,7 @@ MII_PDI_ACCESS = Register[int](0x0517, "<B", "MII management PDI access state")
 
 # Distributed clocks: time loop (clock.py)
 RECEIVE_TIMES = Register[bytes](0x0900, "16s", "receive times of ports 0 to 3")
-RECEIVE_TIME_LATCH = Register[int](0x0900, "<I", "receive time port 0")  # a write latches all
+RECEIVE_TIME_LATCH = Register[int](0x0900, "<I", "receive time port 0")  # a write latches all ports
 SYSTEM_TIME = Register[int](0x0910, "<Q", "system time")
 SYSTEM_TIME_LOW = Register[int](0x0910, "<I", "system time, low half")
 RECEIVE_TIME_PROCESSING_UNIT = Register[int](0x0918, "<Q", "receive time ECAT processing unit")
@@ -181,7 +181,7 @@ ECAT_BUFFER_CHANGE_TIME = Register[int](0x09F0, "<I", "EtherCAT buffer change ev
 PDI_BUFFER_START_TIME = Register[int](0x09F8, "<I", "PDI buffer start event time")
 PDI_BUFFER_CHANGE_TIME = Register[int](0x09FC, "<I", "PDI buffer change event time")
 
-# Registers that only some kinds of controller have
+# Registers that only some controllers have
 PRODUCT_ID = Register[int](0x0E00, "<Q", "product ID")
 VENDOR_ID = Register[int](0x0E08, "<Q", "vendor ID")
 DIGITAL_OUTPUTS = Register[int](0x0F00, "<I", "digital I/O output data")
@@ -190,71 +190,74 @@ GENERAL_PURPOSE_INPUTS = Register[int](0x0F18, "<Q", "general purpose inputs")
 
 
 def watchdog_unit_ns(divider: int) -> int:
-    """Return the unit [ns] of the watchdog times (0x0410, 0x0420) for a divider (0x0400)."""
+    """Return the unit [ns] of the watchdog times (0x0410, 0x0420) for a `divider` (0x0400)."""
     return (divider + 2) * 40
 
 
 def rx_error_counter(port: int) -> Register[int]:
-    """Return the RX error counter of a port. Low byte: invalid frames; high byte: PHY RX errors."""
+    """Return the RX error counter register of a port.
+
+    The low byte counts invalid frames, the high byte PHY RX errors.
+    """
     return Register(0x0300 + 2 * _checked(port, PORT_COUNT), "<H", f"RX error counter port {port}")
 
 
 def forwarded_rx_error_counter(port: int) -> Register[int]:
-    """Return the counter of frames that an earlier device had already marked as broken."""
+    """Return the register that counts frames already marked as broken by an earlier device."""
     address = 0x0308 + _checked(port, PORT_COUNT)
     return Register(address, "<B", f"forwarded RX error counter port {port}")
 
 
 def lost_link_counter(port: int) -> Register[int]:
-    """Return the counter of lost links of a port."""
+    """Return the lost link counter register of a port."""
     return Register(0x0310 + _checked(port, PORT_COUNT), "<B", f"lost link counter port {port}")
 
 
 def phy_port_status(port: int) -> Register[int]:
-    """Return the PHY status that the MII management reports for a port."""
+    """Return the PHY status register of a port (MII management)."""
     return Register(0x0518 + _checked(port, PORT_COUNT), "<B", f"PHY port status {port}")
 
 
 def fmmu(k: int) -> Register[bytes]:
-    """Return the block of FMMU k, see fmmu.py."""
+    """Return the register block of FMMU `k`; see fmmu.py."""
     return Register(0x0600 + 16 * _checked(k, FMMU_COUNT), "16s", f"FMMU {k}")
 
 
 def sync_manager(k: int) -> Register[bytes]:
-    """Return the block of SyncManager k, see sync_manager.py."""
+    """Return the register block of SyncManager `k`; see sync_manager.py."""
     return Register(0x0800 + 8 * _checked(k, SYNC_MANAGER_COUNT), "8s", f"SyncManager {k}")
 
 
 def sync_manager_control(k: int) -> Register[int]:
-    """Return the control byte of SyncManager k: mode, direction, interrupts, watchdog trigger."""
+    """Return the control register of SyncManager `k`: mode, direction, interrupts, watchdog."""
     address = 0x0804 + 8 * _checked(k, SYNC_MANAGER_COUNT)
     return Register(address, "<B", f"SyncManager {k} control")
 
 
 def sync_manager_status(k: int) -> Register[int]:
-    """Return the status byte of SyncManager k: mailbox full, buffers."""
+    """Return the status register of SyncManager `k`: mailbox full, buffers."""
     address = 0x0805 + 8 * _checked(k, SYNC_MANAGER_COUNT)
     return Register(address, "<B", f"SyncManager {k} status")
 
 
 def sync_manager_activation(k: int) -> Register[int]:
-    """Return the activation byte of SyncManager k: enable, repeat request."""
+    """Return the activation register of SyncManager `k`: enable, repeat request."""
     address = 0x0806 + 8 * _checked(k, SYNC_MANAGER_COUNT)
     return Register(address, "<B", f"SyncManager {k} activation")
 
 
 def sync_manager_pdi_control(k: int) -> Register[int]:
-    """Return the PDI control byte of SyncManager k: deactivate, repeat acknowledge."""
+    """Return the PDI control register of SyncManager `k`: deactivate, repeat acknowledge."""
     address = 0x0807 + 8 * _checked(k, SYNC_MANAGER_COUNT)
     return Register(address, "<B", f"SyncManager {k} PDI control")
 
 
 def receive_time(port: int) -> Register[int]:
-    """Return the receive time of a port: local time at which the latching write arrived [ns]."""
+    """Return the receive time register of a port: local arrival time of the latching write [ns]."""
     return Register(0x0900 + 4 * _checked(port, PORT_COUNT), "<I", f"receive time port {port}")
 
 
 def _checked(number: int, count: int) -> int:
     if not 0 <= number < count:
-        raise ValueError(f"number {number} is not in 0 to {count - 1}")
+        raise ValueError(f"number {number} is out of range; use 0 to {count - 1}")
     return number

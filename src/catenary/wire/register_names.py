@@ -1,4 +1,4 @@
-"""Registers by name: `AL_STATUS`, "al status", "fmmu0", "SyncManager 2"."""
+"""Search for registers by name, such as `AL_STATUS`, "al status", "fmmu0" or "SyncManager 2"."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def by_name(name: str) -> AnyRegister:
     """Return the register with a name. Case, spaces and underscores are ignored.
 
     Raises:
-        ValueError: No register has the name. The error lists the nearest names.
+        ValueError: No register has this name. The message lists similar names.
     """
     known = _by_key()
     found = known.get(_key(name))
@@ -49,19 +49,19 @@ def by_name(name: str) -> AnyRegister:
 
 
 def near(name: str) -> tuple[str, ...]:
-    """Return the names of registers that are like a name; the nearest first."""
+    """Return the register names that are similar to a name, the most similar one first."""
     known = _by_key()
     found = get_close_matches(_key(name), known, n=3, cutoff=0.6)
     return tuple(dict.fromkeys(known[key].name for key in found))
 
 
 def at_address(address: int, size: int | None = None) -> AnyRegister | None:
-    """Return the register at an address; None if there is none.
+    """Return the register at an address; None if no register matches.
 
     Args:
-        address: The address of the first byte.
-        size: The size [bytes]. If it is None and several registers match, the shortest number is
-            returned, as for a read without a size.
+        address: Address of the first byte.
+        size: Size [bytes]. If it is None, numbers take precedence over blocks, then smaller
+            registers over larger ones, as for a read without a size.
     """
     found = [
         each for each in _by_key().values() if each.address == address and size in (None, each.size)

@@ -1,4 +1,4 @@
-"""Text that explains the content of registers."""
+"""Explanations of register contents, as text."""
 
 from __future__ import annotations
 
@@ -27,14 +27,15 @@ Explain: TypeAlias = Callable[[bytes], str]
 
 
 def explain(of: AnyRegister, data: bytes) -> str | None:
-    """Return the meaning of the content of a register.
+    """Return an explanation of the content of a register.
 
     Args:
         of: The register.
-        data: Its content, as read.
+        data: The content of the register.
 
     Returns:
-        The meaning, or the reason why the content is invalid; None if only the number is known.
+        The explanation, or the reason why the content is invalid. None if the register has no
+        explanation.
     """
     decode = _EXPLANATIONS.get((of.address, of.size))
     if decode is None:
@@ -115,9 +116,9 @@ def _fmmu(data: bytes) -> str:
     found = decode_fmmu(data)
     if not found.enabled:
         return "off"
-    ways = [way for on, way in ((found.reads, "inputs"), (found.writes, "outputs")) if on]
+    directions = [text for on, text in ((found.reads, "inputs"), (found.writes, "outputs")) if on]
     return (
-        f"{found.bit_length} bits of {' and '.join(ways) or 'nothing'}: logical "
+        f"{found.bit_length} bits of {' and '.join(directions) or 'nothing'}: logical "
         f"0x{found.logical_address:08X} bit {found.logical_start_bit}, physical "
         f"0x{found.physical_address:04X} bit {found.physical_start_bit}"
     )
@@ -127,10 +128,10 @@ def _sync_manager(data: bytes) -> str:
     found = decode_sync_manager(data)
     if Activation.ENABLE not in found.activation:
         return f"off ({found.length} bytes at 0x{found.address:04X})"
-    way = "MainDevice to device" if found.control.direction else "device to MainDevice"
+    direction = "MainDevice to device" if found.control.direction else "device to MainDevice"
     kind = found.control.buffering.name.lower().replace("_", " ")
     return (
-        f"{kind}, {way}: {found.length} bytes at 0x{found.address:04X}; "
+        f"{kind}, {direction}: {found.length} bytes at 0x{found.address:04X}; "
         f"status {_flags(found.status)}; PDI {_flags(found.pdi_control)}"
     )
 

@@ -1,4 +1,4 @@
-"""SDO information, ETG.1000.6 §5.6.3: the objects of a device.
+"""SDO information messages, ETG.1000.6 §5.6.3, which describe the objects of a device.
 
 A reply may consist of fragments. `SdoInformation` is one message. Join the data of the fragments,
 then decode it with `decode_object_list`, `decode_object_description` or `decode_entry_description`.
@@ -12,7 +12,7 @@ from enum import IntEnum, IntFlag
 
 from catenary.errors import DecodeError
 
-_HEADER = struct.Struct("<HBBH")  # CoE header, opcode and incomplete, reserved, fragments left
+_HEADER = struct.Struct("<HBBH")  # CoE header, opcode and incomplete bit, reserved, fragments left
 _SERVICE = 8
 _INCOMPLETE = 0x80
 _OBJECT = struct.Struct("<HHBB")
@@ -43,7 +43,7 @@ class ListType(IntEnum):
 
 
 class ObjectCode(IntEnum):
-    """The shape of an object."""
+    """Structure of an object."""
 
     DOMAIN = 2
     DEFTYPE = 5
@@ -54,7 +54,7 @@ class ObjectCode(IntEnum):
 
 
 class ValueInfo(IntFlag):
-    """Optional fields of an entry description."""
+    """Flags that select optional fields of an entry description."""
 
     NONE = 0
     ACCESS_RIGHTS = 0x01
@@ -67,7 +67,7 @@ class ValueInfo(IntFlag):
 
 
 class Access(IntFlag):
-    """The object access word of an entry."""
+    """Bits of the object access word of an entry."""
 
     READ_PRE_OP = 0x0001
     READ_SAFE_OP = 0x0002
@@ -83,7 +83,10 @@ class Access(IntFlag):
 
 @dataclass(frozen=True, slots=True)
 class SdoInformation:
-    """One message, or a fragment of a reply. `incomplete` (bit 7 of the opcode): more follow."""
+    """One message, or one fragment of a reply.
+
+    If `incomplete` (bit 7 of the opcode) is set, more fragments follow.
+    """
 
     opcode: Opcode
     data: bytes
@@ -100,12 +103,12 @@ class SdoInformation:
 
 
 def decode_sdo_information(data: bytes) -> SdoInformation:
-    """Return the message in the data of a mailbox message, CoE header included."""
+    """Decode the data of a mailbox message, including the CoE header."""
     if len(data) < _HEADER.size:
         raise DecodeError(f"SDO information: needs {_HEADER.size} bytes, received {len(data)}")
     header, opcode, _, fragments_left = _HEADER.unpack_from(data)
     if header >> 12 != _SERVICE:
-        raise DecodeError(f"SDO information: CoE service {header >> 12}, needs {_SERVICE}")
+        raise DecodeError(f"SDO information: CoE service {header >> 12} instead of {_SERVICE}")
     try:
         kind = Opcode(opcode & ~_INCOMPLETE)
     except ValueError:
@@ -130,14 +133,14 @@ def entry_request(index: int, subindex: int, info: ValueInfo = ValueInfo.NONE) -
     Args:
         index: Index of the object.
         subindex: Subindex of the entry.
-        info: Optional fields that the description shall contain.
+        info: Optional fields that the description must contain.
     """
     return SdoInformation(Opcode.ENTRY_REQUEST, struct.pack("<HBB", index, subindex, info))
 
 
 @dataclass(frozen=True, slots=True)
 class ObjectList:
-    """The objects of a kind. For LENGTHS: the number of objects of each other kind."""
+    """Indices of the objects of a kind; for LENGTHS, the number of objects of each other kind."""
 
     kind: ListType
     indices: tuple[int, ...]
@@ -151,10 +154,10 @@ class ObjectList:
 
 
 def decode_object_list(data: bytes) -> ObjectList:
-    """Return the list in the joined data of all LIST_RESPONSE fragments."""
+    """Decode the joined data of all LIST_RESPONSE fragments."""
     if len(data) < 2:
-        raise DecodeError(f"object list: {len(data)} bytes, needs at least 2")
-    # A truncated list may end with half an index.
+        raise DecodeError(f"object list: needs at least 2 bytes, received {len(data)}")
+    # A truncated list may end in the middle of an index.
     kind, *indices = struct.unpack_from(f"<{len(data) // 2}H", data)
     try:
         return ObjectList(ListType(kind), tuple(indices))
@@ -164,12 +167,12 @@ def decode_object_list(data: bytes) -> ObjectList:
 
 @dataclass(frozen=True, slots=True)
 class ObjectDescription:
-    """An object: its type (see `types.by_index`), its shape and its name."""
+    """Description of an object. For `data_type`, see `types.by_index`."""
 
     index: int
     data_type: int
     maximum_subindex: int
-    object_code: int  # an ObjectCode, or another number from the device
+    object_code: int  # an ObjectCode, or an undefined number from the device
     name: str = ""
 
     def encode(self) -> bytes:
@@ -182,7 +185,7 @@ class ObjectDescription:
 
 
 def decode_object_description(data: bytes) -> ObjectDescription:
-    """Return the description in the data of an OBJECT_RESPONSE."""
+    """Decode the data of an OBJECT_RESPONSE."""
     if len(data) < _OBJECT.size:
         raise DecodeError(f"object description: needs {_OBJECT.size} bytes, received {len(data)}")
     name = bytes(data[_OBJECT.size :]).decode("latin-1")
@@ -192,7 +195,7 @@ def decode_object_description(data: bytes) -> ObjectDescription:
 
 @dataclass(frozen=True, slots=True)
 class EntryDescription:
-    """An entry of an object. `rest` contains the fields selected by `info`, then the name."""
+    """Description of an entry. `rest` contains the fields selected by `info`, then the name."""
 
     index: int
     subindex: int
@@ -215,7 +218,7 @@ class EntryDescription:
 
     @property
     def name(self) -> str:
-        """Name of the entry: the part of `rest` after the fields selected by `info`."""
+        """Name of the entry, which follows the selected fields in `rest`."""
         size = (self.bit_length + 7) // 8
         values = (ValueInfo.DEFAULT, ValueInfo.MINIMUM, ValueInfo.MAXIMUM)
         skipped = (4 if self.info & ValueInfo.UNIT else 0) + size * sum(
@@ -225,7 +228,7 @@ class EntryDescription:
 
 
 def decode_entry_description(data: bytes) -> EntryDescription:
-    """Return the description in the data of an ENTRY_RESPONSE."""
+    """Decode the joined data of all ENTRY_RESPONSE fragments."""
     if len(data) < _ENTRY.size:
         raise DecodeError(f"entry description: needs {_ENTRY.size} bytes, received {len(data)}")
     index, subindex, info, data_type, bit_length, access = _ENTRY.unpack_from(data)
@@ -238,7 +241,7 @@ def decode_entry_description(data: bytes) -> EntryDescription:
 def decode_error(data: bytes) -> int | None:
     """Return the abort code in the data of an ERROR; None if it is incomplete.
 
-    KickCAT (CoE/mailbox/response.cc, SDOInformationMessage::abort) appends the code, but does not
-    count it in the length. The message then ends before the code.
+    KickCAT (CoE/mailbox/response.cc, SDOInformationMessage::abort) appends the code, but the length
+    in its header does not include it. The message then ends before the code.
     """
     return int.from_bytes(data[:4], "little") if len(data) >= 4 else None

@@ -1,8 +1,8 @@
-"""SII, the EEPROM of a SubDevice, ETG.1000.6 §5.4 and ETG.2010: header and categories.
+"""Image of the SII EEPROM of a SubDevice, ETG.1000.6 §5.4 and ETG.2010: header and categories.
 
-`decode_sii` returns the whole image as a frozen value that encodes to the same bytes. To read a
-device word by word, use `decode_header` and `decode_category_header`: they give the remaining
-length. The contents of the categories are in sii_categories.py.
+`decode_sii` returns the whole image as a frozen value that encodes to the same bytes. To decode an
+image in parts, use `decode_header`, then `decode_category_header` for the length of each category.
+The contents of the categories are in sii_categories.py.
 """
 
 from __future__ import annotations
@@ -30,12 +30,12 @@ T = TypeVar("T")
 
 HEADER_SIZE = 128
 CATEGORY_HEADER_SIZE = 4
-MAXIMUM_SIZE = 0x20000  # 64 k words: limit of the size field, larger than any EEPROM on sale
+MAXIMUM_SIZE = 0x20000  # bytes: 64 Ki words, more than any EEPROM on the market
 MAXIMUM_CATEGORIES = 512
 END_OF_CATEGORIES = 0xFFFF
 
-# Addresses in words, for single reads and writes
-CONFIGURATION_WORDS = 0x0008  # loaded by the controller at power-up; the last word is the checksum
+# Word addresses
+CONFIGURATION_WORDS = 0x0008  # loaded by the controller at power-up; the last is the checksum
 STATION_ALIAS_WORD = 0x0004
 CHECKSUM_WORD = 0x0007
 IDENTITY_WORD = 0x0008
@@ -45,8 +45,8 @@ CATEGORIES_WORD = 0x0040
 
 _HEADER = struct.Struct("<5H4sH4I8s8HH66sHH")
 _CATEGORY = struct.Struct("<HH")
-_CHECKSUM_SIZE = 14  # bytes that the checksum covers
-CHECKSUM_DISABLED = 0x88A4  # controllers accept it in place of a checksum, for debugging
+_CHECKSUM_SIZE = 14  # number of bytes that the checksum covers
+CHECKSUM_DISABLED = 0x88A4  # controllers accept it instead of a checksum, for debugging
 
 
 class CategoryType(IntEnum):
@@ -90,7 +90,10 @@ _NO_AREA = MailboxArea()
 
 @dataclass(frozen=True, slots=True)
 class Header:
-    """The first 64 words. `receive`: MainDevice → device, `send`: device → MainDevice."""
+    """The first 64 words.
+
+    The device receives messages in the `receive` areas and sends messages in the `send` areas.
+    """
 
     vendor: int
     product: int
@@ -118,7 +121,7 @@ class Header:
             *(self.standard_receive, self.standard_send),
         )
         if len(self.reserved) != 78:
-            raise ValueError(f"SII header: 78 bytes are reserved, got {len(self.reserved)}")
+            raise ValueError(f"SII header: reserved must have 78 bytes, got {len(self.reserved)}")
         numbers = [number for area in areas for number in (area.offset, area.size)]
         try:
             image = _HEADER.pack(
@@ -135,14 +138,14 @@ class Header:
 
 
 def decode_header(data: bytes) -> Header:
-    """Return the header in the first 128 bytes.
+    """Decode the header in the first 128 bytes.
 
     Raises:
         DecodeError: The data is too short, or the checksum is wrong. With a wrong checksum, the
             controller does not load its configuration either.
     """
     if len(data) < HEADER_SIZE:
-        raise DecodeError(f"SII: {len(data)} bytes, the header needs {HEADER_SIZE}")
+        raise DecodeError(f"SII header: needs {HEADER_SIZE} bytes, received {len(data)}")
     (pdi_control, pdi_configuration, pulse_length, pdi_configuration_2, alias, *rest) = (
         _HEADER.unpack_from(data)
     )
@@ -184,13 +187,13 @@ def checksum_of(data: bytes) -> int:
 
 @dataclass(frozen=True, slots=True)
 class Category:
-    """One category as bytes. Bit 15 of the type marks vendor-specific categories."""
+    """One encoded category. Bit 15 of the type marks vendor-specific categories."""
 
     type: int
     data: bytes
 
     def encode(self) -> bytes:
-        """Return its bytes with header. Raises ValueError if the length is odd or too large."""
+        """Return the header and the data. Raises ValueError if the length is odd or too large."""
         if len(self.data) % 2:
             raise ValueError(
                 f"SII category {self.type}: length must be even, got {len(self.data)} bytes"
@@ -202,14 +205,14 @@ class Category:
 
 
 def decode_category_header(data: bytes) -> tuple[int, int]:
-    """Return type and length [bytes] of the category that begins here.
+    """Return the type and the length [bytes] of the category at the start of `data`.
 
     The length of the end mark is 0.
     """
     if data[:2] == b"\xff\xff":
         return END_OF_CATEGORIES, 0
     if len(data) < CATEGORY_HEADER_SIZE:
-        raise DecodeError(f"SII: a category header needs 4 bytes, {len(data)} left")
+        raise DecodeError(f"SII category header: needs 4 bytes, {len(data)} left")
     kind, words = _CATEGORY.unpack_from(data)
     return kind, 2 * words
 
@@ -220,10 +223,10 @@ class Sii:
 
     header: Header
     categories: tuple[Category, ...] = ()
-    trailing: bytes = b"\xff\xff"  # from the end mark on, verbatim
+    trailing: bytes = b"\xff\xff"  # the bytes from the end mark on
 
     def encode(self, size: int | None = None) -> bytes:
-        """Return its bytes, padded with 0xFF to `size`. Raises ValueError if it does not fit."""
+        """Return the image, padded with 0xFF to `size`. Raises ValueError if it does not fit."""
         body = b"".join(category.encode() for category in self.categories)
         image = self.header.encode() + body + self.trailing
         if size is not None and len(image) > size:
@@ -232,11 +235,11 @@ class Sii:
 
     @property
     def strings(self) -> tuple[str, ...]:
-        """Texts in order. Other categories refer to them by number, from 1; see `string`."""
+        """Texts in order. Other categories refer to them by number, starting at 1; see `string`."""
         return self._join(CategoryType.STRINGS, decode_strings)
 
     def string(self, number: int) -> str:
-        """Return the text with a number; empty for 0 and for a number that does not exist."""
+        """Return the text with a number; empty if the number is 0 or does not exist."""
         strings = self.strings
         return strings[number - 1] if 0 < number <= len(strings) else ""
 
@@ -249,7 +252,7 @@ class Sii:
 
     @property
     def fmmus(self) -> tuple[int, ...]:
-        """Intended use of each FMMU, a `FmmuUse` or a vendor's number."""
+        """Intended use of each FMMU: a `FmmuUse`, or a vendor-specific number."""
         return self._join(CategoryType.FMMU, tuple)
 
     @property
@@ -273,7 +276,7 @@ class Sii:
         return self._join(CategoryType.DISTRIBUTED_CLOCKS, decode_clock_modes)
 
     def _join(self, kind: CategoryType, decode: Callable[[bytes], tuple[T, ...]]) -> tuple[T, ...]:
-        # Some vendors split a category into several (pollen: one TXPDO category per PDO).
+        # Some vendors split a category into several (Pollen: one TXPDO category per PDO).
         return tuple(
             item for each in self.categories if each.type == kind for item in decode(each.data)
         )
@@ -282,13 +285,13 @@ class Sii:
 def decode_sii(image: bytes) -> Sii:
     """Return the decoded image of an EEPROM.
 
-    All known categories are decoded once here, so that the properties of the result do not raise.
+    All known categories are decoded once, so that the properties of the result do not raise errors.
 
     Raises:
         DecodeError: The image is invalid.
     """
     if len(image) > MAXIMUM_SIZE:
-        raise DecodeError(f"SII: {len(image)} bytes, at most {MAXIMUM_SIZE}")
+        raise DecodeError(f"SII: {len(image)} bytes, the maximum is {MAXIMUM_SIZE}")
     header = decode_header(image)
     found, end = _split(image)
     sii = Sii(header, found, bytes(image[end:]))
@@ -300,7 +303,7 @@ def decode_sii(image: bytes) -> Sii:
 def _split(image: bytes) -> tuple[tuple[Category, ...], int]:
     found: list[Category] = []
     offset = HEADER_SIZE
-    while offset < len(image):  # an image without an end mark ends with its bytes
+    while offset < len(image):  # without an end mark, the last byte is the end
         kind, size = decode_category_header(image[offset : offset + CATEGORY_HEADER_SIZE])
         if kind == END_OF_CATEGORIES:
             break
@@ -308,7 +311,7 @@ def _split(image: bytes) -> tuple[tuple[Category, ...], int]:
         if start + size > len(image):
             left = len(image) - start
             raise DecodeError(
-                f"SII: category {kind} at byte {offset} specifies {size} bytes, {left} left"
+                f"SII: category {kind} at byte {offset} specifies {size} bytes, but {left} are left"
             )
         found.append(Category(kind, bytes(image[start : start + size])))
         if len(found) > MAXIMUM_CATEGORIES:

@@ -1,8 +1,7 @@
 """Contents of the SII categories, ETG.1000.6 §5.4 tables 18 to 27 and ETG.2010.
 
-Each category has `encode_...` and `decode_...`. Categories are padded to whole words. String
-numbers count from 1; 0 means no string. Bytes at the end of a category that are shorter than one
-record are padding.
+Categories are padded to whole words. If less than one record remains at the end of a category, it
+is padding. String numbers start at 1; 0 means no string.
 """
 
 from __future__ import annotations
@@ -23,7 +22,7 @@ _CLOCK_MODE = struct.Struct("<IiihHhBB4s")
 
 
 class CoeDetails(IntFlag):
-    """CoE capabilities of the device, general category byte 5."""
+    """CoE capabilities of the device: byte 5 of the general category."""
 
     SDO = 0x01
     SDO_INFORMATION = 0x02
@@ -54,7 +53,7 @@ class SyncManagerUse(IntEnum):
 
 
 class SyncManagerEnable(IntFlag):
-    """The enable byte of a SyncManager's entry."""
+    """Bits of the enable byte of a SyncManager entry."""
 
     ENABLED = 0x01
     FIXED_CONTENT = 0x02
@@ -63,7 +62,7 @@ class SyncManagerEnable(IntFlag):
 
 
 class GeneralFlags(IntFlag):
-    """The flags of the general category, byte 0x0B."""
+    """Flags of the general category, byte 0x0B."""
 
     SAFE_OP = 0x01
     NO_LRW = 0x02  # the device does not support LRW
@@ -73,7 +72,7 @@ class GeneralFlags(IntFlag):
 
 
 class PdoFlags(IntFlag):
-    """The flags of a PDO. The last four are reserved; ETG.2010 names them."""
+    """Flags of a PDO. The last four are reserved, but ETG.2010 names them."""
 
     MANDATORY = 0x0001
     DEFAULT = 0x0002
@@ -97,7 +96,7 @@ _NO_DETAILS = CoeDetails(0)
 
 @dataclass(frozen=True, slots=True)
 class General:
-    """General category: names by string number, mailbox details, current on the E-bus."""
+    """General category: string numbers of names, mailbox details, E-bus current."""
 
     group: int = 0
     image: int = 0
@@ -110,7 +109,7 @@ class General:
     ds402_channels: int = 0
     sysman_class: int = 0
     flags: int = 0
-    current_ma: int = 0  # drawn from the E-bus; negative: fed into it [mA]
+    current_ma: int = 0  # drawn from the E-bus; negative if fed into it [mA]
     physical_ports: int = 0  # four bits per port: 1 MII, 3 E-bus
     identification_address: int = 0  # address of the device identification
     reserved: bytes = bytes(15)  # bytes 4, 14, 15 and the last 12, verbatim
@@ -130,7 +129,7 @@ class General:
 
 
 def decode_general(data: bytes) -> General:
-    """Return the general category. A short one of an early edition is padded with zeros."""
+    """Decode the general category. Missing fields of early editions are 0."""
     if len(data) < 16:
         raise DecodeError(f"SII general category: needs at least 16 bytes, received {len(data)}")
     fields = _GENERAL.unpack(data[: _GENERAL.size].ljust(_GENERAL.size, b"\x00"))
@@ -150,7 +149,7 @@ def encode_strings(strings: Sequence[str]) -> bytes:
             outside Latin-1.
     """
     if len(strings) > 255:
-        raise ValueError(f"SII strings: {len(strings)}, at most 255")
+        raise ValueError(f"SII strings: at most 255 are possible, got {len(strings)}")
     parts = [bytes((len(strings),))]
     for text in strings:
         try:
@@ -162,15 +161,15 @@ def encode_strings(strings: Sequence[str]) -> bytes:
 
 
 def decode_strings(data: bytes) -> tuple[str, ...]:
-    """Return the texts of the strings category, decoded as Latin-1."""
+    """Decode the texts of the strings category as Latin-1."""
     strings: list[str] = []
     offset = 1
     for _ in range(data[0] if data else 0):
         length = data[offset] if offset < len(data) else len(data)
         if offset + 1 + length > len(data):
             raise DecodeError(
-                f"SII strings: {data[0]} strings, string {len(strings) + 1} at byte {offset} does "
-                f"not fit into {len(data)} bytes"
+                f"SII strings: string {len(strings) + 1} of {data[0]} at byte {offset} exceeds "
+                f"the {len(data)} bytes of the category"
             )
         strings.append(data[offset + 1 : offset + 1 + length].decode("latin-1"))
         offset += 1 + length
@@ -185,14 +184,14 @@ def encode_fmmus(uses: Sequence[int]) -> bytes:
 
 @dataclass(frozen=True, slots=True)
 class SyncManagerEntry:
-    """Settings of a SyncManager; see sync_manager.Control for the control byte."""
+    """Settings of a SyncManager. For the control byte, see `sync_manager.Control`."""
 
     address: int
     length: int
     control: int
     status: int = 0
     enable: SyncManagerEnable = SyncManagerEnable.ENABLED
-    use: int = SyncManagerUse.UNUSED  # a SyncManagerUse, or another number from the device
+    use: int = SyncManagerUse.UNUSED  # a SyncManagerUse, or an undefined number
 
     def encode(self) -> bytes:
         """Return the 8 encoded bytes. Raises ValueError if a field does not fit."""
@@ -210,7 +209,7 @@ def encode_sync_managers(entries: Sequence[SyncManagerEntry]) -> bytes:
 
 
 def decode_sync_managers(data: bytes) -> tuple[SyncManagerEntry, ...]:
-    """Return the entries of the SyncManager category."""
+    """Decode the SyncManager category."""
     return tuple(
         SyncManagerEntry(address, length, control, status, SyncManagerEnable(enable), use)
         for address, length, control, status, enable, use in _records(_SYNC_MANAGER, data)
@@ -245,7 +244,7 @@ class Pdo:
 
     index: int
     entries: tuple[PdoEntry, ...] = ()
-    sync_manager: int = 0xFF  # 0xFF: not assigned
+    sync_manager: int = 0xFF  # 0xFF if the PDO is not assigned
     synchronization: int = 0
     name: int = 0
     flags: int = 0
@@ -273,7 +272,7 @@ def encode_pdos(pdos: Sequence[Pdo]) -> bytes:
 
 
 def decode_pdos(data: bytes) -> tuple[Pdo, ...]:
-    """Return the PDOs of a TXPDO or RXPDO category."""
+    """Decode a TXPDO or RXPDO category."""
     pdos: list[Pdo] = []
     offset = 0
     while offset + _PDO.size <= len(data):
@@ -297,7 +296,7 @@ def decode_pdos(data: bytes) -> tuple[Pdo, ...]:
 
 @dataclass(frozen=True, slots=True)
 class ClockMode:
-    """One mode of distributed clocks (category 60). Cycle time 0: the period of the loop."""
+    """One mode of distributed clocks (category 60). A cycle time of 0 is the loop's period."""
 
     cycle_time_ns: int = 0
     shift_time_ns: int = 0
@@ -327,7 +326,7 @@ def encode_clock_modes(modes: Sequence[ClockMode]) -> bytes:
 
 
 def decode_clock_modes(data: bytes) -> tuple[ClockMode, ...]:
-    """Return the modes in the distributed clocks category."""
+    """Decode the distributed clocks category."""
     return tuple(ClockMode(*fields) for fields in _records(_CLOCK_MODE, data))
 
 

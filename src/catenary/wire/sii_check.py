@@ -1,4 +1,4 @@
-"""Checks of an EEPROM image before it is written, ETG.2010."""
+"""Checks of an EEPROM image before a write, ETG.2010."""
 
 from __future__ import annotations
 
@@ -24,11 +24,11 @@ class Objection(NamedTuple):
 
     text: str
     hint: str
-    insist: bool = False  # True: the user may override it
+    insist: bool = False  # True if the user may override the objection
 
 
 def objections(image: bytes) -> tuple[Objection, ...]:
-    """Return the faults of an image; empty if it may be written."""
+    """Return the objections to writing an image; empty if it is valid."""
     if len(image) < HEADER_SIZE or len(image) > MAXIMUM_SIZE or len(image) % 2:
         return (_length(image),)
     found = [each for each in (_checksum(image), _size(image), _categories(image)) if each]
@@ -51,7 +51,7 @@ def _checksum(image: bytes) -> Objection | None:
     if checksum & 0xFF == right or checksum == CHECKSUM_DISABLED:
         return None
     return Objection(
-        f"the checksum in word 7 is 0x{checksum:04X}, the first seven words give 0x{right:04X}",
+        f"the checksum in word 7 is 0x{checksum:04X}, but the first seven words give 0x{right:04X}",
         "the device would not load its configuration; if you edited the image, write "
         f"0x{right:02X} to byte 14",
     )
@@ -65,7 +65,7 @@ def _size(image: bytes) -> Objection | None:
         return None
     return Objection(
         f"the image has {len(image)} bytes, but its header specifies an EEPROM of {specified}",
-        "word 0x3E must contain the size of the EEPROM in kbit, minus one",
+        "word 0x3E must contain the size of the EEPROM in kbit minus one",
         insist=True,
     )
 

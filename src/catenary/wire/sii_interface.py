@@ -1,4 +1,4 @@
-"""The interface to the SII EEPROM, registers 0x0500 to 0x050F, ETG.1000.4 §6.4."""
+"""Register interface to the SII EEPROM, 0x0500 to 0x050F, ETG.1000.4 §6.4."""
 
 from __future__ import annotations
 
@@ -7,15 +7,15 @@ from enum import IntEnum
 
 from catenary.errors import DecodeError
 
-CONFIGURATION_TO_PDI = 0x01  # of 0x0500: the device's processor owns the EEPROM
-CONFIGURATION_FORCE = 0x02  # of 0x0500: take the EEPROM back even during an access of the PDI
-PDI_ACCESS_ACTIVE = 0x01  # of 0x0501
+CONFIGURATION_TO_PDI = 0x01  # bit of 0x0500: the device's processor owns the EEPROM
+CONFIGURATION_FORCE = 0x02  # bit of 0x0500: take the EEPROM back even while the PDI uses it
+PDI_ACCESS_ACTIVE = 0x01  # bit of 0x0501
 
 
 class SiiCommand(IntEnum):
-    """Bits 8 to 10 of control/status."""
+    """Command to the EEPROM: bits 8 to 10 of control/status."""
 
-    IDLE = 0  # a write clears the error bits
+    IDLE = 0  # writing it clears the error bits
     READ = 1
     WRITE = 2
     RELOAD = 4
@@ -26,13 +26,13 @@ class ControlStatus:
     """SII control/status (0x0502). Only `write_enable` and `command` can be written."""
 
     command: SiiCommand = SiiCommand.IDLE
-    write_enable: bool = False  # valid for the datagram that also writes the command
+    write_enable: bool = False  # valid only for the datagram that also writes the command
     emulation: bool = False  # the device's processor emulates the EEPROM
-    eight_bytes: bool = False  # a read returns 8 bytes, else 4
-    two_byte_address: bool = False  # EEPROMs above 16 kbit
+    eight_bytes: bool = False  # a read command returns 8 bytes instead of 4
+    two_byte_address: bool = False  # EEPROMs larger than 16 kbit
     checksum_error: bool = False
     not_loaded: bool = False
-    command_error: bool = False  # missing acknowledge, or an invalid command
+    command_error: bool = False  # the EEPROM did not acknowledge, or the command is invalid
     write_enable_error: bool = False
     busy: bool = False
 
@@ -43,7 +43,7 @@ class ControlStatus:
 
     @property
     def failed(self) -> bool:
-        """True if the last command failed; writing IDLE clears it."""
+        """True if the last command failed. Write IDLE to clear the error."""
         return self.command_error or self.write_enable_error
 
     @property

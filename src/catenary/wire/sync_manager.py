@@ -1,4 +1,4 @@
-"""SyncManager blocks, registers 0x0800 + 8·k, ETG.1000.4 §6.7 and ESC data sheet."""
+"""SyncManager blocks, registers 0x0800 + 8·k, ETG.1000.4 §6.7 and Beckhoff's ESC data sheet."""
 
 from __future__ import annotations
 
@@ -9,15 +9,15 @@ from enum import IntEnum, IntFlag
 from catenary.errors import DecodeError
 
 SIZE = 8
-WATCHDOG_TRIGGER = 0x40  # of the control byte: a write triggers the process-data watchdog
+WATCHDOG_TRIGGER = 0x40  # bit of the control byte: a write triggers the process-data watchdog
 _BLOCK = struct.Struct("<HHBBBB")
 
 
 class Buffering(IntEnum):
     """Buffering mode of a SyncManager."""
 
-    THREE_BUFFERS = 0  # process data: always the newest, access without waiting
-    MAILBOX = 2  # one buffer with a handshake: no message is lost
+    THREE_BUFFERS = 0  # for process data: the newest data can always be accessed
+    MAILBOX = 2  # for mailboxes: one buffer with a handshake
 
 
 class Direction(IntEnum):
@@ -28,7 +28,7 @@ class Direction(IntEnum):
 
 
 class Status(IntFlag):
-    """The status byte (offset 5). Bits 4 and 5: last written buffer in three-buffer mode."""
+    """Bits of the status byte (offset 5). Bits 4 and 5 show the last buffer written."""
 
     INTERRUPT_WRITE = 0x01
     INTERRUPT_READ = 0x02
@@ -40,7 +40,7 @@ class Status(IntFlag):
 
 
 class Activation(IntFlag):
-    """The activation byte (offset 6)."""
+    """Bits of the activation byte (offset 6)."""
 
     ENABLE = 0x01
     REPEAT_REQUEST = 0x02
@@ -49,7 +49,7 @@ class Activation(IntFlag):
 
 
 class PdiControl(IntFlag):
-    """The PDI control byte (offset 7); read-only for the MainDevice."""
+    """Bits of the PDI control byte (offset 7), which is read-only for the MainDevice."""
 
     DEACTIVATED = 0x01
     REPEAT_ACKNOWLEDGE = 0x02
@@ -57,13 +57,16 @@ class PdiControl(IntFlag):
 
 @dataclass(frozen=True, slots=True)
 class Control:
-    """The control byte (offset 4), also in the SII. Bits 0 to 3: mode; 4 to 6: side effects."""
+    """The control byte (offset 4), which the SII contains as well.
+
+    Bits 0 to 3 select the mode. Bits 4 to 6 enable interrupts and the watchdog trigger.
+    """
 
     buffering: Buffering
     direction: Direction
     interrupt_ecat: bool = False
     interrupt_pdi: bool = False
-    watchdog: bool = False  # a write triggers the process data watchdog
+    watchdog: bool = False  # a write triggers the process-data watchdog
 
     @property
     def byte(self) -> int:
@@ -78,7 +81,7 @@ class Control:
 
     @classmethod
     def from_byte(cls, byte: int) -> Control:
-        """Return the decoded byte; bit 7 is ignored. Raises DecodeError if the mode is invalid."""
+        """Return the decoded byte. Bit 7 is ignored. Raises DecodeError if the mode is invalid."""
         try:
             buffering, direction = Buffering(byte & 0x03), Direction(byte >> 2 & 0x03)
         except ValueError as error:
@@ -87,10 +90,11 @@ class Control:
         return cls(buffering, direction, bool(byte & 0x10), bool(byte & 0x20), watchdog)
 
 
-MAILBOX_OUT = Control(Buffering.MAILBOX, Direction.WRITE, interrupt_pdi=True)  # 0x26
-MAILBOX_IN = Control(Buffering.MAILBOX, Direction.READ, interrupt_pdi=True)  # 0x22
-OUTPUTS = Control(Buffering.THREE_BUFFERS, Direction.WRITE, interrupt_pdi=True, watchdog=True)  # 64
-INPUTS = Control(Buffering.THREE_BUFFERS, Direction.READ, interrupt_pdi=True)  # 0x20
+# The values are 0x26, 0x22, 0x64 and 0x20.
+MAILBOX_OUT = Control(Buffering.MAILBOX, Direction.WRITE, interrupt_pdi=True)
+MAILBOX_IN = Control(Buffering.MAILBOX, Direction.READ, interrupt_pdi=True)
+OUTPUTS = Control(Buffering.THREE_BUFFERS, Direction.WRITE, interrupt_pdi=True, watchdog=True)
+INPUTS = Control(Buffering.THREE_BUFFERS, Direction.READ, interrupt_pdi=True)
 
 
 _IDLE = Status(0)
@@ -120,7 +124,7 @@ class SyncManager:
 
 
 def decode_sync_manager(data: bytes) -> SyncManager:
-    """Return the SyncManager in a block of 8 bytes."""
+    """Decode a SyncManager block of 8 bytes."""
     if len(data) != SIZE:
         raise DecodeError(f"SyncManager: needs {SIZE} bytes, received {len(data)}")
     address, length, control, status, activation, pdi_control = _BLOCK.unpack(data)

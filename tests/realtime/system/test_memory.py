@@ -1,4 +1,4 @@
-"""Shared memory: zeros, and gone with its last user."""
+"""Shared memory starts as zeros, and is freed with its last user."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ import pytest
 from catenary.realtime.system.memory import SharedMemory
 
 
-def test_is_zeros_at_first():
+def test_starts_as_zeros():
     assert bytes(SharedMemory(10000).buffer) == bytes(10000)
 
 
-def test_nothing_is_left_behind():
+def test_memory_is_freed():
     gc.collect()
     before = len(os.listdir("/proc/self/fd"))
     memory = SharedMemory(4096)
@@ -24,6 +24,6 @@ def test_nothing_is_left_behind():
     assert len(os.listdir("/proc/self/fd")) == before
 
 
-def test_refuses_none():
+def test_refuses_a_size_of_zero():
     with pytest.raises(ValueError, match="size of 0 bytes"):
         SharedMemory(0)

@@ -1,4 +1,4 @@
-"""`realtime.session()`: what it changes, that it is undone, what is said where it is refused."""
+"""`realtime.session()`: its changes, their reversal, and refused settings."""
 
 from __future__ import annotations
 
@@ -11,7 +11,8 @@ from catenary.realtime import session
 
 STATE = """
 import gc, os, sys
-from catenary.realtime.system import libc, session
+from catenary.realtime import session
+from catenary.realtime.system import libc
 from catenary.realtime.system.scheduling import locked_kilobytes
 
 def state():
@@ -30,7 +31,7 @@ preparation.lock_all_memory = refuse
 
 
 def in_another_process(code: str) -> list[str]:
-    """The lines it prints; this process stays as it is."""
+    """Run code in another process, and return the lines that it prints."""
     done = subprocess.run(
         [sys.executable, "-c", STATE + code], capture_output=True, text=True, check=False
     )
@@ -38,7 +39,7 @@ def in_another_process(code: str) -> list[str]:
     return done.stdout.splitlines()
 
 
-def test_all_is_undone():
+def test_all_changes_are_undone():
     before, inside, after = in_another_process(
         "print(state())\n"
         "with session(best_effort=True, switch_interval=2e-4) as s:\n"
@@ -50,7 +51,7 @@ def test_all_is_undone():
     assert "locked memory refused" in inside or inside.endswith("True)")
 
 
-def test_all_is_undone_after_an_exception():
+def test_all_changes_are_undone_after_an_exception():
     before, after = in_another_process(
         "print(state())\n"
         "try:\n"
@@ -60,7 +61,7 @@ def test_all_is_undone_after_an_exception():
     assert before == after
 
 
-def test_a_session_inside_another_leaves_it_as_it_is():
+def test_nested_sessions():
     outer, inner, again = in_another_process(
         "with session(best_effort=True):\n"
         "    print(state())\n"
@@ -70,7 +71,7 @@ def test_a_session_inside_another_leaves_it_as_it_is():
     assert outer == inner == again
 
 
-def test_what_could_not_be_had_is_an_error_that_says_how_to_get_it_and_all_is_undone():
+def test_a_refused_setting_is_an_error_with_a_hint():
     before, message, after = in_another_process(
         REFUSE + "from catenary.errors import RealtimeError\n"
         "print(state())\n"
@@ -86,15 +87,15 @@ def test_what_could_not_be_had_is_an_error_that_says_how_to_get_it_and_all_is_un
     assert before == after
 
 
-def test_with_best_effort_it_is_said():
+def test_best_effort_lists_refused_settings():
     [refusals] = in_another_process(
         REFUSE + "with session(best_effort=True) as s: print(s.refusals[-1])"
     )
     assert refusals == "locked memory refused (Operation not permitted)"
 
 
-def test_no_page_faults_in_a_heap_that_is_kept():
-    """32 times 1 MiB: by mappings of their own each would fault anew."""
+def test_no_page_faults_in_the_prepared_heap():
+    """Allocate 1 MiB 32 times. With separate mappings, each allocation would cause faults."""
     [faults] = in_another_process(
         "import resource\n"
         "def faults(): return resource.getrusage(resource.RUSAGE_SELF).ru_minflt\n"
@@ -104,19 +105,19 @@ def test_no_page_faults_in_a_heap_that_is_kept():
         "    for _ in range(32): bytearray(b'x') * 2**20\n"
         "    print(faults() - before)"
     )
-    assert int(faults) < 256  # one of them has that many pages
+    assert int(faults) < 256  # one allocation has this many pages
 
 
-def test_begins_once():
+def test_a_session_cannot_be_entered_twice():
     [said] = in_another_process(
         "with session(best_effort=True) as s:\n"
         "    try: s.__enter__()\n"
         "    except RuntimeError as error: print(error)"
     )
-    assert said == "this session has already begun; make one session for each block"
+    assert said == "this session is already active; create one session for each `with` block"
 
 
 @pytest.mark.parametrize("wrong", [{"heap_size": -1}, {"switch_interval": 0.0}])
 def test_refuses(wrong):
-    with pytest.raises(ValueError, match=r"heap of -1|switch interval of 0"):
+    with pytest.raises(ValueError, match=r"must not be negative: -1|switch_interval 0"):
         session(**wrong)

@@ -1,4 +1,4 @@
-"""Scheduling: what was obtained is said as it is, whoever runs the tests."""
+"""Scheduling: the obtained settings are reported correctly with any permissions."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from catenary.realtime.system.scheduling import Scheduling, request_scheduling, 
 
 
 def in_another_process(code: str) -> str:
-    """What `code` prints; the tests' own scheduling stays as it is."""
+    """Run code in another process, and return its output."""
     start = "from catenary.realtime.system.scheduling import *; import os; "
     done = subprocess.run(
         [sys.executable, "-c", start + code], capture_output=True, text=True, check=True
@@ -20,14 +20,14 @@ def in_another_process(code: str) -> str:
     return done.stdout.strip()
 
 
-def test_without_asking_nothing_is_real_time():
+def test_the_default_is_not_real_time():
     now = what_scheduling()
     assert now.policy == "SCHED_OTHER"
     assert not now.real_time
     assert now.cpus == tuple(sorted(os.sched_getaffinity(0)))
 
 
-def test_what_is_asked_for_is_obtained_or_refused_with_a_reason():
+def test_a_request_is_granted_or_refused_with_a_reason():
     answer = in_another_process(
         "got = request_scheduling(priority=42); "
         "print(got.real_time or 'SCHED_FIFO 42 refused' in str(got), "
@@ -42,17 +42,17 @@ def test_one_cpu():
     assert in_another_process(f"print(request_scheduling(cpu={cpu}).cpus)") == f"({cpu},)"
 
 
-def test_a_cpu_that_is_not_there_is_refused():
+def test_an_unknown_cpu_is_refused():
     answer = in_another_process("print(request_scheduling(cpu=1000).refusals[0])")
     assert answer.startswith("CPU 1000 refused (")
 
 
-def test_a_priority_that_cannot_be_is_an_error():
+def test_an_invalid_priority_is_an_error():
     with pytest.raises(ValueError, match=r"priority 100 is not within 1\.\.99"):
         request_scheduling(priority=100)
 
 
-def test_reads_well():
+def test_scheduling_as_text():
     obtained = Scheduling("SCHED_FIFO", 80, True, (1,))
     assert str(obtained) == "SCHED_FIFO 80, memory locked, CPU 1"
     refused = Scheduling("SCHED_OTHER", 0, False, (0, 1), ("mlockall refused (no memory)",))

@@ -1,1 +1,1 @@
-"""Linux for real-time programs: scheduling, locked memory, and the preparation of a process."""
+"""Linux settings for real-time programs: scheduling, memory, and preparation of a process."""

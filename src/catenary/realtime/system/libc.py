@@ -1,4 +1,4 @@
-"""Calls of the C library that Python lacks. They raise OSError if refused."""
+"""C library functions that Python lacks. They raise OSError if they fail."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ PR_SET_PDEATHSIG = 1
 
 
 def call(name: str, *arguments: int) -> int:
-    """Call a function of longs that returns -1 and sets errno if it fails.
+    """Call a C function with arguments of type long. On failure, it returns -1 and sets errno.
 
     Args:
         name: name of the function.
-        arguments: its arguments, passed as long.
+        arguments: arguments of the function.
 
     Raises:
         OSError: the call failed, or this C library lacks the function.
@@ -41,7 +41,7 @@ def timer_slack_ns() -> int:
 
 
 def change_timer_slack(ns: int) -> None:
-    """Set by how much the kernel may delay this thread's wake-ups; the default is 50 us."""
+    """Set the longest delay [ns] that the kernel may add to wake-ups of the calling thread."""
     call("prctl", PR_SET_TIMERSLACK, ns, 0, 0, 0)
 
 
@@ -50,10 +50,10 @@ def signal_on_parents_death(number: int) -> None:
 
 
 def change_malloc(trim_threshold: int, mmap_max: int) -> None:
-    """Set when the heap returns memory, and how many allocations may use their own mapping."""
+    """Set when malloc returns memory, and the maximum number of allocations by mmap."""
     for option, value in ((M_TRIM_THRESHOLD, trim_threshold), (M_MMAP_MAX, mmap_max)):
         if call("mallopt", option, value) != 1:
-            raise OSError(0, "mallopt refused")
+            raise OSError(0, f"mallopt({option}, {value}) failed")
 
 
 def trim_heap() -> None:
@@ -61,7 +61,7 @@ def trim_heap() -> None:
 
 
 def touch_heap(size: int) -> None:
-    """Allocate and pre-fault `size` bytes of heap now rather than page by page later."""
+    """Allocate and pre-fault `size` bytes of heap, so that later allocations cause no faults."""
     libc = ctypes.CDLL(None)
     libc.malloc.restype = ctypes.c_void_p
     libc.free.argtypes = [ctypes.c_void_p]

@@ -1,4 +1,4 @@
-"""Anonymous memory shared with tasks in other processes: a killed process leaves no file."""
+"""Anonymous memory shared with tasks in other processes. It leaves no file behind."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ class Descriptor(Protocol):
 class SharedMemory:
     """Owner of pre-faulted memory that starts as zeros.
 
-    Pass it to a child process as an argument. It is freed with the last process that has it.
+    Pass it to a child process as an argument. It is freed when the last process that maps it ends.
     """
 
     def __init__(self, size: int, *, descriptor: int | None = None) -> None:
@@ -34,7 +34,7 @@ class SharedMemory:
 
     def __reduce__(self) -> tuple[object, tuple[object, int]]:
         if context.get_spawning_popen() is None:
-            raise TypeError("shared memory can only be passed as an argument of a process's task")
+            raise TypeError("shared memory can only be passed as an argument when a process starts")
         return attach, (reduction.DupFd(self._descriptor), self.size)
 
 

@@ -1,4 +1,4 @@
-"""`with realtime.session():` prepare a process for real time, and undo all changes at the end."""
+"""Session: prepare a process for real time, and undo all changes at the end of the block."""
 
 from __future__ import annotations
 
@@ -21,9 +21,9 @@ TOUCHED_STACK = 128 * 1024  # [bytes], as in the core's own thread
 LATENCY_DEVICE = "/dev/cpu_dma_latency"
 SET_CAPABILITIES = permission_advice()
 
-HOW_TO_GET = {
-    "locked memory": f"run as root, or once: {SET_CAPABILITIES}; or `ulimit -l unlimited` by a "
-    "memlock line in /etc/security/limits.d",
+REMEDIES = {
+    "locked memory": f"run as root, or run once: {SET_CAPABILITIES}; or add an unlimited memlock "
+    "line to /etc/security/limits.d",
     "CPU latency": f"run as root, or let a udev rule open {LATENCY_DEVICE}: KERNEL=="
     '"cpu_dma_latency", MODE="0660", GROUP="realtime"',
     "heap": "use glibc, which has mallopt and malloc_trim",
@@ -38,9 +38,9 @@ class Session:
 
     def __init__(self, heap_size: int, switch_interval: float, best_effort: bool) -> None:
         if heap_size < 0:
-            raise ValueError(f"a heap of {heap_size} bytes is negative")
+            raise ValueError(f"heap_size must not be negative: {heap_size} bytes")
         if not 1e-6 <= switch_interval <= 1.0:
-            raise ValueError(f"a switch interval of {switch_interval} s is not within 1e-6 to 1")
+            raise ValueError(f"switch_interval {switch_interval} s is not within 1e-6 to 1 s")
         self.heap_size = heap_size
         self.switch_interval = switch_interval
         self.best_effort = best_effort
@@ -52,14 +52,16 @@ class Session:
 
     def __enter__(self) -> Self:
         if self._undo is not None:
-            raise RuntimeError("this session has already begun; make one session for each block")
+            raise RuntimeError(
+                "this session is already active; create one session for each `with` block"
+            )
         with contextlib.ExitStack() as undo:
             refused = list(filter(None, (attempt(*step, undo) for step in self._steps())))
             if refused and not self.best_effort:
                 raise RealtimeError(
                     "; ".join(f"{what} refused ({why})" for what, why in refused),
-                    hint="; ".join(f"{what}: {HOW_TO_GET[what]}" for what, _ in refused)
-                    + "; or continue without them by best_effort=True",
+                    hint="; ".join(f"{what}: {REMEDIES[what]}" for what, _ in refused)
+                    + "; or set best_effort=True to continue without them",
                 )
             self.refusals = tuple(f"{what} refused ({why})" for what, why in refused)
             self._undo = undo.pop_all()
@@ -86,13 +88,13 @@ class Session:
         ]
 
     def _change_switch_interval(self, undo: Undo) -> None:
-        """Set how long a Python thread may keep the interpreter from others (default 5 ms)."""
-        # Python rounds down to whole microseconds: adding half of one restores the same value.
+        """Set how long a Python thread may hold the interpreter lock (Python's default is 5 ms)."""
+        # Python rounds down to whole microseconds, so add 0.5 us to restore the same value.
         undo.callback(sys.setswitchinterval, sys.getswitchinterval() + 0.5e-6)
         sys.setswitchinterval(self.switch_interval)
 
     def _keep_heap(self, undo: Undo) -> None:
-        """Keep freed memory in the heap and pre-fault it: malloc causes no page faults."""
+        """Pre-fault the heap and keep freed memory in it, so that malloc causes no page faults."""
         undo.callback(libc.trim_heap)
         undo.callback(libc.change_malloc, libc.TRIM_THRESHOLD, libc.MMAP_MAX)
         libc.change_malloc(-1, 0)
@@ -104,24 +106,24 @@ def session(
 ) -> Session:
     """Return a context manager that prepares this process for real time.
 
-    It locks and pre-faults memory, freezes and disables the garbage collector, and keeps the
-    processors from deep sleep. Timers become precise for this thread and the threads it starts.
-    The end of the block undoes all changes.
+    It locks and pre-faults memory, freezes and disables the garbage collector, and prevents deep
+    sleep of the processors. Timers become precise for this thread and the threads it starts. The
+    end of the block undoes all changes.
 
     Args:
-        heap_size: heap that malloc keeps [bytes].
-        switch_interval: how long a Python thread may keep the interpreter from others [s].
+        heap_size: heap to pre-fault and keep [bytes].
+        switch_interval: longest time for which a Python thread may hold the interpreter lock [s].
         best_effort: list refused settings in `refusals` instead of raising.
 
     Raises:
-        RealtimeError: on entering, if a setting is refused; the hint says how to get it.
+        RealtimeError: at the start of the block, if a setting is refused; the hint names a remedy.
         ValueError: `heap_size` or `switch_interval` is out of range.
     """
     return Session(heap_size, switch_interval, best_effort)
 
 
 def attempt(what: str, step: Callable[[Undo], None], undo: Undo) -> tuple[str, str] | None:
-    """Run a step. If it is refused, undo it and return its name and the reason."""
+    """Run a step. If it fails, undo it and return its name and the reason."""
     try:
         with contextlib.ExitStack() as own:
             step(own)
@@ -132,7 +134,7 @@ def attempt(what: str, step: Callable[[Undo], None], undo: Undo) -> tuple[str, s
 
 
 def freeze_collector(undo: Undo) -> None:
-    """Freeze all present objects and disable the garbage collector until the end."""
+    """Freeze all existing objects and disable the garbage collector."""
     if gc.isenabled():
         undo.callback(gc.enable)
     if gc.get_freeze_count() == 0:
@@ -148,7 +150,7 @@ def sharpen_timers(undo: Undo) -> None:
 
 
 def hold_latency(undo: Undo) -> None:
-    """Keep processors from deep sleep while the device is open: the kernel's PM QoS interface."""
+    """Prevent deep sleep of the processors through the kernel's PM QoS interface."""
     device = os.open(LATENCY_DEVICE, os.O_WRONLY)
     undo.callback(os.close, device)
     os.write(device, struct.pack("=i", 0))

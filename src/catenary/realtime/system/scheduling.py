@@ -1,4 +1,4 @@
-"""Real-time scheduling of the calling thread: the request, and the settings obtained."""
+"""Real-time scheduling of the calling thread: request it, and read the resulting settings."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ POLICIES = {
 
 @dataclass(frozen=True, slots=True)
 class Scheduling:
-    """Scheduling of a thread. `refusals`: the requests that were refused, and why."""
+    """Scheduling of a thread. `refusals` lists the refused requests and the reasons."""
 
     policy: str
     priority: int
@@ -62,10 +62,10 @@ def request_scheduling(
     Args:
         priority: SCHED_FIFO priority, 1..99.
         lock_memory: lock all pages of the process in memory.
-        cpu: processor to bind the thread to; None: any.
+        cpu: processor to bind the thread to; None for any.
 
     Returns:
-        The scheduling obtained. Refused requests are listed in `refusals`, not raised.
+        The resulting scheduling. Its `refusals` lists refused requests; they are not raised.
 
     Raises:
         ValueError: `priority` is out of range.
@@ -85,9 +85,9 @@ def request_scheduling(
     return Scheduling(now.policy, now.priority, now.memory_locked, now.cpus, tuple(refusals))
 
 
-def refusal(what: str, ask: Callable[[], object]) -> list[str]:
+def refusal(what: str, request: Callable[[], object]) -> list[str]:
     try:
-        ask()
+        request()
     except OSError as error:
         return [f"{what} refused ({error.strerror})"]
     return []
@@ -102,6 +102,6 @@ def lock_all_memory() -> None:
 
 
 def locked_kilobytes() -> int:
-    """Return VmLck of this process, proc(5)."""
+    """Return the locked memory of this process [KiB], VmLck in proc(5)."""
     found = re.search(r"^VmLck:\s*(\d+) kB", Path("/proc/self/status").read_text(), re.MULTILINE)
     return int(found[1]) if found else 0

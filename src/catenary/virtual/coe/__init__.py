@@ -1,1 +1,1 @@
-"""CANopen over EtherCAT on the device side: dictionary, SDO server, information, PDO objects."""
+"""CANopen over EtherCAT on the device side: dictionary, SDO servers and PDO objects."""

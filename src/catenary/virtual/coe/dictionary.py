@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 
 VARIABLE, ARRAY, RECORD = 7, 8, 9
 
-# data types, ETG.1020: number → (bits, struct format)
+# Data types, ETG.1020: number → (bits, struct format)
 FORMATS = {
     0x0001: (1, "<B"),
     0x0002: (8, "<b"),
@@ -43,7 +43,7 @@ WRONG_STATE = 0x08000022
 
 
 class Abort(Exception):
-    """An SDO abort that the device answers with."""
+    """SDO abort with which the device answers."""
 
     def __init__(self, code: int) -> None:
         super().__init__(f"SDO abort 0x{code:08X}")
@@ -52,7 +52,7 @@ class Abort(Exception):
 
 @dataclass(frozen=True, slots=True)
 class Entry:
-    """One subindex. `read` returns its bytes; `write` stores bytes or raises Abort."""
+    """Subindex of an object. `read` returns its bytes; `write` stores bytes or raises Abort."""
 
     name: str
     data_type: int
@@ -60,7 +60,7 @@ class Entry:
     access: int
     read: Callable[[], bytes]
     write: Callable[[bytes], None] | None = None
-    slot: int = -1  # slot of the process data, -1: none
+    slot: int = -1  # slot of the process data; -1: none
 
 
 @dataclass(slots=True)
@@ -77,21 +77,24 @@ class Object:
 
 
 def constant(name: str, data_type: int, value: bytes, access: int = READ_ANY) -> Entry:
+    """Return an entry with constant bytes."""
     return Entry(name, data_type, 8 * len(value), access, lambda: value)
 
 
 def number(name: str, data_type: int, value: int, access: int = READ_ANY) -> Entry:
+    """Return an entry with a constant number."""
     bits, form = FORMATS[data_type]
     packed = struct.pack(form, value)
     return Entry(name, data_type, bits, access, lambda: packed)
 
 
 def text(name: str, value: str) -> Entry:
+    """Return an entry with a constant string."""
     return constant(name, VISIBLE_STRING, value.encode("latin-1", "replace"))
 
 
 class Variable:
-    """Owns the bytes of one writable entry."""
+    """Bytes of one writable entry."""
 
     def __init__(self, value: bytes, *, variable_length: bool = False) -> None:
         self.value = value
@@ -110,14 +113,21 @@ class Variable:
 
 
 def stored(name: str, data_type: int, value: bytes, *, variable_length: bool = False) -> Entry:
-    """Return an entry that stores the bytes written to it."""
+    """Return an entry that stores the bytes written to it.
+
+    Args:
+        name: Name of the entry.
+        data_type: CANopen data type.
+        value: Initial bytes, which determine the maximum length.
+        variable_length: True accepts fewer bytes.
+    """
     variable = Variable(value, variable_length=variable_length)
     access = READ_ANY | WRITE_ANY
     return Entry(name, data_type, 8 * len(value), access, variable.read, variable.write)
 
 
 class Dictionary:
-    """Owns the objects of a device. `state` returns the AL state for access checks."""
+    """Objects of a device. `state` returns the AL state for access checks."""
 
     def __init__(self, state: Callable[[], int]) -> None:
         self._state = state
@@ -133,7 +143,14 @@ class Dictionary:
     def add_record(
         self, index: int, name: str, entries: list[Entry], *, code: int = RECORD
     ) -> None:
-        """Add entries from subindex 1 on; subindex 0 is their number."""
+        """Add an object with entries from subindex 1 on. Subindex 0 is their number.
+
+        Args:
+            index: Index of the object.
+            name: Name of the object.
+            entries: Entries from subindex 1 on.
+            code: Object code: RECORD or ARRAY.
+        """
         counted = {0: number("Number of entries", UNSIGNED8, len(entries))}
         self.add(index, name, counted | dict(enumerate(entries, 1)), code=code)
 
@@ -164,7 +181,15 @@ class Dictionary:
         entry.write(data)
 
     def read_complete(self, index: int, first: int) -> bytes:
-        """Return all subindices from `first` (0 or 1) on; subindex 0 takes 16 bits."""
+        """Return the values of all subindices from `first` on, for complete access.
+
+        Args:
+            index: Index of the object.
+            first: First subindex: 0 or 1. Subindex 0 takes 16 bits.
+
+        Raises:
+            Abort: The object does not exist or does not support complete access.
+        """
         if index not in self.objects:
             raise Abort(NO_OBJECT)
         entries = self.objects[index].entries
@@ -181,7 +206,18 @@ class Dictionary:
         return value.to_bytes((bit + 7) // 8, "little")
 
     def write_complete(self, index: int, first: int, data: bytes) -> None:
-        """Write all subindices. Clear subindex 0 first and set it last, as PDO objects require."""
+        """Write all subindices with complete access.
+
+        Clear subindex 0 first and set it last, as PDO objects require.
+
+        Args:
+            index: Index of the object.
+            first: First subindex in the data: 0 or 1.
+            data: Values of the subindices; subindex 0 takes 16 bits.
+
+        Raises:
+            Abort: The object or a value is refused.
+        """
         if index not in self.objects:
             raise Abort(NO_OBJECT)
         entries = self.objects[index].entries

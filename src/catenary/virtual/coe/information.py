@@ -28,7 +28,7 @@ def _message(opcode: int, payload: bytes, left: int = 0) -> bytes:
 
 
 class InformationServer:
-    """Server of SDO information requests for one dictionary."""
+    """Server of SDO information requests for one dictionary. `size`: mailbox size [bytes]."""
 
     def __init__(
         self, dictionary: Dictionary, *, size: int, quirks: MailboxQuirks = NO_MAILBOX_QUIRKS
@@ -53,7 +53,7 @@ class InformationServer:
         return _message(ERROR, struct.pack("<I", code)[:counted])
 
     def _described(self, opcode: int, head: bytes, name: str) -> bytes:
-        """Return a description. Names that do not fit into the mailbox are truncated."""
+        """Return a description. Truncate a name that does not fit into the mailbox."""
         text = (self._quirks.text_prefix + name).encode("latin-1", "replace")
         return _message(opcode, (head + text)[: self._room])
 

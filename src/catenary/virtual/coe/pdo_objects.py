@@ -1,6 +1,7 @@
 """PDO assignment (0x1C12, 0x1C13) and mapping (0x1600.., 0x1A00..), ETG.1000.6 §5.6.7.4.
 
-Both are writable in PRE-OP only: subindex 0 is cleared first and set last. The result must fit.
+Both can be written only in PRE-OP. A MainDevice clears subindex 0 first and sets it last. The size
+of the result is checked.
 """
 
 from __future__ import annotations
@@ -36,7 +37,7 @@ LOCAL_CONTROL = 0x0800_0021
 
 
 class _Table:
-    """Owns the entries of one assignment or mapping: a count and the values."""
+    """Entries of one assignment or mapping: a count and the values."""
 
     def __init__(self, form: str, values: Sequence[int], places: int) -> None:
         self._form = form
@@ -56,7 +57,7 @@ class _Table:
 
 @dataclass(frozen=True, slots=True)
 class Placed:
-    """One mapped object in a SyncManager's buffer."""
+    """Mapped object in the buffer of a SyncManager."""
 
     bit: int
     bits: int
@@ -65,7 +66,7 @@ class Placed:
 
 
 class PdoObjects:
-    """Owns the selection and order of the objects in a device's process data."""
+    """Selection and order of the objects in the process data of a device."""
 
     def __init__(
         self,
@@ -184,7 +185,7 @@ class PdoObjects:
             raise Abort(MAPPING_TOO_LONG)
 
     def placed(self, assignment: int) -> list[Placed]:
-        """Return the objects of one direction in the order of the buffer, without gaps."""
+        """Return the mapped objects of one direction in buffer order, without gaps."""
         placed: list[Placed] = []
         bit = 0
         for pdo in self._assigned[assignment].values:
@@ -195,7 +196,7 @@ class PdoObjects:
         return placed
 
     def size(self, assignment: int) -> int:
-        """Return the size of one direction's buffer [bytes]."""
+        """Return the buffer size of one direction [bytes]."""
         pdos = self._assigned[assignment].values
         bits = sum(value & 0xFF for pdo in pdos for value in self._mappings[pdo].values)
         return (bits + 7) // 8

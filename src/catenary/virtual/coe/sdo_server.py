@@ -1,7 +1,6 @@
-"""SDO services on the server side: ETG.1000.6 §5.6.2.
+"""SDO server, ETG.1000.6 §5.6.2: expedited, normal and segmented transfers, complete access, abort.
 
-Upload and download, expedited, normal, segmented, complete access, abort. Written independently of
-`catenary.wire.coe`, the client side.
+The code is independent of `catenary.wire.coe`, the client side.
 """
 
 from __future__ import annotations
@@ -33,7 +32,7 @@ DOWNLOAD_MAX = 1 << 20
 
 @dataclass(slots=True)
 class _Transfer:
-    """State of a segmented transfer between two segments."""
+    """Progress of a segmented transfer."""
 
     index: int
     subindex: int
@@ -53,7 +52,7 @@ def _aborted(index: int, subindex: int, code: int) -> bytes:
 
 
 class SdoServer:
-    """Owns the active transfer of a device. `size`: mailbox size without its header."""
+    """SDO server of a device, with its active transfer. `size`: mailbox size without header."""
 
     def __init__(
         self, dictionary: Dictionary, *, size: int, quirks: MailboxQuirks = NO_MAILBOX_QUIRKS
@@ -64,7 +63,7 @@ class SdoServer:
         self._transfer: _Transfer | None = None
 
     def serve(self, payload: bytes) -> Iterable[bytes]:
-        """Return the answers to one SDO request, given without its CoE header."""
+        """Return the answers to one SDO request. `payload`: the request without its CoE header."""
         command, index, subindex = struct.unpack_from("<BHB", payload.ljust(SDO_HEADER, b"\0"))
         kind = command >> 5
         if kind in (DOWNLOAD_SEGMENT, UPLOAD_SEGMENT) and self._transfer is not None:

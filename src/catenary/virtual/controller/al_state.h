@@ -1,8 +1,8 @@
-/* AL control and AL status, ETG.1000.4 §5.3 and ETG.1000.6 §6.4.1, the controller's part.
+/* Controller side of AL control and AL status, ETG.1000.4 §5.3 and ETG.1000.6 §6.4.1.
  *
- * With device emulation the status follows the control word, including the error bit (ET1100
- * datasheet, 0x0140.8), because no application checks it. Otherwise the control register is a
- * mailbox: it is locked until the application has fetched it. */
+ * With device emulation, the status follows the control word, including the error bit (ET1100
+ * datasheet, 0x0140.8), because no application checks it. Otherwise the control register is locked
+ * after a write, until the application has fetched it. */
 #ifndef CATENARY_VIRTUAL_AL_STATE_H
 #define CATENARY_VIRTUAL_AL_STATE_H
 

@@ -1,9 +1,8 @@
-/* One virtual EtherCAT SubDevice controller and its segment: memory, values cached from it for the
- * frame path, and the events that wake the application.
+/* Virtual EtherCAT SubDevice controller and its segment: memory, values derived from it for the frame
+ * path, and the events that wake the application.
  *
- * Two sides access a controller: frames (the EtherCAT side, `noexcept`, answers from memory alone)
- * and the application (the PDI side). Each access holds the segment's mutex. Nothing here
- * allocates, waits or calls Python. */
+ * Two sides access a controller: frames (the EtherCAT side) and the application (the PDI side). Each
+ * access holds the mutex of the segment. Nothing here allocates memory, waits or calls Python. */
 #ifndef CATENARY_VIRTUAL_CONTROLLER_H
 #define CATENARY_VIRTUAL_CONTROLLER_H
 
@@ -25,7 +24,7 @@
 #define PORTS 4
 #define NEVER INT64_MAX
 
-/* events for the application, stored until it fetches them */
+/* Events for the application, which are stored until it fetches them. */
 enum controller_event {
     EVENT_AL_CONTROL = 1,
     EVENT_MAILBOX_WRITTEN = 2,       /* SM0 was filled by the MainDevice */
@@ -34,24 +33,24 @@ enum controller_event {
     EVENT_WATCHDOG = 16,             /* the process data watchdog expired */
     EVENT_OUTPUTS = 32,              /* the first process data since the SyncManager was enabled */
     EVENT_EMERGENCY = 64,            /* a device model has a new error code */
-    EVENT_SYNC_SEEN = 128,           /* the first SYNC0 pulse since the device waits for one */
-    EVENT_SYNC_MISSED = 256,         /* too many pulses in a row without new outputs */
+    EVENT_SYNC_SEEN = 128,           /* the first SYNC0 pulse has arrived */
+    EVENT_SYNC_MISSED = 256,         /* too many consecutive pulses without new outputs */
     EVENT_SYNC_LOST = 512,           /* the pulses have stopped */
     EVENT_RESET = 1024               /* the MainDevice resets the device */
 };
 
-/* A SyncManager as the frame path uses it, derived from its registers. */
+/* State of a SyncManager for the frame path, derived from its registers. */
 typedef struct {
     uint16_t start, length;
     uint8_t enabled;                 /* activated by the MainDevice */
     uint8_t blocked;                 /* deactivated by the PDI: all access is refused */
     uint8_t mailbox, ecat_writes, watchdog;
     uint8_t full;                    /* mailbox */
-    uint8_t open;                    /* the EtherCAT side is between its first and last byte */
-    uint8_t latest, using;           /* three buffers: last complete one; the one the EtherCAT side holds */
+    uint8_t open;                    /* the EtherCAT side has accessed the first but not the last byte */
+    uint8_t latest, using;           /* three buffers: last complete one; the one in use by the EtherCAT side */
     uint8_t written;                 /* three buffers: complete data is available */
     uint32_t writes;                 /* number of complete writes from the producer */
-    int64_t completed;               /* time at which the frame of the last write has passed */
+    int64_t completed;               /* time at which the frame of the last write had passed */
 } sync_manager;
 
 typedef struct {
@@ -61,53 +60,53 @@ typedef struct {
 } fmmu;
 
 typedef struct {
-    uint8_t *image;                  /* the EEPROM's content */
+    uint8_t *image;                  /* content of the EEPROM */
     uint32_t words;
-    uint16_t pending;                /* active command, 0: none */
+    uint16_t pending;                /* active command; 0: none */
     uint32_t address;
     uint16_t word;                   /* word to write */
     int64_t due;
     int64_t read_time, write_time;   /* [ns] */
-    int loaded;                      /* the first load after power-on has set the alias */
+    int loaded;                      /* the alias was loaded after power-on */
 } sii_access;
 
-/* One of a controller's four ports. The mode of its loop is in DL control. */
+/* Port of a controller. DL control contains the mode of its loop. */
 typedef struct {
-    int32_t cable;                   /* number of the connected cable, -1: none */
+    int32_t cable;                   /* number of the connected cable; -1: none */
     uint8_t exists;                  /* the controller has this port */
-    uint8_t link;                    /* link state as detected by the controller */
+    uint8_t link;                    /* link state that the controller has detected */
     uint8_t closed;                  /* its loop is closed */
-    int64_t loss_due;                /* time at which the loss of light will be detected */
+    int64_t loss_due;                /* time at which the controller will detect the loss of light */
 } port;
 
 typedef struct {
     crystal crystal;
-    int64_t anchor, local;           /* at segment time `anchor` the local time was `local` [ns] */
-    double fraction;                 /* remaining fraction of a nanosecond */
+    int64_t anchor, local;           /* the local time at segment time `anchor` was `local` [ns] */
+    double fraction;                 /* remaining fraction of `local` [ns] */
     double correction;               /* correction of the rate by the time control loop */
     double mean, speed;              /* filters of the loop: difference [ns], speed counter difference */
 } dc_clock;
 
 typedef struct {
     uint64_t next0, next1;           /* system times of the next pulses [ns], modulo 2^64 */
-    int64_t due;                     /* time of the earlier one on the segment's clock */
-    uint32_t pulses0, pulses1;
+    int64_t due;                     /* segment time of the earlier pulse */
+    uint32_t pulses0, pulses1;       /* numbers of pulses since power-on */
     uint8_t active;
     uint8_t awaits0, awaits1;        /* a next pulse is pending */
 } sync_unit;
 
-/* A device that synchronises to SYNC0 or SYNC1, and the counters of 0x1C32 and 0x1C33. */
+/* Synchronisation of a device to SYNC0 or SYNC1, and the counters of 0x1C32 and 0x1C33. */
 typedef struct {
     int64_t cycle, minimum, copy_time;            /* [ns] */
     int64_t last;                    /* segment time of the last pulse */
-    int steps, left;                 /* own cycles per SYNC0 cycle; left before the next pulse */
+    int steps, left;                 /* internal cycles per pulse; remaining ones before the next pulse */
     uint16_t limit, missed_in_a_row;
     uint16_t missed, exceeded, shift_short;       /* 0x0B, 0x0C, 0x0D */
     uint8_t active, seen, error;     /* seen: pulses arrive */
-    uint8_t signal;                  /* bit in 0x0981 of the pulses that the device synchronises to */
+    uint8_t signal;                  /* bit of the signal in 0x0981 */
 } synchronous_cycle;
 
-/* One object of a device in its process data: bits of a SyncManager buffer <-> slot. */
+/* Mapping of an object: bits of a SyncManager buffer <-> slot. */
 typedef struct {
     uint32_t bit;
     uint16_t slot;
@@ -134,30 +133,30 @@ typedef struct controller {
     int position;
     uint32_t events;
     uint8_t emulation;               /* AL status follows AL control; no microcontroller */
-    uint8_t has_dc;                  /* bits of its clock: 0, 32 or 64 */
+    uint8_t has_dc;                  /* width of the clock: 0, 32 or 64 bits */
     uint8_t no_lrw;
     uint8_t fixed_loops;             /* the controller ignores loop control (0x0101) */
-    uint8_t al_unread;               /* the PDI has not yet fetched AL control */
+    uint8_t al_unread;               /* the PDI has not fetched AL control */
     uint8_t frozen;                  /* injected: the application is frozen */
-    uint8_t outputs_valid;           /* the application accepts the outputs: OP and watchdog fed */
-    uint8_t outputs_seen, outputs_taken;            /* EVENT_OUTPUTS was raised since the last arming */
-    int64_t outputs_ns;              /* segment time at which outputs were last updated, NEVER: not yet */
-    uint8_t inputs_stale;            /* the model stepped, but its inputs are not in memory yet */
-    uint8_t slots_stale;             /* nor in the slots */
+    uint8_t outputs_valid;           /* the outputs are valid: OP, and the watchdog has not expired */
+    uint8_t outputs_seen, outputs_taken;            /* EVENT_OUTPUTS was raised; the model used the outputs */
+    int64_t outputs_ns;              /* segment time of the last output update; NEVER: none */
+    uint8_t inputs_stale;            /* the model has new inputs that are not in memory */
+    uint8_t slots_stale;             /* the axes have new values that are not in the slots */
     uint8_t powered;
     uint8_t mute;                    /* injected: logical datagrams are ignored */
-    uint8_t is_protected;            /* protected by 0x0021 or 0x0031 */
+    uint8_t is_protected;            /* write protection by 0x0021 or 0x0031 */
     uint8_t reset_step;
     uint64_t registers_enabled, esc_enabled;        /* numbers of the frames that enabled writing */
     port ports[PORTS];
-    uint8_t loops_before;            /* 0x0101 under temporary use: the value restored at loops_due */
+    uint8_t loops_before;            /* value of 0x0101 to restore at loops_due after temporary use */
     int64_t loops_due;
-    uint16_t identification;         /* explicit device ID, 0: none */
+    uint16_t identification;         /* explicit device ID; 0: none */
     sync_manager sm[MAX_SM];
     int sm_count, sm_top;
     fmmu fmmus[MAX_FMMU];
     int fmmu_count, fmmu_active;
-    uint64_t logical_first, logical_end;  /* hull of the active FMMUs, bits */
+    uint64_t logical_first, logical_end;  /* bit range that contains all active FMMUs */
     sii_access sii;
     dc_clock clock;
     sync_unit sync;
@@ -168,13 +167,13 @@ typedef struct controller {
     int model;
     synchronous_cycle synchronous;
     int64_t step_period, step_due;   /* [ns] */
-    double step_seconds, step_rate;  /* the period again [s], and its inverse [Hz] */
+    double step_seconds, step_rate;  /* the same period [s], and its reciprocal [Hz] */
     mapping outputs, inputs;
     int64_t *slots;
     int slot_count;
     struct servo_axis *axes;
     int axis_count;
-    uint16_t emergency;              /* last new error code, for the application */
+    uint16_t emergency;              /* last error code, for the application */
 } controller;
 
 #define QUEUE_SIZE 256u               /* a power of two */
@@ -195,7 +194,7 @@ typedef struct {
     uint8_t plugged, light;          /* light: both sides also have power */
 } cable;
 
-/* Why a frame did not return. */
+/* Reasons why a frame does not return. */
 enum loss_cause {
     LOSS_NO_LIGHT = 1, LOSS_CLOSED_PORT, LOSS_CIRCULATING, LOSS_IN_FLIGHT, LOSS_INJECTED, LOSS_CORRUPT,
     LOSS_EXPIRED
@@ -206,46 +205,46 @@ typedef struct {
     int cause, end;
 } loss;
 
-/* The route of a frame from one interface in the present state of the loops, made by route.h. */
+/* Route of a frame from one interface in the present state of the loops, computed by route.h. */
 typedef struct { struct controller *controller; int64_t offset; } stop;
 typedef struct { int32_t device, port, cable; uint32_t stops; int64_t offset; } arrival;
 
 typedef struct {
-    stop *stops;                     /* where it is processed, in order */
-    arrival *arrivals;               /* where it arrives, including the interface at the end */
-    int64_t *times;                  /* 4 per device: arrival time at each port, NEVER: does not arrive */
+    stop *stops;                     /* processing units, in order */
+    arrival *arrivals;               /* arrivals at ports, including the final interface */
+    int64_t *times;                  /* arrival times, 4 per device; NEVER: does not arrive */
     uint32_t stop_count, arrival_count;
     uint32_t circulates;             /* stop after an automatically closed port 0, counted from 1 */
     int64_t delay;
-    int exit;                        /* interface at which it leaves (0, 1); -cause: lost */
-    int32_t opens;                   /* device and port at which it opens an auto-closed loop, 4·n + port; -1: none */
+    int exit;                        /* interface at which it leaves (0, 1), or -cause if it is lost */
+    int32_t opens;                   /* auto-closed loop that it opens: 4 * device + port; -1: none */
 } route;
 
-/* Faults that hit frames: which frames, and their effect (frame_faults.h). */
+/* Fault of frames: the affected frames and the effect (frame_faults.h). */
 typedef struct {
     int kind, used;
-    int64_t left;                    /* frames still to hit, -1: unlimited */
+    int64_t left;                    /* remaining number of frames to affect; -1: unlimited */
     uint32_t every, seen;
     int64_t delay;
-    int32_t cable, offset;           /* corrupt: cable; garble: offset, -1: random */
+    int32_t cable, offset;           /* corrupt: cable; garble: offset of the byte, -1: random bit */
 } frame_fault;
 
 typedef struct {
     int64_t sent, arrival;
     uint32_t length;
-    int from;                        /* interface at which it arrived */
+    int from;                        /* interface that sent it */
     uint8_t bytes[CAT_FRAME_MAX + 2];
 } queued_frame;
 
-/* One network interface of the MainDevice on the segment, and the frames that return to it. */
+/* Network interface of the MainDevice on the segment, and the frames that return to it. */
 typedef struct {
     struct cat_segment *segment;
     queued_frame *queue;
-    uint16_t order[QUEUE_SIZE];      /* indices of the queue, by arrival */
-    uint32_t head, tail;             /* take at head, put at tail */
+    uint16_t order[QUEUE_SIZE];      /* places in the queue, in order of arrival */
+    uint32_t head, tail;             /* frames are removed at head and added at tail */
     int64_t busy_until;              /* end of the transmission towards the segment */
     int number;
-    int up;                          /* it is in use: its cable has light */
+    int up;                          /* the interface is active and emits light */
     uint8_t taken[CAT_FRAME_MAX + 2];
 } segment_end;
 
@@ -257,37 +256,37 @@ typedef struct cat_segment {
     pthread_mutex_t mutex;
     controller *controllers;
     int count;
-    cable *cables;                   /* cable n leads up from device n; the last one closes the ring */
+    cable *cables;                   /* cable n is the uplink of device n; one more cable closes a ring */
     int cable_count, ring;
     route routes[2];
     const route *route;              /* route of the current frame */
     int routes_stale;
-    int64_t detection;               /* time from loss of light to closed loop [ns] */
+    int64_t detection;               /* time from the loss of light to the closed loop [ns] */
     int64_t link_due;                /* next detection of a lost link */
     uint8_t write_mask[REG_END];
-    int64_t now, epoch;              /* epoch: zero of the faults' time, -1: not yet */
+    int64_t now, epoch;              /* epoch: start of the fault clock; -1: not started */
     int64_t passage;                 /* start of the current frame */
     int64_t frame_end;               /* end of its last byte */
-    int64_t *dues;                   /* due time of each controller, checked at every step */
-    int64_t next_due;                /* earliest of all compiled work */
-    int64_t sii_due;                 /* earliest EEPROM access, for the packet loop */
-    int64_t service_due;             /* due time of the application (Python) */
-    struct plant *plant;             /* joint model driven by the servos' motors; NULL: none */
+    int64_t *dues;                   /* due time of each controller */
+    int64_t next_due;                /* earliest due time of all compiled work */
+    int64_t sii_due;                 /* earliest end of an EEPROM access, for the packet loop */
+    int64_t service_due;             /* due time of the service (Python) */
+    struct plant *plant;             /* model of the joints that the motors drive; NULL: none */
     int synchronous;                 /* number of devices that synchronise to SYNC0 */
-    int inputs_stale;                /* inputs of some controller are stale */
-    int pending;                     /* some controller has events */
-    int event_fd;                    /* wakes the service thread, -1: none */
+    int inputs_stale;                /* set if any controller has stale inputs */
+    int pending;                     /* set if any controller has events */
+    int event_fd;                    /* event descriptor of the service thread; -1: none */
     const cat_clock *clock;          /* shared virtual clock; NULL: the clock is private */
     int is_virtual;
     uint8_t scratch[2048], incoming[2048];
     frame_counters counters;
     frame_fault faults[MAX_FRAME_FAULTS];
-    int fault_count;                 /* in use */
+    int fault_count;                 /* number of faults in use */
     uint64_t random;
     loss losses[LOSS_LOG];
     uint64_t loss_count;
     segment_end ends[2];
-    int (*service)(void *owner);      /* virtual time: runs the application side, takes the GIL; 0 or -errno */
+    int (*service)(void *owner);      /* virtual time: run the service with the GIL; 0 or -errno */
     void *owner;
 } cat_segment;
 
@@ -314,7 +313,7 @@ static inline void raise_event(controller *c, uint32_t event) {
     }
 }
 
-/* Work of this controller is due at `when`: the segment must check it then. */
+/* Schedule work of this controller for the time `when`. */
 static inline void due_at(controller *c, int64_t when) {
     int64_t *due = c->segment->dues + c->position;
     *due = when < *due ? when : *due;

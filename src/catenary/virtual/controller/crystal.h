@@ -1,7 +1,7 @@
-/* The crystal of a controller: constant frequency error, slow swing with the temperature, and
- * scatter of its time stamps.
+/* Crystal of a controller: constant frequency error, slow variation with the temperature, and scatter
+ * of time stamps.
  *
- * The count between two times is a closed formula, so that an unused crystal costs nothing. */
+ * A closed formula gives the count between two times, so a crystal needs no periodic work. */
 #ifndef CATENARY_VIRTUAL_CRYSTAL_H
 #define CATENARY_VIRTUAL_CRYSTAL_H
 
@@ -10,19 +10,19 @@
 
 typedef struct {
     double error;                    /* relative error of the frequency */
-    double swing;                    /* maximum relative change by the temperature */
-    double turn;                     /* angular frequency of this change [rad/ns], 0: none */
-    double scatter;                  /* width of the time stamps' scatter [ns] */
-    uint64_t random;                 /* generator state of the scatter */
+    double swing;                    /* amplitude of the relative change with the temperature */
+    double turn;                     /* angular frequency of this change [rad/ns]; 0: none */
+    double scatter;                  /* width of the scatter of time stamps [ns] */
+    uint64_t random;                 /* state of the random generator for the scatter */
 } crystal;
 
-/* Rate of the crystal at `when`; 1 is exact. */
+/* Return the rate of the crystal at `when`; 1 is exact. */
 static inline double crystal_rate(const crystal *x, int64_t when) {
     double swing = x->turn > 0 ? x->swing * sin(x->turn * (double)when) : 0;
     return 1.0 + x->error + swing;
 }
 
-/* Counted time between two times of the segment's clock [ns]. */
+/* Return the time that the crystal counts between two times of the segment's clock [ns]. */
 static inline double crystal_count(const crystal *x, int64_t from, int64_t to) {
     double counted = (double)(to - from) * (1.0 + x->error);
     if (x->turn > 0)
@@ -30,8 +30,8 @@ static inline double crystal_count(const crystal *x, int64_t from, int64_t to) {
     return counted;
 }
 
-/* Uniform, half of the scatter in either direction; the same in every run (xorshift64*, Marsaglia
- * 2003, Vigna 2016). */
+/* Return a uniform random number from -scatter/2 to scatter/2. The sequence is the same in every run
+ * (xorshift64*, Marsaglia 2003, Vigna 2016). */
 static inline int64_t crystal_scatter(crystal *x) {
     if (x->scatter <= 0)
         return 0;

@@ -1,7 +1,7 @@
 /* Frames and datagrams, ETG.1000.4 §5.4: the fifteen commands, addressing and working counters.
  *
- * Everything in a frame is hostile. A length that does not fit ends the work on that frame, and
- * the rest returns unchanged. Budget: 0.1 us per datagram and device accessed. */
+ * The content of a frame is not trusted. An invalid length ends the processing of a frame, and its
+ * rest returns unchanged. Time budget: 0.1 us for each datagram and accessed device. */
 #ifndef CATENARY_VIRTUAL_DATAGRAM_H
 #define CATENARY_VIRTUAL_DATAGRAM_H
 
@@ -29,7 +29,7 @@ static void fill_mask(uint8_t *mask, uint32_t address, uint32_t size, uint8_t bi
     memset(mask + address, bits, size);
 }
 
-/* Bits that a MainDevice may change. A 0 bit is read-only or not modelled. */
+/* Set the mask of bits that a MainDevice may change. A 0 bit is read-only or not modelled. */
 static void make_write_mask(uint8_t *mask) {
     memset(mask, 0, REG_END);
     fill_mask(mask, REG_STATION, 2, 0xFF);
@@ -73,7 +73,7 @@ static void make_write_mask(uint8_t *mask) {
     fill_mask(mask, REG_USER_RAM, REG_END - REG_USER_RAM, 0xFF);
 }
 
-/* Registers with a condition: return 1 if this byte may be written now. */
+/* Return 1 if a frame may write this register byte now, in the present state of the controller. */
 static inline int register_open(const controller *c, uint32_t address) {
     if (address >= REG_SII_CONTROL && address < REG_SII_END)
         return sii_accessible(c);
@@ -147,8 +147,8 @@ static void registers_written(controller *c, uint32_t first, uint32_t end, const
     clock_registers_written(c, first, end, data, passage);
 }
 
-/* The SII command bits change only after the write was checked: the control word keeps its status
- * bits through the mask. */
+/* Write registers. Return 1 if any byte was written. The write mask protects the status bits of the
+ * SII control word, whose command bits change only after the check. */
 static int register_write(controller *c, uint32_t address, uint32_t size, const uint8_t *data, int64_t passage) {
     uint8_t activate[MAX_SM], loops = c->memory[REG_DL_CONTROL + 1];
     int done = 0;
@@ -185,7 +185,7 @@ static void register_read(controller *c, uint32_t address, uint32_t size, uint8_
         store16(event, load16(event) & (uint16_t)~ECAT_EVENT_DL_STATUS);
 }
 
-/* A physical access, clipped to the existing memory. Return 1 if any byte was accessed. */
+/* Write to physical memory, clipped to its size. Return 1 if any byte was written. */
 static int physical_write(controller *c, uint32_t address, uint32_t size, const uint8_t *data, int64_t passage) {
     int done = 0;
     if (address < REG_END) {
@@ -215,7 +215,8 @@ static int physical_read(controller *c, uint32_t address, uint32_t size, uint8_t
     return done | ram_access(c, address, min32(size, c->memory_size - address), data, 0);
 }
 
-/* Read and write together: the data returned is that from before the write. */
+/* Read and write: the returned data is from before the write. Return the increment of the working
+ * counter. */
 static int physical_exchange(controller *c, uint32_t address, uint32_t size, uint8_t *data, int64_t passage) {
     uint8_t *incoming = c->segment->incoming;
     memcpy(incoming, data, size);
@@ -251,7 +252,8 @@ static inline int station_matches(const controller *c, uint16_t station) {
         || ((c->memory[REG_DL_CONTROL + 3] & DL_CONTROL_ALIAS) && load16(c->memory + REG_ALIAS) == station);
 }
 
-/* Process one datagram at one controller. `header`: its ten bytes; ADP is incremented in place. */
+/* Process one datagram at one controller. `header` points to its ten bytes, of which ADP is
+ * incremented. */
 static int datagram_at(controller *c, uint8_t *header, uint32_t size, uint8_t *data, int64_t passage) {
     int command = header[0];
     uint16_t adp = load16(header + 2);
@@ -289,15 +291,15 @@ static void datagram_through(cat_segment *s, const route *r, uint32_t stops, uin
     store16(data + size, counter);
 }
 
-/* Count an error in every processing unit: the lengths in the frame do not fit. */
+/* Count a malformed frame, with invalid lengths, in every processing unit. */
 static void frame_malformed(cat_segment *s, const route *r, uint32_t stops) {
     s->counters.malformed++;
     for (uint32_t k = 0; k < stops; k++)
         count_up(r->stops[k].controller->memory + REG_PROCESSING_UNIT_ERRORS);
 }
 
-/* Process a whole Ethernet frame, in place, in the first `stops` processing units of a route.
- * `mark`: a closed port 0 on the route marks its datagrams as circulating. */
+/* Process a complete Ethernet frame in place, in the first `stops` processing units of a route.
+ * `mark`: mark its datagrams as circulating, because of a closed port 0 on the route. */
 static void frame_process(cat_segment *s, const route *r, uint32_t stops, int mark, uint8_t *frame, uint32_t length) {
     uint16_t head = load16(frame + ETHERNET_HEADER);
     uint32_t at = ETHERNET_HEADER + ETHERCAT_HEADER;
@@ -336,8 +338,8 @@ static inline int frame_is_marked(const uint8_t *frame, uint32_t length) {
     return length > at && (frame[at] & CIRCULATING);
 }
 
-/* Process a received frame along its whole route. Return the interface at which it leaves, or
- * -cause if it is lost. */
+/* Process a frame along its complete route. Return the interface at which it leaves, or -cause if it
+ * is lost. */
 static int frame_through(cat_segment *s, const route *r, const fate *fate, uint8_t *frame, uint32_t length) {
     uint32_t stops = r->stop_count;
     int exit = r->exit, mark = r->circulates > 0;

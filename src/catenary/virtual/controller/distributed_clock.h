@@ -1,22 +1,25 @@
 /* Distributed clocks: local time, latched receive times, and the time control loop.
  *
- * Beckhoff, EtherCAT Slave Controller, section I §9.1 (functions) and section II §3.49 (registers);
- * ETG.1000.4 §6.10. Behaviour that the documents specify is implemented exactly:
- * - local copy of the system time = local time + offset; a frame reads it minus the delay;
- * - a received time is compared in its low 32 bits: difference = (local + offset - delay) - received;
- * - 0x092C is a mean of 2^(0x0934) differences, sign-magnitude, positive: the local copy is ahead;
- * - with the speed counter's start S and difference D, |D| <= S - 0x7F, the local clock deviates by
- *   D / (5 (S + D + 2) (S - D + 2)). That is 1 ns more every S - D + 2 ticks of 10 ns and 1 ns less
- *   every S + D + 2 ticks: the 9, 10 or 11 ns that a tick adds.
- * They do not specify how D follows from the differences. Here D = V - mean, where V is the mean of
- * 2^(0x0935) values of D. So D is the deviation between the clocks' periods once the difference has
- * settled, as the documents say; a larger S gives a smaller bandwidth. With the reset values a
- * clock that is 100 ppm off initially lags by 3 us ("will lock after a while", "many seconds":
- * SOEM#547). This matches the mean of 2^12: the 15 000 frames that the documents recommend at the
- * start are four times that. A larger share of the mean in D locks a clock sooner, but passes more
- * time stamp scatter on to it.
+ * Sources: Beckhoff, EtherCAT Slave Controller, section I §9.1 (functions) and section II §3.49
+ * (registers); ETG.1000.4 §6.10. The code implements specified behaviour exactly:
+ * - Local copy of the system time = local time + offset. A frame reads it minus the delay.
+ * - The low 32 bits of a received time are compared:
+ *   difference = (local + offset - delay) - received.
+ * - 0x092C is the mean of 2^(0x0934) differences in sign-magnitude format. Positive: the local copy
+ *   is ahead.
+ * - With the start S and the difference D of the speed counter, |D| <= S - 0x7F, the relative
+ *   deviation of the local clock is D / (5 (S + D + 2) (S - D + 2)). It gains 1 ns every S - D + 2
+ *   ticks of 10 ns and loses 1 ns every S + D + 2 ticks, so a tick adds 9, 10 or 11 ns.
  *
- * Times are exact to a nanosecond; real controllers step by 10. */
+ * The documents do not specify how D follows from the differences. Here D = V - mean, where V is the
+ * mean of 2^(0x0935) values of D. When the difference has settled, D is the deviation between the
+ * periods of the clocks, as the documents require. A larger S gives a smaller bandwidth. With the
+ * reset values, a clock with an error of 100 ppm initially lags by 3 us (SOEM#547: "will lock after a
+ * while", "many seconds"). This agrees with the mean of 2^12 values: the documents recommend 15 000
+ * initial frames, which is about four times this number. A larger weight of the mean in D would
+ * lock a clock sooner, but would also pass on more scatter of time stamps.
+ *
+ * Times have a resolution of 1 ns. Real controllers have a resolution of 10 ns. */
 #ifndef CATENARY_VIRTUAL_DISTRIBUTED_CLOCK_H
 #define CATENARY_VIRTUAL_DISTRIBUTED_CLOCK_H
 
@@ -28,10 +31,10 @@ enum {
     SPEED_START_MIN = 0x0080,
     SPEED_START_MAX = 0x3FFF,
     SPEED_ROOM = 0x007F,             /* minimum distance of the difference from the start value */
-    WAKE_UP_NS = 1234567             /* devices are powered up one after the other */
+    WAKE_UP_NS = 1234567             /* interval between the power-up of successive devices */
 };
 
-/* Local time at `when`; the fraction is stored separately. */
+/* Return the time since the anchor at `when`, including the stored fraction [ns]. */
 static inline double dc_elapsed(const dc_clock *k, int64_t when) {
     return k->fraction + crystal_count(&k->crystal, k->anchor, when) * (1.0 + k->correction);
 }
@@ -40,7 +43,7 @@ static inline int64_t dc_local(const controller *c, int64_t when) {
     return c->clock.local + (int64_t)floor(dc_elapsed(&c->clock, when));
 }
 
-/* Anchor the clock: another rate may apply from here on. */
+/* Move the anchor of the clock to `when`, so that the rate can change there. */
 static inline void dc_anchor(controller *c, int64_t when) {
     dc_clock *k = &c->clock;
     double elapsed = dc_elapsed(k, when);
@@ -55,7 +58,7 @@ static inline int64_t dc_offset(const controller *c) {
     return c->has_dc == 64 ? (int64_t)load64(r) : (int64_t)load32(r);
 }
 
-/* The local copy of the system time. */
+/* Return the local copy of the system time. */
 static inline int64_t dc_system_time(const controller *c, int64_t when) {
     return (int64_t)((uint64_t)dc_local(c, when) + (uint64_t)dc_offset(c));
 }
@@ -67,8 +70,8 @@ static inline void dc_store(const controller *c, uint32_t address, int64_t time)
         store32(c->memory + address, (uint32_t)time);
 }
 
-/* Latch the receive times of a frame that started at `start`. It arrives at each port after
- * times[port] (NEVER: not there) and at the processing unit at `unit`. */
+/* Latch the receive times of a frame that was sent at `start`. It arrives at each port after
+ * times[port] (NEVER: it does not arrive), and at the processing unit at `unit`. */
 static void dc_latch(controller *c, int64_t start, const int64_t *times, int64_t unit) {
     if (!c->has_dc)
         return;
@@ -82,7 +85,7 @@ static void dc_latch(controller *c, int64_t start, const int64_t *times, int64_t
     dc_store(c, REG_DC_RECEIVE_UNIT, processed);
 }
 
-/* Relative amount by which speed counters run the local clock faster than its crystal. */
+/* Return the relative amount by which the speed counter speeds up the local clock. */
 static inline double dc_correction(int start, int difference) {
     return 0.1 / (start - difference + 2) - 0.1 / (start + difference + 2);
 }
@@ -108,20 +111,20 @@ static void dc_steer(controller *c, double wanted, int64_t when) {
     store16(c->memory + REG_DC_SPEED_DIFFERENCE, (uint16_t)(int16_t)difference);
 }
 
-/* A write to the speed counter's start resets the loop. */
+/* Reset the loop, after a write to the start value of the speed counter. */
 static void dc_reset_filters(controller *c, int64_t when) {
     c->clock.mean = c->clock.speed = 0;
     dc_show_difference(c);
     dc_steer(c, 0, when);
 }
 
-/* The system time minus the delay from the reference clock, as in frames. */
+/* Return the system time minus the delay from the reference clock, as a frame carries it. */
 static inline uint64_t dc_received_time(controller *c, int64_t when) {
     uint64_t scatter = (uint64_t)crystal_scatter(&c->clock.crystal);
     return (uint64_t)dc_system_time(c, when) + scatter - load32(c->memory + REG_DC_DELAY);
 }
 
-/* Handle a system time received by FRMW, ARMW or a plain write: steer towards it. */
+/* Steer the clock towards a system time that was received by FRMW, ARMW or a plain write. */
 static void dc_receive_time(controller *c, uint32_t received, int64_t when) {
     dc_clock *k = &c->clock;
     int32_t difference = (int32_t)((uint32_t)dc_received_time(c, when) - received);
@@ -130,12 +133,12 @@ static void dc_receive_time(controller *c, uint32_t received, int64_t when) {
     dc_steer(c, k->speed - k->mean, when);
 }
 
-/* Refresh the system time that a frame reads: that of passing the reference clock. */
+/* Update the system time register before a frame reads it. */
 static inline void dc_refresh(controller *c, int64_t when) {
     dc_store(c, REG_DC_SYSTEM_TIME, (int64_t)dc_received_time(c, when));
 }
 
-/* Change the crystal; the time counted so far stays. */
+/* Change the crystal without changing the present time. */
 static void dc_tune(controller *c, double error, double swing, double turn, double scatter, int64_t when) {
     dc_anchor(c, when);
     crystal *x = &c->clock.crystal;
@@ -145,7 +148,7 @@ static void dc_tune(controller *c, double error, double swing, double turn, doub
     x->scatter = scatter;
 }
 
-/* Reset to the state after power-on, except the crystal. `bits`: 0 no clock, 32 or 64. */
+/* Reset the clock to its state after power-on, except the crystal. `bits`: 0 (no clock), 32 or 64. */
 static void dc_power_on(controller *c, int bits) {
     dc_clock *k = &c->clock;
     c->has_dc = (uint8_t)bits;

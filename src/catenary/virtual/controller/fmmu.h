@@ -1,4 +1,4 @@
-/* FMMUs, ETG.1000.4 §6.7: logical addresses to process RAM, bit by bit. */
+/* FMMUs, ETG.1000.4 §6.7: bit-wise mapping of logical addresses to process RAM. */
 #ifndef CATENARY_VIRTUAL_FMMU_H
 #define CATENARY_VIRTUAL_FMMU_H
 
@@ -37,8 +37,8 @@ static inline void put_bit(uint8_t *p, uint64_t bit, int value) {
     p[bit >> 3] = (uint8_t)(value ? p[bit >> 3] | mask : p[bit >> 3] & ~mask);
 }
 
-/* Access the part of the datagram [base, base + size) bytes that FMMU f covers. Return 1 if
- * accessed. */
+/* Access the part of a datagram with the logical bytes [base, base + size) that FMMU f covers. Return
+ * 1 if any byte was accessed. */
 static int fmmu_access(controller *c, const fmmu *f, uint64_t base, uint32_t size, uint8_t *data, int write) {
     uint64_t lo = f->first > base * 8 ? f->first : base * 8;
     uint64_t hi = f->end < (base + size) * 8 ? f->end : (base + size) * 8;
@@ -49,13 +49,13 @@ static int fmmu_access(controller *c, const fmmu *f, uint64_t base, uint32_t siz
     uint32_t bytes = (uint32_t)((physical + (hi - lo) + 7) / 8) - first_byte;
     if ((uint64_t)first_byte + bytes > c->memory_size)
         return 0;
-    int registers = first_byte < REG_END;    /* a mailbox status mapped into the cycle: 0x080D */
+    int registers = first_byte < REG_END;    /* for example a cyclically mapped mailbox status, 0x080D */
     if (registers && (write || first_byte + bytes > REG_END))
         return 0;
     if (f->bytewise && !registers)
         return ram_access(c, first_byte, bytes, data + (lo / 8 - base), write);
 
-    uint8_t *part = c->segment->scratch;     /* bytes <= 1500 + 2, as the datagram is */
+    uint8_t *part = c->segment->scratch;     /* bytes <= 1500 + 2, limited by the datagram */
     uint64_t in_data = lo - base * 8, in_part = physical - (uint64_t)first_byte * 8, count = hi - lo;
     if (write) {
         for (uint32_t k = 0; k < bytes; k++)
@@ -73,8 +73,8 @@ static int fmmu_access(controller *c, const fmmu *f, uint64_t base, uint32_t siz
     return 1;
 }
 
-/* Process a logical datagram at one controller; return the increment of the working counter.
- * Outputs are read before inputs are written, as required for overlapping areas of a frame. */
+/* Process a logical datagram at one controller, and return the increment of the working counter.
+ * Take the outputs before inserting the inputs, because their areas in a frame can overlap. */
 static inline int fmmu_datagram(controller *c, uint32_t address, uint32_t size, uint8_t *data, int reads, int writes) {
     uint64_t base = address;
     if (c->fmmu_active == 0 || c->logical_end <= base * 8 || c->logical_first >= (base + size) * 8)

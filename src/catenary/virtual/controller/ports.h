@@ -1,9 +1,9 @@
 /* Ports: light, link, loop control and their registers (ET1100 datasheet, section I chapter 3, and
  * section II 0x0101, 0x0110, 0x0310).
  *
- * A cable carries light while it is plugged and both sides have power. A controller detects the
- * loss of light after `detection` and then closes the loop. Until then frames run into the dark
- * cable. New light is a link at once. */
+ * A cable carries light while it is plugged in and both sides have power. A controller detects the
+ * loss of light after the time `detection`, and then closes the loop. Until then, it sends frames
+ * into the dark cable. New light establishes a link immediately. */
 #ifndef CATENARY_VIRTUAL_PORTS_H
 #define CATENARY_VIRTUAL_PORTS_H
 
@@ -18,7 +18,7 @@ static inline int loop_mode_of(const controller *c, int p) {
     return c->fixed_loops ? LOOP_AUTO : c->memory[REG_DL_CONTROL + 1] >> (2 * p) & 3;
 }
 
-/* DL status: bits 4 to 7 links; from bit 8 on, loop closed and communication, port by port. */
+/* Update DL status: links in bits 4 to 7; from bit 8 on, loop closed and communication of each port. */
 static void ports_show(controller *c) {
     uint8_t *status = c->memory + REG_DL_STATUS;
     uint8_t links = 0, loops = 0;
@@ -35,8 +35,8 @@ static void ports_show(controller *c) {
     c->segment->routes_stale = 1;
 }
 
-/* Set the loops from mode and link. `written`: DL control was written just now, which opens an
- * auto-closed port with a link. */
+/* Set the loops according to mode and link. `written`: DL control has just been written, which opens
+ * an auto-closed port with a link. */
 static void loops_set(controller *c, int written) {
     int open = 0;
     for (int p = 0; p < PORTS; p++) {
@@ -57,7 +57,7 @@ static void loops_set(controller *c, int written) {
     ports_show(c);
 }
 
-/* A valid frame opens the auto-closed port at which it arrived. */
+/* Open the auto-closed port at which a valid frame has arrived. */
 static void loop_opened_by_frame(controller *c, int p) {
     c->ports[p].closed = 0;
     ports_show(c);
@@ -97,7 +97,7 @@ static void port_loses_link(controller *c, int p) {
     loops_set(c, 0);
 }
 
-/* Handle lost links and temporary loops that are due. */
+/* Handle due detections of lost links, and the end of temporary loop settings. */
 static void links_check(cat_segment *s) {
     s->link_due = NEVER;
     for (int n = 0; n < s->count; n++) {
@@ -128,7 +128,7 @@ static void end_sees_light(cat_segment *s, cable_end e, int light) {
         port_sees_light(&s->controllers[e.device], e.port, light);
 }
 
-/* Handle plugged or pulled cables and changes of power. Return 1 if a cable became dark. */
+/* Handle changes of cables and power. Return 1 if a cable has become dark. */
 static int light_update(cat_segment *s) {
     int darker = 0;
     s->routes_stale = 1;
@@ -145,7 +145,7 @@ static int light_update(cat_segment *s) {
     return darker;
 }
 
-/* Reset to the state after power-on: no link detected, all existing loops wait for a link. */
+/* Reset to the state after power-on: no link is detected, and all loops wait for a link. */
 static void ports_reset(controller *c) {
     for (int p = 0; p < PORTS; p++) {
         c->ports[p].link = 0;

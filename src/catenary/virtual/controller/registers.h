@@ -1,6 +1,5 @@
 /* Addresses and bits of the ESC registers that the virtual controllers implement
- * (ETG.1000.4 §6 and the ET1100 datasheet, section II). Defined only here; Python uses
- * the accessors of `_segment`, never a number. */
+ * (ETG.1000.4 §6 and the ET1100 datasheet, section II). */
 #ifndef CATENARY_VIRTUAL_REGISTERS_H
 #define CATENARY_VIRTUAL_REGISTERS_H
 
@@ -32,7 +31,7 @@ enum {
     REG_PDI_CONFIGURATION_EXTENDED = 0x0152,
     REG_ECAT_EVENT_MASK = 0x0200,
     REG_ECAT_EVENT = 0x0210,
-    REG_RX_ERRORS = 0x0300,          /* 8 bytes, then forwarded errors 4, processing unit, PDI */
+    REG_RX_ERRORS = 0x0300,          /* 8 bytes, followed by forwarded (4), processing unit and PDI errors */
     REG_FORWARDED_ERRORS = 0x0308,
     REG_PROCESSING_UNIT_ERRORS = 0x030C,
     REG_LOST_LINKS = 0x0310,
@@ -81,8 +80,8 @@ enum {
 
 /* bits */
 enum {
-    DL_CONTROL_TEMPORARY = 0x02,     /* in the first byte: loop control lasts only one second */
-    DL_CONTROL_ALIAS = 0x01,         /* in the register's fourth byte: bit 24 */
+    DL_CONTROL_TEMPORARY = 0x02,     /* bit 1: loop control is in effect for only one second */
+    DL_CONTROL_ALIAS = 0x01,         /* bit 24, in the fourth byte of the register */
     ECAT_EVENT_DL_STATUS = 0x0004,
     ECAT_EVENT_AL_STATUS = 0x0008,
     ECAT_EVENT_SM0 = 0x0010,

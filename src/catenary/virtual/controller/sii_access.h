@@ -1,5 +1,5 @@
-/* SII access, ETG.1000.4 §6.4: registers 0x0500 to 0x050F and an EEPROM with access times.
- * Reads return 4 or 8 bytes (bit 6), writes store one word; addresses count words. */
+/* SII access, ETG.1000.4 §6.4: registers 0x0500 to 0x050F, and an EEPROM with access times. A read
+ * returns 4 or 8 bytes (bit 6), and a write stores one word. Addresses are in words. */
 #ifndef CATENARY_VIRTUAL_SII_ACCESS_H
 #define CATENARY_VIRTUAL_SII_ACCESS_H
 
@@ -7,7 +7,7 @@
 
 enum { SII_WORDS_CONFIGURATION = 8, SII_WORD_ALIAS = 4, SII_WORD_CHECKSUM = 7 };
 
-/* CRC-8 over the first 14 bytes: x^8 + x^2 + x + 1, start 0xFF (ETG.2010 §2.2) */
+/* Return the CRC-8 of the first 14 bytes: x^8 + x^2 + x + 1, initial value 0xFF (ETG.2010 §2.2). */
 static uint8_t sii_checksum(const uint8_t *image) {
     uint8_t crc = 0xFF;
     for (int k = 0; k < 14; k++) {
@@ -18,8 +18,8 @@ static uint8_t sii_checksum(const uint8_t *image) {
     return crc;
 }
 
-/* Load the controller's configuration from the first words: at power-on, and by the reload command,
- * which does not change the alias. */
+/* Load the configuration of the controller from the first words, at power-on and for the reload
+ * command. The reload command does not change the alias. */
 static void sii_load(controller *c) {
     uint16_t control = load16(c->memory + REG_SII_CONTROL);
     control &= (uint16_t)~(SII_ERROR_CHECKSUM | SII_ERROR_LOADING);
@@ -57,7 +57,7 @@ static inline void sii_start(controller *c, uint16_t command, int64_t time) {
         c->segment->sii_due = c->sii.due;
 }
 
-/* Handle a write of `value` to the control word: one command at a time, else an error bit. */
+/* Handle a write of `value` to the control word. An invalid command sets an error bit. */
 static void sii_command(controller *c, uint16_t value) {
     uint8_t *control = c->memory + REG_SII_CONTROL;
     uint16_t status = load16(control) & (uint16_t)~(SII_ERROR_COMMAND | SII_ERROR_WRITE_ENABLE);
@@ -94,7 +94,7 @@ static void sii_check(controller *c) {
     else if (c->sii.address < c->sii.words)
         store16(c->sii.image + 2 * c->sii.address, c->sii.word);
     else
-        store16(control, status | SII_ERROR_COMMAND);   /* no acknowledge beyond the end of the EEPROM */
+        store16(control, status | SII_ERROR_COMMAND);   /* beyond its end, the EEPROM does not acknowledge */
     c->sii.pending = 0;
     c->sii.due = NEVER;
     store16(control, load16(control) & (uint16_t)~(SII_BUSY | SII_COMMAND | SII_WRITE_ENABLE));

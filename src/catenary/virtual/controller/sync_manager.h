@@ -1,8 +1,8 @@
-/* SyncManagers, ETG.1000.4 §6.8: mailbox (one buffer with handshake) and three-buffer mode.
+/* SyncManagers, ETG.1000.4 §6.8: mailbox mode (one buffer with handshake) and three-buffer mode.
  *
- * Access to a buffer begins with its first byte and ends with its last. An access that begins in
- * the middle of a buffer that is not open is refused. Three buffers are stored one after the other;
- * both sides always address the first, and the controller redirects. */
+ * Access to the first byte opens a buffer, and access to the last byte closes it. Access to other
+ * bytes is refused while the buffer is not open. The three buffers are consecutive in memory. Both
+ * sides always address the first one, and the controller redirects the access. */
 #ifndef CATENARY_VIRTUAL_SYNC_MANAGER_H
 #define CATENARY_VIRTUAL_SYNC_MANAGER_H
 
@@ -32,7 +32,7 @@ static inline void sm_show_status(controller *c, int n) {
     store16(c->memory + REG_ECAT_EVENT, raised ? events | event : events & (uint16_t)~event);
 }
 
-/* Apply a change of SyncManager n's registers, from either side. */
+/* Apply a change of the registers of SyncManager n, by either side. */
 static void sm_configured(controller *c, int n) {
     sync_manager *sm = &c->sm[n];
     const uint8_t *r = sm_registers(c, n);
@@ -101,7 +101,7 @@ static inline void sm_write_completed(controller *c, int n) {
     sm_show_status(c, n);
 }
 
-/* EtherCAT side: access `size` bytes at `offset` of the buffer. Return 1: done, 0: refused. */
+/* Write `size` bytes at `offset` of the buffer from the EtherCAT side. Return 1 if done, 0 if refused. */
 static inline int sm_ecat_write(controller *c, int n, uint32_t offset, uint32_t size, const uint8_t *data) {
     sync_manager *sm = &c->sm[n];
     if (sm->blocked || !sm->ecat_writes || offset + size > sm->length || (sm->mailbox && sm->full))
@@ -143,7 +143,7 @@ static inline int sm_ecat_read(controller *c, int n, uint32_t offset, uint32_t s
     return 1;
 }
 
-/* PDI side: read a complete buffer. Return the number of bytes, or -1 if there is none. */
+/* Read a complete buffer from the PDI side. Return the number of bytes, or -1 if there is none. */
 static inline int sm_pdi_read(controller *c, int n, uint8_t *data, uint32_t room) {
     sync_manager *sm = &c->sm[n];
     if (!sm->enabled || !sm->ecat_writes || sm->length > room || (sm->mailbox && !sm->full) || !sm->written)
@@ -159,7 +159,7 @@ static inline int sm_pdi_read(controller *c, int n, uint8_t *data, uint32_t room
     return sm->length;
 }
 
-/* Return where the application may write now; NULL: nowhere. `sm_pdi_written` publishes it. */
+/* Return the buffer that the application may write now, or NULL. `sm_pdi_written` publishes it. */
 static inline uint8_t *sm_pdi_buffer(controller *c, int n, uint8_t *which) {
     sync_manager *sm = &c->sm[n];
     if (!sm->enabled || sm->blocked || sm->ecat_writes || (sm->mailbox && sm->full))
@@ -190,7 +190,8 @@ static inline int sm_pdi_write(controller *c, int n, const uint8_t *data, uint32
     return (int)size;
 }
 
-/* Return the SyncManager that guards byte `address`, -1: none; *run: how far this is valid. */
+/* Return the SyncManager that covers `address`, or -1. *run receives the number of bytes for which
+ * the result is valid. */
 static inline int sm_at(const controller *c, uint32_t address, uint32_t *run) {
     uint32_t nearest = c->memory_size;
     for (int n = 0; n < c->sm_top; n++) {
@@ -209,7 +210,8 @@ static inline int sm_at(const controller *c, uint32_t address, uint32_t *run) {
     return -1;
 }
 
-/* EtherCAT access to process RAM, bounded by the caller. Return 1 if any byte was accessed. */
+/* Access process RAM from the EtherCAT side. The caller has checked the range. Return 1 if any byte
+ * was accessed. */
 static int ram_access(controller *c, uint32_t address, uint32_t size, uint8_t *data, int write) {
     int done = 0;
     while (size > 0) {
@@ -237,7 +239,7 @@ static int ram_access(controller *c, uint32_t address, uint32_t size, uint8_t *d
     return done;
 }
 
-/* Return the byte for a bit-wise write: that of the last complete buffer, without side effects. */
+/* Return a byte of the last complete buffer for a bit-wise write, without side effects. */
 static inline uint8_t ram_peek(controller *c, uint32_t address) {
     uint32_t run;
     int n = sm_at(c, address, &run);

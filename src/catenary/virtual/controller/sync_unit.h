@@ -1,11 +1,11 @@
 /* SYNC0 and SYNC1: pulses at given values of the local copy of the system time, which the time
- * control loop steers. Beckhoff, EtherCAT Slave Controller, section I §9.2.3, section II §3.49.4;
- * bits that an ET1100 lacks (0x0981.3 to 7) are not implemented.
+ * control loop steers. Source: Beckhoff, EtherCAT Slave Controller, section I §9.2.3 and section II
+ * §3.49.4. Bits that an ET1100 does not have (0x0981.3 to 7) are not implemented.
  *
- * The unit compares for "reached". A start time may be in the past when the unit is activated, or a
- * new offset may jump over it. It is then reached after the clock has wrapped: after at most 4.3 s
- * with 32 bits, practically never with 64. With a pulse length of 0 the device acknowledges at
- * once, so that 0x098E and 0x098F read 0.
+ * The unit compares for equality. If the start time is in the past at activation, or if a new offset
+ * jumps over it, the pulse occurs after the clock has wrapped. This takes at most 4.3 s with 32 bits,
+ * and practically never happens with 64 bits. With a pulse length of 0, the device acknowledges the
+ * pulse immediately, so that 0x098E and 0x098F read 0.
  *
  * Frames can write any value into these times. They are counted modulo 2^64. The distance to a
  * pulse is their difference, limited to SYNC_HORIZON. A pending pulse is less than 2^63 ns ahead. */
@@ -23,8 +23,8 @@ enum {
     SYNC_PENDING_1 = 0x02
 };
 
-#define SYNC_HOLD_MIN 10000           /* shortest interval of interrupts that a device can follow [ns] */
-#define SYNC_HORIZON 1000000000000ll  /* a pulse farther away is scheduled again at this distance [ns] */
+#define SYNC_HOLD_MIN 10000           /* shortest interrupt interval that a device can handle [ns] */
+#define SYNC_HORIZON 1000000000000ll  /* distance at which a farther pulse is scheduled again [ns] */
 
 /* Return 1 if a frame may write this byte of 0x0900 to 0x09FF now. */
 static inline int clock_register_open(const controller *c, uint32_t address) {
@@ -40,14 +40,15 @@ static inline int clock_register_open(const controller *c, uint32_t address) {
         || !(c->memory[REG_SYNC_ACTIVATION] & SYNC_ACTIVE);
 }
 
-/* Wait until a counter that reads `now` reaches *time. Return 1 if that is within 2^63 ns. */
+/* Extend *time to the next time at which a clock that now reads `now` reaches it. Return 1 if that is
+ * within 2^63 ns. */
 static inline uint8_t sync_await(const controller *c, uint64_t *time, uint64_t now) {
     uint64_t ahead = c->has_dc == 64 ? *time - now : (uint32_t)(*time - now);
     *time = now + ahead;
     return ahead <= INT64_MAX;
 }
 
-/* Return the distance from `now` to `time`; 0 or negative: reached. */
+/* Return the distance from `now` to `time`. A distance of 0 or less means reached. */
 static inline int64_t sync_ahead(uint64_t time, uint64_t now) {
     int64_t ahead = (int64_t)(time - now);
     return ahead < -SYNC_HORIZON ? -SYNC_HORIZON : ahead > SYNC_HORIZON ? SYNC_HORIZON : ahead;
@@ -57,7 +58,7 @@ static inline int sync_reached(int awaits, uint64_t time, uint64_t now) {
     return awaits && sync_ahead(time, now) <= 0;
 }
 
-/* Compute the segment time of the earlier pulse, at the present rate. */
+/* Compute the segment time of the next pulse at the present rate of the clock. */
 static void sync_schedule(controller *c) {
     sync_unit *u = &c->sync;
     u->due = NEVER;
@@ -96,7 +97,7 @@ static void sync_activation_written(controller *c, int64_t when) {
     sync_schedule(c);
 }
 
-/* Handle a jump of the local system time: pulses it jumped over come after the clock has wrapped. */
+/* Handle a jump of the local system time. Skipped pulses occur after the clock has wrapped. */
 static void sync_time_jumped(controller *c, int64_t when) {
     sync_unit *u = &c->sync;
     uint64_t now = (uint64_t)dc_system_time(c, when);
@@ -107,7 +108,7 @@ static void sync_time_jumped(controller *c, int64_t when) {
     sync_schedule(c);
 }
 
-/* Emit SYNC1. It follows a SYNC0 by its cycle time; the next SYNC0 starts this time again. */
+/* Emit SYNC1, which follows a SYNC0 after its cycle time. The next SYNC0 restarts this time. */
 static int sync_pulse1(controller *c) {
     int shown = c->memory[REG_SYNC_ACTIVATION] & SYNC_PULSE_1;
     c->memory[REG_SYNC_ACTIVATION_STATUS] &= (uint8_t)~SYNC_PENDING_1;
@@ -116,8 +117,8 @@ static int sync_pulse1(controller *c) {
     return shown;
 }
 
-/* Return how long a signal is active. If its next pulse comes before the end, the signal stays
- * active (section I §9.2.3.1): no further pulse. */
+/* Return the duration of a pulse. If the next pulse is due before its end, the signal stays active
+ * and no further pulses occur (section I §9.2.3.1). */
 static inline int64_t sync_hold(const controller *c) {
     int64_t length = 10 * (int64_t)load16(c->memory + REG_SYNC_PULSE_LENGTH);
     return length > SYNC_HOLD_MIN ? length : SYNC_HOLD_MIN;
@@ -141,9 +142,9 @@ static int sync_pulse0(controller *c) {
     return u->next1 == now ? shown | sync_pulse1(c) : shown;
 }
 
-/* Handle pulses that are due at the segment's time. Return those for the device: SYNC_PULSE_0, _1.
- * The rate swings and products of it are rounded, so that a pulse may be slightly ahead at its
- * computed time. Computed again from here, it is at least 1 ns ahead and comes nearer. */
+/* Handle pulses that are due at the segment's time. Return the pulses that the device receives, as
+ * SYNC_PULSE_0 and SYNC_PULSE_1. The rate varies and products are rounded, so a pulse can still be
+ * slightly ahead at its computed time. It is then scheduled again, at least 1 ns later. */
 static int sync_advance(controller *c) {
     sync_unit *u = &c->sync;
     dc_anchor(c, c->segment->now);
@@ -159,7 +160,7 @@ static int sync_advance(controller *c) {
     return pulses;
 }
 
-/* Apply the effects of a write to the clocks' registers [first, end), except latched times. */
+/* Apply the effects of a write to clock registers [first, end), except the latching of times. */
 static void clock_registers_written(controller *c, uint32_t first, uint32_t end, const uint8_t *data, int64_t when) {
     if (first <= REG_DC_SYSTEM_TIME && end >= REG_DC_SYSTEM_TIME + 4) {
         dc_receive_time(c, load32(data + (REG_DC_SYSTEM_TIME - first)), when);

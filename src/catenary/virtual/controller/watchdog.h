@@ -1,5 +1,5 @@
 /* Watchdogs, ETG.1000.4 §6.3: divider 0x0400, PDI 0x0410, process data 0x0420.
- * The first trigger arms a watchdog; a time of 0 switches it off. */
+ * The first trigger arms a watchdog. A time of 0 disables it. */
 #ifndef CATENARY_VIRTUAL_WATCHDOG_H
 #define CATENARY_VIRTUAL_WATCHDOG_H
 
@@ -9,7 +9,7 @@ static inline int64_t watchdog_time(const controller *c, uint32_t reg) {
     return (int64_t)(load16(c->memory + REG_WATCHDOG_DIVIDER) + 2) * 40 * load16(c->memory + reg);
 }
 
-/* Handle a complete write into a SyncManager with enabled watchdog trigger. */
+/* Handle a complete write to a SyncManager that triggers the watchdog. */
 static inline void watchdog_trigger(controller *c) {
     int64_t time = watchdog_time(c, REG_WATCHDOG_PROCESS_DATA);
     c->memory[REG_WATCHDOG_STATUS] |= 1;
@@ -21,8 +21,8 @@ static inline void watchdog_trigger(controller *c) {
         c->outputs_valid = (c->memory[REG_AL_STATUS] & AL_STATE) == CAT_AL_OP;
 }
 
-/* Handle a complete write without trigger. A terminal without microcontroller shows its outputs
- * while the watchdog is off or active (0x0440.0). */
+/* Handle a complete write to a SyncManager that does not trigger the watchdog. A terminal without a
+ * microcontroller drives its outputs if the watchdog is disabled or has not expired (0x0440.0). */
 static inline void watchdog_bypass(controller *c) {
     if (c->emulation && watchdog_time(c, REG_WATCHDOG_PROCESS_DATA) == 0)
         c->outputs_valid = (c->memory[REG_AL_STATUS] & AL_STATE) == 8;
@@ -34,7 +34,7 @@ static inline void watchdog_trigger_pdi(controller *c) {
     c->pdi_watchdog_due = time > 0 ? c->segment->now + time : NEVER;
 }
 
-/* Apply a new time or divider from now on. */
+/* Apply a new time or divider. */
 static inline void watchdog_reconfigured(controller *c) {
     int64_t time = watchdog_time(c, REG_WATCHDOG_PROCESS_DATA);
     if (time == 0) {

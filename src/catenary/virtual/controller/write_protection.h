@@ -1,6 +1,7 @@
 /* Write protection, and the reset by three frames (Beckhoff, EtherCAT Slave Controller, section I
- * §17.3 and §17.4): 0x0021 protects registers, 0x0031 everything, until the enable register next to
- * it is written earlier in the same frame. 0x52, 0x45, 0x53 written to 0x0040 reset the device. */
+ * §17.3 and §17.4). 0x0021 protects the registers, and 0x0031 protects all memory. Writing the
+ * adjacent enable register permits writes by the rest of the same frame. Writing 0x52, 0x45 and 0x53
+ * to 0x0040 resets the device. */
 #ifndef CATENARY_VIRTUAL_WRITE_PROTECTION_H
 #define CATENARY_VIRTUAL_WRITE_PROTECTION_H
 
@@ -21,7 +22,7 @@ static inline int byte_unprotected(const controller *c, uint32_t address) {
         || enabled_in_this_frame(c, c->registers_enabled);
 }
 
-/* Return 1 if write protection permits writes to process RAM and beyond the registers. */
+/* Return 1 if write protection permits writes to process RAM. */
 static inline int ram_unprotected(const controller *c) {
     return !c->is_protected || byte_unprotected(c, REG_USER_RAM);
 }
@@ -36,7 +37,7 @@ static void protection_written(controller *c) {
     c->is_protected = (m[REG_WRITE_PROTECTION] | m[REG_ESC_WRITE_PROTECTION]) & 1;
 }
 
-/* Show the progress of the reset sequence in the register. */
+/* Advance the reset sequence, and show its progress in the register. */
 static void reset_written(controller *c) {
     static const uint8_t sequence[3] = {0x52, 0x45, 0x53};
     uint8_t value = c->memory[REG_RESET];

@@ -1,4 +1,4 @@
-"""Kinds of virtual devices, one file each."""
+"""Types of virtual devices, with one file for each."""
 
 from catenary.virtual.devices.analog_inputs import AnalogInputs
 from catenary.virtual.devices.coupler import Coupler

@@ -1,4 +1,7 @@
-"""Analogue inputs with CoE: value in 0x60n0:11, status bits before it, as in real terminals."""
+"""Analogue input terminal with CoE. 0x60n0:11 is the value, preceded by status bits.
+
+Real terminals use the same layout.
+"""
 
 from __future__ import annotations
 
@@ -33,7 +36,7 @@ SecondPdo = Literal["none", "compact", "twice"]
 
 
 class AnalogInputs(AppliedDevice):
-    """Owns a terminal of 1 to 8 analogue inputs of ±10 V, 16 bits."""
+    """Terminal with 1 to 8 analogue inputs of ±10 V and 16 bits."""
 
     kind = "analog_inputs"
 
@@ -58,26 +61,26 @@ class AnalogInputs(AppliedDevice):
 
         Args:
             channels: Number of channels, 1 to 8.
-            name: Device name; empty: a default.
+            name: Device name; empty: a default name.
             alias: Station alias.
             serial: Serial number.
             lrw: True if the device supports LRW.
             mailbox_bytes: Size of each mailbox.
             mailbox_delay: Time until a request is answered [s].
-            crystal: Frequency error of its clock.
-            clock_bits: Width of its clock.
-            second_pdo: Second PDO of each channel, from 0x1A10 on. "compact": the value alone, not
-                assigned, as in Beckhoff's EL30xx. "twice": assigned too, with a value of 8 bits;
-                the EL3632 maps 0x6000:02 twice with different sizes.
-            mapping_quirks: Quirks of its PDOs.
-            mailbox_quirks: Quirks of its mailbox.
-            sii_quirks: Quirks of its SII.
+            crystal: Frequency error of the clock.
+            clock_bits: Width of the clock, 32 or 64.
+            second_pdo: Second PDO of each channel, from 0x1A10 on. "compact": it contains only the
+                value and is not assigned, as in Beckhoff's EL30xx. "twice": it is also assigned,
+                with a value of 8 bits; the EL3632 maps 0x6000:02 twice with different sizes.
+            mapping_quirks: Quirks of the PDOs.
+            mailbox_quirks: Quirks of the mailbox.
+            sii_quirks: Quirks of the SII.
 
         Raises:
             ValueError: A value is out of range.
         """
         if not 1 <= channels <= 8:
-            raise ValueError(f"analogue inputs must have 1 to 8 channels, not {channels}")
+            raise ValueError(f"channels must be 1 to 8, not {channels}")
         super().__init__(
             name=name or f"Catenary virtual {channels}-channel analogue input",
             alias=alias,
@@ -160,17 +163,17 @@ class AnalogInputs(AppliedDevice):
             )
 
     def apply_volts(self, channel: int, volts: float) -> None:
-        """Apply a voltage to the terminals of one channel.
+        """Apply a voltage to one channel.
 
         Args:
-            channel: Channel from 0.
+            channel: Channel number, from 0.
             volts: Voltage [V]; full scale is ±10 V.
 
         Raises:
             IndexError: The channel does not exist.
         """
         if not 0 <= channel < self.channels:
-            raise IndexError(f"no channel {channel}; use 0 to {self.channels - 1}")
+            raise IndexError(f"channel must be 0 to {self.channels - 1}, not {channel}")
         raw = round(volts / 10 * FULL_SCALE)
         clamped = max(-FULL_SCALE - 1, min(FULL_SCALE, raw))
         at = SLOTS * channel
@@ -184,5 +187,5 @@ class AnalogInputs(AppliedDevice):
         self.core.refresh_inputs(self.position)
 
     def volts(self, channel: int) -> float:
-        """Return the measured voltage [V]."""
+        """Return the measured voltage of a channel [V]."""
         return self.core.slot(self.position, SLOTS * channel + VALUE) / FULL_SCALE * 10

@@ -1,6 +1,6 @@
-"""The microcontroller of a device: state machine, mailbox, CoE and process data together.
+"""Application of a device, as in its microcontroller: state machine, mailbox, CoE, process data.
 
-It runs in the segment's service, not in the path of frames.
+It runs in the service of the segment, not in the frame path.
 """
 
 from __future__ import annotations
@@ -60,21 +60,22 @@ from catenary.virtual.state_machine import (
 )
 
 EMERGENCY = 1
-ENABLE_AND_MODE = 0x0F  # mask of a SyncManager's control byte: direction and mode
-WATCHDOG_TRIGGER = 0x40  # bit of the same byte
+ENABLE_AND_MODE = 0x0F  # mask of direction and mode in the control byte of a SyncManager
+WATCHDOG_TRIGGER = 0x40  # bit in the same byte
 WATCHDOG_DIVIDER, WATCHDOG_TIME = 0x0400, 0x0420  # registers
 RAM_START, RAM_END = 0x1000, 0x3000
 BLOB_BYTES = 2048  # an object larger than any usual mailbox
 
 
 def mailbox_of(size: int, coe_details: int = 0x2F) -> MailboxDefault:
+    """Return the description of two mailboxes of `size` bytes, one after the other."""
     return MailboxDefault(RAM_START, size, RAM_START + size, size, coe_details)
 
 
 def process_data_areas(mailbox_size: int) -> tuple[int, int, int]:
-    """Return the start of SM2, the start of SM3 and the maximum size of each [bytes].
+    """Return the start addresses of SM2 and SM3, and the maximum size of their buffers [bytes].
 
-    Each of them takes three buffers; the two share the RAM after the mailboxes.
+    The two SyncManagers share the RAM after the mailboxes. Each has three buffers.
     """
     outputs = RAM_START + (2 * mailbox_size + 0xFF & ~0xFF)
     room = (RAM_END - outputs) // 6 & ~0x7F
@@ -88,6 +89,15 @@ def sync_managers_of(
     *,
     watchdog_trigger: bool = True,
 ) -> tuple[SyncManagerDefault, ...]:
+    """Return the defaults of SyncManagers 0 to 3.
+
+    Args:
+        mailbox_size: Size of each mailbox [bytes].
+        outputs: RxPDOs of the device.
+        inputs: TxPDOs of the device.
+        watchdog_trigger: True if SyncManager 2 triggers the watchdog.
+    """
+
     def size(pdos: Sequence[Pdo]) -> int:
         return (sum(pdo.bits for pdo in pdos if pdo.sync_manager != 0xFF) + 7) // 8
 
@@ -102,7 +112,7 @@ def sync_managers_of(
 
 
 class Application:
-    """Owns the microcontroller side of one device."""
+    """Application of one device."""
 
     def __init__(
         self,
@@ -122,7 +132,7 @@ class Application:
         self._position = position
         self._box = box
         self.synchronisation: Synchronisation | None = None  # only for devices that support SYNC0
-        self.checks_watchdog = False  # True: refuse SAFE-OP with 0x001F (ServoQuirks)
+        self.checks_watchdog = False  # see ServoQuirks
         self.states = StateMachine(self, scheduler, description.identification)
         self.dictionary = Dictionary(lambda: self.states.state)
         self._add_communication_objects(description, quirks.text_prefix)
@@ -172,13 +182,13 @@ class Application:
 
     def handle(self, events: int) -> None:
         if events & _segment.EVENT_WATCHDOG:
-            self._outputs_stayed_away()
+            self._outputs_timed_out()
         if events & _segment.EVENT_AL_CONTROL:
             self.states.obey()
         if events & _segment.EVENT_SYNC_MISSED:
-            self._synchrony_failed(SYNCHRONISATION_ERROR)
+            self._synchronisation_failed(SYNCHRONISATION_ERROR)
         if events & _segment.EVENT_SYNC_LOST:
-            self._synchrony_failed(FATAL_SYNC_ERROR)
+            self._synchronisation_failed(FATAL_SYNC_ERROR)
         if events & (_segment.EVENT_OUTPUTS | _segment.EVENT_SYNC_SEEN):
             self.states.something_arrived()
         if events & _segment.EVENT_MAILBOX_READ:
@@ -190,12 +200,12 @@ class Application:
         if events & _segment.EVENT_EMERGENCY:
             self.send_emergency(self._core.emergency(self._position))
 
-    def _outputs_stayed_away(self) -> None:
+    def _outputs_timed_out(self) -> None:
         self._core.expect_outputs(self._position)
         if self.states.state == OP:
             self.states.fail(SAFE_OP, SYNC_MANAGER_WATCHDOG)
 
-    def _synchrony_failed(self, code: int) -> None:
+    def _synchronisation_failed(self, code: int) -> None:
         if self.states.state == OP:
             self.states.fail(SAFE_OP, code)
 
@@ -203,7 +213,7 @@ class Application:
         """Send an emergency message, ETG.1000.6 §5.6.4.
 
         Args:
-            code: Error code; 0: error reset.
+            code: Error code; 0: the error was reset.
             data: Up to 5 manufacturer-specific bytes.
         """
         if self.states.state == INIT:
@@ -258,9 +268,9 @@ class Application:
         return 0
 
     def _watchdog_is_consistent(self) -> bool:
-        """Return True if the trigger bit of SyncManager 2 is set if and only if the watchdog is on.
+        """Return True if the trigger bit of SyncManager 2 matches the activation of the watchdog.
 
-        This is the rule of Beckhoff's slave stack code, ecatslv.c, StartInputHandler.
+        Beckhoff's slave stack code has the same check (ecatslv.c, StartInputHandler).
         """
         [divider] = struct.unpack("<H", self._core.peek(self._position, WATCHDOG_DIVIDER, 2))
         [time] = struct.unpack("<H", self._core.peek(self._position, WATCHDOG_TIME, 2))
@@ -329,12 +339,12 @@ class Application:
             self._core.map_process_data(self._position, n == 2, n if entries else -1, entries)
 
     def slot_entry(self, name: str, data_type: int, bits: int, slot: int, access: int) -> Entry:
-        """Return a dictionary entry with a slot of the model as its value.
+        """Return a dictionary entry whose value is a slot of the model.
 
         Args:
             name: Name of the entry.
             data_type: CANopen data type.
-            bits: Size of the value.
+            bits: Size of the value [bits].
             slot: Number of the slot.
             access: Access flags.
         """

@@ -1,4 +1,4 @@
-"""Common base of devices with a microcontroller: servos and analogue terminals."""
+"""Base class of devices with a microcontroller: servos and analogue terminals."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from catenary.virtual.sii_quirks import SiiQuirks
 
 
 class AppliedDevice(Device):
-    """Owns a device with an application: mailbox and object dictionary."""
+    """A virtual device with an application: a mailbox and an object dictionary."""
 
     def __init__(
         self,
@@ -37,7 +37,9 @@ class AppliedDevice(Device):
             sii_quirks=sii_quirks,
         )
         if not 32 <= mailbox_bytes <= 1024 or mailbox_bytes % 2:
-            raise ValueError(f"mailbox_bytes must be even and 32 to 1024, not {mailbox_bytes}")
+            raise ValueError(
+                f"mailbox_bytes must be an even number, 32 to 1024, not {mailbox_bytes}"
+            )
         if not 0 <= mailbox_delay <= 10:
             raise ValueError(f"mailbox_delay must be 0 to 10 s, not {mailbox_delay}")
         self.mailbox_bytes = mailbox_bytes
@@ -48,7 +50,7 @@ class AppliedDevice(Device):
     @property
     def application(self) -> Application:
         if self._application is None:
-            raise ValueError(f"{self.name} is not in a segment yet: add it with Segment([...])")
+            raise ValueError(f"{self.name} is not in a segment; add it with Segment([...])")
         return self._application
 
     def started(self, scheduler: Scheduler) -> None:
@@ -63,19 +65,19 @@ class AppliedDevice(Device):
         self.add_objects(self._application)
 
     def add_objects(self, application: Application) -> None:
-        """Add the objects of the device profile."""
+        """Add the objects of the device profile to the dictionary."""
         raise NotImplementedError
 
     def handle(self, events: int) -> None:
         self.application.handle(events)
 
     def refuse_state(self, state: int, code: int | None, times: int | None = None) -> None:
-        """Refuse requests of a state.
+        """Refuse requests for a state.
 
         Args:
             state: AL state number.
             code: AL status code of the refusal; None: accept the state again.
-            times: Number of requests to refuse; None: all.
+            times: Number of requests to refuse; None: all requests.
         """
         refused = self.application.states.refused
         if code is None:
@@ -88,7 +90,7 @@ class AppliedDevice(Device):
 
         Args:
             state: AL state number.
-            seconds: Time until the state is reached [s]; None: never.
+            seconds: Time until the device reaches the state [s]; None: the device never does.
         """
         delay = None if seconds is None else round(seconds * 1e9)
         self.application.states.delays[state] = delay
@@ -99,11 +101,11 @@ class AppliedDevice(Device):
 
     @mailbox_silent.setter
     def mailbox_silent(self, silent: bool) -> None:
-        """Stop or resume the mailbox; while it is stopped, SM0 stays full and SM1 stays empty."""
+        """Stop or resume the mailbox. While it is stopped, SM0 stays full and SM1 stays empty."""
         self.application.mailbox.silence(silent)
 
     def delay_mailbox(self, seconds: float) -> None:
-        """Change the answer time of the mailbox by `seconds` [s]; the result is at least 0."""
+        """Add `seconds` [s] to the response time of the mailbox. The sum is at least 0."""
         self.application.mailbox.delay(round(seconds * 1e9))
 
     def send_emergency(self, code: int, data: bytes = b"") -> None:

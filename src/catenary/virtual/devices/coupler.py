@@ -1,4 +1,4 @@
-"""Bus coupler: no process data, no mailbox; its AL status follows AL control."""
+"""Bus coupler without process data or mailbox. Its AL status follows AL control."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from catenary.virtual.devices.device import Device
 
 
 class Coupler(Device):
-    """Owns a coupler to which terminals are attached."""
+    """Bus coupler, to which terminals are attached."""
 
     kind = "coupler"
 

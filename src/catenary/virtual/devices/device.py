@@ -1,6 +1,6 @@
-"""A device on the segment: its description, its position, and its switches for tests.
+"""Base class of virtual devices: description, position, power, and functions for tests.
 
-This class suffices for devices whose AL status follows AL control (couplers, simple terminals).
+It is sufficient for devices whose AL status follows AL control (couplers and simple terminals).
 Devices with a microcontroller add an `Application`.
 """
 
@@ -17,12 +17,12 @@ from catenary.virtual.sii_image import make_sii_image
 from catenary.virtual.sii_quirks import NO_SII_QUIRKS, SiiQuirks
 
 INIT, PRE_OP, SAFE_OP, OP = 1, 2, 4, 8
-RESET_DELAY_NS, RESET_NS = 100_000, 20_000_000  # the EEPROM is reloaded
+RESET_DELAY_NS, RESET_NS = 100_000, 20_000_000  # delay, and time to reload the EEPROM
 AL_STATUS, RX_ERRORS, LOST_LINKS, ALIAS = 0x0130, 0x0300, 0x0310, 0x0012
 
 
 class Device:
-    """Owns one virtual device. The segment assigns its position."""
+    """A virtual device. The segment assigns its position."""
 
     kind: ClassVar[str]
     ports: tuple[int, ...] = (0, 1)
@@ -69,7 +69,7 @@ class Device:
     @property
     def core(self) -> Core:
         if self._core is None:
-            raise ValueError(f"{self.name} is not in a segment yet: add it with Segment([...])")
+            raise ValueError(f"{self.name} is not in a segment; add it with Segment([...])")
         return self._core
 
     def attach(self, core: Core, position: int, agenda: Agenda) -> None:
@@ -84,7 +84,7 @@ class Device:
             ValueError: The device is already in a segment.
         """
         if self._core is not None:
-            raise ValueError(f"{self.name} is already in a segment; make a new device")
+            raise ValueError(f"{self.name} is already in a segment; create a new device")
         description = self.description()
         core.make_controller(
             position,
@@ -106,7 +106,7 @@ class Device:
         self.switch_on()
 
     def detach(self) -> None:
-        """Switch the device off and remove it from its segment. It can be added to another one."""
+        """Switch the device off and remove it from its segment, so that another can use it."""
         self.switch_off()
         self._core = self._agenda = None
         self.position = -1
@@ -128,7 +128,7 @@ class Device:
         self.core.switch_power(self.position, False)
 
     def reset(self) -> None:
-        """Reset the device after the requesting frame has left: power off, then on."""
+        """Switch the power off and on again, after the requesting frame has left the device."""
         if self._scheduler is None or self._agenda is None:
             return
         self._scheduler.after(RESET_DELAY_NS, self.switch_off)
@@ -138,26 +138,26 @@ class Device:
         """Initialise the device after power-on. Subclasses add their part."""
 
     def handle(self, events: int) -> None:
-        """Handle events of the controller. Called in the service's thread."""
+        """Handle events of the controller. Called in the service thread."""
 
     @property
     def state(self) -> int:
-        """Displayed AL state: 1 INIT, 2 PRE-OP, 4 SAFE-OP, 8 OP; bit 4 error flag; 0: no power."""
+        """AL status: 1 INIT, 2 PRE-OP, 4 SAFE-OP, 8 OP; bit 4: error; 0: no power."""
         return self.core.peek(self.position, AL_STATUS, 1)[0] & 0x1F
 
     @property
     def outputs_taken_ns(self) -> int | None:
-        """Time of the last update of the outputs on the segment's clock (`segment.now_ns`) [ns].
+        """Time of the last output update on the segment's clock (`segment.now_ns`) [ns].
 
-        Outputs change with the frame, at the device's own cycle, or at SYNC0. None: not since
-        power-on.
+        Depending on the device, outputs change with the frame, with its internal cycle, or at
+        SYNC0. None: no update since power-on.
         """
         when = self.core.outputs_at(self.position)
         return None if when == FOREVER else when
 
     @property
     def crystal(self) -> Crystal:
-        """Frequency error of the clock. It can be changed while the segment runs."""
+        """Crystal of the device's clock. It can be changed while the segment runs."""
         return self._crystal
 
     @crystal.setter
@@ -169,11 +169,11 @@ class Device:
             self._core.tune_crystal(self.position, error, swing, period, scatter)
 
     def freeze(self, frozen: bool = True) -> None:
-        """Freeze the device's model (or resume it). Its controller continues to answer frames."""
+        """Freeze or resume the device's model. Its controller continues to answer frames."""
         self.core.freeze(self.position, frozen)
 
     def count_errors(self, port: int, *, invalid_frames: int = 0, lost_links: int = 0) -> None:
-        """Add to the error counters of one port, as a bad cable would.
+        """Increase the error counters of one port, like a bad cable.
 
         Args:
             port: Port number, 0 to 3.
@@ -193,5 +193,5 @@ class Device:
             self.core.poke(self.position, address, bytes([min(before + number, 255)]))
 
     def write_alias(self, alias: int) -> None:
-        """Set the alias register at once, as a rotary switch on the device would."""
+        """Set the alias register, like a rotary switch on the device."""
         self.core.poke(self.position, ALIAS, alias.to_bytes(2, "little"))

@@ -1,4 +1,4 @@
-"""Digital inputs: a terminal without mailbox, 1 to 16 bits, mapped bit by bit."""
+"""Digital input terminal without a mailbox: 1 to 16 inputs, each mapped as one bit."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ SAMPLING_NS = 100_000
 
 
 class DigitalInputs(Device):
-    """Owns a terminal of 1 to 16 digital inputs."""
+    """Terminal with 1 to 16 digital inputs."""
 
     kind = "digital_inputs"
 
@@ -25,7 +25,7 @@ class DigitalInputs(Device):
         lrw: bool = True,
     ) -> None:
         if not 1 <= bits <= 16:
-            raise ValueError(f"digital inputs must have 1 to 16 bits, not {bits}")
+            raise ValueError(f"bits must be 1 to 16, not {bits}")
         super().__init__(
             name=name or f"Catenary virtual {bits}-channel input",
             alias=alias,
@@ -73,12 +73,14 @@ class DigitalInputs(Device):
 
     @property
     def inputs(self) -> int:
-        """Levels at the terminals; bit 0 is channel 1."""
+        """Input levels; bit 0 is channel 1."""
         return self.core.slot(self.position, 0)
 
     @inputs.setter
     def inputs(self, value: int) -> None:
         if not 0 <= value < 1 << self.bits:
-            raise ValueError(f"{value} does not fit {self.bits} inputs")
+            raise ValueError(
+                f"inputs must be 0 to {(1 << self.bits) - 1} ({self.bits} channels), not {value}"
+            )
         self.core.put_slot(self.position, 0, value)
         self.core.refresh_inputs(self.position)

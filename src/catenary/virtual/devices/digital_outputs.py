@@ -1,7 +1,7 @@
-"""Digital outputs: a terminal without mailbox, 1 to 16 bits, mapped bit by bit.
+"""Digital output terminal without a mailbox: 1 to 16 outputs, each mapped as one bit.
 
-Its outputs are on in OP only and turn off when the process data watchdog expires. They switch with
-the frame, or with SYNC0 if the terminal has a clock and was configured for it.
+The outputs are active only in OP, and turn off when the process data watchdog expires. They switch
+with the frame. With a clock and an active SYNC unit, they switch with SYNC0.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ ACTIVATION, SYNC0_ACTIVE = 0x0981, 0x03
 
 
 class DigitalOutputs(Device):
-    """Owns a terminal of 1 to 16 digital outputs. With `dc` it has a clock and 1 to 8 outputs."""
+    """Terminal with 1 to 16 digital outputs. With `dc`, it has a clock and 1 to 8 outputs."""
 
     kind = "digital_outputs"
 
@@ -33,9 +33,9 @@ class DigitalOutputs(Device):
         clock_bits: ClockBits = 64,
     ) -> None:
         if not 1 <= bits <= 16:
-            raise ValueError(f"digital outputs must have 1 to 16 bits, not {bits}")
+            raise ValueError(f"bits must be 1 to 16, not {bits}")
         if dc and bits > 8:
-            raise ValueError(f"digital outputs with a clock must have 1 to 8 bits, not {bits}")
+            raise ValueError(f"bits must be 1 to 8 with dc=True, not {bits}")
         super().__init__(
             name=name or f"Catenary virtual {bits}-channel output",
             alias=alias,
@@ -48,7 +48,7 @@ class DigitalOutputs(Device):
         self.dc = dc
 
     def description(self) -> Description:
-        # one SyncManager per byte, as in real terminals
+        # Real terminals have one SyncManager for each byte.
         managers = tuple(
             SyncManagerDefault(0x1000 + 16 * k, 1, 0x44, 0x09, 3)
             for k in range((self.bits + 7) // 8)
@@ -89,7 +89,7 @@ class DigitalOutputs(Device):
 
     @property
     def outputs(self) -> int:
-        """Levels at the terminals; bit 0 is channel 1."""
+        """Output levels; bit 0 is channel 1."""
         if not self.core.outputs_valid(self.position):
             return 0
         if self._by_sync0:

@@ -1,4 +1,4 @@
-"""Junction: a device where the line branches. No process data, no mailbox."""
+"""Junction, where the line branches. It has no process data and no mailbox."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from catenary.virtual.devices.device import Device
 
 
 class Junction(Device):
-    """Owns a junction of 3 or 4 ports: port 0 towards the MainDevice, 1 and 2, optionally 3."""
+    """Junction with 3 or 4 ports. Port 0 leads towards the MainDevice."""
 
     kind = "junction"
 
@@ -15,7 +15,7 @@ class Junction(Device):
         self, *, name: str = "", alias: int = 0, serial: int = 0, port_count: int = 4
     ) -> None:
         if port_count not in (3, 4):
-            raise ValueError(f"port_count: a junction has 3 or 4 ports, not {port_count}")
+            raise ValueError(f"port_count must be 3 or 4, not {port_count}")
         super().__init__(
             name=name or "Catenary virtual junction", alias=alias, serial=serial, lrw=True
         )

@@ -1,8 +1,9 @@
-"""A servo drive, CiA 402 (IEC 61800-7-201): PP, PV, homing, CSP, CSV, CST; 1 to 8 axes at 0x800·k.
+"""Servo drive, CiA 402 (IEC 61800-7-201): modes PP, PV, homing, CSP, CSV and CST.
 
-The motor, its loops and the drive's state machine are compiled (`servo.h`) and stepped at the
-device's own cycle. Position unit: `counts_per_turn` counts per turn. Velocity unit: counts per
-second. Torque unit: per mille of the rated torque.
+A drive has 1 to 8 axes. The objects of axis k have an offset of 0x800·k. The motor, its control
+loops and the state machine are compiled (`servo.h`), and run in the internal cycle of the device.
+Positions are in counts (`counts_per_turn`), velocities in counts per second, and torques in per
+mille of the rated torque.
 """
 
 from __future__ import annotations
@@ -48,7 +49,7 @@ from catenary.virtual.sii_quirks import NO_SII_QUIRKS, SiiQuirks
 
 STEP_NS = 250_000
 MINIMUM_CYCLE_NS = 62_500  # of SYNC0
-COPY_NS = 20_000  # outputs must arrive this long before SYNC0
+COPY_NS = 20_000  # minimum time from the arrival of outputs to SYNC0
 BOOT_SECONDS = 0.02
 SUPPORTED_MODES = {0, 1, 3, 6, 8, 9, 10}
 SUPPORTED_MODES_MASK = sum(1 << mode - 1 for mode in SUPPORTED_MODES - {0})  # 0x6502
@@ -82,7 +83,7 @@ def _pdo(index: int, name: str, objects: tuple[int, ...], axis: int, sync_manage
 
 
 class Received(NamedTuple):
-    """Outputs of one axis as raw numbers of its objects."""
+    """Outputs of one axis, as raw values of its objects."""
 
     controlword: int  # 0x6040
     position: int  # 0x607A, counts
@@ -99,7 +100,7 @@ RECEIVED_SLOTS = (
 
 
 class Servo(AppliedDevice):
-    """Owns a servo drive of 1 to 8 axes with their motors."""
+    """Servo drive with 1 to 8 axes and their motors."""
 
     kind = "servo"
 
@@ -139,8 +140,8 @@ class Servo(AppliedDevice):
             serial: Serial number.
             axes: Number of axes, 1 to 8.
             counts_per_turn: Position counts per turn of the motor.
-            velocity_counts_per_turn: Velocity unit of 0x606C and 0x60FF: counts per second at one
-                turn per second; None: `counts_per_turn`.
+            velocity_counts_per_turn: Value of 0x606C and 0x60FF at one turn per second; None:
+                `counts_per_turn`.
             inertia: Motor inertia [kg·m²].
             viscous_friction: Viscous friction [N·m·s/rad].
             coulomb_friction: Dry friction [N·m].
@@ -148,18 +149,18 @@ class Servo(AppliedDevice):
             max_torque_ratio: Maximum torque divided by rated torque.
             max_velocity: Maximum velocity [rad/s].
             following_error_turns: Following error window [turns].
-            position_limits: Software position limits [rad].
+            position_limits: Software position limits (minimum, maximum) [rad]; None: no limits.
             mailbox_bytes: Size of each mailbox.
             mailbox_delay: Time until a request is answered [s].
-            crystal: Frequency error of its clock.
-            clock_bits: Width of its clock.
+            crystal: Frequency error of the clock.
+            clock_bits: Width of the clock, 32 or 64.
             lrw: True if the device supports LRW.
-            sync_missed_limit: Number of consecutive SYNC0 pulses without new outputs that is an
-                error.
+            sync_missed_limit: Number of consecutive SYNC0 pulses without new outputs after which
+                the drive reports a fault.
             quirks: Differences of the drive from the profile.
-            mapping_quirks: Quirks of its PDOs.
-            mailbox_quirks: Quirks of its mailbox.
-            sii_quirks: Quirks of its SII.
+            mapping_quirks: Quirks of the PDOs.
+            mailbox_quirks: Quirks of the mailbox.
+            sii_quirks: Quirks of the SII.
 
         Raises:
             ValueError: A value is out of range.
@@ -287,10 +288,10 @@ class Servo(AppliedDevice):
         return velocity_gain, velocity_gain * VELOCITY_BANDWIDTH / 5
 
     def tune(self, inertia: float, axis: int = 0) -> None:
-        """Tune the velocity loop.
+        """Tune the velocity loop for an inertia.
 
         Args:
-            inertia: Total inertia at the motor shaft, motor included [kg·m²].
+            inertia: Total inertia at the motor shaft, including the motor [kg·m²].
             axis: Axis number.
         """
         self._inertias[axis] = inertia
@@ -415,17 +416,17 @@ class Servo(AppliedDevice):
     # -- for tests and plants ------------------------------------------------------------------
 
     def axis_position(self, axis: int = 0) -> float:
-        """Return the true position of the motor [rad]."""
+        """Return the exact position of the motor [rad]."""
         return self._motors.state(self.position, axis)[0]
 
     @property
     def position_rad(self) -> float:
-        """True position of the first axis [rad]."""
+        """Exact position of the first axis [rad]."""
         return self.axis_position()
 
     @property
     def velocity_rad_s(self) -> float:
-        """True velocity of the first axis [rad/s]."""
+        """Exact velocity of the first axis [rad/s]."""
         return self._motors.state(self.position, 0)[1]
 
     @property
@@ -434,7 +435,7 @@ class Servo(AppliedDevice):
         return self._motors.state(self.position, 0)[2]
 
     def received(self, axis: int = 0) -> Received:
-        """Return the outputs that the axis currently uses, as raw numbers."""
+        """Return the outputs that the axis currently uses, as raw values."""
         first = _segment.SLOTS_PER_AXIS * axis
         return Received(*(self.core.slot(self.position, first + slot) for slot in RECEIVED_SLOTS))
 
@@ -443,7 +444,7 @@ class Servo(AppliedDevice):
         return STATES[self._motors.state(self.position, axis)[3]]
 
     def move_to(self, position: float, axis: int = 0) -> None:
-        """Move the shaft to a position, as if turned by hand.
+        """Move the shaft to a position, as if by hand.
 
         Args:
             position: New position [rad].
@@ -464,7 +465,7 @@ class Servo(AppliedDevice):
         """Inject a fault.
 
         Args:
-            code: Error code (0x603F); 0 ends the cause, so that the fault can be reset.
+            code: Error code (0x603F). 0 removes the cause, so that the fault can be reset.
             axis: Axis number.
         """
         self._motors.inject(self.position, axis, code)
@@ -472,19 +473,20 @@ class Servo(AppliedDevice):
     def hide_bit_12(self, seconds: float, axis: int = 0) -> None:
         """Hide bit 12 of the statusword from the next step on.
 
-        Meanwhile the drive holds its last demand, or follows its targets if `quirks` says so.
+        While the bit is hidden, the drive holds its last demand value. With the quirk
+        `follows_without_bit_12`, it follows its targets instead.
 
         Args:
-            seconds: Duration [s]; `inf`: for ever.
+            seconds: Duration [s]; `inf`: without end.
             axis: Axis number.
         """
         self._motors.hide_bit_12(self.position, axis, seconds)
 
     def switch_sto(self, active: bool, axis: int = 0) -> None:
-        """Switch safe torque off on (True) or off (False).
+        """Activate or deactivate safe torque off (STO).
 
         Args:
-            active: True removes the torque.
+            active: True activates STO, which removes the torque.
             axis: Axis number.
         """
         self._motors.stop_torque(self.position, axis, active)

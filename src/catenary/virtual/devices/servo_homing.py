@@ -1,4 +1,4 @@
-"""Objects of mode 6, homing (CiA 402-2), of one axis; the behaviour is in `servo_homing.h`."""
+"""Objects of homing (mode 6, CiA 402-2) for one axis. `servo_homing.h` implements the mode."""
 
 from __future__ import annotations
 
@@ -17,13 +17,19 @@ from catenary.virtual.coe.dictionary import (
 from catenary.virtual.devices.servo_objects import RW
 
 HERE = 37
-TORQUE = 300  # per mille of the rated torque: a stop was hit
+TORQUE = 300  # torque at which a stop is detected [per mille of the rated torque]
 
 
 def add_homing(
     dictionary: Dictionary, base: int, slot: Callable[[str, int, int, int], Entry]
 ) -> None:
-    """Add the homing objects at `base` + index. `slot` makes an entry with a value of the model."""
+    """Add the homing objects.
+
+    Args:
+        dictionary: Object dictionary of the device.
+        base: Offset of the axis, which is added to each index.
+        slot: Function that returns an entry for a slot of the model.
+    """
     add = dictionary.add_variable
     add(0x607C + base, slot("Home offset", INTEGER32, _segment.SLOT_HOME_OFFSET, RW))
     add(0x6098 + base, slot("Homing method", INTEGER8, _segment.SLOT_HOMING_METHOD, RW))
@@ -38,7 +44,7 @@ def add_homing(
 
 
 def homing_presets(velocity_per_radian: float) -> tuple[tuple[int, int], ...]:
-    """Return the defaults as (slot, value): method 37, 1 rad/s, 0.2 rad/s, 10 rad/s²."""
+    """Return the defaults as (slot, value): method 37, 1 rad/s, 0.2 rad/s and 10 rad/s²."""
     return (
         (_segment.SLOT_HOMING_METHOD, HERE),
         (_segment.SLOT_HOMING_SPEED, round(velocity_per_radian)),

@@ -1,4 +1,4 @@
-"""Objects of one CiA 402 axis and the slots they share with the compiled model (`servo.h`)."""
+"""Objects of a CiA 402 axis, and the slots of the compiled model (`servo.h`) for their values."""
 
 from __future__ import annotations
 
@@ -95,23 +95,23 @@ OBJECTS = (
 )
 OBJECT_BY_INDEX = {o.index: o for o in OBJECTS}
 
-# The default process data in this order, 13 bytes per direction.
+# Default process data, in this order: 13 bytes in each direction.
 DEFAULT_RX = (0x6040, 0x6060, 0x60FF, 0x607A, 0x6071)
 DEFAULT_TX = (0x6041, 0x6061, 0x606C, 0x6064, 0x6077)
 
 
 def profile_presets(counts: int, velocity_counts: int) -> tuple[tuple[int, int], ...]:
-    """Return the power-on defaults of the profile modes as (slot, value): 10 rad/s, 100 rad/s².
+    """Return the defaults of the profile modes as (slot, value): 10 rad/s and 100 rad/s².
 
     Args:
         counts: Position counts per turn.
-        velocity_counts: Velocity counts of one turn per second.
+        velocity_counts: Velocity value at one turn per second.
     """
     radian = velocity_counts / (2 * math.pi)
     return (
         (_segment.SLOT_PROFILE_VELOCITY, round(10 * radian)),
         (_segment.SLOT_ACCELERATION, round(100 * radian)),
-        (_segment.SLOT_HALT_OPTION, 1),  # slow down on the slow down ramp, 0x6084
+        (_segment.SLOT_HALT_OPTION, 1),  # slow down with the ramp of 0x6084
         (_segment.SLOT_POSITION_WINDOW, max(counts // 4096, 1)),
         (_segment.SLOT_POSITION_WINDOW_TIME, 5),  # ms
         (_segment.SLOT_VELOCITY_WINDOW, min(max(round(0.1 * radian), 1), 0xFFFF)),

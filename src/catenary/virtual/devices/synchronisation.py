@@ -1,11 +1,11 @@
 """Synchronisation of a device with the bus, ETG.1020 §5.2.1, "sync manager parameters".
 
-0x1C32 describes outputs, 0x1C33 inputs; 0x10F1 limits missed events. Also the device's
-requirements on the SYNC unit.
+0x1C32 describes outputs and 0x1C33 inputs. 0x10F1 limits the number of missed events. The module
+also checks the configuration of the SYNC unit.
 
-Two types are supported: 0 free run, and 2 DC Sync0 (as a quirk 3 DC Sync1). Unless 0x1C32:01
-was written, the SYNC unit decides. A device whose signal is active on the way to SAFE-OP
-synchronises to it, as in common device stacks.
+The supported types are 0 (free run) and 2 (DC Sync0, or with a quirk 3, DC Sync1). If 0x1C32:01 was
+not written, the SYNC unit determines the type: if its signal is active on entry to SAFE-OP, the
+device synchronises to the signal. Common device stacks behave in the same way.
 """
 
 from __future__ import annotations
@@ -35,18 +35,18 @@ from catenary.virtual.state_machine import (
 )
 
 FREE_RUN, DC_SYNC0, DC_SYNC1 = 0, 2, 3
-# 0x1C32:04: bit 0 free run; bits 2 to 4 DC: 1 SYNC0, 2 SYNC1
+# 0x1C32:04: bit 0: free run; bits 2 to 4: DC (1: SYNC0, 2: SYNC1)
 SUPPORTED = {DC_SYNC0: 0x0001 | 0x0004, DC_SYNC1: 0x0001 | 0x0008}
 OUTPUTS, INPUTS, ERROR_SETTINGS = 0x1C32, 0x1C33, 0x10F1
 SYNC_CONTROL, ACTIVATION, SYNC0_CYCLE, SYNC1_CYCLE = 0x0980, 0x0981, 0x09A0, 0x09A4
 ACTIVE = 0x01
-PULSES = {DC_SYNC0: 0x02, DC_SYNC1: 0x04}  # bit in 0x0981
+PULSES = {DC_SYNC0: 0x02, DC_SYNC1: 0x04}  # bits of 0x0981
 CYCLE_MAX_NS = 0xFFFF_FFFF
 _, _, MISSED, EXCEEDED, SHIFT_SHORT, ERROR = range(6)  # fields of Core.synchronous
 
 
 class Synchronisation:
-    """Owns the synchronisation type of a device and the objects that show it."""
+    """Synchronisation type of a device, and the objects that represent it."""
 
     def __init__(
         self,
@@ -65,12 +65,13 @@ class Synchronisation:
         Args:
             core: The compiled segment.
             position: Position of the device.
-            dictionary: The device's objects.
-            step_ns: The device's own cycle.
-            minimum_cycle_ns: Shortest SYNC0 cycle.
-            copy_ns: How long before a pulse outputs must arrive.
-            missed_limit: Number of consecutive pulses without new outputs that is an error.
-            synchronous_type: The signal that the device synchronises to.
+            dictionary: Object dictionary of the device.
+            step_ns: Internal cycle of the device [ns].
+            minimum_cycle_ns: Shortest SYNC0 cycle [ns].
+            copy_ns: Minimum time from the arrival of outputs to the pulse [ns].
+            missed_limit: Number of consecutive pulses without new outputs after which the device
+                reports an error.
+            synchronous_type: Type for the signal of the device: DC_SYNC0 or DC_SYNC1.
         """
         self._core = core
         self._position = position
@@ -82,18 +83,18 @@ class Synchronisation:
         self._pulses = PULSES[synchronous_type]
         self._written: int | None = None  # 0x1C32:01
         self._cycle_written = 0  # 0x1C32:02
-        self._checked_ns = 0  # cycle of the pulses when checked; 0: free run
+        self._checked_ns = 0  # cycle of the pulses at the last check; 0: free run
         self._tune()
         for index, name, copy in (
             (OUTPUTS, "SM output parameter", copy_ns),
-            (INPUTS, "SM input parameter", 0),  # latched at the pulse itself
+            (INPUTS, "SM input parameter", 0),  # inputs are latched at the pulse
         ):
             dictionary.add(index, name, self._parameters(copy))
         dictionary.add_record(
             ERROR_SETTINGS,
             "Error settings",
             [
-                number("Local error reaction", UNSIGNED32, 1),  # 1: to SAFE-OP with an error
+                number("Local error reaction", UNSIGNED32, 1),  # change to SAFE-OP with an error
                 self._entry(
                     "Sync error counter limit", UNSIGNED16, lambda: self._limit, self._limit_to
                 ),
@@ -103,7 +104,7 @@ class Synchronisation:
     # -- for the state machine -----------------------------------------------------------------
 
     def check(self) -> int:
-        """Return 0, or the AL status code if the clocks do not allow PRE-OP → SAFE-OP."""
+        """Return 0, or an AL status code if the clock configuration forbids PRE-OP → SAFE-OP."""
         self._checked_ns = 0
         by_pdi, activation = self._core.peek(self._position, SYNC_CONTROL, 2)
         switched_on = bool(activation & ACTIVE)
@@ -113,7 +114,7 @@ class Synchronisation:
             return INVALID_DC_CONFIGURATION
         if self.sync0_cycle_ns < self._minimum_ns:
             return DC_SYNC0_CYCLE_TIME
-        own = self._step_ns  # the free-run value of 0x1C32:02 may be written back
+        own = self._step_ns  # a MainDevice may write the free-run value of 0x1C32:02 back
         cycle_ns = self.cycle_ns
         if cycle_ns > CYCLE_MAX_NS:
             return INVALID_DC_CONFIGURATION
@@ -123,7 +124,7 @@ class Synchronisation:
         return 0
 
     def begin(self) -> None:
-        """Enter SAFE-OP with the checked values; frames may have changed registers meanwhile."""
+        """Enter SAFE-OP with the checked values, as frames may have changed the registers."""
         if self._checked_ns:
             self._core.run_model_by_pulses(
                 self._position, self._pulses, self._checked_ns, self._step_ns
@@ -134,7 +135,7 @@ class Synchronisation:
             self._core.run_model(self._position, self._step_ns)
 
     def awaits_pulses(self) -> bool:
-        """Return True if the device synchronises to pulses and none has arrived."""
+        """Return True if the device synchronises to pulses and has not received one."""
         active, seen = self._core.synchronous(self._position)[:2]
         return active and not seen
 
@@ -146,9 +147,9 @@ class Synchronisation:
 
     @property
     def cycle_ns(self) -> int:
-        """Period of the device's signal [ns].
+        """Period of the signal to which the device synchronises [ns].
 
-        SYNC1 follows with the first SYNC0 after the time in its register (Beckhoff, ESC data sheet
+        SYNC1 occurs with the first SYNC0 after the time in its register (Beckhoff, ESC data sheet
         I §9.2.3.5).
         """
         sync0_ns = self.sync0_cycle_ns
@@ -166,10 +167,10 @@ class Synchronisation:
             return self._synchronous
         return FREE_RUN if self._written is None else self._written
 
-    def _type_to(self, wanted: int) -> None:
-        if wanted not in (FREE_RUN, self._synchronous):
+    def _type_to(self, requested: int) -> None:
+        if requested not in (FREE_RUN, self._synchronous):
             raise Abort(OUT_OF_RANGE)
-        self._written = wanted
+        self._written = requested
 
     def _cycle(self) -> int:
         return self.cycle_ns if self._is_synchronous else self._cycle_written or self._step_ns

@@ -1,4 +1,4 @@
-"""Feeds procedures by hand: no link, no runner, time as a number."""
+"""Players for procedures: simulated replies, without a link or a runner."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ LAYOUT = MailboxLayout(0x1000, 128, 0x1080, 128, MailboxProtocol.COE)
 
 
 def play(procedure: Procedure[T], answer: Callable[[Request], Reply], *, steps: int = 100_000) -> T:
-    """Runs a procedure against a function that answers datagrams."""
+    """Run a procedure with a function that answers datagrams."""
     now = 0
     try:
         step = next(procedure)
@@ -57,10 +57,11 @@ def play(procedure: Procedure[T], answer: Callable[[Request], Reply], *, steps: 
 
 
 class MailboxDevice:
-    """Owns a mailbox as a device's controller and application show it.
+    """Owner of a simulated mailbox: the controller and the application of a device.
 
-    `respond` makes the answers to a message. `lose_out[k]` loses the k-th mailbox datagram before
-    the device sees it, `lose_back[k]` after; k counts reads and writes of mailboxes from 0.
+    `respond` returns the answers to a message. `lose_out` has the numbers of the mailbox datagrams
+    that are lost before the device receives them, `lose_back` of those that are lost afterwards.
+    Reads and writes of the mailbox are counted from 0.
     """
 
     def __init__(self, respond: Callable[[Mailbox], list[Mailbox]]) -> None:
@@ -68,11 +69,13 @@ class MailboxDevice:
         self.lose_out: set[int] = set()
         self.lose_back: set[int] = set()
         self.deduplicates = True
-        self.repeats = True  # its last message, when it is asked to
-        self.repeats_first = False  # the message before, although a newer one waits
-        self.deaf = False  # does not read its mailbox
-        self.next_counter: Callable[[], int] | None = None  # instead of 1 to 7 and again
-        self.spoil: Callable[[bytes], bytes] = lambda data: data  # what it does to its messages
+        self.repeats = True  # it repeats its last message on request
+        self.repeats_first = False  # it repeats a message even if a newer one is waiting
+        self.deaf = False  # it does not read its mailbox
+        self.next_counter: Callable[[], int] | None = None  # replaces the usual counter, 1 to 7
+        self.spoil: Callable[[bytes], bytes] = lambda data: (
+            data
+        )  # changes the messages of the device
         self.received: list[Mailbox] = []
         self._queue: deque[bytes] = deque()
         self._in_buffer: bytes | None = None
@@ -121,7 +124,7 @@ class MailboxDevice:
             self.send(answer)
 
     def send(self, message: Mailbox) -> None:
-        """Puts a message into the device's queue, with its next counter."""
+        """Add a message with the next counter to the queue of the device."""
         self._counter = next_counter(self._counter)
         counter = self._counter if self.next_counter is None else self.next_counter()
         counted = Mailbox(message.type, message.data, counter)
@@ -145,11 +148,11 @@ class MailboxDevice:
             return Reply(request.data, 1)
         if address == 0x080F:
             return Reply(bytes([0x02 if self._toggle else 0]), 1)
-        raise AssertionError(f"nobody should touch 0x{address:04X}")
+        raise AssertionError(f"unexpected access to 0x{address:04X}")
 
     def _repeat(self) -> None:
         if not self._last_sent or (self._in_buffer is not None and not self.repeats_first):
-            return  # what was asked for again is still there
+            return  # the requested message is still in the buffer
         if self._in_buffer is not None:
             self._queue.appendleft(self._in_buffer)
         self._in_buffer = self._last_sent
@@ -160,7 +163,7 @@ def coe(message: UploadResponse | DownloadResponse | UploadSegment | Abort | obj
 
 
 class Dictionary:
-    """Owns objects and answers SDOs to them; small answers are expedited, large ones segmented."""
+    """Owner of objects. It answers SDOs: small answers are expedited, large ones segmented."""
 
     def __init__(self, objects: dict[tuple[int, int], bytes]) -> None:
         self.objects = objects
