@@ -427,7 +427,7 @@ def test_an_inline_loop_cannot_run_in_the_background() -> None:
 
 def test_open_and_close() -> None:
     cell = Cell("csp")
-    with pytest.raises(RuntimeError, match="the loop is open"):
+    with pytest.raises(RuntimeError, match="the loop is already open"):
         cell.loop.open()
     next(cell.loop)
     cell.run_in_background()

@@ -125,7 +125,7 @@ def test_the_controller_slows_down_to_the_same_time_at_any_period() -> None:
         ((1,), {}, r"device 1 \(Lamps\): dc= was requested, but it has no"),
         ((2,), {"reference": 1}, "given as the reference clock, but it has no"),
         ((2,), {"reference": 3}, r"device 2 \(Servo\) precedes device 3 \(Servo\)"),
-        ((2,), {"reference": 4}, "there is no device 4, the segment has 4"),
+        ((2,), {"reference": 4}, "there is no device 4; the segment has 4 devices"),
     ],
 )
 def test_impossible_clock_requests(

@@ -294,7 +294,7 @@ def test_cyclic_frames_that_exceed_the_period_are_refused() -> None:
     with pytest.raises(ConfigurationError) as caught:
         make_plan(devices, options=PlanOptions(period=1e-3))
     assert str(caught.value).startswith(
-        "the cyclic frames take 1011.04 us at 100 Mbit/s, the period is 1000 us"
+        "the cyclic frames take 1011.04 us at 100 Mbit/s; the period is 1000 us"
     )
     assert "divider=" in str(caught.value)
     turns = make_plan(devices, [Slow(2, *range(12))], PlanOptions(period=1e-3)).cycle

@@ -109,7 +109,7 @@ class Clocks:
 
     @property
     def missed(self) -> int:
-        """Number of cycles without an answer of the reference clock."""
+        """Number of cycles without an answer from the reference clock."""
         return int(self._clock.figures()["missed"])
 
     @property

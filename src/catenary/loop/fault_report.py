@@ -1,7 +1,8 @@
 """Conversion of a bad cycle into events and into the one exception that ends the loop.
 
-Every fault of a loop takes this path (docs/architecture.md, "How a fault reaches you"). The other
-modules find facts: the core sets flags, the watches put events, an exchange queries the devices.
+Every fault of a loop takes this path (docs/explanation/architecture.md, "How a fault reaches you").
+The other modules find facts: the core sets flags, the watches put events, an exchange queries the
+devices.
 """
 
 from __future__ import annotations
@@ -128,7 +129,7 @@ class FaultReport:
         return drive_error(troubles, what, log)
 
     def report_axes(self, *, explained: bool = False) -> list[StoppedAxis]:
-        """Put an event for each axis that the core stopped unasked and each refused mode.
+        """Put an event for each axis that the core stopped without a request and each refused mode.
 
         Args:
             explained: True if no flag of a cycle caused the call: see `AxisWatch.new_refusals`.

@@ -121,7 +121,9 @@ class Loop:
 
     def __enter__(self) -> Loop:
         if any(session.is_open for session in self._sessions):
-            raise RuntimeError("the loop is open: `with` and open() open it; use one of them, once")
+            raise RuntimeError(
+                "the loop is already open: use either `with` or open(), and only once"
+            )
         for network in self._networks:
             network.main.require_no_loop()
         try:
@@ -141,11 +143,11 @@ class Loop:
                     session.enable()
             for session in sessions:
                 session.reset_figures()
-            return self  # inside `try`: a signal may arrive at this line too
+            return self  # inside `try`: a signal may also arrive at this line
         except BaseException as error:
             self._report_end(error)
             for problem in self._leave():
-                error.add_note(f"on the way down: {problem}")
+                error.add_note(f"while leaving: {problem}")
             raise
 
     def __exit__(
@@ -164,7 +166,7 @@ class Loop:
             problems.insert(0, unraised)
         if error is not None:
             for problem in problems:
-                error.add_note(f"on the way down: {problem}")
+                error.add_note(f"while leaving: {problem}")
         elif problems:
             raise problems[0]
 
@@ -446,7 +448,9 @@ class Loop:
             n for n in self._networks if n.current_session and n.current_session.clocks is not None
         ]
         if not with_clocks:
-            raise RuntimeError("no distributed clocks in this loop: Drives(..., dc=True)")
+            raise RuntimeError(
+                "no distributed clocks in this loop: request them with Drives(..., dc=True)"
+            )
         for session in self._sessions:
             session.refuse_powered_torque("wait_locked")
         for network in with_clocks:

@@ -137,7 +137,9 @@ class Network:
         """Distributed clocks: print it. RuntimeError if no request has `dc=`."""
         clocks = self.session.clocks
         if clocks is None:
-            raise RuntimeError("no distributed clocks in this loop: Drives(..., dc=True)")
+            raise RuntimeError(
+                "no distributed clocks in this loop: request them with Drives(..., dc=True)"
+            )
         return clocks
 
     @property
@@ -163,7 +165,7 @@ class Network:
     def session(self) -> Session:
         """Session of the network. RuntimeError before the loop is open."""
         if self.current_session is None:
-            raise RuntimeError("the loop is not open: with Loop(...) as loop:")
+            raise RuntimeError("the loop is not open: use `with Loop(...) as loop:`")
         return self.current_session
 
     def prepare(self, abandon: Callable[[], object]) -> Session:
@@ -200,7 +202,7 @@ class Network:
         return make_plan(devices, self._requests, its.plan_options(self.main, self._cpu))
 
     def advance(self, flags: int) -> None:
-        """Do the work of an iteration after a cycle without one, and raise its error, if any."""
+        """Step the acyclic queue after a cycle without an iteration; raise the cycle's error."""
         session = self.session
         session.service.step_without_thread()
         if flags & TROUBLE or session.engine.al_status != AlState.OP:

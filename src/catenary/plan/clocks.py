@@ -219,7 +219,7 @@ def start_time_ns(now_ns: int, syncs: Sequence[SyncPlan]) -> int:
 def _existing(devices: Sequence[DeviceDescription], position: int) -> DeviceDescription:
     if not 0 <= position < len(devices):
         raise ConfigurationError(
-            f"clocks: there is no device {position}, the segment has {len(devices)}",
+            f"clocks: there is no device {position}; the segment has {len(devices)} devices",
             hint="scan again, or correct the position",
         )
     return devices[position]

@@ -119,7 +119,7 @@ def acyclic_wire_time_ns(cyclic_ns: int, period_ns: int) -> int:
     """
     if cyclic_ns > period_ns:
         raise ConfigurationError(
-            f"the cyclic frames take {cyclic_ns / 1e3:g} us at 100 Mbit/s, the period is "
+            f"the cyclic frames take {cyclic_ns / 1e3:g} us at 100 Mbit/s; the period is "
             f"{period_ns / 1e3:g} us",
             hint="use a longer period, fewer objects, or exchange devices less often (divider=...)",
         )

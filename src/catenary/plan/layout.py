@@ -212,7 +212,7 @@ def _grouped(devices: Sequence[DeviceData], unit_max: int) -> list[list[DeviceDa
                 f"{data.description}: {data.output_size} bytes of outputs and {data.input_size} "
                 f"bytes of inputs are {data.size} bytes of process data; a device is exchanged in "
                 f"one datagram, which holds {unit_max} bytes",
-                hint=f"map fewer objects: {data.size - unit_max} bytes less",
+                hint=f"map fewer objects, at least {data.size - unit_max} bytes less",
             )
         if data.optional:
             groups.append([data])
@@ -296,9 +296,9 @@ def _managers(data: DeviceData, direction: Direction) -> tuple[SyncManagerPlan, 
         channel = channels.get(assignment.sync_manager)
         if channel is None or channel.use is not direction.use:
             raise ConfigurationError(
-                f"{device}: its PDOs name SyncManager {assignment.sync_manager} for "
-                f"{direction.noun}, which its SII does not have as such",
-                hint="its SII is wrong; ask the maker for a corrected image",
+                f"{device}: its PDOs use SyncManager {assignment.sync_manager} for "
+                f"{direction.noun}, but its SII does not define this SyncManager for them",
+                hint="its SII is wrong; request a corrected image from the manufacturer",
             )
         plans.append(
             SyncManagerPlan(
@@ -352,6 +352,6 @@ def _fmmus(
         raise ConfigurationError(
             f"{device}: its process data needs {len(plans)} FMMUs, its controller has "
             f"{device.controller.fmmu_count}",
-            hint="map fewer SyncManagers",
+            hint="use fewer SyncManagers",
         )
     return tuple(plans)

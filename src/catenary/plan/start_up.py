@@ -34,7 +34,7 @@ from catenary.plan.start_up_object import StartUp
 from catenary.types import Scalar, by_index
 from catenary.wire.register import watchdog_unit_ns
 
-if TYPE_CHECKING:  # request.py needs NumPy; a scan does not
+if TYPE_CHECKING:  # request.py imports NumPy, which a scan does not need
     from catenary.plan.request import DeviceRequest
 
 WATCHDOG_DIVIDER = 2498  # the controller's reset value

@@ -1,7 +1,7 @@
-"""The time of each device's process-data watchdog, ETG.1000.4 §6.3 (registers 0x0400, 0x0420).
+"""Time of each device's process-data watchdog, ETG.1000.4 §6.3 (registers 0x0400, 0x0420).
 
 After a crash of the MainDevice a drive uses its last outputs until the watchdog expires. In CSP and
-CSV its own loops hold it meanwhile. In CST it applies a stale torque, so the default is short.
+CSV its own loops hold it until then. In CST it applies a stale torque, so the default is short.
 """
 
 from __future__ import annotations

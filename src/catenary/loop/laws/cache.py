@@ -85,7 +85,7 @@ def private_folder(folder: Path) -> Path:
         raise PermissionError(f"{folder} is a link")
     if stat.S_IMODE(status.st_mode) != 0o700:
         real.chmod(0o700)
-    for path in real.glob("*.nb[ci]"):  # from before the folder was private
+    for path in real.glob("*.nb[ci]"):  # they may be older than the mode of the folder
         found = path.lstat()
         if found.st_uid != os.geteuid() or found.st_mode & OTHERS_WRITE:
             raise PermissionError(f"other users can write {path}")

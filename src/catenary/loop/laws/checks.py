@@ -44,9 +44,9 @@ def forbidden(tree: ast.AST, *, handled: bool) -> Iterator[tuple[ast.stmt | ast.
                 "return True to end the law, or write an error code to memory",
             )
         elif isinstance(node, ast.Call) and called(node) == "print":
-            yield node, "`print` takes the GIL", "write to memory and print it from Python"
+            yield node, "`print` needs the GIL", "write to memory and print it from Python"
         elif isinstance(node, ast.With) and any(map(is_object_mode, node.items)):
-            yield node, "object mode takes the GIL", "do that part in Python, outside the law"
+            yield node, "object mode needs the GIL", "do that part in Python, outside the law"
         elif isinstance(node, ast.Try):
             inner = ast.Module(body=node.body, type_ignores=[])
             yield from forbidden(inner, handled=handled or bool(node.handlers))

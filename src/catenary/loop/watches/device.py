@@ -253,7 +253,7 @@ class Watch:
     # Return of devices
 
     def _find_returned(self) -> Procedure[None]:
-        """Find devices that have returned: in vacant places, without a valid address."""
+        """Find returned devices without a valid address, and assign them to vacant places."""
         present = yield from restore.look_around(len(self._charges) + STRANGERS_MAX)
         known = [charge.plan.station_address for charge in self._charges]
         free = vacancies([presence.station_address for presence in present], known)
