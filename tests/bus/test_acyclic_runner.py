@@ -1,4 +1,4 @@
-"""Procedures beside a cycle: a lane of a few frames, one step a millisecond."""
+"""Procedures while a cycle runs: an acyclic queue of a few frames, one step per millisecond."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ PERIOD_NS = 1_000_000
 
 
 class AcyclicQueue:
-    """Owns a lane over a virtual link: what is pushed goes out with the next cycle."""
+    """Owns an acyclic queue on a virtual link. Pushed frames are sent with the next cycle."""
 
     def __init__(self, link: Link, *, slots: int = 64) -> None:
         self.link = link
@@ -65,7 +65,7 @@ def settle(lane: AcyclicQueue, runner: AcyclicRunner, cycles: int = 5000) -> int
     raise AssertionError(f"still busy after {cycles} cycles")
 
 
-def test_an_upload_takes_one_step_a_cycle() -> None:
+def test_an_upload_takes_one_step_per_cycle() -> None:
     with MainDevice(demo_segment()) as main:
         [drive, *_] = main.scan().drives
         lane = AcyclicQueue(main.link)
@@ -90,7 +90,7 @@ def test_many_procedures_share_the_frame_of_a_cycle() -> None:
         assert all(datagram.index >= 0x80 for datagram in decode_frame(frame).datagrams)
 
 
-def test_conversations_with_one_mailbox_take_turns() -> None:
+def test_procedures_on_one_mailbox_take_turns() -> None:
     with MainDevice(demo_segment()) as main:
         drive = main.scan()[2]
         lane = AcyclicQueue(main.link)
@@ -106,7 +106,7 @@ def test_conversations_with_one_mailbox_take_turns() -> None:
         assert drive.channel.dropped == 0
 
 
-def test_a_full_lane_delays_but_loses_nothing() -> None:
+def test_a_full_queue_delays_but_loses_nothing() -> None:
     with MainDevice(demo_segment()) as main:
         subs = main.scan()
         lane = AcyclicQueue(main.link, slots=0)
@@ -133,7 +133,7 @@ def test_lost_frames_are_repeated_or_recovered() -> None:
         assert runner.counts.lost >= 3
 
 
-def test_a_segment_that_is_gone_ends_in_time() -> None:
+def test_procedures_on_a_lost_segment_end_in_time() -> None:
     segment = demo_segment()
     with MainDevice(segment) as main:
         drive = main.scan()[2]
@@ -146,7 +146,7 @@ def test_a_segment_that_is_gone_ends_in_time() -> None:
             task.result()
 
 
-def test_a_blocking_call_in_the_loops_own_thread_raises_at_once() -> None:
+def test_a_blocking_call_in_the_loops_thread_raises_at_once() -> None:
     with MainDevice(demo_segment()) as main:
         drive = main.scan()[2]
         lane = AcyclicQueue(main.link)
@@ -156,7 +156,7 @@ def test_a_blocking_call_in_the_loops_own_thread_raises_at_once() -> None:
         ):
             drive.sdo.read(0x1000)
         assert lane.pushed == []
-        assert drive.sdo.read(0x1000)  # detached again
+        assert drive.sdo.read(0x1000)  # the loop has ended
 
 
 def test_a_scan_is_refused_while_a_loop_runs() -> None:
@@ -180,14 +180,14 @@ def test_another_thread_reads_while_the_loop_runs() -> None:
                 target=lambda: found.append(drive.sdo.read(0x1018, 1, type=UDINT))
             )
             thread.start()
-            while thread.is_alive():  # each step is a cycle of virtual time; no clock is asked
+            while thread.is_alive():  # each step is a cycle of virtual time
                 runner.step()
                 lane.cycle()
                 thread.join(0.001)
         assert found == [drive.identity.vendor]
 
 
-def test_closing_ends_those_who_wait() -> None:
+def test_closing_ends_waiting_calls() -> None:
     with MainDevice(demo_segment()) as main:
         drive = main.scan()[2]
         runner = AcyclicRunner(AcyclicQueue(main.link))
@@ -210,7 +210,7 @@ def test_closing_ends_those_who_wait() -> None:
             runner.submit(upload(drive.channel, 0x1000, 0))
 
 
-def test_pauses_are_counted_in_the_lanes_time() -> None:
+def test_pauses_use_the_clock_of_the_queue() -> None:
     with demo_segment().open_link() as link:
         lane = AcyclicQueue(link)
         runner = AcyclicRunner(lane)
@@ -229,9 +229,8 @@ def _state(station: int) -> Procedure[int]:
     return AL_STATUS.unpack(reply.data)
 
 
-def test_a_loop_that_begins_waits_for_who_talks_and_others_go_beside_it() -> None:
-    """One thread at a time has the link: a conversation of another thread is finished first, one
-    that comes too late for that goes into the lane."""
+def test_a_starting_loop_waits_for_running_procedures() -> None:
+    """Only one thread uses the link. A running procedure finishes first; a later one is queued."""
     with MainDevice(demo_segment()) as main:
         drive = main.scan()[2]
         lane = AcyclicQueue(main.link)
@@ -251,7 +250,7 @@ def test_a_loop_that_begins_waits_for_who_talks_and_others_go_beside_it() -> Non
         assert talking.wait(60.0)
         late: list[int] = []
         second = threading.Thread(target=lambda: late.append(drive.sdo.read(0x1018, 1, type=UDINT)))
-        second.start()  # waits for the first, on the blocking runner; or comes later
+        second.start()  # waits for the first one on the blocking runner, or starts later
         threading.Timer(0.02, go_on.set).start()
         with main.attached(runner):
             order.append("attached")
@@ -264,7 +263,7 @@ def test_a_loop_that_begins_waits_for_who_talks_and_others_go_beside_it() -> Non
         assert late == [drive.identity.vendor]
 
 
-def test_without_the_lane_nobody_sends_while_a_loop_has_the_link() -> None:
+def test_without_a_queue_procedures_are_refused_while_a_loop_runs() -> None:
     with MainDevice(demo_segment()) as main:
         main.scan()
         blocking = main.runner

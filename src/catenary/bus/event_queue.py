@@ -27,7 +27,7 @@ class LoopClock:
     """Owns the zero of a loop's event times: the cycle start of its first iteration."""
 
     def __init__(self, zero_ns: Callable[[], int]) -> None:
-        self._zero_ns = zero_ns  # returns the link's clock time; 0: no iteration yet
+        self._zero_ns = zero_ns  # returns a time of the link's clock; 0 before the first iteration
 
     def stamped(self, event: Event) -> Event:
         """Return the event with its time on the clock of `cycle.time`, if the zero is known."""
