@@ -473,7 +473,7 @@ def test_an_empty_file_misses_its_format(tmp_path: Path) -> None:
 def test_deep_nesting_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "machine.toml"
     path.write_text("format = " + "[" * 100_000)
-    with pytest.raises(MachineFileError, match="not TOML"):
+    with pytest.raises(MachineFileError, match="nested too deeply"):
         read_machine(path)
 
 
