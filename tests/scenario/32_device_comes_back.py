@@ -324,7 +324,7 @@ def test_a_pending_request_does_not_delay_the_return(cell: Cell) -> None:
         if cycle.number == 600:
             assert cell.states == [OP] * 5
             assert isinstance(answers[0].error, MailboxError)
-            assert "started up again" in str(answers[0].error)
+            assert "restarted before it answered" in str(answers[0].error)
 
     silent = mailbox_silent(TOOL, at=0.19, for_=0.05)
     run(cell, silent, leave_state(TOOL, at=0.2, state="INIT", code=0x001A), each=look)

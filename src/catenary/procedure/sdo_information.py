@@ -203,7 +203,7 @@ def list_objects(
     """Read the descriptions of all objects of a kind.
 
     Listed objects that do not exist are omitted. Other objects that the device does not describe
-    have object code 0. There is a note about both.
+    have object code 0. Notes report both cases.
 
     Args:
         channel: The mailbox of the device.

@@ -1,4 +1,4 @@
-"""Application of a device, as in its microcontroller: state machine, mailbox, CoE, process data.
+"""Application of a device (its microcontroller): state machine, mailbox, CoE and process data.
 
 It runs in the service of the segment, not in the frame path.
 """
