@@ -47,9 +47,9 @@ class DeviceConfiguration:
     position: int
     address: Address
     config: int
-    sdo_request: int  # 0: no CoE
+    sdo_request: int  # 0 without CoE
     register_request: int
-    sync: SyncPlan | None  # None: no SYNC signals
+    sync: SyncPlan | None  # None without SYNC signals
 
 
 @dataclass(frozen=True, slots=True)
@@ -139,7 +139,7 @@ def _device(
     for download in (*plan.before_mapping, *plan.start_up):
         data = ctypes.create_string_buffer(download.data, len(download.data))
         if download.optional:
-            # Not in the master's list: after a refused SDO, the master gives up the device.
+            # Written here, because the master gives up a device that refuses an SDO of its list.
             _download_if_there(master, plan.position, download)
             continue
         place = (download.index, download.subindex, ctypes.addressof(data), len(data))
