@@ -38,8 +38,8 @@ class Machine:
                 loop.wait(arm.move_to(0.0, velocity=0.5))
 
     The `with` statement opens the link and compares the identities of the devices with the file,
-    without a change to any device. Only then it brings the devices to PRE-OP. At the end, it brings
-    them to INIT.
+    without a change to any device. Only then does it bring the devices to PRE-OP. At the end, it
+    brings them to INIT.
 
     Args:
         path: the machine file.

@@ -254,7 +254,7 @@ class Watch:
 
     def _find_returned(self) -> Procedure[None]:
         """Find returned devices without a valid address, and assign them to vacant places."""
-        present = yield from restore.look_around(len(self._charges) + STRANGERS_MAX)
+        present = yield from restore.find_devices(len(self._charges) + STRANGERS_MAX)
         known = [charge.plan.station_address for charge in self._charges]
         free = vacancies([presence.station_address for presence in present], known)
         taken: set[int] = set()
