@@ -218,7 +218,7 @@ def test_a_lock_that_the_system_refuses_is_a_link_error(
     veth: tuple[str, str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(ownership, "NAME", "\0" + 200 * "x")  # longer than an address may be
-    with pytest.raises(LinkError, match=f"{veth[0]}: its lock cannot be taken"):
+    with pytest.raises(LinkError, match=f"{veth[0]}: cannot take the lock of the interface"):
         cat.MainDevice(veth[0]).open()
 
 
