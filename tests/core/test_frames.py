@@ -178,7 +178,7 @@ def test_cycle_numbers_count_the_cycles() -> None:
         (64, 2, False, "33 in one cycle, at most 32"),
         (128, 1, True, None),
         (129, 1, True, "129 in one cycle, at most 128"),
-        (1025, 100, False, "1025, at least 1 and at most 1024"),
+        (1025, 100, False, "1025, must be 1 to 1024"),
     ],
 )
 def test_how_many_frames_a_cycle_may_have(
@@ -334,7 +334,7 @@ def test_a_lost_second_frame(optional: bool) -> None:
 
 
 def slow_second(divider: int, phase: int = 0, **options: object) -> Bench:
-    """The second of two drives rides in a frame of its own, every so many cycles."""
+    """The second of two drives is in a separate frame with a divider."""
     plan = make_plan([axis(0), axis(1)], **options)
     units = (plan.sync_units[0], SyncUnit("second", (1,), divider=divider))
     slow = replace(frame_plan([lrw(1)]), divider=divider, phase=phase)

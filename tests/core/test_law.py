@@ -294,7 +294,7 @@ def test_memory_and_parameters_change_all_at_once_and_can_be_read_back() -> None
     law.set_memory([0.5, 0.0])
     b.steps(1)
     assert law.memory == [2.5, -2.0]
-    with pytest.raises(ValueError, match="2 numbers, not 3"):
+    with pytest.raises(ValueError, match="expected 2 numbers, received 3"):
         law.set_parameters([1.0, 2.0, 3.0])
 
 

@@ -150,7 +150,7 @@ def test_refuses_a_table_of_another_version_or_of_other_blocks() -> None:
         b.engine.set_sink(None)
     b.engine.stop()
     sink.table.actual_size += 8
-    with pytest.raises(ValueError, match=r"a sink for blocks of .* bytes, there are"):
+    with pytest.raises(ValueError, match=r"sink: blocks of .* bytes, the engine has"):
         b.engine.set_sink(sink.capsule)
     sink.table.version = 2
     with pytest.raises(ValueError, match="version 2, not 1"):
