@@ -200,11 +200,11 @@ def test_a_master_in_another_container(veth: tuple[str, str]) -> None:
     )
 
 
-def test_the_process_of_another_container_is_said_to_be_invisible() -> None:
+def test_a_process_of_another_container_is_reported_as_invisible() -> None:
     assert "invisible here" in ownership.described(0)
 
 
-def test_whoever_keeps_the_lock_without_a_right_to_the_interface(veth: tuple[str, str]) -> None:
+def test_a_lock_held_without_permission_for_the_interface(veth: tuple[str, str]) -> None:
     """Any user may bind a name of an abstract socket."""
     with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as stranger:
         stranger.bind(ownership.NAME + veth[0])

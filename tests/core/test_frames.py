@@ -341,7 +341,7 @@ def slow_second(divider: int, phase: int = 0, **options: object) -> Bench:
     return Bench(replace(plan, frames=(frame_plan([al_status(2), lrw(0)]), slow), sync_units=units))
 
 
-def test_a_slow_unit_goes_out_in_its_own_cycles_only() -> None:
+def test_a_unit_with_a_divider_is_sent_only_in_its_cycles() -> None:
     b = slow_second(divider=4, phase=1)
     b.engine.run(12)
     assert [len(decode_frame(f).datagrams) for f in b.link.sent] == [2, 1, 2, 2, 2] * 3
@@ -432,7 +432,7 @@ def test_a_link_that_does_not_send_is_counted_and_the_cycle_is_lost() -> None:
 # ---- receive modes
 
 
-def test_look_waits_for_the_deadline_and_looks_once() -> None:
+def test_poll_mode_waits_for_the_deadline_and_reads_once() -> None:
     b = bench(axis(0), receive_mode="poll")
     b.engine.run(2)
     assert b.ok

@@ -93,7 +93,7 @@ def test_every_cycle_once_with_what_was_known_and_sent(execution: str) -> None:
 
 
 @pytest.mark.parametrize("execution", ["threaded", "inline"])
-def test_it_comes_behind_the_frames_of_its_cycle(execution: str) -> None:
+def test_the_sink_is_called_after_the_frames_of_its_cycle(execution: str) -> None:
     sent: list[int] = []
     b, sink = opened(execution, look=lambda: len(sent))
     b.link.sent = sent
