@@ -1,4 +1,4 @@
-"""Attack: two masters on one network interface. The second one is refused, the first goes on."""
+"""Attack: two masters on one network interface. The second is refused; the first continues."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Other users against shares and mutexes: what they read, command, lock, take and break.
+"""Attacks of other users on shares and mutexes: read, command, lock, take, damage.
 
 Alice runs a loop; Bob is an operator, of her group; Mallory is neither.
 """

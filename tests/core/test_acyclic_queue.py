@@ -1,4 +1,4 @@
-"""The acyclic lane: opaque frames beside the cycle, bounded both ways."""
+"""The acyclic queue: opaque frames outside the cycle, bounded in both directions."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""Areas: bytes of an image that the application has as they are."""
+"""Areas: bytes of an image that the application uses without conversion."""
 
 from __future__ import annotations
 

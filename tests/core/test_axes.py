@@ -1,4 +1,4 @@
-"""Axis records: scales, counters that go round, modes, what is written where."""
+"""Axis records: scales, counters that wrap, modes, and the outputs written."""
 
 import pytest
 

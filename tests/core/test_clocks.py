@@ -1,4 +1,4 @@
-"""The phase controller: beside its twin, and against clocks that drift."""
+"""The phase controller, compared with its twin and tested against clocks that drift."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The three orders, the instants, the figures. Virtual time throughout."""
+"""Execution modes, cycle starts and figures, in virtual time."""
 
 from dataclasses import replace
 

@@ -1,4 +1,4 @@
-"""The frame engine: what is sent, what is believed, and what is counted and forgotten."""
+"""The frame engine: frames that are sent, accepted, or counted and dropped."""
 
 from dataclasses import replace
 

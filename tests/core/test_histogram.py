@@ -1,4 +1,4 @@
-"""Histograms, judged by NumPy on the raw values."""
+"""Histograms, compared with NumPy on the raw values."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Laws in the cycle, in every execution mode: handed over, ended, left. Virtual time throughout."""
+"""Laws in the cycle: hand-over and end, in every execution mode and in virtual time."""
 
 import ctypes
 import gc

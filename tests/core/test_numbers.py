@@ -1,4 +1,4 @@
-"""Numbers at any bit offset, read and written through columns; judged by Python's integers."""
+"""Numbers at any bit offset, read and written through columns, compared with Python's integers."""
 
 import struct
 from dataclasses import replace

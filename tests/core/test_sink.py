@@ -1,4 +1,4 @@
-"""Sinks: every cycle once, in the tail, with what was known and sent."""
+"""Sinks: called once per cycle in the post-processing, with inputs and outputs."""
 
 from __future__ import annotations
 

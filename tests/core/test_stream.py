@@ -1,4 +1,4 @@
-"""Set-points written ahead: one row a cycle, dry, with a law, and back to the application."""
+"""Streams of set-points: one row per cycle, underruns, with a law, and after their end."""
 
 import threading
 

@@ -1,4 +1,4 @@
-"""Faults: which frames they hit, what they do to them, and that a seed repeats them."""
+"""Faults: the frames they affect, their effect, and repetition by a seed."""
 
 from __future__ import annotations
 

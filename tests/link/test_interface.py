@@ -1,4 +1,4 @@
-"""The raw link: round trips over a veth pair, and what refuses to be a link."""
+"""The raw link: round trips over a veth pair, and interfaces that are refused."""
 
 from __future__ import annotations
 

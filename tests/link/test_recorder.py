@@ -1,4 +1,4 @@
-"""Recordings: judged by tshark, a foreign reader."""
+"""Recordings, checked by tshark."""
 
 from __future__ import annotations
 

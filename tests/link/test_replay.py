@@ -1,4 +1,4 @@
-"""Replays: recorded segments that answer again."""
+"""Replays of recorded segments."""
 
 from __future__ import annotations
 

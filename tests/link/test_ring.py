@@ -1,4 +1,4 @@
-"""Two links as one ring, over a row of devices written in Python that counts what passes."""
+"""Two links as one ring, over a line of devices written in Python that counts frames."""
 
 from __future__ import annotations
 
