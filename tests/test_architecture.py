@@ -1,4 +1,4 @@
-"""docs/explanation/architecture.md names what there is, and all of it."""
+"""docs/explanation/architecture.md names all packages, and only existing files."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ FUNCTION = re.compile(r"(\w+/\w+)\.(\w+)")
 
 
 @pytest.mark.parametrize("name", [name for name in NAMED if FILE.fullmatch(name)])
-def test_files_and_folders_are_there(name: str) -> None:
+def test_files_and_folders_exist(name: str) -> None:
     assert any((place / name).exists() for place in PLACES)
 
 
 @pytest.mark.parametrize(
     "name", [n for n in NAMED if FUNCTION.fullmatch(n) and not FILE.fullmatch(n)]
 )
-def test_functions_are_there(name: str) -> None:
+def test_functions_exist(name: str) -> None:
     module, function = name.rsplit(".", 1)
     assert f"def {function}(" in (PACKAGE / f"{module}.py").read_text()
 

@@ -107,7 +107,7 @@ said(lambda: os.rename(folder + "/share-arm", folder + "/y"))
 
 
 def test_the_owner_of_a_taken_folder_is_named(machine: Machine) -> None:
-    """Denial, not deception: /dev/shm is open to everybody. /run/catenary cannot be taken."""
+    """Denial, not deception: /dev/shm is open to all users. /run/catenary cannot be taken."""
     assert machine.run(MALLORY, f"import os; os.mkdir('/dev/shm/catenary-{ALICE}', 0o777)") == []
     take = f'{SAY}\nsaid(lambda: cat.share.Mutex("tool"))'
     [line] = machine.run(ALICE, take)

@@ -37,7 +37,7 @@ def test_a_tool_that_comes_and_goes() -> None:
     assert "device 2" in out
     assert "does not answer any more" in out
     assert "answers again" in out
-    assert out.endswith("the tool is there\n")
+    assert out.endswith("the tool is present\n")
 
 
 def test_two_networks() -> None:

@@ -47,7 +47,7 @@ def describe_mappings(
     requests: Sequence[ProcessDataRequest],
     period_ns: int,
 ) -> None:
-    """Update the descriptions of all CoE devices: the mapping, and the requested objects.
+    """Update the mapping and the requested objects in the descriptions of all CoE devices.
 
     Objects that are requested but not mapped are read from the dictionaries.
 

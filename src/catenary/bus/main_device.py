@@ -32,7 +32,7 @@ from catenary.model.device import Identity
 from catenary.procedure.exchange import Procedure
 from catenary.wire.al import AlState
 
-if TYPE_CHECKING:  # plan needs NumPy, a scan does not
+if TYPE_CHECKING:  # plan imports NumPy, which a scan does not need
     from catenary.bus.diagnosis import Diagnosis
     from catenary.bus.states import Outcome
     from catenary.plan.cycle import ExecutionMode, ReceiveMode
@@ -133,7 +133,7 @@ class MainDevice:
         return self
 
     def forget(self) -> None:
-        """Release the parent's link and devices in a forked child. Sends nothing.
+        """Release the parent's link and devices in a forked child. Send nothing.
 
         No effect in the process that opened it.
         """
@@ -297,8 +297,8 @@ class MainDevice:
         loop runs, call it from another thread.
 
         Args:
-            since: Earlier diagnosis that starts the count; None: power-up of the devices.
-            subs: Devices of a `passive_scan`; None: those of the last `scan`.
+            since: Earlier diagnosis that starts the count; None for the power-up of the devices.
+            subs: Devices of a `passive_scan`; None for those of the last `scan`.
             lost_frames: Number of frames that were lost or damaged in that time.
         """
         chosen = self.subs if subs is None else subs

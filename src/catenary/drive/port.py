@@ -71,7 +71,7 @@ class AxisPort:
 
     @property
     def requested_mode(self) -> int:
-        """Mode that the drive shall use (0x6060)."""
+        """Mode that was requested from the drive (0x6060)."""
         return self._views.mode_target.item(self._index)
 
     @property

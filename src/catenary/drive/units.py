@@ -84,7 +84,7 @@ class AxisUnits:
             raise ValueError(f"counts_per_turn must be positive, not {self.counts_per_turn}")
         if not (math.isfinite(self.gear_ratio) and self.gear_ratio > 0):
             raise ValueError(
-                f"gear_ratio must be positive, not {self.gear_ratio}; use direction=-1"
+                f"gear_ratio must be positive, not {self.gear_ratio}; direction=-1 reverses an axis"
             )
         if self.direction not in (1, -1):
             raise ValueError(f"direction must be 1 or -1, not {self.direction}")

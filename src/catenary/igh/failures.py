@@ -15,7 +15,7 @@ MODULE = Path("/sys/module/ec_master")
 
 
 class NoMailboxError(MailboxError):
-    """The device has no CoE mailbox."""
+    """Error for a device without a CoE mailbox."""
 
 
 def sdo_error(

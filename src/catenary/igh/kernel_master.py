@@ -20,7 +20,7 @@ from catenary.igh.topology import check_delays
 from catenary.model.device import DeviceDescription, Direction, mapped_entries
 from catenary.wire.al import AlState
 
-if TYPE_CHECKING:  # plan needs NumPy, a scan does not
+if TYPE_CHECKING:  # plan imports NumPy, which a scan does not need
     from catenary.bus.diagnosis import Diagnosis
     from catenary.bus.master import MasterOwner
     from catenary.bus.states import Outcome

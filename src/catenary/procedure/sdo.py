@@ -40,7 +40,7 @@ UPLOAD_LIMIT = 1 << 20  # bytes: larger than all known objects
 UPLOAD_TIMEOUT = 60.0  # [s] for all segments: 1 MiB in mailboxes of 128 bytes, 7 ms each
 SMALL_LIMIT = 4096  # bytes: most of these objects have at most 4, but some are strings
 SMALL_TIMEOUT = 5.0  # [s] per object
-NOT_THERE = frozenset((0x0602_0000, 0x0609_0011))  # no such object, no such subindex
+OBJECT_MISSING = frozenset((0x0602_0000, 0x0609_0011))  # no such object, no such subindex
 
 
 def upload(

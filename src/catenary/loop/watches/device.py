@@ -256,7 +256,7 @@ class Watch:
 
     def _look_for_returned(self) -> Procedure[None]:
         """Find returned devices: without a valid address, in free places of the network."""
-        present = yield from restore.look_around(len(self._charges) + STRANGERS_MAX)
+        present = yield from restore.find_devices(len(self._charges) + STRANGERS_MAX)
         known = [charge.plan.station_address for charge in self._charges]
         free = vacancies([presence.station_address for presence in present], known)
         taken: set[int] = set()

@@ -288,7 +288,7 @@ class Servo(AppliedDevice):
         return velocity_gain, velocity_gain * VELOCITY_BANDWIDTH / 5
 
     def tune(self, inertia: float, axis: int = 0) -> None:
-        """Tune the velocity loop for an inertia.
+        """Tune the velocity loop to a total inertia.
 
         Args:
             inertia: Total inertia at the motor shaft, including the motor [kg·m²].
