@@ -476,7 +476,7 @@ def with_datagram(frame, **changes) -> dict[str, object]:
         (lambda p, f, d: {"frames": (replace(f, template=f.template[:40]),)}, "40 bytes"),
         (lambda p, f, d: {"frames": (replace(f, datagrams=()),)}, "no datagrams"),
         (lambda p, f, d: with_datagram(f, offset=31), "expected at 30"),
-        (lambda p, f, d: with_datagram(f, length=14), "its datagrams end at"),
+        (lambda p, f, d: with_datagram(f, length=14), "the end of its datagrams at"),
         (lambda p, f, d: with_datagram(f, command=3), "command or length"),
         (lambda p, f, d: with_datagram(f, sync_unit=1), "sync unit 1 of 1"),
         (lambda p, f, d: with_datagram(f, expected_counter=70000), "counter 70000"),

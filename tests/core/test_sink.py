@@ -153,7 +153,7 @@ def test_refuses_a_table_of_another_version_or_of_other_blocks() -> None:
     with pytest.raises(ValueError, match=r"sink: blocks of .* bytes, the engine has"):
         b.engine.set_sink(sink.capsule)
     sink.table.version = 2
-    with pytest.raises(ValueError, match="version 2, not 1"):
+    with pytest.raises(ValueError, match="version 2, expected 1"):
         b.engine.set_sink(sink.capsule)
     other = b"catenary.link"
     with pytest.raises(ValueError, match="incorrect name"):
