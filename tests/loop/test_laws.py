@@ -93,7 +93,7 @@ def test_watched_while_it_runs_parameters_changed_all_at_once() -> None:
         assert run.steps > 110
         assert run.longest >= 0.0
         assert run.overruns == 0
-        with pytest.raises(ValueError, match="1 numbers, not 2"):
+        with pytest.raises(ValueError, match="expected 1 numbers, received 2"):
             run.parameters = [1.0, 2.0]
         with pytest.raises(ValueError, match="one-dimensional"):
             run.memory = np.zeros((5, 1))
