@@ -20,7 +20,7 @@ cdef enum:  # phases
     RECEIVE = 2
     PROCESS = 3
     SEND = 4
-    TAIL = 5
+    POST_PROCESSING = 5
     ROUND_TRIP = 6
     IN_CONTROLLER = 7
     OUTPUT_DELAY = 8

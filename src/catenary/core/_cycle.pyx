@@ -23,7 +23,7 @@ counted (`missed_sync`).
 
 Phases. receive: inputs usable, from the wake-up (inline) or from the last frame (threaded).
 process: the body of the application, or the law. send: wake-up → last cyclic frame handed to the
-kernel (inline: end of the body →). in_controller: their sum. tail: post-processing until the next
+kernel (inline: end of the body →). in_controller: their sum. post_processing: work until the next
 wait. round_trip: sent → last frame seen (threaded). output_delay: cycle start → last cyclic frame
 handed to the kernel. input_age: frames handed to the kernel → law or body begins with their inputs.
 interpreter: Python's thread awake → it has the interpreter (added by the engine).
@@ -113,7 +113,7 @@ PHASE_NAMES = {
     "receive": RECEIVE,
     "process": PROCESS,
     "send": SEND,
-    "tail": TAIL,
+    "post_processing": POST_PROCESSING,
     "round_trip": ROUND_TRIP,
     "in_controller": IN_CONTROLLER,
     "output_delay": OUTPUT_DELAY,
@@ -403,7 +403,7 @@ cdef void post_process(cycle_t *c, int64_t since, const actual_t *actual,
             histogram_add(&h[IN_CONTROLLER], c.process + record.receive_ns + record.send_ns)
     took = give(c, record, since, actual, target) if c.sink != NULL else now(c) - since
     record.tail_ns = short_ns(took)
-    histogram_add(&h[TAIL], took)
+    histogram_add(&h[POST_PROCESSING], took)
     clear_next_record(c)
 
 

@@ -26,7 +26,7 @@ class Timing(Mapping[str, Mapping[str, float]]):
     - process: the body, or the law.
     - send: wake-up (inline: end of the body) → last frame passed to the kernel.
     - in_controller: sum of receive, process and send.
-    - tail: post-processing until the next wait.
+    - post_processing: work after the frames, until the next wait.
     - round_trip: of the last frame.
     - output_delay: cycle start → last cyclic frame passed to the kernel.
     - input_age: frames passed to the kernel → body or law begins with their inputs.
