@@ -20,7 +20,7 @@ class Registers:
         self.word, self.code = word, code
         self.refuse: dict[int, int] = {}
         self.slow = 0  # number of reads until a state change is visible
-        self.asked: list[int] = []
+        self.requested: list[int] = []
         self.working_counter = 1
         self._coming: int | None = None
 
@@ -37,7 +37,7 @@ class Registers:
         return Reply(struct.pack("<HHH", self.word, 0, self.code), self.working_counter)
 
     def _ask(self, word: int) -> None:
-        self.asked.append(word)
+        self.requested.append(word)
         state, acknowledge = word & 0x0F, word & 0x10
         if self.word & 0x10 and not acknowledge:
             return  # an error must be acknowledged before anything else
@@ -51,19 +51,19 @@ def test_a_state_is_requested_once() -> None:
     device = Registers()
     device.slow = 20
     assert play(request_state(STATION, AlState.PRE_OP), device).state is AlState.PRE_OP
-    assert device.asked == [0x02]
+    assert device.requested == [0x02]
 
 
 def test_a_state_that_is_reached_is_not_requested() -> None:
     device = Registers(0x02)
     play(request_state(STATION, AlState.PRE_OP), device)
-    assert device.asked == []
+    assert device.requested == []
 
 
 def test_a_pending_error_is_acknowledged_first() -> None:
     device = Registers(0x12, code=0x001B)
     assert play(request_state(STATION, AlState.SAFE_OP), device).state is AlState.SAFE_OP
-    assert device.asked == [0x12, 0x04]
+    assert device.requested == [0x12, 0x04]
 
 
 def test_a_refusal_reports_code_text_and_cause() -> None:

@@ -85,18 +85,18 @@ def channel(exchange: Exchange) -> MailboxChannel:
 )
 def test_requests_and_answers_match_the_recording(shared_data: Path, name: str) -> None:
     recorded = exchanges(shared_data / "pcap" / f"{name}.pcapng")
-    lane = channel(recorded[0])
+    mailbox = channel(recorded[0])
     device = Recorded(recorded)
     for each in recorded:
         request = decode_coe(decode_mailbox(each.request.data).data)
         answer = decode_coe(decode_mailbox(each.answer.data).data)
         if isinstance(request, DownloadRequest):
-            run = download(lane, request.index, request.subindex, request.data)
+            run = download(mailbox, request.index, request.subindex, request.data)
             assert play(run, device) is None
         else:
             assert isinstance(request, UploadRequest)
             assert isinstance(answer, UploadResponse)
-            assert play(upload(lane, request.index, request.subindex), device) == answer.data
+            assert play(upload(mailbox, request.index, request.subindex), device) == answer.data
 
 
 def test_an_assignment_is_written_as_recorded(shared_data: Path) -> None:

@@ -22,9 +22,9 @@ OBJECT = {(0x2000, 0): b"\x11\x22\x33\x44"}
 def test_a_lost_read_reply_is_repeated_by_the_toggle() -> None:
     device = MailboxDevice(Dictionary(OBJECT))
     device.lose_back = {1}  # 0 is the write, 1 the read
-    lane = channel()
-    assert play(upload(lane, 0x2000, 0), device) == OBJECT[0x2000, 0]
-    assert lane.repeat_requested
+    mailbox = channel()
+    assert play(upload(mailbox, 0x2000, 0), device) == OBJECT[0x2000, 0]
+    assert mailbox.repeat_requested
     assert len(device.received) == 1
 
 
@@ -77,18 +77,18 @@ def test_a_device_that_never_answers_times_out() -> None:
 def test_a_device_that_does_not_read_its_mailbox_times_out() -> None:
     device = MailboxDevice(lambda _: [])
     device.deaf = True
-    lane = channel()
+    mailbox = channel()
     with pytest.raises(ResponseTimeout):
-        play(upload(lane, 0x2000, 0), device)
+        play(upload(mailbox, 0x2000, 0), device)
     with pytest.raises(MailboxError, match="has not read its mailbox"):
-        play(upload(lane, 0x2000, 0), device)
+        play(upload(mailbox, 0x2000, 0), device)
 
 
 def test_counters_cycle_from_1_to_7() -> None:
     device = MailboxDevice(Dictionary(OBJECT))
-    lane = channel()
+    mailbox = channel()
     for _ in range(9):
-        play(upload(lane, 0x2000, 0), device)
+        play(upload(mailbox, 0x2000, 0), device)
     assert [message.counter for message in device.received] == [1, 2, 3, 4, 5, 6, 7, 1, 2]
 
 
@@ -116,20 +116,20 @@ def _longest_run(numbers: set[int]) -> int:
 def test_a_lost_poll_that_left_the_message_needs_no_repetition() -> None:
     device = MailboxDevice(Dictionary(OBJECT))
     device.repeats = False
-    lane = channel()
-    play(upload(lane, 0x2000, 0), device)
+    mailbox = channel()
+    play(upload(mailbox, 0x2000, 0), device)
     device.lose_out = {3}  # the poll of the second upload: 0 to 2 are write, read, write
-    assert play(upload(lane, 0x2000, 0), device) == OBJECT[0x2000, 0]
-    assert not lane.repeat_requested
+    assert play(upload(mailbox, 0x2000, 0), device) == OBJECT[0x2000, 0]
+    assert not mailbox.repeat_requested
 
 
 def test_a_lost_poll_that_took_the_message_is_repeated() -> None:
     device = MailboxDevice(Dictionary(OBJECT))
-    lane = channel()
-    play(upload(lane, 0x2000, 0), device)
+    mailbox = channel()
+    play(upload(mailbox, 0x2000, 0), device)
     device.lose_back = {3}
-    assert play(upload(lane, 0x2000, 0), device) == OBJECT[0x2000, 0]
-    assert lane.repeat_requested
+    assert play(upload(mailbox, 0x2000, 0), device) == OBJECT[0x2000, 0]
+    assert mailbox.repeat_requested
     assert len(device.received) == 2
 
 
@@ -143,20 +143,20 @@ def test_a_device_that_answers_twice_stays_in_step() -> None:
         answer = Dictionary({(0x2000, 0): bytes([next(values)])})(message)
         return [*answer, *answer]
 
-    lane = channel()
+    mailbox = channel()
     device = MailboxDevice(twice)
-    assert [play(upload(lane, 0x2000, 0), device) for _ in range(5)] == [
+    assert [play(upload(mailbox, 0x2000, 0), device) for _ in range(5)] == [
         bytes([k]) for k in range(5)
     ]
-    assert lane.dropped == 4
+    assert mailbox.dropped == 4
 
 
 def test_an_answer_of_another_kind_is_dropped_and_reported() -> None:
     device = MailboxDevice(lambda _: [Mailbox(Type.EOE, bytes(20))])
-    lane = channel()
+    mailbox = channel()
     with pytest.raises(ResponseTimeout, match="1 other messages arrived"):
-        play(upload(lane, 0x2000, 0), device)
-    assert lane.dropped == 1
+        play(upload(mailbox, 0x2000, 0), device)
+    assert mailbox.dropped == 1
 
 
 def test_endless_unexpected_messages_are_an_error() -> None:
@@ -179,10 +179,10 @@ def test_constant_or_jumping_counters_are_accepted(counters: list[int]) -> None:
     device = MailboxDevice(Dictionary(OBJECT))
     given = iter(counters)
     device.next_counter = lambda: next(given)
-    lane = channel()
+    mailbox = channel()
     for _ in counters:
-        assert play(upload(lane, 0x2000, 0), device) == OBJECT[0x2000, 0]
-    assert lane.dropped == 0
+        assert play(upload(mailbox, 0x2000, 0), device) == OBJECT[0x2000, 0]
+    assert mailbox.dropped == 0
 
 
 @pytest.mark.parametrize("counter", [0, 1, None])
@@ -213,25 +213,25 @@ def test_a_repetition_of_an_accepted_message_is_dropped() -> None:
         0
     )  # check the status first, so that a lost read is repeated at once
     device.repeats_first = True
-    lane = channel()
-    assert [play(upload(lane, 0x2000, 0), device) for _ in range(2)] == [b"\x01"] * 2
-    assert lane.dropped == 0
+    mailbox = channel()
+    assert [play(upload(mailbox, 0x2000, 0), device) for _ in range(2)] == [b"\x01"] * 2
+    assert mailbox.dropped == 0
     device.lose_out = {5}  # 0 to 3 are two writes and reads, 4 is the third write
-    assert play(upload(lane, 0x2000, 0), device) == b"\x02"
-    assert lane.dropped == 1
+    assert play(upload(mailbox, 0x2000, 0), device) == b"\x02"
+    assert mailbox.dropped == 1
 
 
 @pytest.mark.parametrize("counter", [0, 1])
 def test_repetitions_do_not_hide_the_next_answer(counter: int) -> None:
     """Two reads of one answer are lost, so two repetitions are requested and one arrives. Equal
-    answers to the next questions are not repetitions."""
+    answers to the next requests are not repetitions."""
     device = MailboxDevice(lambda message: Dictionary({(0x2000, 0): values.pop(0)})(message))
     values = [b"\x01", b"\x02", b"\x02", b"\x02"]
     device.next_counter = lambda: counter
-    lane = channel()
-    assert play(upload(lane, 0x2000, 0), device) == b"\x01"
+    mailbox = channel()
+    assert play(upload(mailbox, 0x2000, 0), device) == b"\x01"
     device.lose_back = {3, 4}  # 0 and 1 are the first write and read
-    assert [play(upload(lane, 0x2000, 0), device) for _ in range(3)] == [b"\x02"] * 3
+    assert [play(upload(mailbox, 0x2000, 0), device) for _ in range(3)] == [b"\x02"] * 3
 
 
 def test_a_device_that_cannot_repeat_answers_the_next_request() -> None:
@@ -239,12 +239,12 @@ def test_a_device_that_cannot_repeat_answers_the_next_request() -> None:
     device = MailboxDevice(Dictionary(OBJECT))
     device.next_counter = lambda: 1
     device.repeats = False
-    lane = channel()
-    assert [play(upload(lane, 0x2000, 0), device) for _ in range(2)] == [OBJECT[0x2000, 0]] * 2
+    mailbox = channel()
+    assert [play(upload(mailbox, 0x2000, 0), device) for _ in range(2)] == [OBJECT[0x2000, 0]] * 2
     device.lose_back = {5}
     with pytest.raises(MailboxError, match="does not acknowledge the repeat request"):
-        play(upload(lane, 0x2000, 0), device)
-    assert play(upload(lane, 0x2000, 0), device) == OBJECT[0x2000, 0]
+        play(upload(mailbox, 0x2000, 0), device)
+    assert play(upload(mailbox, 0x2000, 0), device) == OBJECT[0x2000, 0]
 
 
 def test_a_length_beyond_the_mailbox_is_a_mailbox_error() -> None:
@@ -255,34 +255,34 @@ def test_a_length_beyond_the_mailbox_is_a_mailbox_error() -> None:
 
 
 def test_a_late_answer_is_not_taken_for_the_next_one() -> None:
-    lane = channel()
+    mailbox = channel()
     answers = Dictionary({(0x2000, 0): b"\x01"})
     device = MailboxDevice(lambda _: [])
     with pytest.raises(ResponseTimeout):
-        play(upload(lane, 0x2000, 0), device)
+        play(upload(mailbox, 0x2000, 0), device)
     for answer in answers(device.received[-1]):
         device.send(answer)  # after the deadline
     device.respond = Dictionary({(0x2000, 0): b"\x02"})
-    assert play(upload(lane, 0x2000, 0), device) == b"\x02"
+    assert play(upload(mailbox, 0x2000, 0), device) == b"\x02"
 
 
 def test_the_answer_to_an_abandoned_request_is_dropped() -> None:
-    lane = channel()
+    mailbox = channel()
     device = MailboxDevice(Dictionary({(0x2000, 0): b"\x01"}))
-    broken_off = upload(lane, 0x2000, 0)
-    device(next(broken_off)[1])  # type: ignore[index]
-    broken_off.close()  # Ctrl-C
+    abandoned = upload(mailbox, 0x2000, 0)
+    device(next(abandoned)[1])  # type: ignore[index]
+    abandoned.close()  # Ctrl-C
     device.respond = Dictionary({(0x2000, 0): b"\x02"})
-    assert play(upload(lane, 0x2000, 0), device) == b"\x02"
+    assert play(upload(mailbox, 0x2000, 0), device) == b"\x02"
 
 
 def test_conversations_run_in_the_order_of_their_start() -> None:
-    lane = channel()
+    mailbox = channel()
     device = MailboxDevice(Dictionary(OBJECT))
-    first, second = upload(lane, 0x2000, 0), upload(lane, 0x2000, 0)
+    first, second = upload(mailbox, 0x2000, 0), upload(mailbox, 0x2000, 0)
     next(first)
     next(second)
-    third = upload(lane, 0x2000, 0)
+    third = upload(mailbox, 0x2000, 0)
     first.close()
     assert isinstance(next(third), After)  # the second one's turn
     assert play_on(second, device) == OBJECT[0x2000, 0]
@@ -305,9 +305,9 @@ def play_on(procedure: Procedure[bytes], device: MailboxDevice) -> bytes:
 
 
 def test_the_first_poll_adapts_to_the_answer_time() -> None:
-    """20 ms: looked at again and again for the first answers, a few times for the later ones."""
-    lane = channel()
-    looks: list[int] = []
+    """The device takes 20 ms: the first answers are polled often, later ones only a few times."""
+    mailbox = channel()
+    polls: list[int] = []
     answers = Dictionary(OBJECT)
     device = MailboxDevice(lambda _: [])
     now = [0]
@@ -315,7 +315,7 @@ def test_the_first_poll_adapts_to_the_answer_time() -> None:
 
     def answer(request: Request) -> Reply:
         if request.address >> 16 == 0x080D and len(request.data) == 1:
-            looks[-1] += 1
+            polls[-1] += 1
             if due and now[0] >= due[0]:
                 due.clear()
                 for message in answers(device.received[-1]):
@@ -327,10 +327,10 @@ def test_the_first_poll_adapts_to_the_answer_time() -> None:
         return reply
 
     for _ in range(20):
-        looks.append(0)
-        assert play_timed(upload(lane, 0x2000, 0), answer, now) == OBJECT[0x2000, 0]
-    assert looks[0] > 8
-    assert max(looks[10:]) <= 5
+        polls.append(0)
+        assert play_timed(upload(mailbox, 0x2000, 0), answer, now) == OBJECT[0x2000, 0]
+    assert polls[0] > 8
+    assert max(polls[10:]) <= 5
 
 
 def play_timed(

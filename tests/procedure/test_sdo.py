@@ -60,21 +60,21 @@ def test_an_emergency_before_the_answer_is_stored() -> None:
     emergency = Emergency(0x7500, 0x11, b"\x01\x02\x03\x04\x05")
     dictionary = Dictionary({(0x1000, 0): b"\x92\x01\x02\x00"})
     device = MailboxDevice(lambda message: [coe(emergency), *dictionary(message)])
-    lane = channel()
-    assert play(upload(lane, 0x1000, 0), device) == b"\x92\x01\x02\x00"
-    assert [received.emergency for received in lane.emergencies] == [emergency]
-    assert lane.dropped == 0
+    mailbox = channel()
+    assert play(upload(mailbox, 0x1000, 0), device) == b"\x92\x01\x02\x00"
+    assert [received.emergency for received in mailbox.emergencies] == [emergency]
+    assert mailbox.dropped == 0
 
 
 def test_a_late_answer_to_another_request_is_dropped() -> None:
     dictionary = Dictionary({(0x1000, 0): b"\x01", (0x1001, 0): b"\x02"})
     late = Dictionary({(0x1000, 0): b"\x01"})
-    lane = channel()
+    mailbox = channel()
     device = MailboxDevice(dictionary)
     for answer in late(Mailbox(Type.COE, UploadRequest(0x1000, 0).encode())):
         device.send(answer)
-    assert play(upload(lane, 0x1001, 0), device) == b"\x02"
-    assert lane.dropped == 1
+    assert play(upload(mailbox, 0x1001, 0), device) == b"\x02"
+    assert mailbox.dropped == 1
 
 
 def test_a_wrong_toggle_is_aborted() -> None:
@@ -155,8 +155,8 @@ def test_complete_access_in_both_directions() -> None:
         seen.append(decode_coe(message.data))
         return dictionary(message)
 
-    device, lane = MailboxDevice(watched), channel()
-    data = play(upload(lane, 0x1C12, 0, complete_access=True), device)
-    play(download(lane, 0x1C12, 0, data, complete_access=True), device)
+    device, mailbox = MailboxDevice(watched), channel()
+    data = play(upload(mailbox, 0x1C12, 0, complete_access=True), device)
+    play(download(mailbox, 0x1C12, 0, data, complete_access=True), device)
     assert dictionary.written == [(0x1C12, 0, data)]
     assert [message.complete_access for message in seen] == [True, True]  # type: ignore[attr-defined]

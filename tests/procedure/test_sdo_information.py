@@ -107,7 +107,7 @@ def test_a_missing_object_is_reported() -> None:
 
 
 def test_a_late_answer_about_another_entry_is_dropped() -> None:
-    lane = channel()
+    mailbox = channel()
     device = answering(dictionary)
     late = EntryDescription(0x1000, 0, ValueInfo.NONE, 5, 8, Access.READ_PRE_OP, b"late")
 
@@ -118,8 +118,8 @@ def test_a_late_answer_about_another_entry_is_dropped() -> None:
         return [coe(part) for part in (first, *dictionary(request))]
 
     device.respond = late_first
-    assert play(read_entry_description(lane, 0x2000, 1), device).name == "entry 1"
-    assert lane.dropped == 1
+    assert play(read_entry_description(mailbox, 0x2000, 1), device).name == "entry 1"
+    assert mailbox.dropped == 1
 
 
 def test_endless_fragments_are_truncated_with_a_note() -> None:

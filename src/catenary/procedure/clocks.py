@@ -117,7 +117,7 @@ def align(
     reference: int,
     epoch_ns: int,
 ) -> Procedure[None]:
-    """Write offsets and delays of all devices from the reference clock on, and reset the filters.
+    """Write offsets and delays of the devices from the reference on, and reset all filters.
 
     The system time of the reference is then the link's time + `epoch_ns`. The devices after it have
     the system time of the reference.

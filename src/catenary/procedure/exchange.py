@@ -101,8 +101,8 @@ def read_memory(station: int, address: int, size: int, *, repeatable: bool) -> R
 
     Args:
         station: The station address.
-        address: The first byte.
-        size: The number of bytes.
+        address: Address of the first byte.
+        size: Number of bytes.
         repeatable: True if a lost request may be sent again.
     """
     return Request(EcatCommand.FPRD, physical(station, address), bytes(size), repeatable)
@@ -113,7 +113,7 @@ def write_memory(station: int, address: int, data: bytes, *, repeatable: bool) -
 
     Args:
         station: The station address.
-        address: The first byte.
+        address: Address of the first byte.
         data: The bytes to write.
         repeatable: True if a lost request may be sent again.
     """

@@ -29,7 +29,7 @@ from catenary.wire.sync_manager import SIZE, Activation, Direction, decode_sync_
 RUNNING = (AlState.SAFE_OP, AlState.OP)
 ACTIVE = 0x01  # 0x0440: the watchdog has not expired or is disabled
 POLL = 0.010  # [s] between two checks
-LONGEST_NS = 5_000_000_000  # longest wait: twice the watchdog time
+LONGEST_NS = 5_000_000_000  # maximum wait, which is twice the watchdog time
 
 
 class Running(NamedTuple):

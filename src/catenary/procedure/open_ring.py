@@ -1,7 +1,7 @@
 """Temporary operation of a ring as a line, for measurements, ETG.1000.4 §6.2.
 
-The port at the second end of the ring is closed (register 0x0100). Frames then return there and
-pass every port.
+The port at the second end of the ring is closed (register 0x0100). Frames then turn back there
+and pass every port.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ T = TypeVar("T")
 
 TEMPORARY = 1 << 1  # the settings expire after about a second, even if the program is killed
 LOOPS = 8  # first bit of the loop settings, for port 0
-POLLS, PAUSE = 10, 1e-3  # [s] until a port is closed, which happens at the end of the frame
+POLLS, PAUSE = 10, 1e-3  # [s] between polls: controllers close a port at the end of a frame
 
 
 def as_line(station: Station, port: int, procedure: Procedure[T]) -> Procedure[T]:

@@ -16,7 +16,7 @@ def probe_inputs(areas: Mapping[int, tuple[int, int]]) -> Procedure[tuple[int, .
     """Return the positions of the devices that do not insert their inputs.
 
     Args:
-        areas: By position, the inputs as (logical address, bytes).
+        areas: Inputs of each device as (logical address, size [bytes]), by position.
     """
     if not areas:
         return ()

@@ -39,7 +39,7 @@ class Presence(NamedTuple):
     alias: int
 
 
-def look_around(at_most: int) -> Procedure[list[Presence]]:
+def find_devices(at_most: int) -> Procedure[list[Presence]]:
     """Return the present devices, by position.
 
     The result is empty if devices appear or disappear at the same time; try again later. In a cut
@@ -60,9 +60,9 @@ def look_around(at_most: int) -> Procedure[list[Presence]]:
             read(EcatCommand.APRD, -rank, STATION_ALIAS),
         )
     ]
-    there = [not reply.lost and reply.working_counter == 1 for reply in replies]
-    reached = there.index(False) if False in there else len(there)
-    if reached % 2 or any(there[reached:]) or any(reply.lost for reply in replies):
+    present = [not reply.lost and reply.working_counter == 1 for reply in replies]
+    reached = present.index(False) if False in present else len(present)
+    if reached % 2 or any(present[reached:]) or any(reply.lost for reply in replies):
         return []
     replies = replies[:reached]
     addresses = [STATION_ADDRESS.unpack(reply.data) for reply in replies[0::2]]

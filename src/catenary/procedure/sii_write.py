@@ -36,8 +36,8 @@ class Change(NamedTuple):
 def changes(old: bytes, new: bytes) -> tuple[Change, ...]:
     """Return the words in which two images differ, the configuration with its checksum last.
 
-    The checksum is therefore wrong until the last write, even if the sequence is interrupted. The
-    controller then detects that its configuration is incomplete.
+    While the configuration is only partly written, its checksum is wrong. The controller can
+    therefore detect an interrupted write.
 
     Args:
         old: The present image.
