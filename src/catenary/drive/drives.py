@@ -79,7 +79,7 @@ class Drives(Request):
       `DistributedClock` applies to all devices.
     - `pdos`: PDOs to assign on each device, `[0x1701, 0x1B01]`, or with their entries (index,
       subindex, bits), `{0x1600: [(0x6040, 0, 16), (0x607A, 0, 32)]}`. They are written even if the
-      SII declares them fixed. For a direction without PDOs here, suitable PDOs are searched.
+      SII declares them fixed. If a direction has no PDOs in this option, Catenary chooses them.
     - `start_up`: `StartUp` objects to write to each device before SAFE-OP.
 
     Options with one value for all axes, or a sequence with one value per axis:
@@ -91,8 +91,8 @@ class Drives(Request):
       axis are then m, m/s and N instead of rad, rad/s and N·m. None means a rotary axis.
     - `direction`: 1, or -1 if the joint turns opposite to the motor.
     - `offset` [rad]: position of the joint where the drive reads 0.
-    - `velocity_unit` [rad/s of the motor]: one raw velocity count. The default is one position
-      count per second.
+    - `velocity_unit` [rad/s of the motor]: value of one raw velocity count. The default is one
+      position count per second.
     - `rated_torque` [N·m of the motor]: by default, it is read from 0x6076.
     - `homing`: a `HomingMethod`.
 
@@ -112,7 +112,7 @@ class Drives(Request):
     - `deceleration_limit` [rad/s²]: the default is a plausible 0x6085 of the drive, otherwise
       `velocity_limit` / 0.25 s.
     - `acceleration_limit` [rad/s²]: the default is the deceleration. It also limits the moves,
-      whose default is this option, otherwise `velocity_limit` / 0.25 s.
+      which use `velocity_limit` / 0.25 s if this option is not given.
     - `torque_slope` [N·m/s]: slope to zero torque in CST. By default, the torque is zero at once.
     - `on_loss`: reaction when the core stops an axis: "quick_stop" (default), "disable", or
       "csp_hold" (change to CSP and hold the position). It is required in CST if the quick stop of
@@ -194,7 +194,7 @@ class Drives(Request):
         self._axes = make_axes(sources, options, common)
         warn_of_default_velocity(self._axes)
         self._period_ns = 0
-        self._is_read = False  # settings of the drives, since the last plan
+        self._is_read = False  # True if the settings were read for the next plan
         self._actual = AxisValues("actual")
         self._target = AxisValues("target")
         self._views: Views | None = None
@@ -443,7 +443,7 @@ class Drives(Request):
     def pdos(self, period_ns: int) -> Mapping[int, DeviceRequest]:
         """Return the process-data request of each device, by position.
 
-        Reads the drives by SDO (PRE-OP or later): rated torque, reactions, limits, mode and
+        It reads the drives by SDO (PRE-OP or later): rated torque, reactions, limits, mode and
         interpolation time.
         """
         self._period_ns = period_ns
@@ -500,7 +500,7 @@ class Drives(Request):
         )
 
     def bind(self, views: Views) -> None:
-        """Connect the request to the arrays of the loop that opens."""
+        """Connect the request to the arrays of a newly opened loop."""
         self._views = views
         self.actual.bind(
             views.actual_position,

@@ -128,7 +128,7 @@ def stop_homing(port: AxisPort, mode: int) -> Steps:
 
 def _await_mode(port: AxisPort, mode: int) -> Steps:
     failure = Failure(
-        f"does not show mode {mode} (0x6061) within {MODE_TIMEOUT:g} s",
+        f"does not report mode {mode} (0x6061) within {MODE_TIMEOUT:g} s",
         "check that the drive supports this mode (0x6502, manual)",
     )
     yield from await_condition(port, mode_is(port, mode), MODE_TIMEOUT, failure)

@@ -216,7 +216,7 @@ class Inputs(Channels):
             last values; see `present`.
         divider: cycles of the loop between two exchanges.
         dc: distributed clocks, as for `Drives`.
-        pdos: PDOs to assign instead of those that are assigned.
+        pdos: PDOs to assign instead of the present ones, as for `Drives`.
         start_up: objects to write to each device before SAFE-OP.
 
     Raises:
@@ -242,7 +242,12 @@ class Outputs(Channels):
     direction = Direction.OUTPUT
 
     def __setitem__(self, name: str, value: float | int) -> None:
-        """Write a channel by name. Raises KeyError if the name is unknown."""
+        """Write a channel by name.
+
+        Raises:
+            KeyError: The name is unknown.
+            RuntimeError: No loop has been opened yet.
+        """
         array, place = self._place(name)
         array[place] = value
 

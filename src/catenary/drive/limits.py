@@ -207,7 +207,7 @@ def _positions(options: LimitOptions, own: OwnLimits) -> tuple[Chosen, Chosen]:
 def _deceleration(
     name: str, options: LimitOptions, velocity: float | None, own: OwnLimits, units: AxisUnits
 ) -> Chosen:
-    """Return the deceleration from the option, from a plausible 0x6085, or for BRAKE_TIME."""
+    """Return the deceleration from the option, from a plausible 0x6085, or from BRAKE_TIME."""
     if options.deceleration_limit is not None:
         return _given(options.deceleration_limit)
     if own.deceleration is not None and _is_plausible(own.deceleration, velocity):
