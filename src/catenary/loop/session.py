@@ -251,9 +251,9 @@ class Session:
         """
         for mover in list(self.views.movers):
             mover.check()
-        error = self.faults.error(flags, enabling=enabling)
         if flags & CYCLE_CLOCKS:
-            self.announce_clocks()
+            self.announce_clocks()  # before the queries, which take time and can fail
+        error = self.faults.error(flags, enabling=enabling)
         if error is not None:
             raise error
 
