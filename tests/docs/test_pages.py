@@ -18,7 +18,6 @@ NOT_YET = {
     "docs/how_to/faults.md",
     "docs/how_to/igh.md",
     "docs/how_to/laws.md",
-    "docs/how_to/moves.md",
     "docs/how_to/networks.md",
     "docs/how_to/realtime.md",
     "docs/how_to/recording.md",
