@@ -204,7 +204,16 @@ def open_state() -> HostState:
 
 
 def apply(changes: Sequence[Change], ground: Ground, state: HostState) -> Iterator[str]:
-    """Make the changes one by one, and yield a line with the result of each."""
+    """Make the changes one by one, and yield a line with the result of each.
+
+    Args:
+        changes: Changes to make.
+        ground: Machine to change.
+        state: State file, which receives the old values before each change.
+
+    Raises:
+        StateError: The state file cannot be read or written.
+    """
     made = state.load()
     for change in changes:
         try:
@@ -226,6 +235,13 @@ def undo(ground: Ground, state: HostState) -> Iterator[str]:
     """Undo all changes in reverse order, and yield a line with the result of each.
 
     Keep values that were changed again since. Refused changes stay in the state file.
+
+    Args:
+        ground: Machine to change.
+        state: State file with the changes.
+
+    Raises:
+        StateError: The state file cannot be read or written.
     """
     left: list[Made] = []
     for made in reversed(state.load()):

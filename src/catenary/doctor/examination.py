@@ -36,10 +36,12 @@ class Examination:
 
     @property
     def checks(self) -> tuple[Check, ...]:
+        """Checks of all groups, in the order of the report."""
         return tuple(check for _, checks in self.groups for check in checks)
 
     @property
     def failed(self) -> bool:
+        """True if a check has the status FAIL."""
         return any(check.status == "FAIL" for check in self.checks)
 
     @property
@@ -55,7 +57,12 @@ class Examination:
 
 
 def examine(machine: Machine, latency: Latency | None = None) -> Examination:
-    """Run all checks on a machine. `latency` is None if it was not measured."""
+    """Run all checks on a machine.
+
+    Args:
+        machine: Machine to check.
+        latency: Latency measured on it; None if it was not measured.
+    """
     groups = [(title, tuple(check(machine) for check in checks)) for title, checks in GROUPS]
     card = machine.card
     if card is None:

@@ -53,6 +53,7 @@ class Machine:
             return None
 
     def number(self, path: str) -> int | None:
+        """Return the number in a file; None if it contains no number."""
         text = self.text(path)
         return int(text) if text is not None and re.fullmatch(r"-?\d+", text) else None
 
@@ -114,6 +115,7 @@ class Machine:
 
     @cached_property
     def cpus(self) -> frozenset[int]:
+        """Online CPUs."""
         online = self.text("/sys/devices/system/cpu/online")
         return cpu_list(online) or self.allowed_cpus or frozenset({0})
 
@@ -124,6 +126,7 @@ class Machine:
 
     @cached_property
     def isolated_cpus(self) -> frozenset[int]:
+        """CPUs isolated by the kernel's command line or by a cpuset."""
         by_command_line = cpu_list(self.text("/sys/devices/system/cpu/isolated"))
         return by_command_line | cpu_list(self.text("/sys/fs/cgroup/cpuset.cpus.isolated"))
 
@@ -150,6 +153,7 @@ class Machine:
         return found[1] if found else None
 
     def capable(self, capability: int) -> bool:
+        """Return True if this process has the capability, capabilities(7)."""
         return bool(int(self.status_field("CapEff") or "0", 16) >> capability & 1)
 
     @cached_property

@@ -33,6 +33,13 @@ NOUNS: dict[Status, str] = {
 
 
 def as_text(examination: Examination, *, colour: bool = False, width: int = WIDTH) -> str:
+    """Return the report as text.
+
+    Args:
+        examination: Results of the checks.
+        colour: True to colour the statuses with escape sequences.
+        width: Width of the lines; at least NARROWEST.
+    """
     lines = []
     for title, checks in examination.groups:
         lines += ["", title[:1].upper() + title[1:]]
@@ -108,7 +115,7 @@ def summary_lines(examination: Examination, width: int) -> Iterator[str]:
 
 
 def change_lines(changes: Sequence[Change], ground: Ground) -> Iterator[str]:
-    """Yield a line for each change, with the current value."""
+    """Yield a line for each change, with the current value in `ground` and the new value."""
     for change in changes:
         try:
             now = ground.read(change.target)

@@ -19,7 +19,7 @@ cdef class Memory:
     cdef uint8_t *at(self, size_t offset, size_t size) except NULL
 
 cdef class Timer:
-    """One waiter on a clock. It belongs to one thread; other threads may only call `wake`."""
+    """Timer of one thread. Other threads may only call `wake`."""
     cdef cat_clock table
     cdef Memory memory
     cdef readonly object capsule

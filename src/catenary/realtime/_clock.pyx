@@ -52,7 +52,9 @@ cdef class Memory:
 
     cdef uint8_t *at(self, size_t offset, size_t size) except NULL:
         if offset + size > <size_t>self.view.len:
-            raise ValueError(f"{size} bytes at offset {offset} exceed {self.view.len} bytes")
+            raise ValueError(
+                f"{size} bytes at offset {offset} exceed the buffer of {self.view.len} bytes"
+            )
         return <uint8_t *>self.view.buf + offset
 
 
@@ -170,7 +172,7 @@ cdef int virtual_wait_until(void *owner, int64_t deadline) noexcept nogil:
 
 
 cdef int virtual_spend(void *owner, int64_t duration) noexcept nogil:
-    """Spend virtual time, also across signals. Python handles a signal afterwards."""
+    """Spend virtual time, even if signals interrupt the sleep. Python handles them afterwards."""
     cdef participant_t *p = <participant_t *>owner
     cdef int error = vt_spend(p.time, p.slot, duration)
     while error == -EINTR:

@@ -68,8 +68,8 @@ cdef void write_text(char *text, str value, size_t size):
 cdef class Block:
     """One task's memory.
 
-    The task's thread writes the job and the figures. Other threads stop it, change its period and
-    signal it.
+    The task's thread writes the job and the figures. Other threads request a stop, change the
+    period and set signals.
     """
     cdef Memory memory
     cdef task_block *c

@@ -31,10 +31,12 @@ class Child:
 
     @property
     def pid(self) -> int:
+        """Process id of the child."""
         return self.process.pid
 
     @property
     def running(self) -> bool:
+        """True until the child ends."""
         return self.process.poll() is None
 
     def read_line(self, seconds: float) -> str | None:

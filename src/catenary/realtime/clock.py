@@ -34,6 +34,7 @@ class Participant:
 
     @property
     def now_ns(self) -> int:
+        """Virtual time [ns]."""
         return self.timer.now_ns
 
     @property
@@ -66,6 +67,7 @@ class Participant:
         self._time.run(self.timer.slot)
 
     def leave(self) -> None:
+        """Remove the participant from the clock, and free its slot."""
         self._time.remove(self.timer.slot)
 
 
@@ -98,6 +100,7 @@ class VirtualClock:
 
     @property
     def now_ns(self) -> int:
+        """Virtual time [ns]."""
         return self._time.now_ns
 
     @property

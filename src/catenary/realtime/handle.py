@@ -33,10 +33,12 @@ class Handle:
 
     @property
     def name(self) -> str:
+        """Name of the task."""
         return self.task.name
 
     @property
     def running(self) -> bool:
+        """True until the task ends or fails."""
         return self.block.state not in (ENDED, FAILED)
 
     @property
@@ -56,6 +58,7 @@ class Handle:
 
     @property
     def statistics(self) -> Statistics:
+        """Statistics of all jobs so far."""
         return read_statistics(self.name, self.block)
 
     def histogram(self, figure: str) -> list[tuple[float, float, int]]:

@@ -1,4 +1,4 @@
-/* Wait-free latest value, from one writer to any number of readers. All may be in different
+/* Wait-free latest value, from one writer to any number of readers. They may be in different
  * processes.
  *
  * The writer uses four slots in turn. Each has a sequence number that is odd during a write (a

@@ -1,4 +1,4 @@
-/* Wait-free bounded queue of records of one size, from one producer to one consumer. Both may be
+/* Wait-free bounded queue of records of one size, from one producer to one consumer. They may be
  * in different processes.
  *
  * The record with ticket t is in slot t % length. The slot's stamp is t + 1 once the record is

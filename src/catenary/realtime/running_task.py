@@ -23,6 +23,7 @@ class Running:
 
     @property
     def name(self) -> str:
+        """Name of the task."""
         return self._task.name
 
     @property
