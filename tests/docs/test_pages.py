@@ -12,7 +12,6 @@ from tests.docs.page import ROOT, run_page
 NOT_YET = {
     "docs/explanation/safety.md",
     "docs/explanation/virtual_segment.md",
-    "docs/how_to/background.md",
     "docs/how_to/clocks.md",
     "docs/how_to/control_blocks.md",
     "docs/how_to/faults.md",
