@@ -146,7 +146,7 @@ class Callbacks:
         self.in_thread = True
         self.dropped = 0  # events that were dropped because callbacks were slow
         self._callbacks: list[Callback] = []
-        self._pending: queue.Queue[Event | None] = queue.Queue(capacity)  # None: end of the thread
+        self._pending: queue.Queue[Event | None] = queue.Queue(capacity)  # None ends the thread
         self._lock = threading.Lock()
         self._thread: threading.Thread | None = None
         self._delivering = False

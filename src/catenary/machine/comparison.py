@@ -191,7 +191,7 @@ def _shift(expected: Sequence[DeviceTable], subs: Sequence[SubDevice]) -> int:
         device for device in expected if device.position is not UNSET and not _fits(device, subs, 0)
     ]
     for count in (1, 2):
-        moved = wrong[count:]  # without the devices that may be missing
+        moved = wrong[count:]  # without the devices that were removed
         if len(wrong) > 1 and all(_fits(device, subs, count) for device in wrong):
             return count
         if (

@@ -54,6 +54,7 @@ class _Scanner:
         self._elements: dict[KeyPath, int] = {}  # number of tables of each [[array]]
 
     def document(self) -> dict[KeyPath, int]:
+        """Scan the whole text. Return the line numbers by path."""
         table: KeyPath = ()
         self._skip(_BLANK)
         while self._at < len(self._text):

@@ -113,7 +113,7 @@ def make_device_requests(file: MachineFile, subs: Subs) -> list[StartUpRequest]:
             StartUpRequest(
                 subs[device.name],
                 objects,
-                required=device.required and not dividers,  # roles have an own `required`
+                required=device.required and not dividers,  # a role has its own `required`
                 divider=dividers[0] if dividers else 1,
             )
         )
