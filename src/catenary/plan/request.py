@@ -118,8 +118,8 @@ class DeviceRequest:
     """Objects that one device must exchange cyclically.
 
     An existing mapping is only changed if a requested object is missing, or by `pdos`. If several
-    requests name a device, the smallest `divider` counts. The device is required if any of them
-    requires it.
+    requests name a device, the greatest common divisor of their dividers counts. The device is
+    required if any of them requires it.
     """
 
     outputs: tuple[ObjectReference, ...] = ()  # MainDevice → device (RxPDO)
