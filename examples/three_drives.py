@@ -12,5 +12,5 @@ with cat.MainDevice(sys.argv[1] if len(sys.argv) > 1 else "virtual") as main:
         for cycle in loop:
             arm.target.position[:] = home + 0.1 * math.sin(cycle.time)
             if cycle.time > 10.0:
-                break  # leaving the block stops the drives, also after an error
+                break  # leaving the block stops the drives, on any exit
     print(loop.timing)

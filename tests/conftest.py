@@ -1,8 +1,8 @@
-"""What tests stand on: shared data, wires of our own, tshark, a machine of the laboratory.
+"""Fixtures of all tests: shared data, private network interfaces, tshark and the laboratory.
 
-A test that uses `shared_data`, `veth`, `tshark` or `rtlab` is skipped, with the reason, where there
-is none, and is marked `shared_data`, `wire`, `tshark` or `rtlab`. `--require MARKER` turns those
-skips into failures, and fails when no test so marked passed: what CI asks for.
+A test that uses `shared_data`, `veth`, `tshark` or `rtlab` is marked `shared_data`, `wire`,
+`tshark` or `rtlab`. It is skipped with a reason if the resource is missing. If CI requires a marker
+(`--require MARKER`), such a skip is a failure, and at least one test with the marker must pass.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ ROOT = Path(__file__).resolve().parent.parent
 # marker: fixture
 FIXTURE_OF = {"shared_data": "shared_data", "wire": "veth", "tshark": "tshark", "rtlab": "rtlab"}
 
-# no deadlines: nothing timed is asserted; the same examples each time where CI says so
+# no deadlines, because no time is asserted; the same examples each time in CI
 hypothesis.settings.register_profile(
     "catenary", max_examples=50, deadline=None, derandomize=bool(os.environ.get("CI"))
 )
@@ -45,7 +45,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    # A shell ignores SIGINT for what it starts in the background, and that is inherited.
+    # A shell ignores SIGINT for background programs, which inherit this.
     signal.signal(signal.SIGINT, signal.default_int_handler)
     config.stash[REQUIRED] = set(config.getoption("--require"))
     config.stash[PASSED] = set()
@@ -86,16 +86,16 @@ def lacking(config: pytest.Config, marker: str, reason: str) -> Never:
 
 @pytest.fixture(scope="session")
 def shared_data(pytestconfig: pytest.Config) -> Path:
-    """The folder of captures, SII images and device descriptions, shared between projects."""
+    """Return the folder of captures, SII images and device descriptions shared by projects."""
     folder = Path(os.environ.get("CATENARY_SHARED") or ROOT.parent / "shared") / "data"
     if not folder.is_dir():
-        lacking(pytestconfig, "shared_data", f"no shared data: {folder} is no folder")
+        lacking(pytestconfig, "shared_data", f"no shared data: {folder} is not a folder")
     return folder
 
 
 @pytest.fixture(scope="session")
 def tshark(pytestconfig: pytest.Config) -> str:
-    """The foreign dissector's command."""
+    """Return the command of tshark."""
     command = shutil.which("tshark")
     if command is None:
         lacking(pytestconfig, "tshark", "tshark is not installed (package tshark)")
@@ -104,7 +104,7 @@ def tshark(pytestconfig: pytest.Config) -> str:
 
 @pytest.fixture
 def veth(pytestconfig: pytest.Config) -> Iterator[tuple[str, str]]:
-    """The names of two connected network interfaces, nobody else's."""
+    """Yield the names of two connected private network interfaces."""
     state = private_network.state()
     if isinstance(state, private_network.Refused):
         hint = "" if private_network.VARIABLE in os.environ else " (`make test` starts it in one)"

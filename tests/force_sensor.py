@@ -1,4 +1,4 @@
-"""Virtual devices of other makers: a force sensor, and a drive with objects of its own."""
+"""Virtual devices of other makers: a force sensor, and a drive with manufacturer objects."""
 
 from __future__ import annotations
 
@@ -23,7 +23,6 @@ from catenary.virtual.coe.dictionary import (
     number,
     stored,
 )
-from catenary.virtual.coe.quirks import NO_MAILBOX_QUIRKS
 from catenary.virtual.crystal import EXACT
 from catenary.virtual.description import Description, MappedEntry, Pdo
 from catenary.virtual.devices.application import Application, mailbox_of, sync_managers_of
@@ -70,15 +69,12 @@ class ForceSensor(AppliedDevice):
             alias=0,
             serial=0,
             lrw=True,
-            mailbox_bytes=128,
-            mailbox_delay=300e-6,
             crystal=EXACT,
             clock_bits=64,
-            mailbox_quirks=NO_MAILBOX_QUIRKS,
             sii_quirks=NO_SII_QUIRKS,
         )
         self.mapping_quirks = mapping_quirks
-        self.force = 0.0  # [N] it measures
+        self.force = 0.0  # [N] measured force
         self.status = 7
         self.rate = 0  # raw
         self.writes: list[tuple[int, int, bytes]] = []
@@ -110,7 +106,7 @@ class ForceSensor(AppliedDevice):
         self.core.run_model(self.position, PERIOD_NS)
 
     def measure(self) -> None:
-        """Take the quantities over."""
+        """Update the measured quantities."""
         [raw] = struct.unpack("<i", struct.pack("<f", self.force))
         for slot, value in ((FORCE, raw), (STATUS, self.status), (RATE, self.rate)):
             self.core.put_slot(self.position, slot, value)
@@ -138,17 +134,17 @@ class ForceSensor(AppliedDevice):
 
     @property
     def tare(self) -> bool:
-        """The output as the device has it."""
+        """Value of the output in the device."""
         return bool(self.core.slot(self.position, TARE) & 1)
 
     @property
     def lamp(self) -> int:
-        """The output as the device has it."""
+        """Value of the output in the device."""
         return self.core.slot(self.position, LAMP) & 0xFFFF
 
 
 class TunedServo(Servo):
-    """A servo with settings of its manufacturer, and objects that can be mapped: 0x2020, 0x2021."""
+    """A servo with manufacturer settings, and the mappable objects 0x2020 and 0x2021."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -178,12 +174,12 @@ class TunedServo(Servo):
 
     @property
     def lamp(self) -> int:
-        """The output as the device has it."""
+        """Value of the output in the device."""
         return self.core.slot(self.position, self._own_slot + 1) & 0xFFFF
 
 
 def add_settings(dictionary: Dictionary, writes: list[tuple[int, int, bytes]]) -> None:
-    """Objects to be set at start-up. `writes` collects what is written to them, in its order."""
+    """Add objects for start-up. `writes` collects the written values, in order."""
     zero = bytes(4)
     dictionary.add_record(
         0x2010,

@@ -1,5 +1,4 @@
-"""`cat_link` of native/link.h, for links written in Python: compiled code is tested over links it
-does not know."""
+"""`cat_link` of native/link.h for links in Python, to test compiled code on other links."""
 
 from __future__ import annotations
 
@@ -19,7 +18,7 @@ VIRTUAL_TIME, SHARED_TIME, SPENDS, POLLS, FORETELLS = 1, 2, 4, 8, 16
 
 
 class Table(ctypes.Structure):
-    """Its fields in their order."""
+    """Fields of `cat_link`, in order."""
 
     _fields_ = (
         ("version", ctypes.c_uint32),
@@ -36,7 +35,7 @@ class Table(ctypes.Structure):
 
 
 def table_in(capsule: object) -> Table:
-    """The table of a compiled link, whose capsule the caller keeps."""
+    """Return the table of a compiled link. The caller keeps its capsule."""
     pointer = ctypes.pythonapi.PyCapsule_GetPointer
     pointer.restype = ctypes.c_void_p
     pointer.argtypes = [ctypes.py_object, ctypes.c_char_p]
@@ -44,7 +43,7 @@ def table_in(capsule: object) -> Table:
 
 
 def capsule_of(structure: ctypes.Structure, name: bytes) -> object:
-    """A capsule round a structure, which the caller keeps alive; `name` too."""
+    """Return a capsule for a structure. The caller keeps the structure and `name` alive."""
     new = ctypes.pythonapi.PyCapsule_New
     new.restype = ctypes.py_object
     new.argtypes = [ctypes.c_void_p, ctypes.c_char_p, ctypes.c_void_p]

@@ -1,4 +1,4 @@
-"""Options of a Loop, written flat: for helpers of tests that pass their own options on."""
+"""Options of a Loop as flat keyword arguments, for test helpers that pass options on."""
 
 from __future__ import annotations
 

@@ -1,8 +1,8 @@
-"""The layers of pyproject.toml, applied to what import-linter does not see: compiled modules.
+"""The layers of pyproject.toml, also for compiled modules, which import-linter does not check.
 
 Every import and cimport of .py, .pyi, .pyx, .pxd and .pxi is read as text. Upper layers import
-lower ones; siblings (`|`) do not see each other; compiled modules (`_name.pyx`) are private to
-their package; no file includes another package's.
+lower ones. Siblings (`|`) do not import each other. Compiled modules (`_name.pyx`) are private to
+their package. No file includes a file of another package.
 """
 
 from __future__ import annotations
@@ -61,13 +61,13 @@ LAYERS = read_layers()
 
 
 def module_of(path: str) -> list[str]:
-    """The dotted name of a file below src, as parts; of its package for `__init__`."""
+    """Return the dotted name of a file below src, as parts. `__init__` stands for its package."""
     parts = list(Path(path).with_suffix("").parts)
     return parts[:-1] if parts[-1] == "__init__" else parts
 
 
 def imports(path: str, text: str) -> Iterator[list[str]]:
-    """The modules a file may be importing: `from a.b import c` may be a.b or a.b.c."""
+    """Return the modules that a file may import: `from a.b import c` may be a.b or a.b.c."""
     text = re.sub(r'""".*?"""|#[^\n]*', "", text, flags=re.DOTALL)  # examples in docstrings too
     package = list(Path(path).parent.parts)
     for source, names in FROM.findall(text):
@@ -83,12 +83,12 @@ def imports(path: str, text: str) -> Iterator[list[str]]:
 
 
 def objections(path: str, text: str, layers: Layers) -> list[str]:
-    """What a file of src, given by its path below src, imports against the rules."""
+    """Return the forbidden imports of a file, given by its path below src."""
     module = module_of(path)
     found = []
     for imported in imports(path, text):
         if imported[0] != "catenary" or len(imported) < 2 or len(module) < 2:
-            continue  # not ours; or catenary/__init__, which is above all layers
+            continue  # another package, or catenary/__init__, which is above all layers
         if imported[1] in layers.level and not layers.allow(module[1], imported[1]):
             found.append(f"{path}: {module[1]} must not import {'.'.join(imported)}")
         private = [part for part in imported[2:] if re.match(r"_[^_]", part)]
@@ -105,19 +105,19 @@ def sources() -> dict[str, str]:
     return {str(path.relative_to(ROOT / "src")): path.read_text() for path in files}
 
 
-def test_every_package_has_its_layer():
+def test_every_package_has_a_layer():
     packages = {path.parent.name for path in (ROOT / "src/catenary").glob("*/__init__.py")}
     modules = {path.stem for path in (ROOT / "src/catenary").glob("*.py")} - {"__init__"}
     assert packages | modules <= set(LAYERS.level)
 
 
-def test_no_file_imports_against_the_layers():
+def test_no_file_violates_the_layers():
     files = sources()
     assert {Path(path).suffix for path in files} >= {".py", ".pyi", ".pyx", ".pxd"}
     assert [line for path, text in files.items() for line in objections(path, text, LAYERS)] == []
 
 
-def test_the_core_imports_nothing_of_catenary():
+def test_the_core_does_not_import_catenary():
     foreign = [
         (path, imported)
         for path, text in sources().items()
@@ -128,7 +128,7 @@ def test_the_core_imports_nothing_of_catenary():
     assert foreign == []
 
 
-def test_native_headers_include_one_another_and_the_system_alone():
+def test_native_headers_include_only_each_other_and_the_system():
     headers = {path.name: path.read_text() for path in (ROOT / "src/catenary/native").glob("*.h")}
     included = {
         name for text in headers.values() for name in re.findall(r'#include "([^"]+)"', text)
@@ -154,7 +154,7 @@ def test_native_headers_include_one_another_and_the_system_alone():
         ("catenary/drive/_x.pyx", 'cdef extern from "../core/engine.h":'),
     ],
 )
-def test_objects_to(path, text):
+def test_a_forbidden_import_is_found(path, text):
     assert objections(path, text, LAYERS)
 
 
@@ -170,5 +170,5 @@ def test_objects_to(path, text):
         ("catenary/__init__.py", "from catenary.loop import Loop"),
     ],
 )
-def test_allows(path, text):
+def test_an_allowed_import_is_accepted(path, text):
     assert objections(path, text, LAYERS) == []

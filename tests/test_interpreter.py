@@ -1,4 +1,4 @@
-"""Rights go to a Python of one environment, never to that of the whole machine."""
+"""Capabilities are given to the Python of one environment, never to that of the machine."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from catenary import interpreter
 
 @pytest.fixture
 def system(tmp_path: Path) -> Path:
-    """The folder of a machine's Python."""
+    """Return the folder of a machine's Python."""
     place = tmp_path / "usr" / "bin" / "python3"
     place.parent.mkdir(parents=True)
     place.touch()
@@ -36,7 +36,7 @@ def advice(monkeypatch: pytest.MonkeyPatch, prefix: Path, base: Path, name: str)
     return interpreter.permission_advice()
 
 
-def test_a_copy_gets_the_rights(
+def test_a_copied_interpreter_gets_the_capabilities(
     tmp_path: Path, system: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     prefix = environment(tmp_path, system, copies=True)
@@ -45,7 +45,9 @@ def test_a_copy_gets_the_rights(
     assert "every user who can run this file gets raw sockets" in said
 
 
-def test_a_link_does_not(tmp_path: Path, system: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_linked_interpreter_does_not_get_them(
+    tmp_path: Path, system: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     prefix = environment(tmp_path, system, copies=False)
     said = advice(monkeypatch, prefix, system, "python")
     assert "`python3 -m venv --copies .venv`" in said
@@ -53,11 +55,13 @@ def test_a_link_does_not(tmp_path: Path, system: Path, monkeypatch: pytest.Monke
     assert f"{system}/bin/python3 also runs other programs" in said
 
 
-def test_the_machines_own_python_does_not(system: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_python_of_the_machine_does_not_get_them(
+    system: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     assert "venv --copies" in advice(monkeypatch, system, system, "python3")
 
 
-def test_an_environment_of_conda_is_of_its_own(
+def test_a_conda_environment_gets_the_capabilities(
     system: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     (system / "conda-meta").mkdir()

@@ -24,7 +24,7 @@ def log(cycles: int = 4) -> Log:
     return Log(rows)
 
 
-def test_it_is_an_array() -> None:
+def test_the_log_is_an_array() -> None:
     assert np.asarray(log())["number"].tolist() == [7, 8, 9, 10]
     assert np.asarray(log()).dtype == log().dtype == DTYPE
     assert np.array(log(), copy=True).shape == (4,)
@@ -42,14 +42,14 @@ def test_a_field_a_cycle_and_a_part() -> None:
     assert log()[[0, 3]]["number"].tolist() == [7, 10]
 
 
-def test_what_is_not_there() -> None:
+def test_a_missing_field_or_cycle_is_an_error() -> None:
     with pytest.raises(ValueError, match="lunch"):
         log()["lunch"]
     with pytest.raises(IndexError):
         log()[4]
 
 
-def test_a_summary() -> None:
+def test_the_repr_is_a_summary() -> None:
     assert repr(log()) == "Log(4 cycles, 0 to 0.003 s, 1 axes)"
     assert repr(log(0)) == "Log(0 cycles)"
     assert log().axes == ("arm",)
@@ -73,7 +73,7 @@ def test_to_pandas_has_the_time_as_its_index() -> None:
     assert table["number"].dtype == np.uint64
 
 
-def test_without_pandas_the_error_says_what_to_do(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_error_without_pandas_has_a_hint(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "pandas", None)
     with pytest.raises(ImportError, match=r"pip install pandas; to_csv .* work without it"):
         log().to_pandas()

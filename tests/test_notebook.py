@@ -1,4 +1,4 @@
-"""What a notebook shows."""
+"""HTML for notebooks."""
 
 from __future__ import annotations
 

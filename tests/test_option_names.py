@@ -1,4 +1,4 @@
-"""Options that a message or a document names, as in `Loop(period=...)`: each of them exists."""
+"""All options that a message or a document names exist, such as `Loop(period=...)`."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a newcomer reads where something is missing: one line that names the packages."""
+"""Missing packages are named in one line."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ TOOL = Path(__file__).resolve().parent.parent / "tools/missing_prerequisites"
 
 @pytest.fixture
 def bare_path(tmp_path):
-    """A PATH with nothing on it but what the tool itself runs."""
+    """Return a PATH with only the programs that the tool itself runs."""
     for command in ("id", "sh"):
         found = shutil.which(command)
         assert found
@@ -30,7 +30,7 @@ def missing(path: str, python: str, *kind: str) -> str:
     return done.stdout
 
 
-def test_nothing_is_said_where_all_is_there():
+def test_no_output_if_all_packages_are_installed():
     assert missing("/usr/sbin:/usr/bin:/sbin:/bin", sys.executable) == ""
 
 
@@ -49,7 +49,7 @@ def test_a_missing_python_is_three_packages(bare_path):
     assert "apt-get install python3 python3-venv python3-dev gcc" in line
 
 
-def test_an_old_python_is_named_with_the_way_out(bare_path):
+def test_an_old_python_is_named_with_the_solution(bare_path):
     old = bare_path / "python3"
     old.write_text('#!/bin/sh\n[ "$1" = -V ] && echo "Python 3.9.2" && exit\nexit 1\n')
     old.chmod(0o755)

@@ -1,4 +1,4 @@
-"""The README shows what is really there."""
+"""The README refers to existing files, and shows the tested example."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ def test_the_example_is_the_one_in_the_repository() -> None:
 
 
 @pytest.mark.parametrize("link", sorted(set(re.findall(r"\]\(([^)#]+)\)", README))))
-def test_what_the_readme_points_at_exists(link: str) -> None:
+def test_the_links_of_the_readme_exist(link: str) -> None:
     assert link.startswith("https://") or (ROOT / link).exists()
 
 

@@ -70,7 +70,7 @@ def test_indices_and_names_are_unique():
     assert len({entry.index for entry in types.ALL}) == len(types.ALL)
 
 
-def test_unknown_ones_are_refused():
+def test_unknown_names_and_indices_are_refused():
     with pytest.raises(ValueError, match=r"'FOO'.*known types: BOOL, SINT"):
         by_name("FOO")
     with pytest.raises(ValueError, match="0x0023"):
@@ -87,7 +87,7 @@ def test_golden_bytes():
     assert UNICODE_STRING.encode("µ") == b"\xb5\x00"
 
 
-def test_text_is_not_a_truth_value():
+def test_text_is_not_a_boolean():
     with pytest.raises(TypeError, match="BOOL: 'false' is text; use True or False"):
         BOOL.encode("false")
 
@@ -95,7 +95,7 @@ def test_text_is_not_a_truth_value():
 @pytest.mark.parametrize("entry", INTEGERS, ids=str)
 @settings(max_examples=20)
 @given(data=st.data())
-def test_integers_come_back_and_their_neighbours_are_refused(entry, data):
+def test_integers_round_trip_and_values_out_of_range_are_refused(entry, data):
     value = data.draw(st.integers(entry.minimum, entry.maximum))
     encoded = entry.encode(value)
     assert len(encoded) == entry.size
@@ -107,22 +107,22 @@ def test_integers_come_back_and_their_neighbours_are_refused(entry, data):
 
 
 @given(st.floats(width=32))
-def test_reals_come_back(value):
+def test_reals_round_trip(value):
     assert struct.pack("<d", REAL.decode(REAL.encode(value))) == struct.pack("<d", value)
 
 
 @given(st.floats())
-def test_long_reals_come_back(value):
+def test_long_reals_round_trip(value):
     assert struct.pack("<d", LREAL.decode(LREAL.encode(value))) == struct.pack("<d", value)
 
 
 @given(st.text(st.characters(codec="latin-1", exclude_characters="\x00")))
-def test_visible_strings_come_back(text):
+def test_visible_strings_round_trip(text):
     assert VISIBLE_STRING.decode(VISIBLE_STRING.encode(text)) == text
 
 
 @given(st.text(st.characters(codec="utf-8", exclude_characters="\x00")))
-def test_unicode_strings_come_back(text):
+def test_unicode_strings_round_trip(text):
     assert UNICODE_STRING.decode(UNICODE_STRING.encode(text)) == text
 
 
@@ -146,7 +146,7 @@ def test_another_length_is_refused(entry):
             entry.decode(bytes(size))
 
 
-def test_other_kinds_of_value_are_refused():
+def test_values_of_other_types_are_refused():
     with pytest.raises(TypeError):
         UINT.encode(1.5)
     with pytest.raises(TypeError, match="REAL"):
@@ -178,7 +178,7 @@ def test_undefined_bits_and_characters_are_refused():
         (OCTET_STRING, "0x0a0b", b"\x0a\x0b"),
     ],
 )
-def test_values_as_a_person_writes_them(entry, text, value):
+def test_values_are_parsed_from_text(entry, text, value):
     assert entry.parse(text) == value
 
 
@@ -189,7 +189,7 @@ def test_values_as_a_person_writes_them(entry, text, value):
         *((REAL, "x"), (OCTET_STRING, "0xabc"), (VISIBLE_STRING, "\u20ac"), (types.GUID, "00")),
     ],
 )
-def test_what_a_person_cannot_mean_is_refused(entry, text):
+def test_invalid_text_is_refused(entry, text):
     with pytest.raises(ValueError, match=entry.name):
         entry.parse(text)
 
@@ -233,7 +233,7 @@ def test_a_record_is_a_dict() -> None:
         kind.encode({"vendor": 2})
 
 
-def test_what_has_no_size_stands_in_no_record() -> None:
+def test_a_type_without_a_size_is_refused_in_a_record() -> None:
     with pytest.raises(ValueError, match=r"sized\(VISIBLE_STRING, 32\)"):
         types.Record({"name": types.VISIBLE_STRING})
     with pytest.raises(ValueError, match="longer than 4 bytes"):

@@ -24,7 +24,7 @@ def test_the_help_explains_each(capsys: pytest.CaptureFixture[str]) -> None:
 
 def test_an_unknown_one_is_answered_by_the_list(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["table", "rteml2"]) == 2
-    assert f"there are {', '.join(TABLES)}" in capsys.readouterr().err
+    assert f"known tables: {', '.join(TABLES)}" in capsys.readouterr().err
 
 
 def test_all_of_it_is_written(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -1,4 +1,4 @@
-"""Links in Python round a virtual segment's: they lose, repeat, spoil or echo frames."""
+"""Links in Python around that of a virtual segment. They lose, repeat, corrupt or echo frames."""
 
 from __future__ import annotations
 
@@ -11,8 +11,10 @@ from catenary.virtual import Segment
 
 
 class Meddler:
-    """Owns what happens to the frames of a link: `meddle` maps (number, frame that came back) to
-    the frames that are received instead."""
+    """Owns the changes to the frames of a link.
+
+    `meddle` maps the number and the content of a returned frame to the frames that are received.
+    """
 
     def __init__(self, link: Link, meddle: Callable[[int, bytes], list[bytes]]) -> None:
         self._link = link
@@ -61,7 +63,7 @@ class Meddler:
 
 
 class Echo:
-    """Owns a clock and gives every frame back untouched, as `lo` does; or none at all."""
+    """Owns a clock, and returns every frame unchanged, like `lo`, or no frame."""
 
     name = "lo"
     capsule = None

@@ -1,4 +1,4 @@
-"""`main.diagnose()`: alone and while a loop runs."""
+"""`main.diagnose()` with and without a running loop."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def main(segment: cat.Segment) -> Iterator[cat.MainDevice]:
         yield main
 
 
-def test_a_sound_segment(main: cat.MainDevice) -> None:
+def test_a_segment_without_faults(main: cat.MainDevice) -> None:
     main.scan()
     found = main.diagnose()
     assert not found
@@ -68,7 +68,7 @@ def test_silence_names_the_cable(segment: cat.Segment, main: cat.MainDevice) -> 
 
 
 def after(segment: cat.Segment, main: cat.MainDevice, *injected: faults.Fault) -> Diagnosis:
-    """What is found after half a second of traffic with faults."""
+    """Return the diagnosis after half a second of traffic with faults."""
     subs = main.passive_scan()
     before = main.diagnose(subs=subs)
     for fault in injected:
@@ -107,10 +107,10 @@ def test_a_device_that_was_switched_off_and_on(segment: cat.Segment, main: cat.M
     assert "it has lost its station address" in found.evidence
 
 
-def test_a_device_that_came_back_by_itself_had_no_power(
+def test_a_device_that_returned_by_itself_had_no_power(
     segment: cat.Segment, main: cat.MainDevice
 ) -> None:
-    """With its address given again its counters can be read, and show that they began anew."""
+    """After it gets its address again, its counters can be read, and show a restart."""
     subs = main.passive_scan()
     before = main.diagnose(subs=subs)
     segment.inject(faults.power_cycle(2, for_=0.1))
@@ -120,7 +120,7 @@ def test_a_device_that_came_back_by_itself_had_no_power(
     assert (found.kind, found.devices) == (Kind.POWER, (2,))
 
 
-def test_frames_lost_on_nobodys_cable(segment: cat.Segment, main: cat.MainDevice) -> None:
+def test_lost_frames_without_a_faulty_cable(segment: cat.Segment, main: cat.MainDevice) -> None:
     [found] = after(segment, main, faults.lose_frames(20, every=4, way="back")).findings
     assert found.kind is Kind.MAIN
     assert found.evidence == (
@@ -128,7 +128,7 @@ def test_frames_lost_on_nobodys_cable(segment: cat.Segment, main: cat.MainDevice
     )
 
 
-def test_a_device_with_an_error_says_so(segment: cat.Segment, main: cat.MainDevice) -> None:
+def test_a_device_with_an_error_is_named(segment: cat.Segment, main: cat.MainDevice) -> None:
     main.scan()
     segment.core.show_al_status(1, 0x14, 0x001B)
     [found] = main.diagnose().findings
@@ -137,13 +137,13 @@ def test_a_device_with_an_error_says_so(segment: cat.Segment, main: cat.MainDevi
     )
 
 
-def test_on_devices_that_were_only_looked_at(segment: cat.Segment, main: cat.MainDevice) -> None:
+def test_diagnosis_of_devices_of_a_passive_scan(segment: cat.Segment, main: cat.MainDevice) -> None:
     segment.core.poke(2, 0x0300, b"\x09")
     assert main.diagnose(subs=main.passive_scan())
     assert len(main.subs) == 0
 
 
-def test_beside_a_running_loop_from_another_thread(segment: cat.Segment) -> None:
+def test_diagnosis_from_another_thread_while_a_loop_runs(segment: cat.Segment) -> None:
     segment.core.poke(2, 0x0300, b"\x09")
     results: list[Diagnosis] = []
     with cat.MainDevice(segment) as main:
@@ -162,7 +162,7 @@ def test_beside_a_running_loop_from_another_thread(segment: cat.Segment) -> None
     assert found.kind is Kind.CABLE
 
 
-def test_in_the_loops_own_thread_it_is_refused(segment: cat.Segment) -> None:
+def test_diagnosis_in_the_loops_thread_is_refused(segment: cat.Segment) -> None:
     with cat.MainDevice(segment) as main:
         arm = cat.Drives(
             main.scan().drives, mode="csp", counts_per_turn=2**20, velocity_limit=100.0

@@ -1,4 +1,4 @@
-"""Whole EEPROMs read and written, and writes that break off."""
+"""Reading and writing of whole EEPROMs, and interrupted writes."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def test_another_image_is_written(segment: cat.Segment, main: cat.MainDevice) ->
     assert segment.core.sii_image(1) == new
 
 
-def test_a_write_that_breaks_off_says_what_the_device_is_now(
+def test_an_interrupted_write_reports_the_state_of_the_device(
     segment: cat.Segment, main: cat.MainDevice
 ) -> None:
     station = main.passive_scan(names=False)[1].station

@@ -1,4 +1,4 @@
-"""The queue of events, and callbacks beside it."""
+"""The queue of events, and callbacks."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def numbered(count: int) -> list[Event]:
     return [Event(float(number), None, f"number {number}") for number in range(count)]
 
 
-def test_iterating_takes_what_is_pending() -> None:
+def test_iterating_removes_the_pending_events() -> None:
     events = Events()
     first, second = numbered(2)
     events.put(first)
@@ -29,7 +29,7 @@ def test_iterating_takes_what_is_pending() -> None:
     assert list(events) == []
 
 
-def test_getting_takes_the_oldest_or_none() -> None:
+def test_get_returns_the_oldest_event_or_none() -> None:
     events = Events()
     first, second = numbered(2)
     events.put(first)
@@ -37,7 +37,7 @@ def test_getting_takes_the_oldest_or_none() -> None:
     assert [events.get(), events.get(), events.get()] == [first, second, None]
 
 
-def test_getting_waits_for_another_thread() -> None:
+def test_get_waits_for_another_thread() -> None:
     events = Events()
     [event] = numbered(1)
     thread = threading.Thread(target=events.put, args=(event,))
@@ -46,7 +46,7 @@ def test_getting_waits_for_another_thread() -> None:
     thread.join()
 
 
-def test_an_event_put_while_iterating_is_taken_too() -> None:
+def test_an_event_put_while_iterating_is_returned_too() -> None:
     events = Events()
     first, second = numbered(2)
     events.put(first)
@@ -58,7 +58,7 @@ def test_an_event_put_while_iterating_is_taken_too() -> None:
     assert seen == [first, second]
 
 
-def test_the_oldest_are_dropped_and_counted() -> None:
+def test_the_oldest_events_are_dropped_and_counted() -> None:
     events = Events(capacity=3)
     for event in numbered(5):
         events.put(event)
@@ -76,7 +76,7 @@ def test_in_a_loop_times_count_from_its_first_iteration() -> None:
     early = events.get()
     assert before is not None
     assert early is not None
-    assert (before.time, early.time) == (7.0, 8.0)  # there is no zero yet
+    assert (before.time, early.time) == (7.0, 8.0)  # the zero is not known yet
     zero_ns = 10_000_000_000
     events.put(DeviceLost(10.5, None, "in the loop"))
     events.end_loop()
@@ -85,7 +85,7 @@ def test_in_a_loop_times_count_from_its_first_iteration() -> None:
     assert [event.time for event in events] == [-1.0, 0.5, 12.0]
 
 
-def test_a_listener_has_the_clock_of_the_link() -> None:
+def test_a_listener_gets_times_of_the_links_clock() -> None:
     events, told = Events(), list[float]()
     events.begin_loop(lambda: 2_000_000_000)
     events.listen(lambda event: told.append(event.time))
@@ -95,7 +95,7 @@ def test_a_listener_has_the_clock_of_the_link() -> None:
     assert events.stamped(event).time == 1.0
 
 
-def test_an_event_is_frozen_and_reads_well() -> None:
+def test_an_event_is_frozen_and_has_a_readable_text() -> None:
     event = DeviceLost(1.5, None, "device 3 (Servo) does not answer")
     assert str(event) == "1.500 s: device 3 (Servo) does not answer"
     with pytest.raises(dataclasses.FrozenInstanceError):
@@ -134,7 +134,7 @@ def test_a_callback_that_raises_is_logged_and_the_others_are_called(
     assert "a mistake of the user's" in caplog.text
 
 
-def test_slow_callbacks_lose_the_oldest_and_nobody_waits() -> None:
+def test_slow_callbacks_lose_the_oldest_events_and_block_nothing() -> None:
     callbacks = Callbacks(capacity=2)
     callbacks.in_thread = False
     told: list[float] = []
@@ -146,7 +146,7 @@ def test_slow_callbacks_lose_the_oldest_and_nobody_waits() -> None:
     assert callbacks.dropped == 3
 
 
-def test_an_event_told_by_a_callback_comes_after_the_one_before() -> None:
+def test_an_event_put_by_a_callback_is_delivered_later() -> None:
     callbacks = Callbacks()
     callbacks.in_thread = False
     first, second = numbered(2)
@@ -186,7 +186,7 @@ def test_an_emergency_is_an_event_with_its_text() -> None:
         assert told == [event]
 
 
-def test_a_drive_that_faults_tells_by_the_next_reading_of_its_mailbox() -> None:
+def test_a_fault_is_reported_with_the_next_reading_of_the_mailbox() -> None:
     segment = demo_segment()
     with cat.MainDevice(segment) as main:
         drive = main.scan().drives[0]
@@ -203,7 +203,7 @@ def test_a_drive_that_faults_tells_by_the_next_reading_of_its_mailbox() -> None:
         assert told == [event]
 
 
-def test_the_application_marks_an_instant() -> None:
+def test_the_application_sets_a_marker() -> None:
     with cat.MainDevice(demo_segment()) as main:
         before = main.link.now() * 1e-9
         main.mark("gripper closed")

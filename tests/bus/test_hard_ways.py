@@ -1,4 +1,4 @@
-"""Devices that are slow, odd or answered for twice: they come up, or the error names them."""
+"""Slow, unusual or duplicate answers: the device reaches PRE-OP, or the error names it."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def segment() -> cat.Segment:
 # ---- EEPROM
 
 
-def test_a_slow_eeprom_is_waited_for() -> None:
+def test_the_scan_waits_for_a_slow_eeprom() -> None:
     slow = segment()
     slow.core.time_sii(1, 20 * MS, 20 * MS, False)
     with cat.MainDevice(slow) as main:
@@ -43,7 +43,7 @@ def test_a_slow_eeprom_is_waited_for() -> None:
         assert slow.now_ns > 1_000 * MS  # some hundred words, 20 ms each
 
 
-def test_one_that_stays_busy_is_named() -> None:
+def test_a_device_with_a_busy_eeprom_is_named() -> None:
     slow = segment()
     slow.core.time_sii(1, 5_000 * MS, 5_000 * MS, False)
     with cat.MainDevice(slow) as main:
@@ -65,7 +65,7 @@ def answering_late(device: cat.virtual.Servo, segment: cat.Segment, delay_ns: in
     device.handle = later  # type: ignore[method-assign]
 
 
-def test_a_reply_after_half_a_second_is_waited_for() -> None:
+def test_a_reply_after_half_a_second_is_accepted() -> None:
     late = segment()
     with cat.MainDevice(late) as main:
         servo = main.scan()[1]
@@ -75,7 +75,7 @@ def test_a_reply_after_half_a_second_is_waited_for() -> None:
         assert late.now_ns - before > 500 * MS
 
 
-def test_one_that_never_comes_has_a_deadline_and_the_mailbox_goes_on() -> None:
+def test_a_missing_reply_has_a_deadline_and_the_mailbox_recovers() -> None:
     late = segment()
     with cat.MainDevice(late) as main:
         servo = main.scan()[1]
@@ -104,7 +104,7 @@ def categories(image: bytes) -> Iterator[tuple[int, bytes]]:
 
 
 def changed(monkeypatch: pytest.MonkeyPatch, change: Callable[[bytes], bytes]) -> cat.Segment:
-    """A segment whose servo has another SII image."""
+    """Return a segment whose servo has another SII image."""
     make = virtual_device.make_sii_image
 
     def made(description: object, *quirks: object) -> bytes:
@@ -119,7 +119,7 @@ def changed(monkeypatch: pytest.MonkeyPatch, change: Callable[[bytes], bytes]) -
 def test_an_sii_without_one_of_its_categories(
     monkeypatch: pytest.MonkeyPatch, missing: int
 ) -> None:
-    """It comes to PRE-OP and answers; without SyncManagers it cannot exchange process data."""
+    """It reaches PRE-OP and answers. Without SyncManagers, it cannot exchange process data."""
 
     def without(image: bytes) -> bytes:
         rest = b"".join(part for kind, part in categories(image) if kind != missing)
@@ -132,7 +132,7 @@ def test_an_sii_without_one_of_its_categories(
         assert servo.name
         assert servo.sdo.read(0x1018, 1, type=UDINT) == servo.identity.vendor
         arm = cat.Drives([servo], counts_per_turn=2**20, velocity_limit=100.0)
-        if missing == SYNC_MANAGER:  # there is no place to put process data
+        if missing == SYNC_MANAGER:  # process data cannot be mapped
             with pytest.raises(MappingError, match=r"device 1.*SyncManager"), cat.Loop(arm):
                 pass
             return
@@ -140,8 +140,8 @@ def test_an_sii_without_one_of_its_categories(
             assert next(loop).ok
 
 
-def test_coe_is_said_but_there_is_no_mailbox(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The header's standard mailbox of no size."""
+def test_an_sii_with_coe_but_without_a_mailbox(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The header has a standard mailbox of size 0."""
 
     def without_mailbox(image: bytes) -> bytes:
         return image[:48] + b"\0" * 8 + image[56:]
@@ -155,7 +155,7 @@ def test_coe_is_said_but_there_is_no_mailbox(monkeypatch: pytest.MonkeyPatch) ->
 # ---- frames
 
 
-def test_every_answer_comes_twice() -> None:
+def test_duplicate_answers_are_ignored() -> None:
     link = FaultInjector(segment(), seed=1)
     link.inject(Fault(kind="duplicate"))
     with cat.MainDevice(link) as main:
@@ -175,7 +175,7 @@ def test_every_answer_comes_twice() -> None:
 
 
 @pytest.mark.parametrize("run", ["threaded", "inline"])
-def test_sdo_from_another_thread_while_the_loop_runs_and_never_from_its_own(run: str) -> None:
+def test_sdo_works_in_another_thread_but_not_in_the_loops_thread(run: str) -> None:
     devices = [cat.virtual.Coupler(), cat.virtual.Servo()]
     found: list[int] = []
     with cat.MainDevice(cat.Segment(devices, clock="monotonic")) as main:
@@ -203,7 +203,7 @@ def test_sdo_from_another_thread_while_the_loop_runs_and_never_from_its_own(run:
     assert found == [12345]
 
 
-def test_a_port_behind_which_nobody_answers_is_noted() -> None:
+def test_a_port_with_a_link_but_without_a_device_is_noted() -> None:
     odd = segment()
     with cat.MainDevice(odd) as main:
         main.scan()

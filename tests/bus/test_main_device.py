@@ -33,8 +33,8 @@ from tests.bus.links import Echo
 from tests.plan.devices import Asking, asks
 
 
-def test_the_eeprom_belongs_to_the_device_once_it_is_asked_for_pre_op() -> None:
-    """Some refuse PRE-OP without it; who looks into it afterwards gives it back."""
+def test_the_device_gets_its_eeprom_before_pre_op() -> None:
+    """Some devices refuse PRE-OP without it. A later access of the master returns it."""
     segment = demo_segment()
     with MainDevice(segment) as main:
         for _ in range(2):
@@ -62,7 +62,7 @@ def test_every_axis_of_a_drive_is_a_slot() -> None:
         assert main.scan().drives[0].slots == (0, 1, 2)
 
 
-def test_scanning_again_keeps_the_handles_of_the_same_devices() -> None:
+def test_a_second_scan_keeps_the_handles() -> None:
     with MainDevice(demo_segment()) as main:
         first = list(main.scan())
         second = list(main.scan())
@@ -79,7 +79,7 @@ def test_closing_brings_all_devices_to_init() -> None:
     assert [device.state for device in segment] == [AlState.INIT] * 6
 
 
-def test_an_exception_in_the_block_closes_too() -> None:
+def test_an_exception_in_the_block_closes_the_link() -> None:
     segment = demo_segment()
     main = MainDevice(segment)
     with pytest.raises(KeyboardInterrupt):
@@ -111,14 +111,14 @@ def test_an_sdo_abort_names_device_and_object() -> None:
             drive.sdo.write(0x6041, 0, 1, type=UINT)
 
 
-def test_a_device_without_mailbox_says_so() -> None:
+def test_sdo_of_a_device_without_a_mailbox_is_an_error() -> None:
     with MainDevice(demo_segment()) as main:
         lamps = main.scan()[1]
         with pytest.raises(MailboxError, match=r"device 1 .*has no mailbox"):
             lamps.sdo.read(0x1000)
 
 
-def test_mistakes_of_the_caller_send_nothing() -> None:
+def test_invalid_arguments_send_nothing() -> None:
     with MainDevice(demo_segment()) as main:
         drive = main.scan()[2]
         before = main.counts.sent
@@ -148,7 +148,7 @@ def test_attributes_send_nothing() -> None:
         assert main.counts.sent == before
 
 
-def test_read_state_asks() -> None:
+def test_read_state_reads_the_device() -> None:
     with MainDevice(demo_segment()) as main:
         assert main.scan()[2].read_state().state is AlState.PRE_OP
 
@@ -193,7 +193,7 @@ def test_a_device_that_never_reaches_a_state() -> None:
         assert main.link.now() - start < 15e9
 
 
-def test_a_silent_mailbox_ends_in_time() -> None:
+def test_a_silent_mailbox_has_a_deadline() -> None:
     segment = demo_segment()
     with MainDevice(segment) as main:
         drive = main.scan()[2]
@@ -204,7 +204,7 @@ def test_a_silent_mailbox_ends_in_time() -> None:
         assert main.link.now() - start < 5e9
 
 
-def test_emergencies_are_kept_whoever_reads_them() -> None:
+def test_emergencies_are_kept_for_every_reader() -> None:
     segment = demo_segment()
     with MainDevice(segment) as main:
         drive = main.scan()[2]
@@ -213,7 +213,7 @@ def test_emergencies_are_kept_whoever_reads_them() -> None:
         assert [emergency.error_code for emergency in drive.emergencies] == [0x7500]
 
 
-def test_a_segment_that_goes_away_is_an_error_not_a_wait() -> None:
+def test_a_lost_segment_is_an_error() -> None:
     segment = demo_segment()
     with MainDevice(segment) as main:
         drive = main.scan()[2]
@@ -305,7 +305,7 @@ def test_leaving_brings_devices_from_safe_op_to_pre_op() -> None:
         assert [device.state for device in segment] == [AlState.PRE_OP] * 6
 
 
-def test_all_kinds_of_devices_reach_safe_op_whatever_their_controller_can() -> None:
+def test_devices_with_all_kinds_of_controllers_reach_safe_op() -> None:
     devices = [Coupler(), DigitalInputs(), AnalogInputs(), Servo(lrw=False), DigitalOutputs()]
     segment = Segment(devices)
     with MainDevice(segment) as main:
@@ -320,8 +320,8 @@ FEATURES, NO_LRW = 0x0008, 0x0200
 
 
 @pytest.mark.parametrize("by_sii", [True, False])
-def test_one_indication_is_enough_to_do_without_lrw(by_sii: bool) -> None:
-    """The SII's general category, or the controller's features."""
+def test_one_indication_is_enough_to_avoid_lrw(by_sii: bool) -> None:
+    """The indication is in the SII's general category, or in the features of the controller."""
     segment = Segment([Servo(lrw=not by_sii), Servo()])
     features = int.from_bytes(segment.core.peek(0, FEATURES, 2), "little")
     shown = features & ~NO_LRW if by_sii else features | NO_LRW
@@ -337,26 +337,26 @@ def test_one_indication_is_enough_to_do_without_lrw(by_sii: bool) -> None:
 
 
 def test_a_hundred_devices_in_few_frames() -> None:
-    """PySOEM's config_init takes about 100 frames a device (`python -m benchmarks scan`)."""
+    """PySOEM's config_init takes about 100 frames per device (`python -m benchmarks scan`)."""
     segment = Segment([Coupler(), *(Servo() for _ in range(99))])
     with MainDevice(segment) as main:
         assert len(main.scan()) == 100
         assert main.counts.sent < 15 * 100
 
 
-def test_two_devices_with_one_alias_are_noticed() -> None:
+def test_two_devices_with_one_alias_are_noted() -> None:
     with MainDevice(Segment([DigitalOutputs(alias=5), DigitalOutputs(alias=5)])) as main:
         main.scan()
         assert main.notes == ("devices (0, 1) have the same alias 5",)
 
 
-def test_a_closed_main_device_says_so() -> None:
+def test_calls_on_a_closed_main_device_are_errors() -> None:
     main = MainDevice(demo_segment())
     with pytest.raises(RuntimeError, match="with block"):
         main.scan()
 
 
-def test_a_reference_is_checked_for_its_length() -> None:
+def test_the_length_of_a_requested_object_is_checked() -> None:
     with MainDevice(demo_segment()) as main:
         main.scan()
         asked = Asking({2: DeviceRequest(inputs=(ObjectReference(0x60F4, 0, 16),))})

@@ -1,4 +1,4 @@
-"""Mappings of devices with quirks: read, kept, chosen, written, refused and brought back."""
+"""Mappings of devices with quirks: read, kept, chosen, written, refused and restored."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ DEMAND = ObjectReference(0x6062, 0, 32)  # in no PDO of the servo
 
 @contextmanager
 def scanned(**quirks: object) -> Iterator[MainDevice]:
-    """A coupler and a servo with quirks of its mapping, in PRE-OP."""
+    """Yield a coupler and a servo with quirks of its mapping, in PRE-OP."""
     servo = Servo(mapping_quirks=MappingQuirks(**quirks))  # type: ignore[arg-type]
     with MainDevice(Segment([Coupler(), servo])) as main:
         main.scan()
@@ -48,7 +48,7 @@ def indices(device: DeviceDescription, direction: Direction) -> list[int]:
 # -- reading changes nothing ---------------------------------------------------------------------
 
 
-def test_a_scan_shows_what_the_device_has_and_notes_what_the_sii_says() -> None:
+def test_a_scan_shows_the_mapping_of_the_device_and_notes_that_of_the_sii() -> None:
     with scanned(power_up=(0x1601, 0x1A01)) as main:
         device = main.subs[1].description
         assert indices(device, Direction.OUTPUT) == [0x1601]
@@ -64,7 +64,7 @@ def test_a_device_that_agrees_with_its_sii_has_no_notes() -> None:
         assert main.notes == ()
 
 
-def test_a_mapping_that_carries_what_is_asked_for_is_not_written() -> None:
+def test_a_sufficient_mapping_is_not_written() -> None:
     with scanned(power_up=(0x1601, 0x1A01), fixed_pdos="silent", fixed_lists="silent") as main:
         plan = main.plan(asking(STATUS, POSITION))
         assert plan.devices[1].downloads == ()
@@ -75,7 +75,7 @@ def test_a_mapping_that_carries_what_is_asked_for_is_not_written() -> None:
 # -- fixed PDOs ----------------------------------------------------------------------------------
 
 
-def test_a_fixed_pdo_that_says_so_is_refused_in_the_plan() -> None:
+def test_a_pdo_flagged_as_fixed_is_refused_in_the_plan() -> None:
     with scanned(fixed_pdos="declared") as main:
         with pytest.raises(MappingError, match="all its PDOs are fixed: 0x1A00") as caught:
             main.plan(asking(DEMAND))
@@ -83,16 +83,16 @@ def test_a_fixed_pdo_that_says_so_is_refused_in_the_plan() -> None:
         assert "none of its PDOs carries 0x6062:00" in str(caught.value)
 
 
-def test_the_dictionary_tells_what_the_sii_does_not() -> None:
-    """PDOs that are flagged in the SII are not needed: the access rights are read."""
+def test_access_rights_are_read_from_the_dictionary() -> None:
+    """The SII need not flag fixed PDOs, because the access rights are read."""
     wanted = asking(FOLLOWING_ERROR, POSITION, DEMAND, ObjectReference(0x5FFF, 0, 8))
-    refused = pytest.raises(MappingError, match="its dictionary says that 0x1C13 is read-only")
+    refused = pytest.raises(MappingError, match="0x1C13 is read-only in its dictionary")
     with scanned(fixed_lists="declared") as main, refused:
         main.plan(wanted)
 
 
 @pytest.mark.parametrize("code", [0x06010002, 0x08000021])
-def test_a_refused_mapping_names_the_alternatives_and_is_brought_back(code: int) -> None:
+def test_a_refused_mapping_names_the_alternatives_and_is_restored(code: int) -> None:
     with scanned(fixed_pdos="silent", abort_code=code) as main:
         before = main.subs[1].description
         plan = main.plan(asking(DEMAND))
@@ -118,7 +118,7 @@ def test_a_refused_list_of_pdos_is_named() -> None:
         assert assigned(main, 0x1C13) == [0x1A00]
 
 
-def test_an_object_that_the_device_does_not_map_leaves_the_old_mapping() -> None:
+def test_the_old_mapping_is_restored_if_an_object_cannot_be_mapped() -> None:
     with scanned(refused_objects=(0x6062,)) as main:
         with pytest.raises(MappingError, match=r"0x6062:00 .*cannot be mapped into PDO 0x1A00"):
             main.configure(main.plan(asking(DEMAND)))
@@ -128,14 +128,14 @@ def test_an_object_that_the_device_does_not_map_leaves_the_old_mapping() -> None
 
 def test_an_sii_without_the_permissions_is_honoured() -> None:
     with scanned(coe_details=0x23) as main:
-        with pytest.raises(MappingError, match="0x1C13 cannot be changed"):
+        with pytest.raises(MappingError, match="does not allow changes of 0x1C13"):
             main.plan(asking(FOLLOWING_ERROR))
-        with pytest.raises(MappingError, match="the entries of PDOs cannot be changed"):
+        with pytest.raises(MappingError, match="does not allow changes of PDO entries"):
             main.plan(asking(DEMAND))
         main.configure(main.plan(asking(POSITION)))
 
 
-def test_a_written_mapping_is_tried_against_the_sii() -> None:
+def test_a_mapping_of_the_application_is_tried_against_the_sii() -> None:
     written = (WrittenPdo(0x1A00, (STATUS, DEMAND)), WrittenPdo(0x1A03))
     with scanned(coe_details=0x23) as main:
         plan = main.plan(asking(DEMAND, pdos=written))
@@ -144,8 +144,8 @@ def test_a_written_mapping_is_tried_against_the_sii() -> None:
         assert main.subs[1].sdo.read(0x1A00, 0, type=USINT) == 2
 
 
-def test_pdos_that_exclude_each_other_are_exchanged() -> None:
-    """Adding 0x1A00 to 0x1A01 would be refused with 0x08000021."""
+def test_pdos_that_exclude_each_other_are_replaced() -> None:
+    """The device refuses 0x1A00 in addition to 0x1A01 with 0x08000021."""
     with scanned(power_up=(0x1601, 0x1A01), exclusive=True, fixed_pdos="declared") as main:
         torque = ObjectReference(0x6077, 0, 16)
         plan = main.plan(asking(STATUS, POSITION, torque))
@@ -154,7 +154,7 @@ def test_pdos_that_exclude_each_other_are_exchanged() -> None:
         assert assigned(main, 0x1C13) == [0x1A00]
 
 
-def test_optional_objects_do_not_force_what_the_device_refuses() -> None:
+def test_optional_objects_are_omitted_if_the_device_refuses_them() -> None:
     optional = [ObjectReference(index, 0, 32, required=False) for index in (0x6062, 0x60F4)]
     with scanned(fixed_pdos="silent", fixed_lists="silent") as main:
         plan = main.plan(asking(POSITION, *optional))
@@ -172,7 +172,7 @@ def test_a_plan_shows_what_would_change_with_old_and_new_values() -> None:
         assert "0x6060:00  00 → 08" in str(plan)
 
 
-def test_a_plan_shows_how_a_device_will_keep_time() -> None:
+def test_a_plan_shows_the_synchronisation_of_a_device() -> None:
     with scanned() as main:
         plan = main.plan(Asking({1: DeviceRequest(clock=DistributedClock())}))
         changes = {c.what: (c.old, c.new) for c in plan.devices[1].changes}

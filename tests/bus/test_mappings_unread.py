@@ -1,4 +1,4 @@
-"""Devices that do not answer while their mappings are read: a scan and a plan go on, and end."""
+"""Devices that do not answer while their mappings are read. A scan and a plan still end."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def answer_uploads(servo: Servo, answer: Callable[[bytes], list[bytes] | None]) 
 
 
 def silence(servo: Servo, *indices: int) -> None:
-    """Uploads of these objects are never answered."""
+    """Return a filter that never answers uploads of these objects."""
 
     def answer(payload: bytes) -> list[bytes] | None:
         return [] if struct.unpack_from("<H", payload, 3)[0] in indices else None
@@ -48,7 +48,7 @@ def silence(servo: Servo, *indices: int) -> None:
 
 
 def drip_lists(payload: bytes) -> list[bytes] | None:
-    """0x1C12 is announced with 4000 bytes; one of them comes in each segment."""
+    """Announce 4000 bytes for 0x1C12, and send one byte per segment."""
     if payload[2] >> 5 == UPLOAD and payload[3:5] != b"\x12\x1c":
         return None
     if payload[2] >> 5 == SEGMENT:
@@ -60,7 +60,7 @@ def asking(position: int, *inputs: ObjectReference, **more: object) -> Asking:
     return Asking({position: DeviceRequest(inputs=inputs, **more)})  # type: ignore[arg-type]
 
 
-def test_a_list_of_pdos_that_is_never_sent_does_not_end_a_scan() -> None:
+def test_a_missing_list_of_pdos_does_not_end_a_scan() -> None:
     odd = Servo()
     segment = make_segment(odd)
     silence(odd, 0x1C12)
@@ -73,7 +73,7 @@ def test_a_list_of_pdos_that_is_never_sent_does_not_end_a_scan() -> None:
         assert "its mapping cannot be read, so that of its SII is used" in note
 
 
-def test_a_list_of_pdos_that_is_never_sent_does_not_stop_other_devices() -> None:
+def test_a_missing_list_of_pdos_does_not_affect_other_devices() -> None:
     odd = Servo()
     segment = make_segment(odd)
     silence(odd, 0x1C12)
@@ -87,7 +87,7 @@ def test_a_list_of_pdos_that_is_never_sent_does_not_stop_other_devices() -> None
             main.plan(asking(1, POSITION))
 
 
-def test_a_list_of_pdos_that_drips_does_not_hold_a_scan() -> None:
+def test_an_endless_list_of_pdos_does_not_block_a_scan() -> None:
     odd = Servo(mailbox_delay=0.05)
     segment = make_segment(odd)
     answer_uploads(odd, drip_lists)
@@ -97,7 +97,7 @@ def test_a_list_of_pdos_that_drips_does_not_hold_a_scan() -> None:
         assert "of 4000 bytes within 5 s" in str(main.notes)
 
 
-def test_a_slow_mailbox_does_not_hold_a_scan() -> None:
+def test_a_slow_mailbox_does_not_block_a_scan() -> None:
     segment = make_segment(Servo(mailbox_delay=1.5))
     with MainDevice(segment) as main:
         main.scan()
@@ -121,22 +121,22 @@ def slow_mailbox() -> Iterator[MainDevice]:
         assert segment.now_ns - before < 70e9
 
 
-def test_a_slow_mailbox_does_not_hold_a_plan() -> None:
+def test_a_slow_mailbox_does_not_block_a_plan() -> None:
     start_up = tuple((0x2200 + k, 0, b"\x00") for k in range(40))
     too_slow = pytest.raises(ResponseTimeout, match=r"device 1 .* not complete within 60 s")
     with slow_mailbox() as main, too_slow:
         main.plan(asking(1, OPTIONAL, start_up=start_up))
 
 
-def test_a_slow_mailbox_does_not_hold_settings() -> None:
+def test_a_slow_mailbox_does_not_block_the_reading_of_settings() -> None:
     too_slow = pytest.raises(ResponseTimeout, match="its settings were not complete within 60 s")
     with slow_mailbox() as main, too_slow:
         main.read_objects({1: [(0x1018, k % 4 + 1) for k in range(100)]})
 
 
 @pytest.mark.parametrize("length", [None, 0, 6])
-def test_pdos_that_are_not_described_do_not_end_a_plan(length: int | None) -> None:
-    """Descriptions of entries are missing, or end too early."""
+def test_pdos_without_a_description_do_not_end_a_plan(length: int | None) -> None:
+    """Descriptions of entries are missing or truncated."""
     odd = Servo()
     with MainDevice(make_segment(odd)) as main:
         main.scan()
@@ -156,7 +156,7 @@ def test_pdos_that_are_not_described_do_not_end_a_plan(length: int | None) -> No
 
 
 @pytest.mark.parametrize("indices", [(0x1A02,), (0x60F4,)])
-def test_optional_objects_that_are_never_sent_do_not_end_a_plan(indices: tuple[int, ...]) -> None:
+def test_missing_optional_objects_do_not_end_a_plan(indices: tuple[int, ...]) -> None:
     odd = Servo()
     with MainDevice(make_segment(odd)) as main:
         main.scan()
@@ -164,7 +164,7 @@ def test_optional_objects_that_are_never_sent_do_not_end_a_plan(indices: tuple[i
         main.configure(main.plan(asking(1, POSITION, OPTIONAL)))
 
 
-def test_a_value_that_is_never_sent_is_shown_as_not_read() -> None:
+def test_a_missing_value_is_shown_as_not_read() -> None:
     odd = Servo()
     with MainDevice(make_segment(odd)) as main:
         main.scan()
@@ -174,7 +174,7 @@ def test_a_value_that_is_never_sent_is_shown_as_not_read() -> None:
         main.configure(plan)
 
 
-def test_a_synchronisation_type_that_is_refused_oddly_does_not_end_a_bring_up() -> None:
+def test_an_unusual_refusal_of_a_synchronisation_type_does_not_end_a_bring_up() -> None:
     """0x08000000, a general error, instead of the code for an object that does not exist."""
     odd = Servo()
     segment = make_segment(odd)

@@ -1,4 +1,4 @@
-"""Requests and the frames they share."""
+"""Requests that share frames."""
 
 from __future__ import annotations
 
@@ -15,5 +15,5 @@ def test_small_requests_share_a_frame() -> None:
     assert batches([SHARES] * 5) == [[0, 1, 2, 3, 4]]
 
 
-def test_one_that_is_to_be_alone_is_alone() -> None:
+def test_a_request_marked_as_alone_gets_its_own_frame() -> None:
     assert batches([SHARES, ALONE, ALONE, SHARES, SHARES]) == [[0], [1], [2], [3, 4]]

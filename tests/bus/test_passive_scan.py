@@ -1,4 +1,4 @@
-"""Devices looked at and brought to states outside a loop."""
+"""Passive scans and state requests outside a loop."""
 
 from __future__ import annotations
 
@@ -32,12 +32,12 @@ def states(segment: cat.Segment) -> list[AlState]:
     return [AlState(segment.core.peek(n, 0x0130, 1)[0] & 15) for n in range(len(segment))]
 
 
-def test_a_look_finds_what_a_scan_finds(main: cat.MainDevice) -> None:
+def test_a_passive_scan_finds_the_same_devices_as_a_scan(main: cat.MainDevice) -> None:
     looked = [(sub.name, sub.identity, sub.alias) for sub in main.passive_scan()]
     assert looked == [(sub.name, sub.identity, sub.alias) for sub in main.scan()]
 
 
-def test_a_look_changes_no_state_and_closing_brings_nobody_down(segment: cat.Segment) -> None:
+def test_a_passive_scan_and_closing_change_no_state(segment: cat.Segment) -> None:
     with cat.MainDevice(segment) as main:
         main.request_states(main.passive_scan(), range(3), AlState.PRE_OP)
     assert states(segment) == [AlState.PRE_OP] * 3
@@ -46,7 +46,7 @@ def test_a_look_changes_no_state_and_closing_brings_nobody_down(segment: cat.Seg
     assert states(segment) == [AlState.PRE_OP] * 3
 
 
-def test_without_names_nothing_is_read_from_the_eeproms(main: cat.MainDevice) -> None:
+def test_without_names_no_eeprom_is_read(main: cat.MainDevice) -> None:
     main.passive_scan(names=False)
     few = main.counts.datagrams
     main.passive_scan()
@@ -64,12 +64,12 @@ def test_safe_op_is_reached_from_every_state(segment: cat.Segment, main: cat.Mai
     assert states(segment) == [AlState.SAFE_OP] * 3
 
 
-def test_one_device_alone(segment: cat.Segment, main: cat.MainDevice) -> None:
+def test_a_single_device_changes_its_state(segment: cat.Segment, main: cat.MainDevice) -> None:
     main.request_states(main.passive_scan(), [SERVO], AlState.PRE_OP)
     assert states(segment) == [AlState.INIT, AlState.PRE_OP, AlState.INIT]
 
 
-def test_who_refuses_says_why_and_the_others_go_on(
+def test_a_refusal_is_reported_and_does_not_affect_other_devices(
     segment: cat.Segment, main: cat.MainDevice
 ) -> None:
     found = main.request_states(main.passive_scan(), range(3), AlState.OP)
@@ -86,7 +86,7 @@ def test_boot_needs_a_bootstrap_mailbox(main: cat.MainDevice) -> None:
 
 
 @pytest.mark.parametrize("cut", [None, ("main", 0), (0, 1), (1, 2), (2, "main")])
-def test_a_ring_is_looked_at_from_both_ends(cut: tuple[int | str, int | str] | None) -> None:
+def test_a_ring_is_scanned_from_both_ends(cut: tuple[int | str, int | str] | None) -> None:
     devices = [cat.virtual.Coupler(), cat.virtual.Servo(name="a"), cat.virtual.Servo(name="b")]
     segment = cat.Segment(devices, ring=True)
     if cut is not None:

@@ -19,7 +19,7 @@ def main() -> Iterator[MainDevice]:
         yield main
 
 
-def test_rows_have_the_places_of_the_bytes(main: MainDevice) -> None:
+def test_rows_have_the_offsets_of_the_process_data(main: MainDevice) -> None:
     rows = [row for row in main.subs[1].pdos if row.index]
     assert [(r.direction, r.pdo, r.index, r.name, r.type, r.bit_offset) for r in rows] == [
         (Direction.OUTPUT, 0x1600, 0x7000, "Tare", "BOOL", 0),

@@ -1,4 +1,4 @@
-"""Rings as the MainDevice sees them, over the virtual segment."""
+"""Rings on the virtual segment, from the view of the MainDevice."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from catenary.virtual import Coupler, Segment, Servo
 
 
 @pytest.mark.parametrize("ask", [cat.MainDevice.scan, cat.MainDevice.passive_scan])
-def test_two_ports_that_are_swapped_are_told(ask: Callable[[cat.MainDevice], object]) -> None:
-    """Frames then pass all devices unprocessed from the first port, and positions mean nobody."""
+def test_swapped_ports_are_an_error(ask: Callable[[cat.MainDevice], object]) -> None:
+    """Frames of the first port then pass all devices unprocessed, so positions match no device."""
     segment = Segment([Coupler(), Servo()], ring=True)
     with (
         cat.MainDevice(segment.second, segment.first) as main,

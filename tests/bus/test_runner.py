@@ -1,4 +1,4 @@
-"""The blocking runner on a bad cable: lost, late, doubled, spoiled and alien frames."""
+"""The blocking runner on a bad cable: lost, late, duplicate, corrupt and alien frames."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def bring_up_and_ask(main: MainDevice) -> str:
     return main.scan()[1].sdo.read(0x1008, 0, type=VISIBLE_STRING)
 
 
-def test_every_seventh_frame_lost() -> None:
+def test_loss_of_every_seventh_frame() -> None:
     link = meddled(small_segment(), lambda k, frame: [] if k % 7 == 3 else [frame])
     with MainDevice(link) as main:
         assert bring_up_and_ask(main) == "Elbow"
@@ -37,14 +37,14 @@ def test_every_seventh_frame_lost() -> None:
 
 @settings(max_examples=25, deadline=None)
 @given(st.sets(st.integers(0, 400), max_size=30))
-def test_whichever_frames_are_lost(lost: set[int]) -> None:
+def test_loss_of_any_frames(lost: set[int]) -> None:
     link = meddled(small_segment(), lambda k, frame: [] if k in lost else [frame])
-    # An error only where several in a row were lost.
+    # An error is allowed only after several consecutive losses.
     with contextlib.suppress(CatenaryError), MainDevice(link) as main:
         assert bring_up_and_ask(main) == "Elbow"
 
 
-def test_doubled_alien_and_spoiled_frames_are_counted_and_change_nothing() -> None:
+def test_duplicate_alien_and_corrupt_frames_are_only_counted() -> None:
     def meddle(k: int, frame: bytes) -> list[bytes]:
         spoiled = frame[:20] + bytes([frame[20] ^ 0x40]) + frame[21:]
         return [ALIEN, frame[:17], spoiled, frame, frame]
@@ -57,21 +57,21 @@ def test_doubled_alien_and_spoiled_frames_are_counted_and_change_nothing() -> No
         assert counts.lost == 0
 
 
-def test_a_flood_of_alien_frames_does_not_keep_a_deadline_from_passing() -> None:
+def test_a_flood_of_alien_frames_does_not_extend_a_deadline() -> None:
     link = meddled(small_segment(), lambda k, frame: [ALIEN] * 10_000)
     with MainDevice(link) as main, pytest.raises(CatenaryError):
         main.scan()
 
 
 class Halting(Echo):
-    """The program is halted for longer than any deadline whenever it looks at the clock."""
+    """Link of a program that is halted beyond any deadline at each reading of the clock."""
 
     def now(self) -> int:
         self._now += 200_000_000
         return self._now
 
 
-def test_answers_that_came_while_the_program_was_halted_are_not_lost() -> None:
+def test_answers_received_while_the_program_was_halted_are_not_lost() -> None:
     def asks() -> Procedure[bool]:
         [reply] = yield [read(EcatCommand.BRD, 0, AL_STATUS)]
         return reply.lost
@@ -90,7 +90,7 @@ def test_many_procedures_share_frames() -> None:
         assert runner.counts.sent == 1
 
 
-def test_the_others_are_finished_before_an_error_is_raised() -> None:
+def test_other_procedures_finish_before_an_error_is_raised() -> None:
     finished: list[str] = []
 
     def fails() -> Procedure[None]:

@@ -1,4 +1,4 @@
-"""A device that cannot be brought to PRE-OP: named, told when it is used, no harm to the others."""
+"""A device that cannot be brought to PRE-OP is named, and does not affect the others."""
 
 import struct
 
@@ -25,7 +25,7 @@ def segment() -> cat.Segment:
     return segment
 
 
-def test_strict_it_is_raised_and_the_others_are_there(segment: cat.Segment) -> None:
+def test_a_strict_scan_raises_the_error_and_keeps_all_handles(segment: cat.Segment) -> None:
     with cat.MainDevice(segment) as main:
         with pytest.raises(StateError, match="device 1") as caught:
             main.scan()
@@ -39,11 +39,11 @@ def test_strict_it_is_raised_and_the_others_are_there(segment: cat.Segment) -> N
         assert [device.state for device in segment][2:] == [2, 2]
 
 
-def test_else_it_is_raised_when_the_device_is_used(segment: cat.Segment) -> None:
+def test_without_strict_the_error_is_raised_when_the_device_is_used(segment: cat.Segment) -> None:
     with cat.MainDevice(segment) as main:
         subs = main.scan(strict=False)
         assert isinstance(subs[1].error, StateError)
-        assert subs[1].identity == subs[2].identity  # what could be read is known
+        assert subs[1].identity == subs[2].identity  # the readable part is known
         assert subs[2].error is None
         assert subs[2].sdo.read(0x1018, 1)
         with pytest.raises(StateError, match="device 1"):
@@ -53,7 +53,7 @@ def test_else_it_is_raised_when_the_device_is_used(segment: cat.Segment) -> None
             pass
 
 
-def test_mended_and_scanned_again_it_is_whole(segment: cat.Segment) -> None:
+def test_a_repaired_device_works_after_a_new_scan(segment: cat.Segment) -> None:
     with cat.MainDevice(segment) as main:
         before = main.scan(strict=False)[2]
         segment[1].refuse_state(AlState.PRE_OP, None)
@@ -63,7 +63,7 @@ def test_mended_and_scanned_again_it_is_whole(segment: cat.Segment) -> None:
         assert [sub.state for sub in subs] == [AlState.PRE_OP] * 4
 
 
-def test_further_ones_are_notes(segment: cat.Segment) -> None:
+def test_further_errors_are_notes(segment: cat.Segment) -> None:
     segment[2].refuse_state(AlState.PRE_OP, REFUSED)
     with cat.MainDevice(segment) as main:
         with pytest.raises(CatenaryError, match="device 1") as caught:
@@ -76,13 +76,13 @@ SLOW_READ, WRITE = 400_000_000, 3_000_000  # [ns] of the EEPROM
 
 @pytest.fixture
 def slow_segment() -> cat.Segment:
-    """The EEPROM of device 1 would take minutes."""
+    """Yield a segment in which reading the EEPROM of device 1 takes minutes."""
     segment = cat.Segment([cat.virtual.Coupler(), cat.virtual.Servo(), cat.virtual.Servo(serial=2)])
     segment.core.time_sii(1, SLOW_READ, WRITE, False)
     return segment
 
 
-def test_a_slow_eeprom_does_not_hold_a_scan(slow_segment: cat.Segment) -> None:
+def test_a_slow_eeprom_does_not_block_a_scan(slow_segment: cat.Segment) -> None:
     segment = slow_segment
     with cat.MainDevice(segment) as main:
         subs = main.scan(strict=False)
@@ -92,7 +92,7 @@ def test_a_slow_eeprom_does_not_hold_a_scan(slow_segment: cat.Segment) -> None:
         assert subs[2].sdo.read(0x1018, 4)
 
 
-def test_a_slow_eeprom_does_not_hold_a_look(slow_segment: cat.Segment) -> None:
+def test_a_slow_eeprom_does_not_block_a_passive_scan(slow_segment: cat.Segment) -> None:
     with cat.MainDevice(slow_segment) as main:
         found = main.passive_scan()
         assert slow_segment.now_ns < 40e9
@@ -100,8 +100,8 @@ def test_a_slow_eeprom_does_not_hold_a_look(slow_segment: cat.Segment) -> None:
         assert found[2].identity.serial == 2
 
 
-def test_an_object_that_drips_does_not_hold_a_scan() -> None:
-    """0x1000 is announced with 4000 bytes; one of them comes in each segment, after 50 ms."""
+def test_an_endless_object_does_not_block_a_scan() -> None:
+    """The device announces 4000 bytes for 0x1000, and sends one byte per segment, after 50 ms."""
     device = cat.virtual.Servo(mailbox_delay=0.05)
     segment = cat.Segment([cat.virtual.Coupler(), device, cat.virtual.Servo(serial=2)])
     announced = struct.pack("<HBHBI", 0x3000, 0x41, 0x1000, 0, 4000)

@@ -1,4 +1,4 @@
-"""The object dictionary of a device, where no loop runs."""
+"""The object dictionary of a device, without a loop."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ def test_strings_and_sizes(drive: SubDevice) -> None:
         drive.sdo.read(0x2100, limit=100)
 
 
-def test_a_request_without_a_loop_is_answered_already(drive: SubDevice) -> None:
+def test_a_request_without_a_loop_is_answered_at_once(drive: SubDevice) -> None:
     answer = drive.sdo.request(0x1018, 1, type=UDINT)
     assert answer.done
     assert answer.result() == drive.identity.vendor
@@ -65,7 +65,7 @@ def test_the_device_describes_its_objects(drive: SubDevice) -> None:
     assert 0x607A in {known.index for known in mappable}
 
 
-def test_callers_mistakes_are_told_before_anything_is_sent(drive: SubDevice) -> None:
+def test_invalid_arguments_are_refused_before_anything_is_sent(drive: SubDevice) -> None:
     with pytest.raises(ValueError, match="subindex 0 or 1, not 2"):
         drive.sdo.read(0x1018, 2, complete=True)
     with pytest.raises(ValueError, match="an index has 16 bits"):

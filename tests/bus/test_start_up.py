@@ -39,7 +39,7 @@ def arm_of(cell: Cell) -> Drives:
 
 
 @pytest.mark.parametrize("request_class", [Inputs, Outputs, ProcessData, Drives])
-def test_every_request_has_them(cell: Cell, request_class: type) -> None:
+def test_every_request_accepts_start_up_objects(cell: Cell, request_class: type) -> None:
     start_up = [StartUp(0x2010, 3, 1.5), StartUp(0x2100, 0, 1)]
     if request_class is Drives:
         request = Drives(
@@ -52,7 +52,7 @@ def test_every_request_has_them(cell: Cell, request_class: type) -> None:
         assert device.writes == [GAIN, (0x2100, 0, b"\x01\x00")]
 
 
-def test_before_the_mapping_and_after_it(cell: Cell) -> None:
+def test_objects_are_written_before_or_after_the_mapping(cell: Cell) -> None:
     sensor = ProcessData(
         cell.main.subs[SENSOR],
         inputs={"status": (0x6010, 0, types.UDINT)},
@@ -63,7 +63,7 @@ def test_before_the_mapping_and_after_it(cell: Cell) -> None:
     assert places == [(0x2100, 0), (0x1C13, 0), (0x1C13, 0), (0x2010, 3)]
 
 
-def test_a_value_that_the_device_changes(cell: Cell) -> None:
+def test_a_value_changed_by_the_device_is_an_error(cell: Cell) -> None:
     data = ProcessData(cell.main.subs[SENSOR], start_up=[StartUp(0x2011, 0, 9)])
     with (
         pytest.raises(
@@ -81,7 +81,7 @@ def test_a_value_that_the_device_changes(cell: Cell) -> None:
     assert cell.main.subs[SENSOR].sdo.read(0x2011, 0) == b"\x05"
 
 
-def test_an_object_that_the_device_refuses(cell: Cell) -> None:
+def test_a_refused_object_is_an_error(cell: Cell) -> None:
     data = ProcessData(cell.main.subs[SENSOR], start_up=[StartUp(0x2222, 1, b"\x01")])
     with (
         pytest.raises(SdoAbort, match=r"start-up object 0x2222:01 = 01 refused with 0x06020000"),
@@ -90,14 +90,14 @@ def test_an_object_that_the_device_refuses(cell: Cell) -> None:
         pass
 
 
-def test_an_object_that_does_not_exist_has_no_type(cell: Cell) -> None:
+def test_an_unknown_object_is_an_error(cell: Cell) -> None:
     data = ProcessData(cell.main.subs[SENSOR], start_up=[StartUp(0x2222, 1, 5)])
     with pytest.raises(ConfigurationError, match="0x2222:01 is unknown: the object dictionary"):
         cell.main.plan(data)
     assert cell.sensor.writes == []
 
 
-def test_they_are_written_again_when_the_device_returns(cell: Cell) -> None:
+def test_objects_are_written_again_when_the_device_returns(cell: Cell) -> None:
     start_up = [StartUp(0x2010, 3, 1.5), StartUp(0x2100, 0, 1, before_mapping=True)]
     sensor = ProcessData(
         cell.main.subs[SENSOR],

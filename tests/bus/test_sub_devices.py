@@ -15,7 +15,7 @@ def positions(subs: tuple[cat.SubDevice, ...]) -> list[int]:
     return [sub.position for sub in subs]
 
 
-def test_a_group_goes_up_to_the_next_alias() -> None:
+def test_a_group_ends_before_the_next_alias() -> None:
     devices = [Coupler(), Servo(alias=10), DigitalOutputs(), Servo(), Coupler(alias=20), Servo()]
     with cat.MainDevice(Segment(devices)) as main:
         subs = main.scan()
@@ -27,7 +27,7 @@ def test_a_group_goes_up_to_the_next_alias() -> None:
             subs.group(0)
 
 
-def test_an_alias_that_two_have_is_refused_when_it_is_asked_for() -> None:
+def test_a_duplicate_alias_is_refused() -> None:
     with cat.MainDevice(Segment([Servo(alias=7), Servo(alias=7)])) as main:
         subs = main.scan()
         with pytest.raises(SegmentError, match="devices 0, 1 have the same alias 7"):

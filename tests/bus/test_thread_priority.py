@@ -1,4 +1,4 @@
-"""Threads beside the loop."""
+"""Scheduling of threads while a loop runs."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from catenary.bus.thread_priority import BEHIND, step_behind
 
 
 def scheduling_of_a_thread_started_with(policy: int, priority: int) -> tuple[int, int]:
-    """Policy and priority after `step_behind`."""
+    """Return policy and priority after `step_behind`."""
     found: list[tuple[int, int]] = []
 
     def inner() -> None:
@@ -36,9 +36,9 @@ def scheduling_of_a_thread_started_with(policy: int, priority: int) -> tuple[int
 
 
 @pytest.mark.parametrize("policy", [os.SCHED_FIFO, os.SCHED_RR])
-def test_it_does_not_keep_the_loop_s_priority(policy: int) -> None:
+def test_a_thread_does_not_keep_the_priority_of_the_loop(policy: int) -> None:
     assert scheduling_of_a_thread_started_with(policy, 80) == (os.SCHED_FIFO, BEHIND)
 
 
-def test_in_an_ordinary_program_it_stays_ordinary() -> None:
+def test_a_thread_of_an_ordinary_program_keeps_its_scheduling() -> None:
     assert scheduling_of_a_thread_started_with(os.SCHED_OTHER, 0) == (os.SCHED_OTHER, 0)

@@ -1,4 +1,4 @@
-"""Devices with watchdogs of all kinds come up: what their SII says does not decide."""
+"""Watchdogs of devices follow the plan, for any content of the SII."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ TORQUE = ObjectReference(0x6071, 0, 16)
 
 
 def registers(segment: cat.Segment, position: int) -> tuple[int, int]:
-    """(control byte of SyncManager 2, 0x0420) of a virtual device."""
+    """Return the control byte of SyncManager 2 and 0x0420 of a virtual device."""
     core: Any = segment[position].core
     return core.peek(position, 0x0814, 1)[0], int.from_bytes(
         core.peek(position, 0x0420, 2), "little"
@@ -28,7 +28,7 @@ def registers(segment: cat.Segment, position: int) -> tuple[int, int]:
 @pytest.mark.parametrize(
     ("watchdog", "expected"), [(None, (0x64, 1000)), (0.02, (0x64, 200)), (0, (0x24, 0))]
 )
-def test_the_trigger_follows_the_time(
+def test_the_watchdog_trigger_follows_the_watchdog_time(
     trigger: bool, checks: bool, watchdog: float | None, expected: tuple[int, int]
 ) -> None:
     quirks = ServoQuirks(watchdog_trigger=trigger, checks_watchdog=checks)
@@ -48,7 +48,7 @@ def test_a_drive_in_cst_has_10_ms() -> None:
         assert [registers(segment, k)[1] for k in range(2)] == [1000, 100]
 
 
-def test_terminals_show_their_outputs_without_a_watchdog() -> None:
+def test_terminals_keep_their_outputs_without_a_watchdog() -> None:
     lamps = DigitalOutputs()
     segment = cat.Segment([cat.virtual.Coupler(), lamps])
     with cat.MainDevice(segment) as main:

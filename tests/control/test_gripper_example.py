@@ -58,9 +58,9 @@ def test_the_observer_compensates_the_friction(printed, tmp_path: Path) -> None:
     program = tmp_path / "gripper.py"
     program.write_text(text.replace(bandwidth, "VISCOUS, 0.0, COULOMB"))
     shutil.copy(FOLDER / "gripper.xml", tmp_path)
-    without = run(program)["left"]
+    without = run(program)["offset"]
     assert all(1.0 < abs(x) <= 2.5 for x in without)
-    assert all(abs(x) < 0.2 for x in printed["left"])
+    assert all(abs(x) < 0.2 for x in printed["offset"])
 
 
 def test_the_object_is_detected_soon_and_at_its_place(printed) -> None:

@@ -1,4 +1,4 @@
-"""A layout and SubDevices out of thin air: the drive layer needs no bus to be judged."""
+"""Fake layouts and SubDevices, so that tests of the drive layer need no bus."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from catenary.plan.request import DeviceRequest, RequestTables, Views
 
 @dataclass
 class FakeLayout:
-    """Lays the objects of each device one behind the other."""
+    """Layout that places the objects of each device one after the other."""
 
     outputs: dict[int, dict[tuple[int, int], int]] = field(default_factory=dict)
     inputs: dict[int, dict[tuple[int, int], int]] = field(default_factory=dict)
@@ -59,7 +59,7 @@ def place(
 
 @dataclass
 class FakeSdo:
-    """A dictionary of 32-bit values; what is not in it does not exist."""
+    """An object dictionary of 32-bit values; a missing object causes an SDO abort."""
 
     values: dict[tuple[int, int], int]
     position: int = 0

@@ -1,4 +1,4 @@
-"""Names that do not exist fail on reading and on writing, before and while a loop is open."""
+"""Access to unknown attributes fails, for reading and writing, before and while a loop is open."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A named object of the process data: raw bits and values."""
+"""Channels: conversion between raw bits and values."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ INTEGERS = [kind for kind in types.ALL if isinstance(kind, types.Integer) and ki
 
 
 @given(st.sampled_from(INTEGERS), st.data())
-def test_integers_come_back_as_they_were(kind: types.Integer, data: st.DataObject) -> None:
+def test_integers_round_trip(kind: types.Integer, data: st.DataObject) -> None:
     value = data.draw(st.integers(kind.minimum, kind.maximum))
     channel = Channel(0x6000, 1, kind)
     raw = channel.encode(value)
@@ -27,7 +27,7 @@ def test_integers_come_back_as_they_were(kind: types.Integer, data: st.DataObjec
 
 
 @given(st.floats(width=32, allow_nan=False, allow_infinity=False))
-def test_reals_come_back_as_they_were(value: float) -> None:
+def test_reals_round_trip(value: float) -> None:
     channel = Channel(0x6000, 1, types.REAL)
     assert channel.decode(channel.encode(value)) == value
 
@@ -59,14 +59,14 @@ def test_booleans_are_booleans() -> None:
         (types.REAL, 1e39, ValueError),
     ],
 )
-def test_what_does_not_fit_is_refused(
+def test_a_value_out_of_range_is_refused(
     kind: types.Integer, value: float, error: type[Exception]
 ) -> None:
     with pytest.raises(error):
         Channel(0x7000, 1, kind).encode(value)
 
 
-def test_mistakes_in_a_channel_name_it() -> None:
+def test_an_invalid_channel_is_named() -> None:
     with pytest.raises(
         TypeError, match=r"inputs\['force'\] is 5; give a Channel or \(index, subindex"
     ):

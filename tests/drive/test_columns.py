@@ -1,4 +1,4 @@
-"""Further objects of drives: read and written by name."""
+"""Columns: additional objects of drives, read and written by name."""
 
 from __future__ import annotations
 
@@ -66,13 +66,13 @@ def test_columns_of_one_direction_are_not_in_the_other(main: MainDevice) -> None
             _ = arm.actual["lamp"]
 
 
-def test_objects_of_the_profile_know_their_direction() -> None:
+def test_objects_of_the_standard_have_a_direction() -> None:
     columns = named_columns({"offset": (0x60B2, 0, types.INT), "error": (0x60F4, 0, types.DINT)})
     assert columns["offset"].output
     assert not columns["error"].output
 
 
-def test_names_alone_and_pairs() -> None:
+def test_columns_by_name_or_with_an_object() -> None:
     columns = named_columns(["following_error", ("heat", (0x2020, 0, types.INT))])
     assert list(columns) == ["following_error", "heat"]
     with pytest.raises(ValueError, match="unknown name 'folowing'; known names are error_code"):
@@ -91,7 +91,7 @@ def test_names_alone_and_pairs() -> None:
         (0x6060, types.SINT, "mode_target"),
     ],
 )
-def test_what_the_axis_writes_cannot_be_a_column(
+def test_an_object_that_the_axis_writes_cannot_be_a_column(
     main: MainDevice, index: int, kind: types.Integer, what: str
 ) -> None:
     arm = Drives(

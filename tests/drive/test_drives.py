@@ -1,4 +1,4 @@
-"""Drives as a request: objects, tables, arrays, requests."""
+"""Drives as a process-data request: objects, tables, arrays and state requests."""
 
 import math
 import warnings
@@ -27,13 +27,13 @@ def _no_warning_of_the_default_velocity() -> Iterator[None]:
 
 
 def opened(drives: Drives) -> Drives:
-    """The drives bound to arrays of their own, as a Loop does it."""
+    """Return drives that are bound to new arrays, as by a Loop."""
     tables = drives.tables(FakeLayout.of(dict(drives.pdos(MILLISECOND))))
     drives.bind(views_of(tables))
     return drives
 
 
-def test_csp_requests_for_what_it_needs_and_no_more() -> None:
+def test_csp_requests_only_the_objects_it_needs() -> None:
     request = Drives([fake_sub(3)], counts_per_turn=2**20).pdos(MILLISECOND)[3]
     assert [r.index for r in request.outputs] == [0x6040, 0x6060, 0x607A]
     assert [r.index for r in request.inputs] == [0x6041, 0x6061, 0x6064, 0x606C, 0x6077]
@@ -49,17 +49,17 @@ def test_an_interpolation_time_that_agrees_is_not_written() -> None:
     assert Drives([fake_sub(3)], counts_per_turn=1).pdos(2_000_000)[3].start_up == ()
 
 
-def test_a_drive_without_interpolation_time_is_left_alone() -> None:
+def test_a_drive_without_interpolation_time_gets_none() -> None:
     sub = fake_sub(3, {(0x6076, 0): 640})
     assert Drives([sub], counts_per_turn=1).pdos(MILLISECOND)[3].start_up == ()
 
 
-def test_a_period_that_cannot_be_said_is_refused_by_its_object() -> None:
+def test_a_period_that_0x60c2_cannot_represent_is_refused() -> None:
     with pytest.raises(ConfigurationError, match="0x60C2"):
         Drives([fake_sub(3)], counts_per_turn=1).pdos(333_333)
 
 
-def test_a_drive_that_does_not_know_its_rated_torque_asks_for_it() -> None:
+def test_a_drive_without_rated_torque_needs_the_option() -> None:
     sub = fake_sub(3, {})
     for asked in (
         {"mode": "cst", "velocity_limit": 1.0},
@@ -79,7 +79,7 @@ def test_without_a_rated_torque_the_torque_is_absent() -> None:
     assert axis.actual_velocity is not None
 
 
-def test_what_a_drive_may_lack_is_not_required() -> None:
+def test_optional_objects_are_not_required() -> None:
     def required(drives: Drives) -> list[int]:
         request = drives.pdos(MILLISECOND)[3]
         return [r.index for r in request.outputs + request.inputs if r.required]
@@ -100,7 +100,7 @@ def test_the_mode_is_written_once_where_the_drive_has_it() -> None:
     assert Drives([sub], counts_per_turn=1).pdos(MILLISECOND)[3].start_up == ((0x6060, 0, b"\x08"),)
 
 
-def test_slots_are_axes_of_their_own() -> None:
+def test_each_slot_is_an_axis() -> None:
     values = {(0x6076, 0): 640, (0x6876, 0): 1280, (0x685A, 0): 2}
     sub = fake_sub(2, values)
     drives = Drives(
@@ -158,7 +158,7 @@ def test_limits_reach_the_plan() -> None:
         {"gear_ratio": [1.0, 2.0]},
     ],
 )
-def test_what_cannot_be_is_refused_before_anything_is_sent(wrong: dict[str, object]) -> None:
+def test_invalid_options_are_refused_before_anything_is_sent(wrong: dict[str, object]) -> None:
     with pytest.raises(ValueError, match=next(iter(wrong)).split("_")[0]):
         Drives([fake_sub(3)], **{"counts_per_turn": 1, **wrong})  # type: ignore[arg-type]
 
@@ -204,7 +204,7 @@ def test_an_object_that_is_not_mapped_is_named() -> None:
         drives.tables(FakeLayout())
 
 
-def test_values_are_there_once_a_loop_is_open() -> None:
+def test_values_exist_only_while_a_loop_is_open() -> None:
     drives = Drives([fake_sub(3)], counts_per_turn=1)
     with pytest.raises(AttributeError, match="before a Loop is open"):
         _ = drives.actual.position
@@ -247,7 +247,7 @@ def test_an_axis_of_an_absent_device_is_not_enabled() -> None:
     assert drives.enabled.tolist() == [True, False]
 
 
-def test_the_reason_of_a_stop_is_kept() -> None:
+def test_the_reason_for_a_stop_is_kept() -> None:
     drives = opened(Drives([fake_sub(1), fake_sub(2)], counts_per_turn=1))
     views = drives._views
     assert views is not None
@@ -255,7 +255,7 @@ def test_the_reason_of_a_stop_is_kept() -> None:
     assert drives.stopped == (None, StopReason.UNDERRUN)
 
 
-def test_a_statusword_that_codes_no_state_is_none() -> None:
+def test_the_state_of_an_invalid_statusword_is_none() -> None:
     drives = opened(Drives([fake_sub(1), fake_sub(2)], counts_per_turn=1))
     assert drives._views is not None
     drives._views.axis_state[:] = [state_of(0x0022), AxisState.FAULT]  # core: 255
@@ -263,7 +263,7 @@ def test_a_statusword_that_codes_no_state_is_none() -> None:
     assert drives.faults == (1,)
 
 
-def test_names_are_those_given() -> None:
+def test_the_given_names_are_used() -> None:
     arm = Drives(
         [fake_sub(3), fake_sub(4)],
         counts_per_turn=1000,

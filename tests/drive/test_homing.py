@@ -1,4 +1,4 @@
-"""Drives.home: mode 6 from the MainDevice's side, and what goes wrong."""
+"""Drives.home: homing in mode 6, and its errors."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -40,7 +40,7 @@ def opened(
 
 @pytest.mark.parametrize("run", ["threaded", "inline"])
 @pytest.mark.parametrize("mode", ["csp", "csv", "cst"])
-def test_here_is_home(run: str, mode: str) -> None:
+def test_method_37_makes_the_present_position_home(run: str, mode: str) -> None:
     servos = Servo(), Servo()
     method = HomingMethod(37)
     with opened(*servos, run=run, mode=mode, homing=method, at=0.5) as (arm, loop):
@@ -64,7 +64,7 @@ def test_an_offset_in_radians_and_one_axis_alone() -> None:
         assert arm.target.position == pytest.approx([0.3, 0.0], abs=1e-3)
 
 
-def test_a_method_the_drive_does_not_have() -> None:
+def test_a_method_that_the_drive_lacks() -> None:
     with opened(Servo(name="Left"), homing=HomingMethod(5)) as (arm, loop):
         with pytest.raises(DriveError, match=r"1 Left reports a homing error .*bit 13"):
             loop.wait(arm.home())
@@ -88,7 +88,7 @@ STOPS = """
 
 
 @pytest.mark.parametrize(("method", "stop"), [(-3, 0.4), (-4, -0.7)])
-def test_against_a_joints_hard_stop(tmp_path: Path, method: int, stop: float) -> None:
+def test_homing_against_a_hard_stop(tmp_path: Path, method: int, stop: float) -> None:
     (tmp_path / "finger.xml").write_text(STOPS)
     plant = Plant(tmp_path / "finger.xml", [Joint("finger", gear=10.0)])
     segment = cat.Segment([Servo(rated_torque=0.5)], plant=plant)
@@ -108,7 +108,7 @@ def test_against_a_joints_hard_stop(tmp_path: Path, method: int, stop: float) ->
             assert segment.plant.data.qpos[0] == pytest.approx(stop, abs=0.02)
 
 
-def test_a_stop_that_is_nowhere() -> None:
+def test_homing_fails_without_a_stop() -> None:
     method = HomingMethod(-3, speed=2.0, acceleration=20.0)
     with opened(Servo(name="Left"), homing=method) as (arm, loop):
         with pytest.raises(DriveError, match=r"1 Left was still moving after 0\.5 s"):
@@ -120,7 +120,7 @@ def test_a_stop_that_is_nowhere() -> None:
         assert arm.actual.position[0] == pytest.approx(1.0, abs=0.3)
 
 
-def test_an_axis_that_drops_out() -> None:
+def test_a_torque_off_during_homing_ends_it() -> None:
     servo = Servo(name="Left")
     with opened(servo, homing=HomingMethod(-3)) as (arm, loop):
         servo.switch_sto(True)
@@ -128,12 +128,12 @@ def test_an_axis_that_drops_out() -> None:
             loop.wait(arm.home())
 
 
-def test_drives_made_without_homing() -> None:
+def test_homing_needs_the_mode() -> None:
     with opened(Servo(), other_modes=[]) as (arm, _), pytest.raises(ValueError, match="'hm'"):
         arm.home()
 
 
-def test_numbers_of_the_objects() -> None:
+def test_the_settings_are_written_in_counts() -> None:
     """0x6098, 0x607C, 0x6099:01 and :02, 0x609A of slot 1, in counts after a gear of 2."""
     method = HomingMethod(-4, speed=1.0, slow=0.5, acceleration=10.0, offset=0.25)
     per_radian = 2000 / (2 * 3.141592653589793) * 2
@@ -155,6 +155,6 @@ def test_numbers_of_the_objects() -> None:
         ({"offset": float("nan")}, "offset=nan"),
     ],
 )
-def test_a_method_that_cannot_be(options: dict, message: str) -> None:
+def test_an_invalid_method_is_refused(options: dict, message: str) -> None:
     with pytest.raises(ValueError, match=message):
         HomingMethod(**options)

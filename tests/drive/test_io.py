@@ -1,4 +1,4 @@
-"""Process data by name."""
+"""Inputs and Outputs: process data as arrays and by name."""
 
 from dataclasses import replace
 from types import SimpleNamespace
@@ -14,7 +14,7 @@ from tests.plan.devices import servo
 
 
 def sub_of(position: int, direction: Direction, *pdos: Pdo) -> SimpleNamespace:
-    """A SubDevice with this process data in one direction."""
+    """Return a SubDevice with this process data in one direction."""
     assignments = (Assignment(sync_manager=0, pdos=pdos),)
     description = SimpleNamespace(
         position=position,
@@ -25,7 +25,7 @@ def sub_of(position: int, direction: Direction, *pdos: Pdo) -> SimpleNamespace:
 
 
 def terminal(position: int, direction: Direction, n: int, word: str) -> SimpleNamespace:
-    """Every channel a PDO of its own, all entries called alike, as terminals do."""
+    """Return channels in separate PDOs whose entries have the same name, as in many terminals."""
     pdos = [
         Pdo(0x1600 + i, (Entry(0x7000 + 0x10 * i, 1, 1, word, 1),), 0, name=f"Channel {i + 1}")
         for i in range(n)
@@ -40,7 +40,7 @@ def opened(io: Inputs | Outputs) -> tuple:
     return tables, views
 
 
-def test_a_lamp_goes_by_its_name_and_by_its_bit() -> None:
+def test_an_output_is_written_by_name_and_by_bit() -> None:
     lamps = Outputs(terminal(1, Direction.OUTPUT, 4, "Output"))
     assert lamps.names == (
         "Channel 1 Output",
@@ -56,7 +56,7 @@ def test_a_lamp_goes_by_its_name_and_by_its_bit() -> None:
     assert lamps["Channel 1 Output"] == 1
 
 
-def test_inputs_request_for_what_is_mapped_only() -> None:
+def test_inputs_request_only_mapped_objects() -> None:
     buttons = Inputs(terminal(2, Direction.INPUT, 2, "Input"))
     request = buttons.pdos(1_000_000)[2]
     assert request.outputs == ()
@@ -91,7 +91,7 @@ def test_analogue_values_are_raw_integers_or_scaled() -> None:
     assert volts["Value"] == 2.5
 
 
-def test_names_of_two_devices_stay_apart() -> None:
+def test_names_of_two_devices_are_distinct() -> None:
     both = Outputs(
         terminal(1, Direction.OUTPUT, 1, "Output"), terminal(4, Direction.OUTPUT, 1, "Output")
     )
@@ -102,7 +102,7 @@ def test_nameless_entries_are_numbered() -> None:
     assert unique_names([("", "", "3"), ("", "", "3")]) == ["3 value 1", "3 value 2"]
 
 
-def test_mistakes_name_the_channel() -> None:
+def test_errors_name_the_channel() -> None:
     sub = terminal(1, Direction.OUTPUT, 2, "Output")
     lamps = Outputs(sub)
     with pytest.raises(RuntimeError, match="before a Loop is open"):
@@ -123,12 +123,12 @@ def test_a_device_without_assigned_pdos_shows_its_choice() -> None:
     assert len(Inputs(sub, pdos=[0x1A00]).names) == 5
 
 
-def test_numbers_that_are_no_pdos_are_refused() -> None:
+def test_an_index_that_is_not_a_pdo_is_refused() -> None:
     with pytest.raises(ValueError, match="0x1C12 is not a PDO"):
         Inputs(terminal(1, Direction.INPUT, 1, "Input"), pdos=[0x1C12])
 
 
-def test_no_device_at_all_is_another_mistake() -> None:
-    """A group of which nobody has the alias is empty."""
+def test_an_empty_list_of_devices_has_its_own_error() -> None:
+    """A group is empty if no device has its alias."""
     with pytest.raises(ValueError, match="outputs: no device given"):
         Outputs()

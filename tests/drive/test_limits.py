@@ -1,4 +1,4 @@
-"""Limits and reactions of an axis: options, the drive's own limits, defaults."""
+"""Limits and reactions of an axis, from options, limits of the drive and defaults."""
 
 import math
 import warnings
@@ -50,7 +50,7 @@ def test_csv_and_cst_require_a_velocity_limit(options: dict[str, object]) -> Non
         Drives([fake_sub(3)], counts_per_turn=1, **options)  # type: ignore[arg-type]
 
 
-def test_an_infinite_velocity_limit_is_none() -> None:
+def test_an_infinite_velocity_limit_means_no_limit() -> None:
     axis = axis_of(mode="csv", velocity_limit=math.inf, deceleration_limit=5.0)
     assert axis.limits.velocity is None
     assert (axis.deceleration, axis.acceleration) == (5.0, 5.0)
@@ -93,12 +93,12 @@ def test_limits_must_be_positive(option: str, value: float) -> None:
 @pytest.mark.parametrize(
     "option", ["acceleration_limit", "deceleration_limit", "torque_slope", "step_limit"]
 )
-def test_what_shapes_the_fallback_must_be_finite(option: str) -> None:
+def test_options_of_the_fallback_must_be_finite(option: str) -> None:
     with pytest.raises(ValueError, match=f"3 Servo: {option} must be finite"):
         axis_of(**{option: math.inf})
 
 
-def test_other_impossible_options_are_refused() -> None:
+def test_other_invalid_options_are_refused() -> None:
     with pytest.raises(ValueError, match="position_min must be a number"):
         axis_of(position_min=math.nan)
     with pytest.raises(ValueError, match=r"3 Servo: position_min 1\.0 must be below"):
@@ -201,7 +201,7 @@ def test_the_limits_of_the_drive_only_tighten() -> None:
         assert bounds.velocity.source == source
 
 
-def test_position_limits_that_contradict_the_options_do_not_count() -> None:
+def test_position_limits_that_contradict_the_options_are_ignored() -> None:
     own = OwnLimits(position_min=2.0, position_max=3.0)
     bounds = make_bounds("a", LimitOptions(-1.0, 1.0, 1.0), [Mode.CSP], own, AxisUnits(1))
     assert (bounds.position_min.value, bounds.position_max.value) == (-1.0, 1.0)

@@ -1,11 +1,11 @@
-"""The set-point handshake of profile position, and what happens if a drive does not answer."""
+"""The set-point handshake of profile position, and its errors if a drive does not reply."""
 
 from __future__ import annotations
 
 import pytest
 
 from catenary.drive.motions import AT_ONCE, HALT, NEW_SET_POINT, move_profile, stop_profile
-from catenary.drive.port import AxisPort, Steps
+from catenary.drive.port import AxisFacts, AxisPort, Steps
 from catenary.drive.profile import Rates
 from catenary.drive.units import AxisUnits
 from catenary.errors import MoveError, SdoAbort
@@ -32,7 +32,7 @@ class Answer:
 
 
 class Rig:
-    """Owns one axis without a drive: the test sets its statusword."""
+    """One axis without a drive, whose statusword the test sets."""
 
     def __init__(self, *, refused: dict[int, int] | None = None) -> None:
         self.views = views_of(RequestTables(axes=(axis(0),)))
@@ -42,11 +42,7 @@ class Rig:
         self.port = AxisPort(
             self.views,
             0,
-            name="left",
-            units=AxisUnits(1000),
-            exchange=PERIOD,
-            period=PERIOD,
-            measures_velocity=True,
+            AxisFacts("left", AxisUnits(1000), PERIOD, PERIOD, measures_velocity=True),
             write=self.write,  # type: ignore[arg-type]
             put_rate=lambda name, value: False,
         )
@@ -70,7 +66,7 @@ class Rig:
         return False
 
 
-def test_each_level_is_held_until_the_drive_has_answered() -> None:
+def test_each_bit_keeps_its_level_until_the_drive_replies() -> None:
     rig = Rig()
     steps = move_profile(rig.port, 1.0, RATES)
     rig.run(steps, 50)
@@ -108,7 +104,7 @@ def test_a_rate_that_the_drive_refuses_ends_the_move_before_it_begins() -> None:
     rig = Rig(refused={0x6081: 0x06090030})
     with pytest.raises(SdoAbort):
         rig.run(move_profile(rig.port, 1.0, RATES), 3)
-    assert rig.bits == HALT  # a move before may still go on
+    assert rig.bits == HALT  # a previous move may still be running
 
 
 def test_a_set_point_that_is_not_acknowledged() -> None:
@@ -116,7 +112,7 @@ def test_a_set_point_that_is_not_acknowledged() -> None:
     with pytest.raises(MoveError, match=r"left did not acknowledge the set-point .*bit 12") as e:
         rig.run(move_profile(rig.port, 1.0, RATES), 1100)
     assert e.value.remaining == 1.0
-    assert rig.bits & HALT  # the drive may be on its way
+    assert rig.bits & HALT  # the drive may still be moving
 
 
 def test_a_drive_that_does_not_accept_another_set_point() -> None:
@@ -139,7 +135,7 @@ def test_a_target_that_is_never_reached() -> None:
     assert rig.bits == HALT
 
 
-def test_halt_ends_when_the_set_point_that_holds_is_acknowledged() -> None:
+def test_halt_ends_when_the_hold_set_point_is_acknowledged() -> None:
     rig = Rig()
     rig.views.actual_velocity[0] = 1.0
     steps = stop_profile(rig.port)
@@ -158,12 +154,12 @@ def test_halt_ends_when_the_set_point_that_holds_is_acknowledged() -> None:
     assert rig.bits == 0
 
 
-def test_a_drive_that_does_not_acknowledge_the_stop_stays_halted() -> None:
+def test_halt_stays_set_if_the_stop_is_not_acknowledged() -> None:
     rig = Rig()
     steps = stop_profile(rig.port)
     for _ in range(1000):
         rig.run(steps, 1)
-        assert rig.bits & HALT  # else it would go on to its old goal
+        assert rig.bits & HALT  # otherwise the drive would continue to its old goal
     with pytest.raises(MoveError, match="did not acknowledge"):
         rig.run(steps, 1000)
     assert rig.bits & HALT
@@ -172,7 +168,7 @@ def test_a_drive_that_does_not_acknowledge_the_stop_stays_halted() -> None:
 @pytest.mark.parametrize(
     ("acknowledged", "target", "start"), [(0.4, 0.4, 0.4), (0.4, 5.0, 0.39), (None, 0.4, 0.39)]
 )
-def test_a_target_that_a_drive_in_pp_does_not_know_is_no_start(
+def test_a_target_that_the_drive_has_not_received_is_not_a_start(
     acknowledged: float | None, target: float, start: float
 ) -> None:
     rig = Rig()
@@ -191,7 +187,7 @@ def test_an_axis_that_does_not_stop() -> None:
     assert rig.bits == HALT
 
 
-def test_a_set_point_in_the_middle_of_another_handshake_shows_bit_4_low_first() -> None:
+def test_a_set_point_during_another_handshake_first_clears_bit_4() -> None:
     rig = Rig()
     old = move_profile(rig.port, 1.0, RATES)
     rig.run(old, 2)
@@ -207,16 +203,12 @@ def test_a_set_point_in_the_middle_of_another_handshake_shows_bit_4_low_first() 
     assert rig.views.target_position[0] == 2.0
 
 
-def test_an_estimated_velocity_that_jumps_by_a_count_is_no_motion() -> None:
+def test_noise_of_an_estimated_velocity_is_not_a_motion() -> None:
     rig = Rig()
     coarse = AxisPort(
         rig.views,
         0,
-        name="left",
-        units=AxisUnits(1000),
-        exchange=PERIOD,
-        period=PERIOD,
-        measures_velocity=False,
+        AxisFacts("left", AxisUnits(1000), PERIOD, PERIOD, measures_velocity=False),
         write=rig.write,  # type: ignore[arg-type]
         put_rate=lambda name, value: False,
     )

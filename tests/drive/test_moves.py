@@ -1,4 +1,4 @@
-"""Moves: profiles of ours in CSP, the drive's in PP and PV, and how they end."""
+"""Moves: profiles of the loop in CSP, of the drive in PP and PV, and their results."""
 
 from __future__ import annotations
 
@@ -144,12 +144,12 @@ def test_a_stop_with_limited_jerk() -> None:
 
 
 @pytest.mark.parametrize("jerk", [None, 200.0])
-def test_a_new_move_goes_on_from_the_velocity_of_the_old_one(jerk: float | None) -> None:
+def test_a_new_move_continues_from_the_velocity_of_the_old_one(jerk: float | None) -> None:
     with opened(Servo(), Servo()) as (arm, loop):
         old = arm.move_to(2.0, velocity=1.0, acceleration=5.0, jerk=jerk)
         loop_for(loop, 0.5)
         new = arm.move_to(0.0, velocity=0.5, acceleration=5.0, jerk=jerk, axes=0)
-        assert not old.done  # its other axis goes on
+        assert not old.done  # its other axis continues
         sent = trace(loop, new, lambda: arm.target.position.item(0))
         assert rates(sent)[1] < 5.2
         with pytest.raises(
@@ -169,7 +169,7 @@ def test_move_by_counts_from_the_goal() -> None:
         assert arm.actual.position[0] == pytest.approx(0.3, abs=1e-3)
 
 
-def test_a_move_that_begins_in_motion_goes_on_at_that_velocity() -> None:
+def test_a_move_of_a_moving_axis_starts_at_its_velocity() -> None:
     with opened(Servo()) as (arm, loop):
         for cycle in loop:
             arm.target.position[:] += 0.5e-3
@@ -193,7 +193,7 @@ def test_late_iterations_do_not_slow_a_move_down() -> None:
         assert arm.actual.position[0] == pytest.approx(1.0, abs=1e-3)
 
 
-def test_after_a_long_pause_a_move_goes_on_at_its_own_velocity() -> None:
+def test_after_a_long_pause_a_move_continues_within_its_velocity() -> None:
     with opened(Servo(), stop=StopPolicy(late_limit=0)) as (arm, loop):
         move = arm.move_to(0.5, velocity=0.1)
         loop_for(loop, 1.0).spend(3.0)
@@ -215,7 +215,7 @@ def test_a_move_with_too_little_acceleration_to_stop_before_a_limit() -> None:
         loop.wait(arm.move_to(0.5, acceleration=0.5))
 
 
-def test_a_written_target_is_no_start_of_a_move_in_pp() -> None:
+def test_a_written_target_is_not_the_start_of_a_move_in_pp() -> None:
     with opened(Servo(), mode="pp") as (arm, loop):
         arm.target.position[:] = 0.5  # it has no effect
         loop_for(loop, 0.1)
@@ -226,7 +226,7 @@ def test_a_written_target_is_no_start_of_a_move_in_pp() -> None:
 
 
 @pytest.mark.parametrize("mode", ["csp", "pp"])
-def test_a_goal_that_was_given_up_is_no_start(mode: str) -> None:
+def test_the_goal_of_a_stopped_move_is_not_a_start(mode: str) -> None:
     with opened(Servo(), mode=mode) as (arm, loop):
         move = arm.move_to(2.0, velocity=0.5)
         loop_for(loop, 1.0)
@@ -254,7 +254,7 @@ def test_a_stop_may_be_requested_in_the_middle_of_a_step(monkeypatch: pytest.Mon
         assert move.outcome == "stopped"
 
 
-def test_axes_by_their_numbers() -> None:
+def test_axes_are_selected_by_number() -> None:
     with opened(Servo(), Servo(), Servo()) as (arm, loop):
         loop.wait(arm.move_to(0.1, axes=(0, 2)))
         assert arm.actual.position == pytest.approx([0.1, 0.0, 0.1], abs=1e-3)
@@ -285,7 +285,7 @@ def test_no_move_while_a_stream_sets_the_targets() -> None:
         stream.close()
         next(loop)
         move = arm.move_to(0.1)
-        with pytest.raises(RuntimeError, match="a stream cannot begin during a move"):
+        with pytest.raises(RuntimeError, match="a stream cannot start during a move"):
             loop.stream(100)
         loop.wait(move)
         loop.stream(100)
@@ -305,7 +305,7 @@ def test_a_law_that_begins_after_the_request_ends_the_move() -> None:
         assert arm.actual.position[0] == pytest.approx(0.0, abs=1e-3)
 
 
-# ---- what cannot be
+# ---- invalid requests
 
 
 @pytest.mark.parametrize(
@@ -343,10 +343,10 @@ def test_an_axis_that_is_not_enabled() -> None:
             arm.move_to(0.5)
 
 
-# ---- how a move ends otherwise
+# ---- other ends of a move
 
 
-def test_a_fault_ends_the_move_and_names_the_rest() -> None:
+def test_a_fault_ends_the_move_and_reports_the_remaining_distance() -> None:
     servo = Servo(name="Left")
     with opened(servo, stop=StopPolicy(raise_faults=False)) as (arm, loop):
         move = arm.move_to(1.0, velocity=1.0)
@@ -434,7 +434,7 @@ def test_another_mode_ends_the_move() -> None:
             loop.wait(move)
 
 
-def test_drives_without_a_move_cost_the_iteration_nothing() -> None:
+def test_drives_without_a_move_add_no_work_to_the_iteration() -> None:
     with opened(Servo()) as (arm, loop):
         movers = loop._opened.views.movers
         assert movers == []
@@ -447,7 +447,7 @@ def test_drives_without_a_move_cost_the_iteration_nothing() -> None:
 # ---- PP and PV
 
 
-def test_pp_hands_the_rates_over_by_sdo() -> None:
+def test_pp_writes_the_rates_by_sdo() -> None:
     servo = Servo()
     with opened(servo, mode="pp", gear_ratio=10.0, direction=-1) as (arm, loop):
         move = arm.move_to(0.3, velocity=0.5, acceleration=2.0)
@@ -517,7 +517,7 @@ def test_moves_in_every_execution_and_with_a_divider(
         assert truth == pytest.approx([0.0] * 3, abs=1e-3)
 
 
-def test_a_stop_in_pp_halts_and_does_not_go_on() -> None:
+def test_a_stop_in_pp_halts_and_holds() -> None:
     servo = Servo()
     with opened(servo, mode="pp") as (arm, loop):
         move = arm.move_to(1.0, velocity=0.5, acceleration=2.0)

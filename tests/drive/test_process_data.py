@@ -19,7 +19,7 @@ SENSOR, TERMINAL, SERVO = 1, 2, 3
 
 
 class Cell:
-    """Owns a segment and its MainDevice."""
+    """A segment and its MainDevice."""
 
     def __init__(self) -> None:
         self.sensor, self.terminal, self.servo = ForceSensor(), DigitalOutputs(), TunedServo()
@@ -88,7 +88,7 @@ def test_nothing_is_written_to_the_device(cell: Cell) -> None:
     assert cell.main.plan(raw).devices[SENSOR].downloads == ()
 
 
-def test_objects_that_are_not_mapped_get_mapped(cell: Cell) -> None:
+def test_unmapped_objects_are_mapped(cell: Cell) -> None:
     """Without `pdos` the planner searches."""
     sensor = ProcessData(
         cell.main.subs[SENSOR],
@@ -123,7 +123,7 @@ def test_named_inputs_are_columns_for_laws_and_recordings(cell: Cell) -> None:
     assert (column.name, column.device) == ("rate", SENSOR)
 
 
-def test_pdos_by_names_and_as_before(cell: Cell) -> None:
+def test_pdos_with_entries_by_name_and_unchanged(cell: Cell) -> None:
     sub = cell.main.subs[SENSOR]
     named = ProcessData(
         sub,
@@ -163,7 +163,7 @@ def test_a_divider_and_a_device_that_is_not_required(cell: Cell) -> None:
         assert cell.sensor.lamp == 9
 
 
-def test_mistakes_are_told_before_anything_is_sent(cell: Cell) -> None:
+def test_invalid_options_are_refused_before_anything_is_sent(cell: Cell) -> None:
     sub = cell.main.subs[SENSOR]
     both = {"x": (0x6000, 0x12, types.INT)}
     with pytest.raises(ValueError, match="'x' names an input and an output"):
@@ -180,9 +180,9 @@ def test_mistakes_are_told_before_anything_is_sent(cell: Cell) -> None:
         cell.main.plan(ProcessData(sub, safe=b"\x01\x02"))
 
 
-def test_arguments_of_another_kind_are_named(cell: Cell) -> None:
+def test_arguments_of_the_wrong_type_are_refused(cell: Cell) -> None:
     sub = cell.main.subs[SENSOR]
-    wrong: Any = cell.main.subs  # type checkers refuse all of these, too
+    wrong: Any = cell.main.subs  # type checkers also refuse these arguments
     with pytest.raises(TypeError, match=r"ProcessData takes SubDevices.*not <\d SubDevices"):
         ProcessData(wrong)
     for wrong in ([1], 3):
@@ -217,7 +217,7 @@ def test_names_can_be_iterated(cell: Cell) -> None:
         _ = raw[number]
 
 
-def test_text_is_not_a_truth_value(cell: Cell) -> None:
+def test_text_is_not_a_boolean(cell: Cell) -> None:
     text: Any = "off"
     with pytest.raises(TypeError, match=r"safe\['Tare'\] = 'off': BOOL: 'off' is text"):
         ProcessData(cell.main.subs[SENSOR], safe={"Tare": text})
@@ -228,7 +228,7 @@ def test_text_is_not_a_truth_value(cell: Cell) -> None:
         assert raw["Tare"] is False
 
 
-def test_values_that_cannot_be(cell: Cell) -> None:
+def test_invalid_values_are_refused(cell: Cell) -> None:
     raw = ProcessData(cell.main.subs[SENSOR])
     with pytest.raises(RuntimeError, match=r"ProcessData\(1 Force sensor\) has no values before"):
         _ = raw.inputs
@@ -260,7 +260,7 @@ def test_a_byte_that_two_requests_write(cell: Cell) -> None:
         cell.main.plan(lamp, ProcessData(sub))
 
 
-def test_a_request_that_only_reads_goes_with_another(cell: Cell) -> None:
+def test_a_read_only_request_combines_with_another(cell: Cell) -> None:
     sub = cell.main.subs[SENSOR]
     lamp = Outputs(sub, channels={"lamp": (0x7010, 0, types.UINT)})
     tare = Outputs(sub, channels={"tare": (0x7000, 1, types.BOOL)})

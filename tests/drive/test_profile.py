@@ -1,4 +1,4 @@
-"""Profiles of one axis: every one ends at rest at its goal, and keeps its rates."""
+"""Profiles of one axis: each ends at rest at its goal and keeps its rates."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def samples(profile: Profile) -> list[Motion]:
 
 
 def check_motion(profile: Profile, start: Motion, rates: Rates, speed: float) -> None:
-    """Continuous, within the rates, at rest in the end."""
+    """Check that a profile is continuous, keeps its rates, and ends at rest."""
     step = profile.duration / STEPS
     for before, after in pairwise(samples(profile)):
         assert abs(after.velocity) <= speed * (1 + 1e-6) + 1e-9
@@ -62,13 +62,13 @@ def test_limited_jerk(
     check_motion(make_stop(start, rates), start, rates, abs(velocity))
 
 
-def test_a_start_that_is_too_fast_slows_down_first() -> None:
+def test_a_start_above_the_velocity_limit_decelerates_first() -> None:
     profile = make_profile(Motion(0.0, 2.0), 5.0, Rates(1.0, 4.0))
     assert profile.at(0.25).velocity == pytest.approx(1.0)
     assert profile.at(1.0).velocity == pytest.approx(1.0)
 
 
-def test_no_way_at_all() -> None:
+def test_a_profile_of_no_distance() -> None:
     profile = make_profile(Motion(1.0), 1.0, Rates(1.0, 1.0))
     assert profile.duration == 0.0
     assert profile.at(0.0) == Motion(1.0)

@@ -1,4 +1,4 @@
-"""Rates in the process data: what they begin with, and what is left to the application."""
+"""Initial values of the rates in the process data."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def presets(names: object, **options: Any) -> dict[str, float]:
             return {name: arm.target[name].item(0) for name in list(names)}  # type: ignore[call-overload]
 
 
-def test_rates_begin_with_the_limits() -> None:
+def test_rates_are_initialised_with_the_limits() -> None:
     names = ["profile_velocity", "profile_acceleration", "profile_deceleration"]
     found = presets(names, mode="pp", acceleration_limit=4.0)
     assert found == pytest.approx(dict(zip(names, (2.0, 4.0, 4.0), strict=True)))
@@ -37,10 +37,12 @@ def test_rates_begin_with_the_limits() -> None:
         ({"torque_limit": 0.5, "direction": -1}, 0.5),
     ],
 )
-def test_max_torque_begins_with_the_torque_limit(options: dict[str, Any], torque: float) -> None:
+def test_max_torque_is_initialised_with_the_torque_limit(
+    options: dict[str, Any], torque: float
+) -> None:
     assert presets(["max_torque"], **options) == pytest.approx({"max_torque": torque})
 
 
-def test_an_object_with_a_type_of_its_own_is_the_applications() -> None:
+def test_an_object_with_another_type_is_not_initialised() -> None:
     own = {"max_torque": (0x6072, 0, types.UINT)}
     assert presets(own) == {"max_torque": 0}

@@ -1,4 +1,4 @@
-"""Reactions of a drive: option codes read in PRE-OP, CST without a quick stop that brakes."""
+"""Reactions of a drive: option codes from PRE-OP, and CST with a quick stop that may not brake."""
 
 import pytest
 
@@ -34,11 +34,11 @@ def lines(**codes: int) -> tuple[str, ...]:
         (9, "quick stop: reserved code (0x605A = 9)"),
     ],
 )
-def test_a_quick_stop_in_words(code: int, text: str) -> None:
+def test_the_text_of_a_quick_stop(code: int, text: str) -> None:
     assert lines(quick_stop=code)[0] == text
 
 
-def test_the_other_reactions_in_words() -> None:
+def test_the_text_of_the_other_reactions() -> None:
     assert lines(disable_operation=1, fault_reaction=2, abort_connection=3) == (
         "quick stop: unknown (0x605A cannot be read)",
         "disable operation: slow down on the slow down ramp, then disable the drive function "
@@ -69,8 +69,8 @@ def test_an_object_of_another_size_is_unreadable(monkeypatch: pytest.MonkeyPatch
     assert read_settings([(fake_sub(1, {(0x605A, 0): 2}), 0)]) == [DriveSettings()]
 
 
-def test_real_frames_bring_the_same() -> None:
-    """Two axes of a virtual servo: all objects of all devices in one conversation each."""
+def test_settings_over_frames_are_the_same() -> None:
+    """The settings of two axes of a virtual servo, read over frames."""
     with cat.MainDevice(cat.Segment([cat.virtual.Servo(axes=2), cat.virtual.Servo()])) as main:
         first, second = main.scan()
         first.sdo.write(0x685A, 0, 6, type=INT)
@@ -153,7 +153,7 @@ def test_demand_values_are_used_where_they_are_mapped_and_never_requested() -> N
     assert axis.torque_demand.scale == pytest.approx(0.64e-3)
 
 
-def test_the_velocity_offset_counts_only_as_a_column() -> None:
+def test_the_velocity_offset_is_used_only_as_a_column() -> None:
     for columns in ([], ["velocity_offset"]):
         drives = Drives([fake_sub(3)], counts_per_turn=1, velocity_limit=1.0, columns=columns)
         layout = FakeLayout.of(dict(drives.pdos(MILLISECOND)))

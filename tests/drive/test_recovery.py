@@ -1,4 +1,4 @@
-"""Drives that were stopped and are led back, on a virtual segment."""
+"""Recovery of stopped drives on a virtual segment."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ MS = 1e-3
 
 
 class Rig:
-    """Two drives in a loop that go on to the first second after they were led back."""
+    """Two drives in a loop, and their recovery."""
 
     def __init__(self, segment: cat.Segment, arm: cat.Drives, loop: cat.Loop, **options: float):
         self.segment, self.arm, self.loop = segment, arm, loop
@@ -56,7 +56,7 @@ def rig(*faults: object, **options: float) -> Iterator[Rig]:
 STARTING, RUNNING, STOPPED = cat.drive.Phase
 
 
-def test_a_reason_is_a_quick_stop_and_its_end_an_enabling() -> None:
+def test_a_reason_causes_a_quick_stop_and_its_end_an_enable() -> None:
     with rig(after=0.1) as there:
         there.run(300, lambda now: "key" if 0.1 <= now < 0.15 else None)
         assert there.phases == [RUNNING, STOPPED, STARTING, RUNNING]
@@ -65,7 +65,7 @@ def test_a_reason_is_a_quick_stop_and_its_end_an_enabling() -> None:
         assert there.states() == ["OPERATION ENABLED"] * 2
 
 
-def test_while_the_reason_lasts_nothing_moves() -> None:
+def test_nothing_moves_while_the_reason_holds() -> None:
     with rig(after=0.1) as there:
         there.run(400, lambda now: "key" if now >= 0.1 else None)
         assert there.phases == [RUNNING, STOPPED]
@@ -74,7 +74,7 @@ def test_while_the_reason_lasts_nothing_moves() -> None:
 
 
 @pytest.mark.parametrize("lasting", [0.01, 0.7])
-def test_faults_are_reset_until_their_cause_is_gone(lasting: float) -> None:
+def test_faults_are_reset_until_their_cause_ends(lasting: float) -> None:
     with rig(drive_fault(1, at=1.0, for_=lasting), after=0.1) as there:
         there.run(2500, lambda now: "drive fault" if there.arm.faults else None)
         assert there.phases == [RUNNING, STOPPED, STARTING, RUNNING]
@@ -101,7 +101,7 @@ def test_drives_that_cannot_be_enabled_are_named() -> None:
         there.run(5000, lambda now: "safe torque off" if 1.0 < now < 1.1 else None)
 
 
-def test_what_is_waited_for_is_said() -> None:
+def test_the_error_for_drives_that_are_not_ready() -> None:
     with (
         pytest.raises(DriveError, match="all drives are enabled, but not ready"),
         rig(patience=0.2) as there,
@@ -110,7 +110,7 @@ def test_what_is_waited_for_is_said() -> None:
 
 
 def test_patience_begins_with_the_first_step() -> None:
-    """Not with the loop, which may have run for long before."""
+    """The loop may have run for a long time before the first step."""
     with rig(patience=0.2) as there:
         for cycle in there.loop:
             if cycle.number == 500:
@@ -120,6 +120,6 @@ def test_patience_begins_with_the_first_step() -> None:
 
 
 @pytest.mark.parametrize("options", [{"after": -1.0}, {"patience": 0.0}])
-def test_times_must_be_possible(options: dict[str, float]) -> None:
+def test_invalid_times_are_refused(options: dict[str, float]) -> None:
     with pytest.raises(ValueError, match="must be positive"), rig(**options):
         pass

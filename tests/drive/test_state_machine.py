@@ -1,4 +1,4 @@
-"""The CiA 402 step: its table against the standard's machine, and against its compiled twin."""
+"""The CiA 402 step, compared with the state machine of the standard and with the compiled step."""
 
 import pytest
 
@@ -6,7 +6,7 @@ from catenary import core
 from catenary.drive.state_machine import RequestedState, controlword_towards
 from catenary.wire.cia402 import COMMANDS, TRANSITIONS, AxisState, state_of
 
-# The drive's side, by the standard's own table of transitions (IEC 61800-7-201 table 29).
+# Transitions of the drive, by the table of the standard (IEC 61800-7-201 table 29).
 BY_ITSELF = {
     AxisState.NOT_READY_TO_SWITCH_ON: AxisState.SWITCH_ON_DISABLED,  # transition 1
     AxisState.FAULT_REACTION_ACTIVE: AxisState.FAULT,  # transition 14
@@ -14,7 +14,7 @@ BY_ITSELF = {
 
 
 def obey(state: AxisState, controlword: int, previous: int) -> AxisState:
-    """What a drive does with a controlword, by the standard's table of transitions."""
+    """Return the next state of a drive, by the transition table of the standard."""
     if state in BY_ITSELF:
         return BY_ITSELF[state]
     for transition in TRANSITIONS:
@@ -28,7 +28,7 @@ def obey(state: AxisState, controlword: int, previous: int) -> AxisState:
 
 
 def walk(state: AxisState, requested_state: RequestedState, previous: int) -> list[AxisState]:
-    """The states a drive goes through when it is led towards a requested_state."""
+    """Return the states that a drive passes through towards a requested state."""
     path = [state]
     for _ in range(12):
         word = controlword_towards(state, requested_state, previous)
@@ -54,7 +54,7 @@ def test_disabled_ends_without_power(state: AxisState) -> None:
     assert end in (AxisState.SWITCH_ON_DISABLED, AxisState.READY_TO_SWITCH_ON)
 
 
-def test_a_fault_is_kept_until_somebody_asks() -> None:
+def test_a_fault_remains_until_a_reset_is_requested() -> None:
     assert (
         walk(AxisState.FAULT_REACTION_ACTIVE, RequestedState.DISABLED, 0x000F)[-1]
         is AxisState.FAULT
@@ -63,7 +63,7 @@ def test_a_fault_is_kept_until_somebody_asks() -> None:
     assert walk(AxisState.FAULT, RequestedState.RESET, 0x000F)[-1] is AxisState.SWITCH_ON_DISABLED
 
 
-def test_quick_stop_stays_until_told_otherwise() -> None:
+def test_a_quick_stop_remains_until_another_request() -> None:
     assert (
         walk(AxisState.OPERATION_ENABLED, RequestedState.QUICK_STOP, 0x000F)[-1]
         is AxisState.QUICK_STOP_ACTIVE
@@ -80,14 +80,14 @@ def test_enabling_out_of_a_quick_stop_goes_through_the_whole_machine() -> None:
     assert path[-1] is AxisState.OPERATION_ENABLED
 
 
-def test_only_commands_of_the_standard_are_given() -> None:
+def test_only_commands_of_the_standard_are_sent() -> None:
     for state in AxisState:
         for requested_state in RequestedState:
             word = controlword_towards(state, requested_state, 0)
             assert any(command.matches(word) for command in COMMANDS)
 
 
-def test_an_unknown_state_gets_no_voltage() -> None:
+def test_an_unknown_state_disables_the_voltage() -> None:
     assert controlword_towards(None, RequestedState.ENABLED, 0x000F) == 0
 
 

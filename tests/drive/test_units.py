@@ -1,4 +1,4 @@
-"""Raw numbers to SI and back."""
+"""Conversion of raw numbers to SI units and back."""
 
 import math
 
@@ -23,18 +23,18 @@ def test_one_motor_turn_is_one_turn_at_a_joint_without_gear() -> None:
     assert (position.bit_offset, position.bit_length) == (24, 32)
 
 
-def test_gear_direction_and_offset_are_the_joints() -> None:
+def test_gear_direction_and_offset() -> None:
     units = AxisUnits(counts_per_turn=1000, gear_ratio=50, direction=-1, offset=0.5)
     assert si(units.apply(RAW, Unit.POSITION), 50_000) == pytest.approx(0.5 - 2 * math.pi)
     assert si(units.apply(RAW, Unit.DISTANCE), 50_000) == pytest.approx(-2 * math.pi)
 
 
-def test_velocity_is_in_counts_per_second_unless_said() -> None:
+def test_velocity_is_in_counts_per_second_by_default() -> None:
     units = AxisUnits(counts_per_turn=1000, gear_ratio=10)
     assert si(units.apply(RAW, Unit.VELOCITY), 10_000) == pytest.approx(2 * math.pi)
 
 
-def test_velocity_may_have_a_unit_of_its_own() -> None:
+def test_velocity_may_have_another_unit() -> None:
     rpm = AxisUnits(counts_per_turn=1000, gear_ratio=10, velocity_unit=2 * math.pi / 60)
     assert si(rpm.apply(RAW, Unit.VELOCITY), 600) == pytest.approx(2 * math.pi)
 
@@ -61,7 +61,7 @@ def test_torque_without_a_rated_torque_is_refused() -> None:
         {"rated_torque": -1},
     ],
 )
-def test_what_cannot_be_is_refused(wrong: dict[str, float]) -> None:
+def test_invalid_units_are_refused(wrong: dict[str, float]) -> None:
     with pytest.raises(ValueError, match=next(iter(wrong))):
         AxisUnits(**{"counts_per_turn": 1000, **wrong})
 
@@ -73,7 +73,7 @@ def test_what_cannot_be_is_refused(wrong: dict[str, float]) -> None:
     offset=st.floats(-10, 10),
     raw=st.integers(-(2**31), 2**31 - 1),
 )
-def test_position_comes_back(
+def test_positions_round_trip(
     counts: float, gear: float, direction: int, offset: float, raw: int
 ) -> None:
     number = AxisUnits(counts, gear, direction, offset).apply(RAW, Unit.POSITION)
@@ -87,11 +87,11 @@ def test_per_axis_repeats_one_value_or_takes_one_each() -> None:
         per_axis("gear_ratio", [1.0, 2.0], 3)
 
 
-def test_a_linear_axis_has_metres_per_turn_of_the_output_side() -> None:
+def test_a_linear_axis_has_metres_per_turn_of_the_gear_output() -> None:
     units = AxisUnits(counts_per_turn=4096, gear_ratio=2, metres_per_turn=0.01, rated_torque=0.5)
     assert si(units.apply(RAW, Unit.POSITION), 2 * 4096) == pytest.approx(0.01)
     assert si(units.apply(RAW, Unit.VELOCITY), 2 * 4096) == pytest.approx(0.01)
-    force = 0.5 * 2 * 2 * math.pi / 0.01  # power is kept: F · 0.01 m = M · 2 turns
+    force = 0.5 * 2 * 2 * math.pi / 0.01  # the work is the same: F · 0.01 m = M · 2 turns
     assert si(units.apply(RAW, Unit.TORQUE), 1000) == pytest.approx(force)
     assert units.names.torque == "N"
     assert units.defaults.velocity_limit == 0.1

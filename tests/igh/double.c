@@ -1,7 +1,7 @@
-/* A double of libethercat: n CiA 402 drives that obey, every call recorded in order.
+/* Test double of libethercat with n working CiA 402 drives. All calls are recorded in order.
  *
- * `status` functions return -5 (-EIO) in a build whose header says void: whoever reads that is
- * wrong. What a test arranges goes through the double_* functions at the end.
+ * In a build with void functions, these leave -5 (-EIO) in the return register, which must not be
+ * read. Tests control the double by the double_* functions at the end.
  */
 #include "double.h"
 
@@ -17,7 +17,7 @@
 enum { SLAVES = 64, OBJECTS = 40, PDO_ENTRIES = 16, DOMAINS = 64, CLIMB = 3, ANSWER_AFTER = 2 };
 enum { PREOP = 2, SAFEOP = 4, OP = 8 };
 
-#if defined(RETURNS_VOID) && defined(__x86_64__)  /* what such a function leaves in the register */
+#if defined(RETURNS_VOID) && defined(__x86_64__)  /* value left in the return register */
 #define DONE(value) do { register long garbage __asm__("rax") = -EIO; \
                          __asm__ volatile("" : "+r"(garbage)); (void)(value); return; } while (0)
 #elif defined(RETURNS_VOID)
@@ -37,8 +37,8 @@ typedef struct {
     int al, error, online, sends;
     int alias, clockless, plain;  /* plain: no mailbox, its outputs in SyncManager 0 */
     int unacknowledged;           /* sends until the master has acknowledged its error */
-    int booting;                  /* looks until the master has brought it to PRE-OP */
-    int staying;                  /* looks at it after a deactivation until it leaves OP */
+    int booting;                  /* reads until the master has brought it to PRE-OP */
+    int staying;                  /* reads after a deactivation until it leaves OP */
     uint8_t emergencies[16][8];
     int first_emergency, last_emergency;
 } slave;
@@ -79,11 +79,11 @@ static struct {
     int climb;                    /* sends from one state to the next */
     int lingering;                /* `staying` of all devices when the master is deactivated */
     uint32_t refusal;             /* abort code of downloads to 0x1C32 */
-    uint32_t delay_to_next;       /* of every device, as measured [ns] */
-    int mainless;                 /* answers come by the backup interface: no monitor datagram */
+    uint32_t delay_to_next;       /* measured delay of every device [ns] */
+    int mainless;                 /* answers return on the backup interface: no monitor datagram */
     int closed_ring;              /* the last device's second port leads to a backup interface */
     volatile int blocked;         /* position whose objects do not answer, plus one */
-    uint64_t reference;           /* the reference clock as the last frame found it; 0: as told */
+    uint64_t reference;           /* reference time in the last frame; 0: the application time */
     slave all[SLAVES];
     char *record;
     size_t length, room;
@@ -129,7 +129,7 @@ static void pause_a_little(void)
     nanosleep(&nap, NULL);
 }
 
-/* ---- objects and drives */
+/* Objects and drives */
 
 static object *find(slave *s, uint16_t index, uint8_t subindex)
 {
@@ -229,7 +229,7 @@ static void move(slave *s, const pdo_map *map, uint8_t *bytes, int to_bytes)
     }
 }
 
-/* ---- the master */
+/* Master */
 
 unsigned int ecrt_version_magic(void) { return VERSION_MAGIC; }
 
@@ -398,7 +398,7 @@ static int upload(int position, uint16_t index, uint8_t subindex, uint8_t *targe
         return -EPROTONOSUPPORT;
     if (bus.silent > 0 && bus.silent--)
         return -EIO;
-    if (bus.all[position].al < PREOP)  /* as the real one: nobody answers in INIT */
+    if (bus.all[position].al < PREOP)  /* in INIT, devices do not answer */
         return -EIO;
     if (o == NULL) {
         *abort_code = 0x06020000;
@@ -431,7 +431,7 @@ int ecrt_master_sdo_download(ec_master_t *m, uint16_t position, uint16_t index, 
         pause_a_little();
     *abort_code = 0;
     if (o != NULL && index == 0x1C32 && (bus.refusal || bus.all[position].al != PREOP)) {
-        *abort_code = bus.refusal ? bus.refusal : 0x08000022;  /* in this state: not now */
+        *abort_code = bus.refusal ? bus.refusal : 0x08000022;  /* cannot be transferred in this state */
         return -EIO;
     }
     if (o == NULL || size != (size_t)(o->bits + 7) / 8) {
@@ -462,7 +462,7 @@ status ecrt_master_deactivate(ec_master_t *m)
 {
     note("deactivate");
     for (int k = 0; k < bus.slaves; k++) {
-        if ((bus.all[k].staying = bus.lingering) == 0)  /* the real one leads them down later */
+        if ((bus.all[k].staying = bus.lingering) == 0)  /* the real master brings them down later */
             bus.all[k].al = PREOP;
         bus.all[k].sends = 0;
     }
@@ -483,7 +483,7 @@ static void answer_requests(ec_master_t *m)
         ec_sdo_request_t *r = &m->sdos[k];
         uint32_t code;
         if (!bus.all[r->position].online)
-            continue;             /* nobody looks at the requests of a device that is not there */
+            continue;             /* requests of a missing device are not processed */
         if (r->state == EC_REQUEST_BUSY && --r->pending == 0)
             r->state = upload(r->position, r->index, r->subindex, r->data, r->room, &r->size, &code)
                 ? EC_REQUEST_ERROR : EC_REQUEST_SUCCESS;
@@ -633,7 +633,7 @@ uint32_t ecrt_master_sync_monitor_process(ec_master_t *m)
     return m->monitored ? bus.spread & 0x7FFFFFFF : UINT32_MAX;
 }
 
-/* ---- configurations */
+/* Configurations */
 
 int ecrt_slave_config_sync_manager(ec_slave_config_t *c, uint8_t sync, ec_direction_t direction,
                                    ec_watchdog_mode_t watchdog)
@@ -753,7 +753,7 @@ status ecrt_slave_config_state(const ec_slave_config_t *c, ec_slave_config_state
     DONE(0);
 }
 
-/* ---- domains and requests */
+/* Domains and requests */
 
 uint8_t *ecrt_domain_data(ec_domain_t *d) { return the_master->active ? d->data : NULL; }
 size_t ecrt_domain_size(const ec_domain_t *d) { return d->size; }
@@ -852,11 +852,11 @@ int ecrt_slave_config_state_timeout(ec_slave_config_t *c, unsigned int from, uns
 }
 #endif
 
-/* ---- what a test arranges and asks */
+/* Controls for tests */
 
 void double_reset(int slaves);
 
-/* For programs that know nothing of a double: so many slaves from the start. */
+/* Number of slaves at the start, for programs without controls of the double. */
 __attribute__((constructor)) static void double_begin(void)
 {
     const char *slaves = getenv("DOUBLE_SLAVES");
@@ -914,7 +914,7 @@ void double_boot(int looks)
     }
 }
 void double_alias(int position, int alias) { bus.all[position].alias = alias; }
-/* Two devices are plugged in the other way round. */
+/* Exchange two devices. */
 void double_swap(int a, int b)
 {
     slave between = bus.all[a];

@@ -1,7 +1,7 @@
-/* The interface of a double of libethercat, written from the numbers of abi.json.
+/* Interface of a test double of libethercat, written from the numbers of abi.json.
  *
- * Compiled with VERSION_MAGIC and, for releases whose header says void where later ones say int,
- * with RETURNS_VOID; with RELEASE 2 (1.5.2), 3 (1.5.3), 60 (1.6.0 and later).
+ * It is compiled with VERSION_MAGIC, with RETURNS_VOID for releases with void functions, and with
+ * RELEASE 2 (1.5.2), 3 (1.5.3) or 60 (1.6.0 and later).
  */
 #ifndef DOUBLE_H
 #define DOUBLE_H

@@ -1,4 +1,4 @@
-"""The double of libethercat: built once a session for each interface, arranged by its test.
+"""Test double of libethercat, built once per session for each interface.
 
 python -m tests.igh.double FOLDER       builds that of 1.6.1 and prints its path
 """
@@ -22,7 +22,7 @@ DEFINES = {
 
 
 def build(folder: Path, release: str, *more: str) -> Path:
-    """Compiles the double with the interface of a release."""
+    """Compile the double with the interface of a release."""
     path = folder / f"libethercat-{release}.so.1"
     compiler = shutil.which("cc") or "gcc"
     flags = ("-shared", "-fPIC", "-O2", "-Wall", "-Wextra", "-Werror")
@@ -37,7 +37,7 @@ def build(folder: Path, release: str, *more: str) -> Path:
 
 
 class Double:
-    """Owns the double's own knobs, of a library that somebody else has loaded too."""
+    """Owns the controls of a double in a library that is loaded elsewhere, too."""
 
     def __init__(self, path: Path, slaves: int = 2) -> None:
         self.path = path
@@ -49,11 +49,11 @@ class Double:
         self._library.double_reset(slaves)
 
     def calls(self) -> list[str]:
-        """What was called, in order, with what matters of the arguments."""
+        """Calls in order, with the relevant arguments."""
         return self._library.double_calls().decode().splitlines()
 
     def changes(self) -> list[str]:
-        """The same without those that only look for devices and their states."""
+        """Calls without those that only read devices and their states."""
         looks = ("master", "get_slave", "sdo_upload")
         return [call for call in self.calls() if not call.startswith(looks)]
 

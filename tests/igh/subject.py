@@ -1,7 +1,7 @@
-"""The master under test: a double of libethercat, or the real one that CATENARY_IGH names.
+"""The master under test: a double of libethercat, or the real one selected by CATENARY_IGH.
 
-CATENARY_IGH=0          the kernel's master 0, by the library found, or CATENARY_LIBETHERCAT's
-CATENARY_IGH_PERIOD=    [s] of its loops, where the machine is slow: else 2 ms
+CATENARY_IGH=0          the kernel's master 0, with a found library or CATENARY_LIBETHERCAT
+CATENARY_IGH_PERIOD=    [s] of its loops, for a slow machine; 2 ms by default
 CATENARY_IGH_MOVE=1     drives may be enabled and moved by a tenth of a turn
 """
 
@@ -24,29 +24,29 @@ PATIENCE = 5000  # cycles
 
 @dataclass(frozen=True)
 class Subject:
-    """A kernel master, and how a loop on it is to be."""
+    """A kernel master, and the options of a loop on it."""
 
     make: Callable[[], Master]
     period: float
     may_move: bool
 
     def open(self) -> cat.MainDevice:
-        """A MainDevice that reserves it in its `with` block."""
+        """Return a MainDevice that reserves it in its `with` block."""
         return cat.MainDevice(self.make())
 
     def loop(self, *requests: object, **options: object) -> cat.Loop:
-        """One that no stalled machine stops."""
+        """Return a loop that is not stopped by a stalled machine."""
         calm = {"watchdog": max(0.1, 50 * self.period), "late_limit": 0, "lost_limit": 100}
         settings = {"period": self.period, "enable": False, **calm, **options}
         return cat.Loop(*requests, **grouped(settings))  # type: ignore[arg-type]
 
     def inputs(self, main: cat.MainDevice) -> list[cat.Inputs]:
-        """All inputs of all devices."""
+        """Return all inputs of all devices."""
         return [cat.Inputs(sub) for sub in main.subs if sub.description.inputs]
 
 
 def real() -> Subject:
-    """The one that the environment names."""
+    """Return the real master from the environment."""
     assert REAL is not None
     period = float(os.environ.get("CATENARY_IGH_PERIOD", PERIOD))
     move = os.environ.get("CATENARY_IGH_MOVE") == "1"
@@ -54,13 +54,13 @@ def real() -> Subject:
 
 
 def doubled(path: Path) -> Subject:
-    """Two drives of a double, in virtual time."""
+    """Return two drives of a double, in virtual time."""
     Double(path)
     return Subject(lambda: Master(library=path, virtual_time=True), PERIOD, may_move=True)
 
 
 def until(loop: cat.Loop, done: Callable[[], bool]) -> None:
-    """Cycles until something is so."""
+    """Run cycles until a condition holds."""
     for _ in range(PATIENCE):
         if done():
             return

@@ -41,7 +41,7 @@ releases = pytest.mark.parametrize("tag", TABLE)
 
 
 def place(structure: type[ctypes.Structure], member: str) -> int:
-    """Offset of a member, `ports[1].desc` included; `x:bit`, `x:bits`: of a bit field."""
+    """Return the offset of a member (`ports[1].desc`) or of a bit field (`x:bit`, `x:bits`)."""
     if ":" in member:
         name, what = member.split(":")
         field = getattr(structure, name)
@@ -55,7 +55,7 @@ def place(structure: type[ctypes.Structure], member: str) -> int:
 
 
 @releases
-def test_structures_lie_as_in_the_header(tag: str) -> None:
+def test_structures_have_the_layout_of_the_header(tag: str) -> None:
     for name, structure in STRUCTURES.items():
         members = dict(TABLE[tag]["structures"][name])
         assert ctypes.sizeof(structure) == members.pop("size"), name
@@ -120,8 +120,8 @@ def test_the_double_has_the_same_interface(tag: str, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("tag", DEFINES)
-def test_old_libraries_return_nothing_that_is_read(doubles: dict[str, Path], tag: str) -> None:
-    """The void functions of the old doubles leave -EIO where a result would be."""
+def test_return_values_of_old_libraries_are_not_read(doubles: dict[str, Path], tag: str) -> None:
+    """The void functions of the old doubles leave -EIO in place of a result."""
     Double(doubles[tag])
     library = Library(doubles[tag])
     assert library.returns is (tag not in OLD)
@@ -132,7 +132,7 @@ def test_old_libraries_return_nothing_that_is_read(doubles: dict[str, Path], tag
     library.ecrt_release_master(master)
 
 
-def test_a_new_library_tells_why(doubles: dict[str, Path]) -> None:
+def test_errors_of_new_libraries_are_reported(doubles: dict[str, Path]) -> None:
     double = Double(doubles["1.6.1"])
     library = Library(doubles["1.6.1"])
     master = library.ecrt_request_master(0)
@@ -142,13 +142,13 @@ def test_a_new_library_tells_why(doubles: dict[str, Path]) -> None:
     library.ecrt_release_master(master)
 
 
-def test_which_calls_there_are(doubles: dict[str, Path]) -> None:
+def test_the_calls_of_each_release(doubles: dict[str, Path]) -> None:
     assert not Library(doubles["1.5.2"]).has("ecrt_master_sync_reference_clock_to")
     assert Library(doubles["1.5.3"]).has("ecrt_master_sync_reference_clock_to")
     assert Library(doubles["1.6.1"]).version == "1.6"
 
 
-def test_without_a_library(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_missing_library_is_an_error(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("catenary.igh.library.PLACES", ("/nowhere/libethercat.so.1",))
     monkeypatch.setattr("ctypes.util.find_library", lambda name: None)
     monkeypatch.delenv("CATENARY_LIBETHERCAT", raising=False)
@@ -159,7 +159,7 @@ def test_without_a_library(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> N
         Library(tmp_path / "libethercat.so.1")
 
 
-def test_something_else_and_another_version(tmp_path: Path) -> None:
+def test_another_library_or_version_is_refused(tmp_path: Path) -> None:
     empty = tmp_path / "empty.so"
     subprocess.run(["gcc", "-shared", "-xc", "/dev/null", "-o", empty], check=True)
     with pytest.raises(LinkError, match="is not a libethercat"):

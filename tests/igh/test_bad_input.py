@@ -1,4 +1,4 @@
-"""What is in the way of a kernel master: the cause, the command that mends it, nothing left."""
+"""Errors of a kernel master: the cause, a command as remedy, and no leftovers."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from tests.igh.double import Double
 
 @pytest.fixture
 def node(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A device file that is there, of a module that is loaded."""
+    """Provide a device file and a loaded module."""
     path = tmp_path / "EtherCAT0"
     path.touch()
     sysfs = tmp_path / "ec_master"
@@ -108,13 +108,13 @@ def test_no_link(double: Double) -> None:
     assert double.reserved() == 0
 
 
-def test_a_scan_waits_for_the_masters_own(double: Double) -> None:
+def test_a_scan_waits_for_the_scan_of_the_master(double: Double) -> None:
     double.scanning(20)
     with cat.MainDevice(Master(library=double.path, virtual_time=True)) as main:
         assert len(main.scan()) == 2
 
 
-def test_other_devices_than_expected(double: Double) -> None:
+def test_an_unexpected_number_of_devices(double: Double) -> None:
     with cat.MainDevice(Master(library=double.path, virtual_time=True)) as main:
         with pytest.raises(IdentityError):
             main.scan(expected=[(0xAA, 0x402), (0xBB, 0x402)])
@@ -166,8 +166,8 @@ def test_nothing_is_left_reserved(double: Double, error: type[BaseException]) ->
     assert double.reserved() == 0
 
 
-def test_a_device_that_is_gone_when_the_loop_begins(double: Double) -> None:
-    """Its place is empty: the master has found fewer devices since."""
+def test_a_device_lost_before_the_loop_is_named(double: Double) -> None:
+    """Its position is empty: the master has found fewer devices since the scan."""
     with cat.MainDevice(Master(library=double.path, virtual_time=True)) as main:
         main.scan()
         arm = cat.Drives(main.subs.drives, counts_per_turn=1000, velocity_limit=100.0)

@@ -1,4 +1,4 @@
-"""Distributed clocks on a kernel master: SYNC0, and who follows whom."""
+"""Distributed clocks on a kernel master: SYNC0, and the clock to follow."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ import pytest
 
 import catenary as cat
 from catenary.igh import Master
+from catenary.plan.options import PlanOptions
 from catenary.plan.planner import make_plan
 from tests.igh.double import Double
 from tests.igh.loops import clocked_loop, kernel_of
@@ -20,7 +21,7 @@ def times_of(calls: list[str], name: str) -> list[int]:
     return [int(call.split()[1]) for call in calls if call.startswith(f"{name} ")]
 
 
-def test_sync0_fires_behind_the_frames(main: cat.MainDevice, double: Double) -> None:
+def test_sync0_fires_after_the_frames(main: cat.MainDevice, double: Double) -> None:
     with clocked_loop(main, margin=100e-6):
         pass
     [first, second] = [call for call in double.calls() if call.startswith("dc ")]
@@ -40,7 +41,7 @@ def test_application_time_keeps_to_the_grid(main: cat.MainDevice, double: Double
 
 
 def test_the_reference_follows_the_machine(main: cat.MainDevice, double: Double) -> None:
-    """1.5.2 has no call that takes the time: the application time is taken."""
+    """1.5.2 has no call with a time argument, so the application time is used."""
     with clocked_loop(main, lead="main") as loop:
         double.forget()
         next(loop)
@@ -52,7 +53,7 @@ def test_the_reference_follows_the_machine(main: cat.MainDevice, double: Double)
 
 @pytest.mark.parametrize("ppm", [40, -40])
 def test_the_machine_follows_the_reference(doubles: dict[str, Path], ppm: int) -> None:
-    """A reference clock that is 40 ppm off: the instants go its way, and stay in phase with it."""
+    """The cycle starts follow a reference clock that is 40 ppm off, and stay in phase."""
     double = Double(doubles["1.6.1"])
     with cat.MainDevice(Master(library=double.path, virtual_time=True)) as main:
         main.scan()
@@ -70,7 +71,7 @@ def test_the_machine_follows_the_reference(doubles: dict[str, Path], ppm: int) -
 
 
 class Reference:
-    """A reference clock that is some time ahead of the machine's clock."""
+    """Owns a reference clock with an offset from the clock of the machine."""
 
     def __init__(self, main: cat.MainDevice, double: Double) -> None:
         self.main, self.double = main, double
@@ -81,7 +82,7 @@ class Reference:
         return dict(kernel_of(self.main).configuration.exchange.figures)
 
     def follow(self, loop: cat.Loop, cycles: int, late_every: int = 0, late_ns: int = 0) -> None:
-        """Run cycles. Every so many frames one is late at the reference."""
+        """Run cycles. One of every `late_every` frames is late at the reference clock."""
         for number in range(cycles):
             machine = self.main.link.now() - int(self.figures["offset_ns"])
             late = late_ns if late_every and number % late_every == 0 else 0
@@ -95,11 +96,13 @@ def reference(main: cat.MainDevice, double: Double) -> Reference:
 
 
 @pytest.mark.parametrize("periods", [-1, 4, -1000])
-def test_whole_periods_are_no_phase_error(
+def test_whole_periods_are_not_a_phase_error(
     main: cat.MainDevice, double: Double, reference: Reference, periods: int
 ) -> None:
-    """The master leaves a clock alone that is less than 1 ms off, and sets others to 4 ms (seen on
-    a real master: -998115 ns, which were chased until the drives left OP with 0x001A)."""
+    """The master does not correct an offset below 1 ms.
+
+    On a real master, -998115 ns were followed until the drives left OP with 0x001A.
+    """
     reference.ahead_ns = periods * PERIOD_NS + 1885
     double.reference(main.link.now() + reference.ahead_ns)
     with clocked_loop(main, execution="inline", lead="reference") as loop:
@@ -113,16 +116,18 @@ def test_whole_periods_are_no_phase_error(
 
 
 @pytest.mark.parametrize("share", [0.4, -0.3])
-def test_the_phase_is_sought_before_operation(
+def test_the_phase_is_corrected_before_op(
     main: cat.MainDevice, double: Double, reference: Reference, share: float
 ) -> None:
-    """The clocks keep the phase of an earlier loop: it is found while devices climb, not by slewing
-    for half a second in OP."""
+    """The clocks keep the phase of an earlier loop.
+
+    It is corrected on the way to OP, not by half a second of slewing in OP.
+    """
     double.climb(60)
     arm = cat.Drives(main.subs.drives, counts_per_turn=1000, velocity_limit=100.0, dc=True)
     main.read_mappings(arm)
     devices = [sub.description for sub in main.subs]
-    main.configure(make_plan(devices, [arm], clock="reference"))
+    main.configure(make_plan(devices, [arm], PlanOptions(clock="reference")))
     exchange, start = kernel_of(main).configuration.exchange, main.link.now()
     for cycle in range(100):  # SAFE-OP
         main.link.wait_until(start + cycle * PERIOD_NS, False)
@@ -133,10 +138,10 @@ def test_the_phase_is_sought_before_operation(
     assert reference.figures["offset_ns"] == pytest.approx(share * PERIOD_NS, abs=2000)
 
 
-def test_late_frames_are_no_jumps(
+def test_late_frames_do_not_count_as_jumps(
     main: cat.MainDevice, double: Double, reference: Reference
 ) -> None:
-    """A frame that the segment, or this thread, delays says nothing about clocks."""
+    """A frame delayed by the segment or this thread does not measure the clocks."""
     with clocked_loop(main, execution="inline", lead="reference") as loop:
         reference.follow(loop, 200)
         loop.clocks.reset()
@@ -150,10 +155,10 @@ def test_late_frames_are_no_jumps(
         assert not [e for e in main.events if isinstance(e, cat.events.ClockUnlocked)]
 
 
-def test_a_clock_that_jumps_in_operation_is_followed_slowly(
+def test_a_jump_in_op_is_followed_slowly(
     main: cat.MainDevice, double: Double, reference: Reference
 ) -> None:
-    """By 0.1 % of the period in a cycle, and no drift is learnt from it."""
+    """The correction is 0.1 % of the period per cycle, and the rate does not change."""
     with clocked_loop(main, execution="inline", lead="reference") as loop:
         reference.follow(loop, 100)
         before = int(reference.figures["offset_ns"])
@@ -175,8 +180,8 @@ def test_a_reference_clock_can_be_chosen(main: cat.MainDevice, double: Double) -
 
 
 @pytest.mark.parametrize("clock", ["main", "reference"])
-def test_the_watch_of_the_clocks(main: cat.MainDevice, double: Double, clock: str) -> None:
-    """Phase and the largest difference of every cycle, single differences one after the other."""
+def test_the_figures_of_the_clocks(main: cat.MainDevice, double: Double, clock: str) -> None:
+    """Each cycle measures the phase and the largest difference; single ones are read in turn."""
     double.spread(300)
     double.register(1, 0x092C, 0x00FA)
     with clocked_loop(main, lead=clock) as loop:
@@ -196,7 +201,7 @@ def test_the_watch_of_the_clocks(main: cat.MainDevice, double: Double, clock: st
         assert any(isinstance(event, cat.events.ClockUnlocked) for event in main.events)
 
 
-def test_clocks_that_do_not_come_together_are_told(main: cat.MainDevice, double: Double) -> None:
+def test_clocks_that_do_not_synchronise_are_an_error(main: cat.MainDevice, double: Double) -> None:
     double.spread(50_000)
     with (
         clocked_loop(main) as loop,
@@ -205,8 +210,8 @@ def test_clocks_that_do_not_come_together_are_told(main: cat.MainDevice, double:
         loop.wait_locked(within=1e-6, timeout=0.2)
 
 
-def test_a_silent_reference_is_asked_seldom(main: cat.MainDevice, double: Double) -> None:
-    """libethercat writes a line on stderr for each question without an answer."""
+def test_a_silent_reference_is_read_rarely(main: cat.MainDevice, double: Double) -> None:
+    """libethercat prints a line on stderr for each read without an answer."""
     with clocked_loop(main) as loop:
         double.fail(b"reference_clock_time", -6)
         double.forget()
@@ -217,10 +222,10 @@ def test_a_silent_reference_is_asked_seldom(main: cat.MainDevice, double: Double
         assert double.calls().count("reference_clock_time") <= 18
 
 
-def test_clocks_are_kept_while_a_device_is_away_that_need_not_be_there(
+def test_clocks_stay_synchronised_without_an_optional_device(
     main: cat.MainDevice, double: Double
 ) -> None:
-    """Its domain stays incomplete: that is no reason to let the instants of the others drift."""
+    """Its domain stays incomplete, but the cycle still follows the clock."""
     arm = cat.Drives([main.subs[0]], counts_per_turn=1000, velocity_limit=100.0, dc=True)
     tool = cat.Drives([main.subs[1]], counts_per_turn=1000, velocity_limit=100.0, required=False)
     with cat.Loop(arm, tool) as loop:
@@ -234,7 +239,7 @@ def test_clocks_are_kept_while_a_device_is_away_that_need_not_be_there(
         assert not loop.clocks.locked
 
 
-def test_without_clocks_there_is_nothing_to_watch(main: cat.MainDevice) -> None:
+def test_waiting_without_clocks_is_refused(main: cat.MainDevice) -> None:
     with (
         cat.Loop(cat.Drives(main.subs.drives, counts_per_turn=1000, velocity_limit=100.0)) as loop,
         pytest.raises(RuntimeError, match="no distributed clocks"),

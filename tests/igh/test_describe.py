@@ -9,7 +9,7 @@ from catenary.igh.describe import describe
 from catenary.igh.reservation import Reservation
 
 
-def test_control_characters_are_no_part_of_a_name() -> None:
+def test_control_characters_are_removed_from_a_name() -> None:
     port = SimpleNamespace(link=SimpleNamespace(link_up=True), receive_time=0)
     info = SimpleNamespace(
         name=b"\x1b[2Jdrive\r\n",

@@ -1,4 +1,4 @@
-"""The image table: what leaves a domain or an image is refused, nothing is called after its end."""
+"""The image table: copies are checked, and no call follows its end."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def library(doubles: dict[str, Path]) -> Library:
         ([], [(0, -1, 2)], "exceed an image"),
     ],
 )
-def test_a_copy_stays_in_its_place(
+def test_a_copy_outside_a_domain_or_image_is_refused(
     library: Library, outputs: list[object], inputs: list[object], said: str
 ) -> None:
     domain = Domain(1, 1, 0, False, data=1, size=8, outputs=outputs, inputs=inputs)
@@ -42,7 +42,7 @@ def test_a_copy_stays_in_its_place(
         Exchange(KernelTime(True), library, 1, [domain], 16, 16)
 
 
-def test_time_passes_where_it_is_waited_for() -> None:
+def test_virtual_time_advances_only_in_waits() -> None:
     time = KernelTime(True)
     begin = time.now()
     assert time.wait_until(begin + 5_000_000, True) is False
@@ -54,7 +54,7 @@ def test_time_passes_where_it_is_waited_for() -> None:
         machine.send(bytes(60))
 
 
-def test_an_engine_takes_an_image_made_for_its_plan(doubles: dict[str, Path]) -> None:
+def test_an_engine_refuses_an_image_of_another_plan(doubles: dict[str, Path]) -> None:
     double = Double(doubles["1.6.1"])
     with cat.MainDevice(Master(library=double.path, virtual_time=True)) as main:
         main.scan()
@@ -74,7 +74,7 @@ def test_an_engine_takes_an_image_made_for_its_plan(doubles: dict[str, Path]) ->
             Engine(plan.cycle, link, link)
 
 
-def test_nothing_is_called_behind_the_end(doubles: dict[str, Path]) -> None:
+def test_no_call_follows_the_end(doubles: dict[str, Path]) -> None:
     double = Double(doubles["1.6.1"])
     with cat.MainDevice(Master(library=double.path, virtual_time=True)) as main:
         main.scan()
@@ -95,22 +95,24 @@ def test_nothing_is_called_behind_the_end(doubles: dict[str, Path]) -> None:
 
 
 def test_no_domain_is_processed_before_its_frame_is_back(doubles: dict[str, Path]) -> None:
-    """The kernel logs one that is as "working counter changes". Naps learn when answers come, and
-    forget it slowly: a look that is too early must cost nothing. (Frames take 400 us; a machine
-    that stalls only makes looks later.)"""
+    """The kernel logs "working counter changes" for a domain that is processed too early.
+
+    The wait adapts to the round trip, and an early check must cost nothing. Frames take 400 us. A
+    stalled machine only delays checks.
+    """
     double = Double(doubles["1.6.1"])
     double.delay(400)
     with cat.MainDevice(Master(library=double.path)) as main:
         main.scan()
         arm = cat.Drives(main.subs.drives, counts_per_turn=1000, velocity_limit=100.0)
         with cat.Loop(arm, period=4e-3, stop=cat.StopPolicy(late_limit=0), priority=None) as loop:
-            double.early()  # bring-up: nothing is known of the answers before the first cycle
+            double.early()  # bring-up: the round trip is unknown before the first cycle
             for _ in range(60):
                 assert next(loop).ok
             assert double.early() == 0
 
 
-def test_the_monitor_leaves_last_where_answers_are_waited_for(doubles: dict[str, Path]) -> None:
+def test_the_monitor_datagram_is_sent_last_in_threaded_execution(doubles: dict[str, Path]) -> None:
     double = Double(doubles["1.6.1"])
     with cat.MainDevice(Master(library=double.path, virtual_time=True)) as main:
         main.scan()
@@ -125,9 +127,11 @@ def test_the_monitor_leaves_last_where_answers_are_waited_for(doubles: dict[str,
     ]
 
 
-def test_a_ring_without_its_main_interface_is_not_waited_for(doubles: dict[str, Path]) -> None:
-    """The monitor datagram goes by the main interface alone. The domains come by the other one, and
-    are not kept until the deadline."""
+def test_a_ring_without_its_main_interface_causes_no_wait(doubles: dict[str, Path]) -> None:
+    """The monitor datagram uses only the main interface.
+
+    The domains return on the other one, and are not delayed until the deadline.
+    """
     double = Double(doubles["1.6.1"])
     with cat.MainDevice(Master(library=double.path, virtual_time=True)) as main:
         main.scan()
@@ -142,8 +146,8 @@ def test_a_ring_without_its_main_interface_is_not_waited_for(doubles: dict[str, 
             assert all(next(loop).ok for _ in range(50))
 
 
-def test_slow_answers_of_devices_that_need_not_be_there_are_found(doubles: dict[str, Path]) -> None:
-    """Nobody is waited for long who was away before; but who is only slow must be received."""
+def test_slow_answers_of_optional_devices_are_received(doubles: dict[str, Path]) -> None:
+    """A lost device causes only a short wait, but slow answers must be received."""
     double = Double(doubles["1.6.1"])
     double.delay(20_000)
     with cat.MainDevice(Master(library=double.path)) as main:

@@ -24,8 +24,8 @@ def in_child(check: Callable[[], bool]) -> bool:
 
 
 @pytest.mark.parametrize("run", ["threaded", "inline"])
-def test_a_child_closes_its_copies_and_commands_nothing(double: Double, run: str) -> None:
-    """libethercat has one descriptor; the kernel releases the master with its last copy."""
+def test_a_child_closes_its_copies_and_sends_nothing(double: Double, run: str) -> None:
+    """libethercat has one descriptor. The kernel releases the master with its last copy."""
 
     def forgotten() -> bool:
         double.forget()

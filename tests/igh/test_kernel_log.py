@@ -1,4 +1,4 @@
-"""AL status codes out of the kernel's log."""
+"""AL status codes from the kernel's log."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ LINES = """\
 """
 
 
-def test_the_last_code_of_a_device_counts(tmp_path: Path) -> None:
+def test_the_last_code_of_a_device_is_returned(tmp_path: Path) -> None:
     file = tmp_path / "kmsg"
     file.write_text('3,1,1,-;EtherCAT ERROR 0-1: AL status message 0x0011: "before".\n')
     log = KernelLog(str(file))
@@ -29,7 +29,7 @@ def test_the_last_code_of_a_device_counts(tmp_path: Path) -> None:
     assert log.status_code(0, 1) == 0x001B
 
 
-def test_a_log_that_may_not_be_read_says_nothing(tmp_path: Path) -> None:
+def test_an_unreadable_log_returns_no_code(tmp_path: Path) -> None:
     log = KernelLog(str(tmp_path / "none"))
     assert log.status_code(0, 0) == 0
     log.close()

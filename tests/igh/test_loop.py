@@ -1,4 +1,4 @@
-"""Loops on a kernel master: the double's drives enable, follow and stop; calls in their order."""
+"""Loops on a double of the kernel master: motion of drives, and the order of calls."""
 
 from __future__ import annotations
 
@@ -110,10 +110,10 @@ def test_without_a_watchdog_the_trigger_is_cleared(main: cat.MainDevice, double:
     assert not [call for call in calls if call.startswith("watchdog")]
 
 
-def test_the_mapping_is_changed_where_something_is_missing(
+def test_the_mapping_is_changed_if_an_object_is_missing(
     main: cat.MainDevice, double: Double
 ) -> None:
-    """Torque control needs 0x6071, which is not mapped: the master is told a new mapping."""
+    """Torque control needs 0x6071, which is not mapped, so the master gets a new mapping."""
     arm = cat.Drives(main.subs.drives, mode="cst", counts_per_turn=1000, velocity_limit=100.0)
     with cat.Loop(arm) as loop:
         for cycle in loop:
@@ -139,7 +139,7 @@ def test_sync_units_are_domains(main: cat.MainDevice, double: Double) -> None:
     assert calls.count("queue 1") == 2
 
 
-def test_a_cable_pulled_ends_the_loop(main: cat.MainDevice, double: Double) -> None:
+def test_a_pulled_cable_ends_the_loop(main: cat.MainDevice, double: Double) -> None:
     def run() -> None:
         with cat.Loop(arm_of(main)) as loop:
             for cycle in loop:
@@ -152,7 +152,7 @@ def test_a_cable_pulled_ends_the_loop(main: cat.MainDevice, double: Double) -> N
     assert any("main interface lost its link" in str(event) for event in main.events)
 
 
-def test_a_device_that_need_not_be_there_comes_back(main: cat.MainDevice, double: Double) -> None:
+def test_an_optional_device_returns(main: cat.MainDevice, double: Double) -> None:
     left, right = main.subs.drives
     one = cat.Drives([left], counts_per_turn=1000, velocity_limit=100.0)
     two = cat.Drives([right], counts_per_turn=1000, velocity_limit=100.0, required=False)
@@ -173,8 +173,8 @@ def test_a_device_that_need_not_be_there_comes_back(main: cat.MainDevice, double
     assert "DeviceReturned" in kinds
 
 
-def test_a_device_that_is_away_holds_no_cycle_up(main: cat.MainDevice, double: Double) -> None:
-    """Answers of those that are there are not kept until frames might still come back."""
+def test_a_lost_device_does_not_delay_a_cycle(main: cat.MainDevice, double: Double) -> None:
+    """Answers of present devices are not delayed by the wait for missing frames."""
     left, right = main.subs.drives
     one = cat.Drives([left], counts_per_turn=1000, velocity_limit=100.0)
     two = cat.Drives([right], counts_per_turn=1000, velocity_limit=100.0, required=False)
@@ -186,7 +186,7 @@ def test_a_device_that_is_away_holds_no_cycle_up(main: cat.MainDevice, double: D
         double.forget()
         for _ in range(64):
             assert next(loop).ok
-        assert double.calls().count("receive") < 640  # of some 2500 where all are waited for
+        assert double.calls().count("receive") < 640  # about 2500 with a wait for all
 
 
 def test_a_device_that_refuses_op_is_named(main: cat.MainDevice, double: Double) -> None:
@@ -215,7 +215,7 @@ def test_leaving_op_ends_the_loop(main: cat.MainDevice, double: Double) -> None:
 
 
 def test_the_real_clock(doubles: dict[str, Path]) -> None:
-    """A native thread, and Python that may be late: what is asserted holds on any machine."""
+    """A native thread, and Python that may be late. The assertions hold on any machine."""
     double = Double(doubles["1.6.1"])
     with cat.MainDevice(Master(library=double.path)) as main:
         main.scan()
@@ -232,7 +232,7 @@ def test_the_real_clock(doubles: dict[str, Path]) -> None:
     assert double.reserved() == 0
 
 
-def test_a_ring_of_the_masters(main: cat.MainDevice, double: Double) -> None:
+def test_a_ring_on_the_kernel_master(main: cat.MainDevice, double: Double) -> None:
     with cat.Loop(arm_of(main)) as loop:
         next(loop)
         exchange = kernel_of(main).configuration.exchange
@@ -250,8 +250,8 @@ def test_the_plan_is_printed(main: cat.MainDevice) -> None:
         assert loop.timing.counters["lost"] >= 0
 
 
-def test_the_second_interface_is_asked_for_once(main: cat.MainDevice, double: Double) -> None:
-    """libethercat writes a line on stderr each time there is none."""
+def test_a_missing_second_interface_is_read_once(main: cat.MainDevice, double: Double) -> None:
+    """libethercat prints a line on stderr for each read of a missing interface."""
     with cat.Loop(arm_of(main)) as loop:
         for _ in range(100):
             next(loop)
@@ -260,10 +260,10 @@ def test_the_second_interface_is_asked_for_once(main: cat.MainDevice, double: Do
     assert calls.count("link_state 0") > 1
 
 
-def test_an_error_that_is_not_acknowledged_hides_its_code(
+def test_the_code_of_an_error_is_read_after_its_acknowledgement(
     main: cat.MainDevice, double: Double
 ) -> None:
-    """The master refuses requests to a device in an error state: asked again, it tells."""
+    """The master refuses requests to a device in an error state; a later one succeeds."""
     double.register(0, 0x0134, 0x001B)
 
     def run() -> None:
@@ -291,7 +291,7 @@ def test_send_errors_of_new_libraries_are_counted(doubles: dict[str, Path]) -> N
             assert kernel_of(main).configuration.exchange.figures["send_errors"] >= 1
 
 
-def test_others_read_along_and_set_points_are_streamed(main: cat.MainDevice) -> None:
+def test_a_share_and_a_stream_on_the_kernel_master(main: cat.MainDevice) -> None:
     arm = arm_of(main)
     with cat.Share(f"igh-{os.getpid()}") as share, cat.Loop(arm, sink=share) as loop:
         home = arm.actual.position.copy()
@@ -299,7 +299,7 @@ def test_others_read_along_and_set_points_are_streamed(main: cat.MainDevice) -> 
         stream.write(home + np.linspace(0.0, 0.2, 50)[:, None])
         while stream.taken < 50:
             next(loop)
-        stream.close()  # the end; an empty stream would be continued
+        stream.close()  # the end of the motion; an empty stream would be continued
         for _ in range(10):
             next(loop)
         with cat.attach(f"igh-{os.getpid()}") as reader:
@@ -308,7 +308,7 @@ def test_others_read_along_and_set_points_are_streamed(main: cat.MainDevice) -> 
 
 
 def test_two_masters_in_one_loop(doubles: dict[str, Path], tmp_path: Path) -> None:
-    """Each library has its own devices; a native thread for each."""
+    """Each library has its own devices and its own native thread."""
     paths = [doubles["1.6.1"], Path(shutil.copy(doubles["1.6.1"], tmp_path / "second.so"))]
     for path in paths:
         Double(path)
@@ -328,10 +328,10 @@ def test_two_masters_in_one_loop(doubles: dict[str, Path], tmp_path: Path) -> No
             assert all(arm.enabled.all() for arm in arms)
 
 
-def test_start_up_objects_are_told_to_the_master_in_their_order(
+def test_the_master_gets_the_start_up_objects_in_order(
     main: cat.MainDevice, double: Double
 ) -> None:
-    """The kernel writes all before the mapping, and reads none back (docs/how_to/igh.md)."""
+    """The kernel writes all objects before the mapping, without a check (docs/how_to/igh.md)."""
     arm = arm_of(
         main,
         start_up=[
@@ -347,7 +347,7 @@ def test_start_up_objects_are_told_to_the_master_in_their_order(
     assert double.value(1, 0x60C2, 1) == 2
 
 
-def test_libethercat_does_not_know_the_type_of_an_object(main: cat.MainDevice) -> None:
+def test_the_type_of_a_start_up_object_is_required(main: cat.MainDevice) -> None:
     arm = arm_of(main, start_up=[StartUp(0x605A, 0, 2)])
     with pytest.raises(ConfigurationError, match="type of start-up object 0x605A:00 is unknown"):
         main.plan(arm)

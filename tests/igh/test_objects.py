@@ -34,7 +34,7 @@ def test_objects_before_a_loop(main: cat.MainDevice, double: Double) -> None:
     assert (caught.value.position, caught.value.code) == (1, 0x06020000)
 
 
-def test_objects_in_operation_go_by_request_objects(main: cat.MainDevice, double: Double) -> None:
+def test_request_objects_read_objects_in_op(main: cat.MainDevice, double: Double) -> None:
     sub = main.subs[0]
     with loop_of(main) as loop:
         next(loop)
@@ -51,7 +51,7 @@ def test_objects_in_operation_go_by_request_objects(main: cat.MainDevice, double
     assert double.value(0, 0x605A, 0) == 6
 
 
-def test_a_refused_request_says_why(main: cat.MainDevice) -> None:
+def test_a_refused_request_has_the_reason(main: cat.MainDevice) -> None:
     with loop_of(main) as loop:
         next(loop)
         answer = main.subs[0].sdo.request(0x2000)
@@ -63,7 +63,7 @@ def test_a_refused_request_says_why(main: cat.MainDevice) -> None:
             main.subs[0].sdo.read(0x6076)
 
 
-def test_registers_in_operation(main: cat.MainDevice, double: Double) -> None:
+def test_registers_in_op(main: cat.MainDevice, double: Double) -> None:
     sub = main.subs[1]
     assert isinstance(sub, SubDevice)
     double.register(1, 0x0990, 0x1234)
@@ -91,7 +91,7 @@ def test_emergencies_are_events(main: cat.MainDevice, double: Double) -> None:
     assert main.subs[1].emergencies[0].data == b"\1\2\3\4\5"
 
 
-def test_what_the_library_cannot_do_says_so(main: cat.MainDevice) -> None:
+def test_unsupported_calls_are_errors_with_a_hint(main: cat.MainDevice) -> None:
     sub = main.subs[0]
     for ask, command in (
         (sub.sdo.list, "ethercat sdos -p 0"),
@@ -119,8 +119,8 @@ def test_a_device_without_objects(main: cat.MainDevice, double: Double) -> None:
         sub.sdo.read(0x1018)
 
 
-def test_another_thread_asks_while_the_loop_runs(doubles: dict[str, Path]) -> None:
-    """In real time a call that blocks waits in its own thread."""
+def test_another_thread_reads_objects_while_the_loop_runs(doubles: dict[str, Path]) -> None:
+    """In real time, a blocking call waits in a separate thread."""
     double = Double(doubles["1.6.1"])
     found: list[int] = []
     with cat.MainDevice(Master(library=double.path)) as main:
@@ -136,10 +136,10 @@ def test_another_thread_asks_while_the_loop_runs(doubles: dict[str, Path]) -> No
     assert found == [1000]
 
 
-def test_an_activated_master_without_cycles_is_not_asked(
+def test_calls_on_an_activated_master_without_cycles_are_refused(
     main: cat.MainDevice, double: Double
 ) -> None:
-    """The real one would wait in the kernel for ever, and the process with it."""
+    """A call to the real master would block in the kernel forever."""
     plan = main.plan(cat.Drives(main.subs.drives, counts_per_turn=1000, velocity_limit=100.0))
     main.configure(plan)
     double.forget()
@@ -152,8 +152,8 @@ def test_an_activated_master_without_cycles_is_not_asked(
     assert double.calls() == []
 
 
-def test_a_request_that_nobody_serves_has_an_end(main: cat.MainDevice, double: Double) -> None:
-    """A device that is not there: its request stays busy in the kernel."""
+def test_a_request_that_is_not_served_has_a_deadline(main: cat.MainDevice, double: Double) -> None:
+    """The request of a missing device stays busy in the kernel."""
     one, two = (
         cat.Drives([drive], counts_per_turn=1000, velocity_limit=100.0, required=required)
         for drive, required in zip(main.subs.drives, (True, False), strict=True)
@@ -173,8 +173,8 @@ def test_a_request_that_nobody_serves_has_an_end(main: cat.MainDevice, double: D
         assert again.result() == 1000
 
 
-def test_a_device_that_does_not_answer_holds_nobody_else_up(doubles: dict[str, Path]) -> None:
-    """Calls that block wait in a thread of their device's own, and not for ever."""
+def test_a_silent_device_does_not_delay_others(doubles: dict[str, Path]) -> None:
+    """Blocking calls wait in a thread of their device, with a deadline."""
     double = Double(doubles["1.6.1"])
     with cat.MainDevice(Master(library=double.path)) as main:
         main.scan()
@@ -198,8 +198,8 @@ def test_a_device_that_does_not_answer_holds_nobody_else_up(doubles: dict[str, P
     assert double.reserved() == 0
 
 
-def test_a_thread_that_comes_too_late_calls_nothing(double: Double) -> None:
-    """libethercat does not look at the handle it is given: none of a master that was given back."""
+def test_a_late_thread_makes_no_call(double: Double) -> None:
+    """libethercat does not check handles, so those of a released master are not used."""
     reservation = Master(library=double.path).open_link()
     reservation.close()
     double.forget()

@@ -1,6 +1,6 @@
-"""What holds for every kernel master: the doubles, and with CATENARY_IGH=0 the real one.
+"""Tests for every kernel master: the doubles, and with CATENARY_IGH=0 the real one.
 
-Nothing is enabled on a real one without CATENARY_IGH_MOVE=1 (tests/igh/subject.py).
+Drives of a real one are enabled only with CATENARY_IGH_MOVE=1 (tests/igh/subject.py).
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ RELEASES = ["1.5.2", "1.5.3", "1.6-alpha", "1.6.1"]
 
 @pytest.fixture(params=["real"] if REAL is not None else RELEASES)
 def subject(request: pytest.FixtureRequest) -> Subject:
-    if request.param == "real":  # where there need be no compiler
+    if request.param == "real":  # needs no compiler
         return real()
     return doubled(request.getfixturevalue("doubles")[request.param])
 
@@ -42,7 +42,7 @@ def main(subject: Subject) -> Iterator[cat.MainDevice]:
 
 
 def talker(main: cat.MainDevice) -> SubDevice:
-    """The first device that has objects."""
+    """Return the first device with objects."""
     found = next((sub for sub in main.subs if sub.description.coe), None)
     if found is None:
         pytest.skip("no device with objects on this segment")
@@ -68,8 +68,8 @@ def test_devices_are_found(main: cat.MainDevice) -> None:
 
 
 @pytest.mark.parametrize("run", ["threaded", "inline"])
-def test_a_loop_reaches_op_and_leaves_nothing(subject: Subject, run: str) -> None:
-    for _ in range(2):  # the second time shows that nothing was left of the first
+def test_a_loop_reaches_op_and_can_be_repeated(subject: Subject, run: str) -> None:
+    for _ in range(2):  # the second loop shows that the first one left nothing behind
         with subject.open() as main:
             main.scan()
             with subject.loop(*subject.inputs(main), execution=run) as loop:
@@ -120,7 +120,7 @@ def test_objects_before_a_loop(main: cat.MainDevice) -> None:
 
 
 def test_objects_in_operation(subject: Subject, main: cat.MainDevice) -> None:
-    """By a request, by a call of its own where that says no, and writing."""
+    """Objects are read by a request, by a call if the request is refused, and written."""
     sub = talker(main)
     with subject.loop(*subject.inputs(main)) as loop:
         next(loop)
@@ -144,8 +144,8 @@ def test_registers_in_operation(subject: Subject, main: cat.MainDevice) -> None:
 
 
 @pytest.mark.parametrize("clock", ["main", "reference"])
-def test_clocks_are_watched(subject: Subject, main: cat.MainDevice, clock: str) -> None:
-    """Every follower tells its difference, the reference its time; how close is the machine's."""
+def test_the_figures_of_the_clocks(subject: Subject, main: cat.MainDevice, clock: str) -> None:
+    """All followers report differences, and the reference its time; their size is not checked."""
     clocked = [sub for sub in drives(main) if sub.description.clock_bits]
     if not clocked:
         pytest.skip("no drive with distributed clocks")
@@ -174,7 +174,7 @@ def test_drives_follow(subject: Subject, main: cat.MainDevice, run: str) -> None
         np.testing.assert_allclose(arm.actual.position, home + 0.1, atol=0.02)
 
 
-def test_another_thread_asks_while_the_loop_runs(subject: Subject) -> None:
+def test_another_thread_reads_objects_while_the_loop_runs(subject: Subject) -> None:
     with subject.open() as main:
         main.scan()
         sub = talker(main)
@@ -190,7 +190,7 @@ def test_another_thread_asks_while_the_loop_runs(subject: Subject) -> None:
         assert found == [sub.identity.vendor]
 
 
-def test_the_published_interface(subject: Subject) -> None:
+def test_the_interface_of_pyigh(subject: Subject) -> None:
     with MasterBase(subject.make(), period=subject.period) as master:
         slave = SlaveIO(next(sub.position for sub in master.main.subs if sub.description.inputs))
         master.ecat_init_slave(slave)
@@ -213,8 +213,8 @@ def test_the_published_interface(subject: Subject) -> None:
 
 
 @pytest.mark.skipif(REAL is not None, reason="this is what it starts")
-def test_the_switch_is_no_dead_code(doubles: dict[str, Path]) -> None:
-    """CATENARY_IGH=0 takes whatever library is found: here the double, as if it were installed."""
+def test_the_switch_for_the_real_master_works(doubles: dict[str, Path]) -> None:
+    """CATENARY_IGH=0 uses any library that is found; here it is the double."""
     environment = {
         **os.environ,
         "CATENARY_IGH": "0",
@@ -231,4 +231,4 @@ def test_the_switch_is_no_dead_code(doubles: dict[str, Path]) -> None:
     )
     assert done.returncode == 0, done.stdout + done.stderr
     assert "passed" in done.stdout
-    assert "skipped" in done.stdout  # nothing moves where nobody allowed it
+    assert "skipped" in done.stdout  # without permission, drives do not move

@@ -1,4 +1,4 @@
-"""What a scan asks, and what it takes from what the master knows."""
+"""Scans with the data of the kernel master."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ from catenary.igh import Master
 from tests.igh.double import Double
 
 
-def test_devices_that_are_on_their_way_are_waited_for(double: Double) -> None:
-    """In INIT nobody answers an SDO: they would pass for devices without objects."""
+def test_a_scan_waits_for_devices_on_the_way_to_pre_op(double: Double) -> None:
+    """In INIT, devices do not answer SDOs, and would look like devices without objects."""
     double.boot(12)
     with cat.MainDevice(Master(library=double.path, virtual_time=True)) as main:
         subs = main.scan()
@@ -19,8 +19,8 @@ def test_devices_that_are_on_their_way_are_waited_for(double: Double) -> None:
         assert all(sub.is_drive for sub in subs)
 
 
-def test_a_device_that_the_master_keeps_in_op_holds_nobody_up(double: Double) -> None:
-    """As those with Ethernet over EtherCAT."""
+def test_a_device_that_stays_in_op_does_not_block_a_scan(double: Double) -> None:
+    """Devices with Ethernet over EtherCAT do so."""
     double.state(1, 8, 0)
     with cat.MainDevice(Master(library=double.path, virtual_time=True)) as main:
         begun = main.link.now()
@@ -28,9 +28,11 @@ def test_a_device_that_the_master_keeps_in_op_holds_nobody_up(double: Double) ->
         assert (main.link.now() - begun) * 1e-9 < 3.0
 
 
-def test_an_answer_that_was_lost_is_asked_for_again(double: Double) -> None:
-    """Else a drive whose answer a frame has lost would pass for a device without objects (seen on a
-    real master)."""
+def test_an_upload_with_a_lost_answer_is_repeated(double: Double) -> None:
+    """Otherwise, a drive whose answer was lost would look like a device without objects.
+
+    This was observed on a real master.
+    """
     double.silent(2)
     with cat.MainDevice(Master(library=double.path, virtual_time=True)) as main:
         assert all(sub.is_drive for sub in main.scan())
@@ -39,8 +41,8 @@ def test_an_answer_that_was_lost_is_asked_for_again(double: Double) -> None:
             main.scan()
 
 
-def test_a_terminal_without_mailbox_is_not_asked_for_objects(double: Double) -> None:
-    """libethercat and the kernel would complain of it, on stderr and in the log."""
+def test_no_objects_are_read_from_a_terminal_without_a_mailbox(double: Double) -> None:
+    """libethercat and the kernel would report an error, on stderr and in the log."""
     double.plain(1)
     with cat.MainDevice(Master(library=double.path, virtual_time=True)) as main:
         drive, terminal = main.scan()
@@ -49,7 +51,7 @@ def test_a_terminal_without_mailbox_is_not_asked_for_objects(double: Double) -> 
     assert not any(call.startswith("sdo_upload 1 ") for call in double.calls())
 
 
-def test_clocks_are_where_receive_times_were_latched(double: Double) -> None:
+def test_devices_with_latched_receive_times_have_clocks(double: Double) -> None:
     double.clockless(0)
     with cat.MainDevice(Master(library=double.path, virtual_time=True)) as main:
         first, second = main.scan()

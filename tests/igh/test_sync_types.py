@@ -13,11 +13,13 @@ from tests.igh.double import Double
 from tests.igh.loops import clocked_loop
 
 
-def test_devices_keep_time_as_before_when_a_loop_with_clocks_ends(
+def test_the_types_are_restored_after_a_loop_with_clocks(
     main: cat.MainDevice, double: Double
 ) -> None:
-    """Else the next program, without clocks, would find them waiting for SYNC0 (seen on a real
-    master: AL status 0x0030)."""
+    """Otherwise, the devices would wait for SYNC0 in the next program without clocks.
+
+    This was observed on a real master, with AL status 0x0030.
+    """
     with clocked_loop(main):
         assert double.value(0, 0x1C32, 1) == 2
     assert double.value(0, 0x1C32, 1) == 1
@@ -28,7 +30,7 @@ def test_devices_keep_time_as_before_when_a_loop_with_clocks_ends(
 def test_types_are_restored_once_devices_are_in_pre_op(
     main: cat.MainDevice, double: Double
 ) -> None:
-    """The master leads them down after it was deactivated; in OP they refuse 0x1C32."""
+    """The master brings them down after its deactivation. In OP, they refuse 0x1C32."""
     double.linger(20)
     with clocked_loop(main):
         assert double.value(1, 0x1C32, 1) == 2
@@ -38,13 +40,13 @@ def test_types_are_restored_once_devices_are_in_pre_op(
 
 def test_a_device_may_take_seconds_to_reach_pre_op(main: cat.MainDevice, double: Double) -> None:
     """The master repeats a lost INIT request after 5 s (seen on a real master)."""
-    double.linger(500)  # a look takes 10 ms
+    double.linger(500)  # a check takes 10 ms
     with clocked_loop(main):
         pass
     assert [double.value(p, 0x1C32, 1) for p in (0, 1)] == [1, 1]
 
 
-def test_a_type_that_cannot_be_restored_is_told(main: cat.MainDevice, double: Double) -> None:
+def test_a_type_that_cannot_be_restored_is_an_error(main: cat.MainDevice, double: Double) -> None:
     def run() -> None:
         with clocked_loop(main):
             double.refuse(0x06090030)
@@ -55,29 +57,31 @@ def test_a_type_that_cannot_be_restored_is_told(main: cat.MainDevice, double: Do
     assert any("device 1" in note for note in caught.value.__notes__)
 
 
-def test_a_device_that_stays_up_is_told(main: cat.MainDevice, double: Double) -> None:
+def test_a_device_that_stays_in_op_is_an_error(main: cat.MainDevice, double: Double) -> None:
     def run() -> None:
         with clocked_loop(main):
             double.linger(1_000_000)
 
     with pytest.raises(cat.errors.StateError, match=r"device 0 is not in PRE-OP but in OP.*0x1C32"):
         run()
-    assert all(str(sub.state) == "OP" for sub in main.subs)  # as read, not as it should be
+    assert all(str(sub.state) == "OP" for sub in main.subs)  # as read from the device
     double.linger(0)
     double.state(0, 2, 0)
     double.state(1, 2, 0)
     with cat.Loop(cat.Drives(main.subs.drives, counts_per_turn=1000, velocity_limit=100.0)):
-        assert double.value(0, 0x1C32, 1) == 1  # made up for
+        assert double.value(0, 0x1C32, 1) == 1  # restored later
 
 
-def test_a_configuration_that_fails_leaves_no_type(main: cat.MainDevice, double: Double) -> None:
+def test_the_types_are_restored_after_a_failed_configuration(
+    main: cat.MainDevice, double: Double
+) -> None:
     double.fail(b"activate", -5)
     with pytest.raises(cat.CatenaryError, match="activat"), clocked_loop(main):
         pass
     assert [double.value(p, 0x1C32, 1) for p in (0, 1)] == [1, 1]
 
 
-def test_the_kernels_log_tells_a_code_that_the_device_has_forgotten(
+def test_a_cleared_code_is_read_from_the_kernel_log(
     main: cat.MainDevice, double: Double, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The master acknowledges an error, and the device clears its AL status code."""
@@ -98,9 +102,7 @@ def test_the_kernels_log_tells_a_code_that_the_device_has_forgotten(
     assert caught.value.position == 1
 
 
-def test_the_error_of_a_type_that_was_left_behind_says_so(
-    main: cat.MainDevice, double: Double
-) -> None:
+def test_the_error_names_a_leftover_type(main: cat.MainDevice, double: Double) -> None:
     """A program that was killed wrote 2 into 0x1C32:01: AL status code 0x0030."""
     double.set(0, 0x1C32, 1, 2)
     double.register(0, 0x0134, 0x0030)

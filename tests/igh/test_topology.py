@@ -1,4 +1,4 @@
-"""Delays that cannot be right: clocks are refused."""
+"""Clocks are refused if delays are implausible."""
 
 from __future__ import annotations
 
@@ -10,10 +10,8 @@ from tests.igh.loops import clocked_loop
 
 
 @pytest.mark.parametrize("delay", [2_147_000_000, 5_000_000])
-def test_delays_that_cannot_be_are_refused(
-    main: cat.MainDevice, double: Double, delay: int
-) -> None:
-    """A closed ring makes them: the clocks would agree with each other on a wrong time."""
+def test_implausible_delays_are_refused(main: cat.MainDevice, double: Double, delay: int) -> None:
+    """A closed ring causes them. The clocks would agree with each other on a wrong time."""
     double.measured(delay)
     with pytest.raises(cat.errors.ConfigurationError, match="us from device 0"), clocked_loop(main):
         pass
@@ -31,5 +29,5 @@ def test_clocks_in_a_closed_ring_are_refused(main: cat.MainDevice, double: Doubl
     ):
         pass
     plain = cat.Drives(main.subs.drives, counts_per_turn=1000, velocity_limit=100.0)
-    with cat.Loop(plain) as loop:  # without clocks there are no delays to be wrong
+    with cat.Loop(plain) as loop:  # without clocks, delays do not matter
         assert next(loop).ok

@@ -1,4 +1,4 @@
-"""The examples of loops in the background run without arguments, and end by themselves."""
+"""Examples of loops in the background run without arguments, and end without help."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from tests.loop.test_examples import run
 
 def test_notebook() -> None:
     out = run("notebook.py")
-    assert "there [rad]: [0.3" in out
+    assert "reached [rad]: [0.3" in out
     assert "device name: Catenary virtual servo" in out
     assert "error: None" in out
 

@@ -1,4 +1,4 @@
-"""Whatever a user writes, the result is a machine or an error that names the place."""
+"""Any edit of a file results in a machine, or in an error that names the line."""
 
 from __future__ import annotations
 

@@ -31,26 +31,26 @@ def without_esi(example: Path, folder: Path) -> Path:
     return path
 
 
-def test_it_is_read_as_it_is(example: Path) -> None:
+def test_the_example_can_be_read(example: Path) -> None:
     tables = read_machine(example).tables
     assert tables.name == "cell 3"
     assert [device.name for device in tables.device][-3:] == ["wrist_a", "wrist_b", "hand"]
 
 
-def test_its_segment_agrees(example: Path) -> None:
+def test_the_segment_agrees_with_the_example(example: Path) -> None:
     with MainDevice(example_segment()) as main:
         found = compare(read_machine(example).tables.device, main.passive_scan())
     assert {each.verdict for each in found} == {"same"}
 
 
-def test_its_esi_file_is_refused_with_its_line(example: Path) -> None:
+def test_the_esi_file_of_the_example_is_refused_with_its_line(example: Path) -> None:
     with pytest.raises(MachineFileError, match="ESI files are not supported yet") as caught:
         Machine(example)
     line = example.read_text(encoding="utf-8").splitlines()[(caught.value.line or 0) - 1]
     assert line.startswith(ESI)
 
 
-def test_it_runs(example: Path, tmp_path: Path) -> None:
+def test_the_example_runs(example: Path, tmp_path: Path) -> None:
     with Machine(without_esi(example, tmp_path), target=example_segment()) as machine:
         arm, valves = machine.drives["arm"], machine.process_data["valves"]
         assert arm.names == ("base", "shoulder", "elbow", "roll", "pitch", "yaw")

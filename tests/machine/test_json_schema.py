@@ -1,4 +1,4 @@
-"""The JSON schema for editors, judged by another implementation of the format."""
+"""The JSON schema for editors, checked with the package jsonschema."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ def check(text: str) -> None:
     jsonschema.Draft202012Validator(schema.json_schema()).validate(tomllib.loads(text))
 
 
-def test_the_schema_is_one() -> None:
+def test_the_schema_is_valid() -> None:
     jsonschema.Draft202012Validator.check_schema(schema.json_schema())
 
 
@@ -39,7 +39,7 @@ def test_the_schema_accepts_the_example(shared_data: Path) -> None:
         (", product = 0x20004", ""),
     ],
 )
-def test_the_schema_refuses_mistakes(old: str, new: str) -> None:
+def test_the_schema_rejects_invalid_files(old: str, new: str) -> None:
     assert old in SMALL
     with pytest.raises(jsonschema.ValidationError):
         check(SMALL.replace(old, new, 1))

@@ -83,7 +83,7 @@ def test_every_path_of_the_content_has_a_line() -> None:
     assert set(paths(tomllib.loads(TEXT))) - parents <= set(lines)
 
 
-def test_a_path_that_is_not_there_has_the_line_of_the_table_around_it() -> None:
+def test_a_missing_path_has_the_line_of_the_table_around_it() -> None:
     lines = key_lines(TEXT)
     assert line_of(lines, ("device", 1, "identity", "product")) == 17
     assert line_of(lines, ("nothing",)) == 1

@@ -1,4 +1,4 @@
-"""Machine: what a program gets from a machine file, and what is checked before a device changes."""
+"""Machine: the objects of a machine file, and the checks before a device changes."""
 
 from __future__ import annotations
 
@@ -119,7 +119,7 @@ def test_a_file_without_a_target_needs_one(tmp_path: Path) -> None:
         assert machine.drives
 
 
-def test_a_ring_has_its_segment_too(tmp_path: Path) -> None:
+def test_a_ring_also_has_its_segment(tmp_path: Path) -> None:
     path = write_small(tmp_path)
     line = tmp_path / "line.toml"
     line.write_text("ring = true\n" + line.read_text())
@@ -133,7 +133,7 @@ def test_a_network_interface_has_no_segment(tmp_path: Path) -> None:
         _ = Machine(path).segment
 
 
-def test_a_machine_that_is_not_open_says_so(tmp_path: Path) -> None:
+def test_a_machine_that_is_not_open_raises_an_error(tmp_path: Path) -> None:
     machine = Machine(write_small(tmp_path))
     with pytest.raises(RuntimeError, match="not open"):
         _ = machine.drives
@@ -166,11 +166,11 @@ def test_a_lost_optional_device_does_not_end_the_loop(tmp_path: Path) -> None:
         assert machine.drives["arm"].present.all()
 
 
-def test_an_unknown_name_has_the_nearest_one(tmp_path: Path) -> None:
+def test_the_error_for_an_unknown_name_has_the_nearest_one(tmp_path: Path) -> None:
     with Machine(write_small(tmp_path)) as machine:
         with pytest.raises(KeyError, match='no drives "amr"; did you mean "arm"'):
             _ = machine.drives["amr"]
-        with pytest.raises(KeyError, match='no process data "x"; known: valves, gauge'):
+        with pytest.raises(KeyError, match='no process data "x"; known names are valves, gauge'):
             _ = machine.process_data["x"]
 
 
@@ -185,7 +185,7 @@ def test_another_device_is_refused_before_a_device_changes(tmp_path: Path) -> No
     assert "position 0" in error.message
     assert "expected vendor 0x43544E59 product 0x00010001" in error.message
     assert "found vendor 0x43544E59 product 0x00020004" in error.message
-    assert 'it has the identity of "valves": swapped' in error.hint
+    assert 'it has the identity of "valves"; check' in error.hint
     assert error.position == 0
     assert states(segment) == {INIT}
     assert len(error.__notes__) == 4  # valves, and what is missing
@@ -237,14 +237,15 @@ def test_two_devices_with_one_alias_are_refused(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("axes", "message"),
     [
-        ('"j1", "wrist/0", "wrist/2"', '"wrist/2": .* no axis in slot 2; "wrist/0", "wrist/1"'),
-        ('"j1", "hand", "wrist"', '"wrist" has 2 axes: write "wrist/0", "wrist/1"'),
+        (
+            '"j1", "wrist/0", "wrist/2"',
+            '"wrist/2": .* no axis in slot 2; its axes are "wrist/0", "wrist/1"',
+        ),
+        ('"j1", "hand", "wrist"', '"wrist" has 2 axes; write one of "wrist/0", "wrist/1"'),
         ('"j1", "coupler", "valves"', "is not a drive"),
     ],
 )
-def test_an_axis_that_is_not_there_is_refused_with_its_line(
-    axes: str, message: str, tmp_path: Path
-) -> None:
+def test_a_missing_axis_is_refused_with_its_line(axes: str, message: str, tmp_path: Path) -> None:
     roles = SMALL[SMALL.index("[drives.gripper]") : SMALL.index("[process_data.valves]")]
     text = SMALL.replace('"j1", "wrist/0", "wrist/1"', axes).replace(roles, "")
     with (
@@ -257,7 +258,7 @@ def test_an_axis_that_is_not_there_is_refused_with_its_line(
     assert caught.value.line in (45, 46)
 
 
-def test_an_object_that_no_pdo_has_is_refused(tmp_path: Path) -> None:
+def test_an_object_outside_all_pdos_is_refused(tmp_path: Path) -> None:
     path = write_small(tmp_path, SMALL.replace("0x7010:01", "0x7090:01"))
     message = "0x7090:01 is not in a PDO of device 1"
     with pytest.raises(MachineFileError, match=message) as caught, Machine(path):

@@ -1,4 +1,4 @@
-"""Hand-written files with the mistakes that users make: each error names file, line and key."""
+"""Files with common mistakes: each error names file, line and key."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from tests.machine.files import SMALL, write_small
 
 
 def line_of(text: str, part: str) -> int:
-    """Return the line of a text on which a part stands."""
+    """Return the line number of a part of a text."""
     return text[: text.index(part)].count("\n") + 1
 
 
-# what the user wrote: old text, new text, key and message of the error. It names the new text's
-# line, unless there is a fifth part: a text on that line.
+# Edits of a valid file: old text, new text, key and message of the error. The error names the line
+# of the new text, or that of the fifth text if there is one.
 MISTAKES: dict[str, tuple[str, ...]] = {
     "unknown key at the top": (
         'target = "',
@@ -116,28 +116,28 @@ MISTAKES: dict[str, tuple[str, ...]] = {
         "alias = 11",
         "alias = 11\nposition = 3",
         "device[3].position",
-        'device "j1" has alias and position',
+        'device "j1" has both alias and position',
         "position = 3",
     ),
     "duplicate name": (
         'name = "wrist"',
         'name = "j1"',
         "device[4].name",
-        r'name "j1" is that of device\[3\], "j1" already',
+        r'name "j1" is already used by device\[3\], "j1"',
         "alias = 12",
     ),
     "duplicate alias": (
         "alias = 12",
         "alias = 11",
         "device[4].alias",
-        r'alias 11 is that of device\[3\], "j1" already',
+        r'alias 11 is already used by device\[3\], "j1"',
         "product = 0x50002",
     ),
     "duplicate position": (
         "position = 1",
         "position = 0",
         "device[1].position",
-        "position 0 is that of",
+        "position 0 is already used by",
         "product = 0x20004",
     ),
     "alias 0": (
@@ -150,13 +150,13 @@ MISTAKES: dict[str, tuple[str, ...]] = {
         'name = "valves"',
         'name = "val/ves"',
         "device[1].name",
-        'a name has no "/"',
+        'must not contain "/"',
     ),
     "unknown device in axes": (
         '"j1", "wrist/0"',
         '"j2", "wrist/0"',
         "drives.arm.axes[0]",
-        'no device is named "j2"; known: coupler, .* j1, wrist',
+        'no device is named "j2"; known names are coupler, .* j1, wrist',
     ),
     "slot is not a number": (
         '"wrist/1"]',
@@ -357,7 +357,7 @@ MISTAKES: dict[str, tuple[str, ...]] = {
         "product = 0x10001 }",
         'product = 0x10001 }\nop_mode = "DC Sync0"',
         "device[0].op_mode",
-        r'no role uses the device "coupler"(?s:.*)\[process_data\.NAME\]',
+        r'no drives or process data use "coupler"(?s:.*)\[process_data\.NAME\]',
         "op_mode",
     ),
     "table that is not there": ("[drives.arm]", "[drive.arm]", "drive", 'did you mean "drives"'),
@@ -365,7 +365,7 @@ MISTAKES: dict[str, tuple[str, ...]] = {
         "[drives.arm]",
         "[drives]",
         "drives.axes",
-        r"expected a table, found a list(?s:.*)has a name of yours: \[drives\.NAME\]",
+        r"expected a table, found a list(?s:.*)name of your choice to the header: \[drives\.NAME\]",
         'axes = ["j1"',
     ),
     "lead that is not there": (
@@ -378,7 +378,7 @@ MISTAKES: dict[str, tuple[str, ...]] = {
         "catenary-machine/1",
         "catenary-machine/2",
         "format",
-        '"catenary-machine/2" is not a format that this version',
+        'cannot read the format "catenary-machine/2"',
     ),
     "no format": ('format = "catenary-machine/1"\n', "", None, 'key "format" is missing', "target"),
     "not TOML": ('period = "1 ms"', "period = 1 ms", None, "not TOML"),
@@ -412,7 +412,7 @@ MISTAKES: dict[str, tuple[str, ...]] = {
         '"250 us"',
         "inf",
         "drives.arm.clock.shift",
-        "shift=inf: must be a finite time",
+        "shift=inf s: must be finite",
     ),
 }
 
@@ -438,7 +438,7 @@ def test_there_are_at_least_30_mistakes() -> None:
     assert len(MISTAKES) >= 30
 
 
-def test_a_file_that_is_not_there_is_named(tmp_path: Path) -> None:
+def test_a_missing_file_is_named(tmp_path: Path) -> None:
     with pytest.raises(MachineFileError, match=r"nothing\.toml: No such file") as caught:
         read_machine(tmp_path / "nothing.toml")
     assert "catenary init" in caught.value.hint
@@ -456,7 +456,7 @@ def test_text_that_is_not_utf_8_names_the_line(tmp_path: Path) -> None:
         read_machine(path)
 
 
-def test_a_mark_at_the_beginning_is_skipped(tmp_path: Path) -> None:
+def test_a_byte_order_mark_is_skipped(tmp_path: Path) -> None:
     """Windows editors write a byte order mark."""
     path = tmp_path / "machine.toml"
     path.write_bytes(b'\xef\xbb\xbfformat = "catenary-machine/1"\r\n')
@@ -473,7 +473,7 @@ def test_an_empty_file_misses_its_format(tmp_path: Path) -> None:
 def test_deep_nesting_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "machine.toml"
     path.write_text("format = " + "[" * 100_000)
-    with pytest.raises(MachineFileError, match="not TOML"):
+    with pytest.raises(MachineFileError, match="nested too deeply"):
         read_machine(path)
 
 
@@ -485,7 +485,7 @@ def test_deep_nesting_is_refused(tmp_path: Path) -> None:
         ("virtual:nothing.toml", r"nothing\.toml: No such file"),
     ],
 )
-def test_a_target_that_cannot_be_has_its_line(target: str, message: str, tmp_path: Path) -> None:
+def test_an_invalid_target_has_its_line(target: str, message: str, tmp_path: Path) -> None:
     path = write_small(tmp_path, SMALL.replace("virtual:line.toml", target))
     with pytest.raises(MachineFileError, match=rf"machine\.toml:2: target: .*{message}"):
         Machine(path)

@@ -60,7 +60,7 @@ def everything() -> list[Device]:
     ]
 
 
-def test_terminals_alone_need_nothing_filled_in(tmp_path: Path) -> None:
+def test_a_file_of_terminals_is_complete(tmp_path: Path) -> None:
     devices = [Coupler(), DigitalOutputs(), DigitalInputs(), AnalogInputs()]
     path = tmp_path / "machine.toml"
     path.write_text(written(devices))
@@ -129,7 +129,7 @@ def test_a_target_with_quotes_is_escaped() -> None:
     assert tomllib.loads(machine_text([], 'a"b\\', {}))["target"] == 'a"b\\'
 
 
-def test_one_name_for_an_input_and_an_output_becomes_two() -> None:
+def test_the_same_name_of_an_input_and_an_output_is_numbered() -> None:
     value = Entry(0x6000, 1, 16, "Value", types.UINT.index)
     device = replace(
         demo()[1],

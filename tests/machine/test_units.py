@@ -1,4 +1,4 @@
-"""Quantities as text."""
+"""Conversion of quantities from text."""
 
 from __future__ import annotations
 
@@ -65,7 +65,9 @@ def test_a_number_is_in_si_units() -> None:
         (math.nan, "time", "nan is not a number"),
     ],
 )
-def test_another_text_is_refused(value: float | str, dimension: Dimension, message: str) -> None:
+def test_an_invalid_quantity_is_refused(
+    value: float | str, dimension: Dimension, message: str
+) -> None:
     with pytest.raises(ValueError, match=message):
         to_si(value, dimension)
 

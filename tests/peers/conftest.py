@@ -1,4 +1,4 @@
-"""Foreign programs that judge us, over a pair of network interfaces."""
+"""Fixtures for tests with other EtherCAT programs, over a pair of network interfaces."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ import pytest
 
 from catenary.realtime.child import Child, start_python
 
-# Whole bytes: SOEM's expected counter forgets a device whose bits fill no byte up (the difference
-# of logical addresses is 0 there), so that with 4-bit terminals it is too low.
+# Whole bytes: SOEM's expected counter omits a device whose bits do not fill a byte, because its
+# difference of logical addresses is 0. With 4-bit terminals, the counter is too low.
 LINE = """
 [[device]]
 kind = "coupler"
@@ -42,10 +42,10 @@ bits = 16
 
 
 def serve_command(interface: str, file: Path, *, max_age: float = 1e6) -> list[str]:
-    """Return the call of `catenary virtual serve` in real time, or else with `max_age` [s].
+    """Return the command `catenary virtual serve` in real time, or with `max_age` [s].
 
-    By default late frames are answered then: SOEM does not check the mailbox counter, and takes an
-    old message for a new one after a lost frame.
+    By default, late frames are answered, because SOEM does not check the mailbox counter. After a
+    lost frame, it takes an old message for a new one.
     """
     command = ["-m", "catenary.cli", "virtual", "serve", interface, "--config", str(file)]
     before = os.sched_getscheduler(0), os.sched_getparam(0)
@@ -59,7 +59,7 @@ def serve_command(interface: str, file: Path, *, max_age: float = 1e6) -> list[s
 
 @contextmanager
 def serving(interface: str, file: Path, *, max_age: float = 1e6) -> Iterator[Child]:
-    """Serve the devices of a file on an interface. Yields the process that serves them."""
+    """Serve the devices of a file on an interface, and yield the serving process."""
     with start_python(serve_command(interface, file, max_age=max_age)) as server:
         assert server.read_line(20.0), "the virtual segment did not start"
         yield server
@@ -67,7 +67,7 @@ def serving(interface: str, file: Path, *, max_age: float = 1e6) -> Iterator[Chi
 
 @pytest.fixture
 def line(tmp_path: Path) -> Path:
-    """The devices behind `served`."""
+    """Return the devices of `served`."""
     file = tmp_path / "line.toml"
     file.write_text(LINE)
     return file
@@ -75,7 +75,7 @@ def line(tmp_path: Path) -> Path:
 
 @pytest.fixture
 def served(veth: tuple[str, str], line: Path) -> Iterator[str]:
-    """An interface at the other end of which virtual devices answer, as a user starts them."""
+    """Yield an interface with served virtual devices at its other end."""
     ours, theirs = veth
     with serving(theirs, line):
         yield ours

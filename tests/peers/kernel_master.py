@@ -1,10 +1,9 @@
-"""A player of what the IgH kernel master (EtherLab 1.6) says on the wire, and of what it demands.
+"""Simulation of the IgH kernel master (EtherLab 1.6): its frames, and the answers that it requires.
 
-Written from the behaviour of its state machines, in our own words; each function names the file and
-functions it plays. One tick is one realtime cycle of 1 ms: one frame with the domains, the clock's
-datagrams and at most one datagram of a state machine. A `Complaint` is what the kernel log would
-show as an error. Frames are packed and read here, not by `catenary.wire`: whoever shares a codec
-with the judged one judges nothing.
+It is written from the behaviour of the state machines. Each function names the file and functions
+that it simulates. One tick is one real-time cycle of 1 ms: one frame with the domains, the clock
+datagrams and at most one datagram of a state machine. A `Complaint` is an error in the kernel log.
+The frames are encoded here and not by `catenary.wire`, so that the check is independent.
 """
 
 from __future__ import annotations
@@ -25,7 +24,7 @@ APP_EPOCH = 848_540_000_000_000_000  # application time at start: ns since 2000
 
 
 class Complaint(AssertionError):
-    """What the master would log as an error."""
+    """Error that the master would log."""
 
 
 def demand(condition: bool, what: str) -> None:
@@ -34,7 +33,7 @@ def demand(condition: bool, what: str) -> None:
 
 
 class Abort(Exception):
-    """An SDO abort, which is an answer like another."""
+    """An SDO abort, which is a regular answer."""
 
     def __init__(self, code: int) -> None:
         super().__init__(hex(code))
@@ -90,7 +89,7 @@ class Slave:
         return int.from_bytes(self.sii[2 * address : 2 * address + 2], "little")
 
     def size(self, sync: int) -> int:
-        """Bytes of the process data of a sync manager."""
+        """Return the size of the process data of a SyncManager [bytes]."""
         if sync not in self.pdos:
             return self.syncs[sync].length
         bits = sum(e & 0xFF for entries in self.pdos[sync].values() for e in entries)
@@ -99,7 +98,7 @@ class Slave:
 
 @dataclass
 class Part:
-    """What one FMMU of a domain transfers (domain.c, slave_config.c)."""
+    """Data that one FMMU of a domain transfers (domain.c, slave_config.c)."""
 
     slave: Slave
     sync: int
@@ -115,7 +114,7 @@ class Part:
 
 
 class Domain:
-    """Owns one process image: its parts, its datagram and what it expects (datagram_pair.c)."""
+    """Owns a process image: its parts, its datagram and its counter (datagram_pair.c)."""
 
     def __init__(self, logical: int) -> None:
         self.logical = logical
@@ -153,14 +152,14 @@ class Domain:
         return Datagram(command, self.logical, bytes(self.image))
 
     def take(self, answer: Datagram) -> None:
-        """The counter always, data only where a counter came (domain.c, ecrt_domain_process)."""
+        """Take the counter, and the data if it is not 0 (domain.c, ecrt_domain_process)."""
         self.counter = answer.counter
         if answer.command != LWR and answer.counter:
             self.image[:] = answer.data
 
 
 class KernelMaster:
-    """Owns the link and the frames: the cyclic ones and one state machine's datagram a tick."""
+    """Owns the link, the cyclic frames and one datagram of a state machine per tick."""
 
     def __init__(self, segment: Segment) -> None:
         self.link = segment.open_link()
@@ -182,7 +181,7 @@ class KernelMaster:
     # -- frames (master.c: ec_master_send_datagrams, ec_master_receive_datagrams)
 
     def tick(self, *extra: Datagram) -> list[Datagram]:
-        """One cycle; the answers to `extra`."""
+        """Run one cycle, and return the answers to `extra`."""
         cyclic = [domain.datagram() for domain in self.domains]
         sync: list[Datagram] = []
         if self.clock is not None:
@@ -202,7 +201,7 @@ class KernelMaster:
             self.tick()
 
     def ask(self, command: int, place: int, register: int, data: bytes | int) -> Datagram:
-        """A state machine's datagram; a number of bytes is a read of so many."""
+        """Send a datagram of a state machine. An integer as data is the number of bytes to read."""
         content = bytes(data) if isinstance(data, int) else data
         [answer] = self.tick(Datagram(command, place & 0xFFFF | register << 16, content))
         return answer
@@ -250,12 +249,12 @@ class KernelMaster:
     # -- scanning (fsm_master.c, fsm_slave_scan.c)
 
     def broadcast(self) -> tuple[int, int]:
-        """ec_fsm_master_state_broadcast: how many respond, all their states."""
+        """Return the number of devices and their states (ec_fsm_master_state_broadcast)."""
         answer = self.ask(BRD, 0, 0x0130, 2)
         return answer.counter, answer.data[0]
 
     def scan(self) -> list[Slave]:
-        """From the broadcast that finds devices to all of them scanned."""
+        """Find and scan all devices, from the broadcast on."""
         count, _ = self.broadcast()
         cleared = self.ask(BWR, 0, 0x0010, bytes(2))
         demand(cleared.counter == count, "failed to clear station addresses")
@@ -294,7 +293,7 @@ class KernelMaster:
     def read_sii(self, slave: Slave, word: int) -> bytes:
         """fsm_sii.c, reading: two words."""
         self.ask_one(FPWR, slave.station, 0x0502, struct.pack("<BBH", 0x80, 0x01, word))
-        for _ in range(22):  # SII_TIMEOUT: 20 ms, and once more
+        for _ in range(22):  # SII_TIMEOUT is 20 ms; one more try
             answer = self.ask_one(FPRD, slave.station, 0x0502, 10)
             demand(not answer[1] & 0x20, f"error on SII command, word 0x{word:04X}")
             if not answer[1] & 0x81:
@@ -302,7 +301,7 @@ class KernelMaster:
         raise Complaint("SII: read timeout")
 
     def write_sii(self, slave: Slave, word: int, value: int) -> None:
-        """fsm_sii.c, writing: one word, not believed before 5 ms."""
+        """fsm_sii.c, writing: one word; the status is valid after 5 ms."""
         command = struct.pack("<BBHHH", 0x81, 0x02, word, 0, value)
         self.ask_one(FPWR, slave.station, 0x0502, command)
         for tick in range(22):
@@ -373,8 +372,10 @@ class KernelMaster:
         return [int.from_bytes(item, "little") for item in items]
 
     def _calculate_delays(self) -> None:
-        """slave.c, ec_slave_calc_port_delays_rec and ec_slave_calc_transmission_delays_rec, for a
-        line: half of what a device's round trip exceeds that of the next clock behind it."""
+        """slave.c, ec_slave_calc_port_delays_rec and ec_slave_calc_transmission_delays_rec.
+
+        In a line, a delay is half the difference of the round trips of a device and the next clock.
+        """
         clocks = [slave for slave in self.slaves if slave.has_dc]
         trips = [(c.port_times[1] - c.port_times[0]) & 0xFFFFFFFF for c in clocks]
         trips = [t if c.dl_status & 1 << 5 else 0 for t, c in zip(trips, clocks, strict=True)]
@@ -384,7 +385,7 @@ class KernelMaster:
     # -- states (fsm_change.c)
 
     def change(self, slave: Slave, state: int) -> None:
-        """ec_fsm_change_state_start to _status; a refusal is acknowledged, then a Complaint."""
+        """ec_fsm_change_state_start to _status. A refusal is acknowledged, and is a Complaint."""
         before = slave.state
         for attempt in range(3000):
             answer = self.ask(FPWR, slave.station, 0x0120, struct.pack("<H", state))
@@ -405,7 +406,7 @@ class KernelMaster:
         raise Complaint(f"timeout while setting state {state}")
 
     def acknowledge(self, slave: Slave) -> int:
-        """ec_fsm_change_state_start_code to _check_ack; the AL status code."""
+        """Return the AL status code (ec_fsm_change_state_start_code to _check_ack)."""
         code = self.ask_one(FPRD, slave.station, 0x0134, 2)
         self.ask_one(FPWR, slave.station, 0x0120, struct.pack("<H", slave.state))
         for _ in range(500):
@@ -424,7 +425,7 @@ class KernelMaster:
         if slave.sync_count:
             self.ask_one(FPWR, slave.station, 0x0800, bytes(8 * slave.sync_count))
         if slave.has_dc:
-            self.ask(FPWR, slave.station, 0x0980, bytes(2))  # may fail on simple ones
+            self.ask(FPWR, slave.station, 0x0980, bytes(2))  # may fail on simple devices
         if slave.mailbox_protocols:
             pages = b"".join(s.page(s.length, transfers=False) for s in slave.syncs[:2])
             pages = pages.ljust(8 * len(slave.syncs), b"\0")
@@ -441,7 +442,7 @@ class KernelMaster:
         watchdog: tuple[int, int] = (2498, 1000),
         sync0: int = 0,
     ) -> None:
-        """All of it: INIT, PRE-OP, PDOs, watchdog, sync managers, FMMUs, clock, SAFE-OP, OP."""
+        """Configure INIT, PRE-OP, PDOs, watchdog, SyncManagers, FMMUs, clock, SAFE-OP, OP."""
         self.to_pre_op(slave)
         self.write_pdos(slave)
         self.ask_one(FPWR, slave.station, 0x0400, struct.pack("<H", watchdog[0]))
@@ -486,7 +487,7 @@ class KernelMaster:
                 continue
             block = self.ask_one(FPRD, slave.station, 0x0910, 24)
             system_time, old_offset = struct.unpack("<Q8xQ", block)
-            system_time += TICK_NS  # as it goes on until the offset is written
+            system_time += TICK_NS  # time passes until the offset is written
             if slave.dc_64:
                 offset = self.app_time - system_time + old_offset & (1 << 64) - 1
             else:
@@ -494,7 +495,7 @@ class KernelMaster:
             self.ask_one(FPWR, slave.station, 0x0920, struct.pack("<QI", offset, slave.delay))
 
     def difference(self, slave: Slave) -> int:
-        """0x092C without its sign [ns]."""
+        """Return 0x092C without its sign [ns]."""
         data = self.ask_one(FPRD, slave.station, 0x092C, 4)
         return int.from_bytes(data, "little") & 0x7FFFFFFF
 
@@ -513,7 +514,7 @@ class KernelMaster:
     # -- mailbox (mailbox.c, fsm_coe.c)
 
     def post(self, slave: Slave, payload: bytes) -> None:
-        """ec_slave_mbox_prepare_send: the whole mailbox, counter 0; tried again for 3 s."""
+        """ec_slave_mbox_prepare_send: the whole mailbox, counter 0, repeated for 3 s."""
         at, size = slave.rx
         demand(6 + len(payload) <= size, "data size does not fit in mailbox")
         message = struct.pack("<HHBB", len(payload), slave.station, 0, COE) + payload
@@ -525,7 +526,7 @@ class KernelMaster:
         raise Complaint("reception of CoE request failed: working counter 0")
 
     def fetch(self, slave: Slave) -> bytes:
-        """ec_slave_mbox_prepare_check, _check, _prepare_fetch, _fetch; emergencies passed over."""
+        """ec_slave_mbox_prepare_check, _check, _prepare_fetch, _fetch; emergencies are skipped."""
         for _ in range(RESPONSE_MS):
             if not self.ask_one(FPRD, slave.station, 0x0808, 8)[5] & 8:
                 continue
@@ -539,7 +540,7 @@ class KernelMaster:
         raise Complaint("timeout while waiting for a CoE response")
 
     def _initiated(self, slave: Slave, kind: int, index: int, subindex: int) -> bytes:
-        """The response to an initiate request; late answers to others are passed over."""
+        """Return the response to an initiate request, and skip late answers to others."""
         while True:
             payload = self.fetch(slave)
             demand(len(payload) >= 6, "corrupted response")

@@ -1,4 +1,4 @@
-"""A served ring that obeys signals: SIGUSR1 cuts a cable, SIGUSR2 joins it.
+"""A served ring with signals: SIGUSR1 cuts a cable, SIGUSR2 joins it.
 
 serve_ring.py FILE.toml NIC NIC2 DEVICE DEVICE
 """

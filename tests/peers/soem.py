@@ -1,8 +1,8 @@
-"""A player of what SOEM does on the wire where it differs from other masters. SOEM itself cannot be
-put into virtual time.
+"""Simulation of SOEM, as far as its frames differ from those of other masters.
 
-Written from its behaviour, in our own words (OpenEtherCATsociety/SOEM, revision b410bf6); each
-function names the file and function it plays.
+SOEM itself cannot run in virtual time. The module is written from its behaviour
+(OpenEtherCATsociety/SOEM, revision b410bf6). Each function names the file and function that it
+simulates.
 """
 
 from __future__ import annotations
@@ -29,13 +29,13 @@ class SocketLike(Protocol):
     def send(self, frame: bytes, /) -> int: ...
 
     def receive(self) -> bytes | None:
-        """The next frame in the socket; None: there is none."""
+        """Return the next frame in the socket; None if there is none."""
         ...
 
 
 @dataclass
 class Port:
-    """Owns the buffers of oshw/linux/nicdrv.c: one a datagram index, found by it alone."""
+    """Owns the buffers of oshw/linux/nicdrv.c, one per datagram index."""
 
     socket: SocketLike
     states: list[int] = field(default_factory=lambda: [EMPTY] * MAX_BUF)
@@ -43,8 +43,10 @@ class Port:
     last: int = 0
 
     def exchange(self, frame: bytes, wait: int) -> bytes | None:
-        """One frame out and, after at most `wait` looks, back: ecx_getindex, ecx_outframe,
-        ecx_waitinframe, ecx_setbufstat. Nothing empties the socket before."""
+        """Send one frame, and receive it within `wait` reads of the socket, which is not drained.
+
+        Simulates ecx_getindex, ecx_outframe, ecx_waitinframe and ecx_setbufstat.
+        """
         index = self._index()
         self.states[index] = SENT
         self.socket.send(frame[:17] + bytes([index]) + frame[18:])
@@ -53,7 +55,7 @@ class Port:
         return self.buffers[index] if found else None
 
     def _index(self) -> int:
-        """ecx_getindex: the next one that is not in use, modulo 16."""
+        """ecx_getindex: the next unused index, modulo 16."""
         index = (self.last + 1) % MAX_BUF
         while self.states[index] != EMPTY:
             index = (index + 1) % MAX_BUF
@@ -77,7 +79,7 @@ class Port:
 
 @dataclass(frozen=True)
 class Record:
-    """The part of a device's SII that SOEM keeps."""
+    """Part of a device's SII that SOEM keeps."""
 
     identity: tuple[int, int, int]
     block_lrw: bool
@@ -85,7 +87,7 @@ class Record:
     mailbox: bool
 
     def managers_of(self, kind: int) -> list[tuple[int, int, int, int]]:
-        """(number, start, length, control) of those of a type."""
+        """Yield (number, start, length, control) of the SyncManagers of a type."""
         return [
             (n, *struct.unpack_from("<HHB", each))
             for n, each in enumerate(self.managers)
@@ -94,7 +96,7 @@ class Record:
 
 
 class Soem:
-    """Plays ecx_config_init, ecx_config_map_group and the exchange of process data."""
+    """Simulates ecx_config_init, ecx_config_map_group and the exchange of process data."""
 
     def __init__(self, segment: Segment) -> None:
         self.main = MainDevice(segment)
@@ -116,7 +118,7 @@ class Soem:
             self._start_mailbox(station, self.records[-1])
 
     def _lookup(self, identity: tuple[int, ...]) -> Record | None:
-        """ecx_lookup_prev_sii: the SII of the first device with these three numbers serves all."""
+        """ecx_lookup_prev_sii: devices with the same three numbers share the SII of the first."""
         return next((replace(r) for r in self.records if r.identity == identity), None)
 
     def _read(self, station: int, identity: tuple[int, ...]) -> Record:
@@ -137,7 +139,7 @@ class Soem:
         return int(struct.unpack_from("<I", self.main.read(station, SII_CONTROL, 10), 6)[0])
 
     def _category(self, station: int, wanted: int) -> bytes:
-        """ecx_siifind, and what it found."""
+        """Return the content of a category (ecx_siifind)."""
         word = FIRST_CATEGORY
         while True:
             kind, size = struct.unpack("<HH", self._words(station, word).to_bytes(4, "little"))
@@ -158,11 +160,11 @@ class Soem:
 
     @property
     def blocks_lrw(self) -> bool:
-        """True if the SII of any device denies LRW. The controllers' features do not count."""
+        """True if the SII of any device denies LRW. The features of controllers are ignored."""
         return any(record.block_lrw for record in self.records)
 
     def map(self) -> None:
-        """Whole bytes, outputs first, with the lengths of the SII."""
+        """Map whole bytes, outputs first, with the lengths of the SII."""
         logical = 0
         for kind, direction in ((OUTPUTS, 2), (INPUTS, 1)):
             for position, record in enumerate(self.records):
@@ -196,7 +198,7 @@ class Soem:
     # -- src/ec_main.c, ecx_main_send_processdata and ecx_receive_processdata_group
 
     def exchange(self) -> int:
-        """The working counter, as SOEM counts it: an LWR twice, to be like an LRW."""
+        """Return the working counter as SOEM counts it: an LWR counts twice, like an LRW."""
         if not self.blocks_lrw:
             image = bytes(self.outputs + self.inputs)
             return self.main.exchange_logical(EcatCommand.LRW, 0, image).working_counter

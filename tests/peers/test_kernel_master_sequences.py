@@ -1,5 +1,7 @@
-"""The kernel master IgH, played word for word (`kernel_master.py`), judges the virtual segment: by
-what it sends in scan, configuration and operation, and by what it would log as an error."""
+"""A simulated IgH kernel master (`kernel_master.py`) tests the virtual segment.
+
+Its frames are those of scan, configuration and operation. Errors that it would log are failures.
+"""
 
 from __future__ import annotations
 
@@ -64,7 +66,7 @@ def slaves(master: KernelMaster) -> list[Slave]:
 
 
 def operate(master: KernelMaster, slaves: list[Slave], **options: int) -> Domain:
-    """One domain over all, everything configured to OP while it runs."""
+    """Configure all devices to OP with one running domain."""
     domain = Domain(0)
     for slave in slaves:
         domain.add(slave)
@@ -88,11 +90,11 @@ def test_scan(master: KernelMaster, slaves: list[Slave]) -> None:
     assert list(servo.pdos) == [2, 3]
     assert [len(v) for pdos in servo.pdos.values() for v in pdos.values()] == [5, 5]
     assert (servo.size(2), servo.size(3)) == (13, 13)
-    assert slaves[COUPLER].state == INIT  # no CoE: left alone until it is configured
+    assert slaves[COUPLER].state == INIT  # no CoE: unchanged until it is configured
 
 
 def test_topology_and_delays(slaves: list[Slave]) -> None:
-    # DL status: link of port 0 and 1, loop closed behind the last (slave.c, ec_slave_set_dl_status)
+    # DL status: link of port 0 and 1, loop closed after the last (slave.c, ec_slave_set_dl_status)
     for slave in slaves:
         last = slave is slaves[-1]
         assert bool(slave.dl_status & 1 << 4)
@@ -103,7 +105,7 @@ def test_topology_and_delays(slaves: list[Slave]) -> None:
     assert delays[0] == 0 < delays[-1] < 100_000
 
 
-def test_sii_is_read_the_same_by_position(master: KernelMaster, slaves: list[Slave]) -> None:
+def test_the_sii_can_be_read_by_position(master: KernelMaster, slaves: list[Slave]) -> None:
     # fsm_sii.c with EC_FSM_SII_USE_INCREMENT_ADDRESS
     master.ask_one(2, -SERVO, 0x0502, struct.pack("<BBH", 0x80, 0x01, 0x08))
     master.run(3)
@@ -131,7 +133,7 @@ def test_operation(master: KernelMaster, slaves: list[Slave], segment: Segment) 
     assert master.broadcast() == (6, OP)
 
 
-def test_outputs_and_inputs_pass(
+def test_outputs_and_inputs_are_exchanged(
     master: KernelMaster, slaves: list[Slave], segment: Segment
 ) -> None:
     domain = operate(master, slaves)
@@ -167,7 +169,7 @@ def test_counters_of_domains(
     assert domain.counter == domain.expected == expected
 
 
-def test_two_domains_with_logical_addresses_of_their_own(
+def test_two_domains_with_separate_logical_addresses(
     master: KernelMaster, slaves: list[Slave]
 ) -> None:
     first, second = Domain(0), Domain(64)
@@ -197,7 +199,7 @@ def test_clocks(master: KernelMaster, slaves: list[Slave]) -> None:
 def test_clocks_that_ran_before_their_offset_was_set(
     master: KernelMaster, slaves: list[Slave]
 ) -> None:
-    """The application is quicker than the state machine: wrong times first, then the offset."""
+    """The application is faster than the state machine: the offset follows after wrong times."""
     master.clock = slaves[COUPLER]
     master.run(200)
     operate(master, slaves, sync0=1_000_000)
@@ -234,7 +236,7 @@ def test_sdo_downloads(master: KernelMaster, slaves: list[Slave], size: int) -> 
     assert master.upload(slaves[SERVO], 0x2101, 0) == data
 
 
-def test_a_download_that_is_refused(master: KernelMaster, slaves: list[Slave]) -> None:
+def test_a_refused_download(master: KernelMaster, slaves: list[Slave]) -> None:
     with pytest.raises(Abort) as caught:
         master.download(slaves[SERVO], 0x1018, 1, bytes(4))
     assert caught.value.code == 0x06010002
@@ -272,10 +274,10 @@ def test_a_refused_state_is_acknowledged(
     assert domain.counter == domain.expected
 
 
-def test_a_device_that_has_no_outputs_falls_and_is_acknowledged(
+def test_a_device_without_outputs_leaves_op_and_is_acknowledged(
     master: KernelMaster, slaves: list[Slave]
 ) -> None:
-    """The application stops: watchdogs expire, the master acknowledges and configures again."""
+    """The application stops, watchdogs expire, and the master configures the device again."""
     operate(master, slaves)
     domains, master.domains = master.domains, []
     master.run(300)
@@ -294,7 +296,7 @@ def test_a_device_that_has_no_outputs_falls_and_is_acknowledged(
 
 
 @pytest.mark.parametrize("state", [PRE_OP, INIT])
-def test_going_down(
+def test_states_on_the_way_down(
     master: KernelMaster, slaves: list[Slave], segment: Segment, state: int
 ) -> None:
     operate(master, slaves)
@@ -306,11 +308,13 @@ def test_going_down(
 
 
 @pytest.mark.parametrize("gap", range(9))
-def test_a_stop_is_quick_whatever_fails_meanwhile(
+def test_a_stop_is_quick_despite_errors(
     master: KernelMaster, slaves: list[Slave], segment: Segment, gap: int
 ) -> None:
-    """The application stops with clocks on. Drives miss their outputs before, while and after INIT
-    is requested. A lost request is a wait of 5 s (fsm_change.c, ec_fsm_change_timeout_ms)."""
+    """The application stops with clocks. Drives miss outputs before and after INIT requests.
+
+    A lost request costs 5 s (fsm_change.c, ec_fsm_change_timeout_ms).
+    """
     operate(master, slaves, sync0=1_000_000)
     master.domains = []
     master.run(gap)
@@ -321,15 +325,15 @@ def test_a_stop_is_quick_whatever_fails_meanwhile(
     assert [device.state for device in segment] == [INIT] * 6
 
 
-def test_another_master_finds_the_segment_in_op(segment: Segment) -> None:
+def test_a_second_master_finds_the_segment_in_op(segment: Segment) -> None:
     first = KernelMaster(segment)
     operate(first, first.scan())
     first.post(first.slaves[SERVO], struct.pack("<HBHB4x", 0x2000, 0x40, 0x1008, 0))
-    first.run(5)  # its answer lies in the mailbox, nobody fetches it
+    first.run(5)  # its answer stays in the mailbox
     first.close()
     second = KernelMaster(segment)
     slaves = second.scan()
-    # nobody fed the outputs while it scanned, so watchdogs have expired, as they must
+    # the scan sends no outputs, so the watchdogs must have expired
     assert [slave.state for slave in slaves] == [OP, OP, SAFE_OP | 0x10, SAFE_OP | 0x10, OP, OP]
     for slave in slaves[SERVO : SERVO_2 + 1]:
         assert second.acknowledge(slave) == 0x001B
@@ -339,7 +343,7 @@ def test_another_master_finds_the_segment_in_op(segment: Segment) -> None:
     second.close()
 
 
-def test_registers_are_asked_by_the_application(master: KernelMaster, slaves: list[Slave]) -> None:
+def test_the_application_reads_registers(master: KernelMaster, slaves: list[Slave]) -> None:
     # fsm_slave.c, ec_fsm_slave_action_process_reg
     servo = slaves[SERVO]
     assert len(master.ask_one(FPRD, servo.station, 0x0300, 20)) == 20

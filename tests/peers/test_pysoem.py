@@ -1,5 +1,4 @@
-"""A foreign MainDevice judges the virtual segment: PySOEM, unmodified, over a pair of network
-interfaces."""
+"""PySOEM, unmodified, tests the virtual segment over a pair of network interfaces."""
 
 from __future__ import annotations
 
@@ -55,8 +54,7 @@ ENABLING = {0x40: 0x06, 0x21: 0x07, 0x23: 0x0F, 0x27: 0x0F}
 
 
 def again(devices: int, count: int = 5) -> Callable[[Callable[P, None]], Callable[P, None]]:
-    """Where this machine stood still in the middle, a test begins anew: SOEM waits 2 ms for a frame
-    and takes what did not come for zeros."""
+    """Repeat a test if this machine stalled: SOEM waits 2 ms for a frame, then reads zeros."""
 
     def wrapped(test: Callable[P, None]) -> Callable[P, None]:
         @functools.wraps(test)
@@ -85,7 +83,7 @@ def master(served: str) -> Iterator[Any]:
 
 @pytest.fixture
 def clocked(veth: tuple[str, str], tmp_path: Path) -> Iterator[Any]:
-    """Servos with crystals of their own, which forgive a machine that stops for a while."""
+    """Yield servos with different crystals that tolerate a stalled machine."""
     ours, theirs = veth
     file = tmp_path / "clocked.toml"
     file.write_text(CLOCKED)
@@ -97,7 +95,7 @@ def clocked(veth: tuple[str, str], tmp_path: Path) -> Iterator[Any]:
 def test_finds_every_device(master: Any, devices: list[Description]) -> None:
     found = [(slave.man, slave.id, slave.rev) for slave in master.slaves]
     assert found == [(VENDOR_ID, d.product_code, d.revision) for d in devices]
-    # SOEM reads the name of the first of a kind only, and copies it to the others.
+    # SOEM reads only the name of the first device of a kind, and copies it.
     names = {slave.id: slave.name for slave in master.slaves}
     assert names == {d.product_code: d.name for d in reversed(devices)}
 
@@ -120,13 +118,13 @@ def test_sdo_expedited(master: Any) -> None:
 
 
 def test_sdo_normal(master: Any) -> None:
-    """More than four bytes, in one mailbox."""
+    """The object has more than four bytes and fits in one mailbox."""
     servo = master.slaves[SHOULDER]
     assert b"shoulder" in tries(lambda: servo.sdo_read(0x1008, 0).rstrip(b"\0"))
 
 
 def test_sdo_segmented(master: Any) -> None:
-    """More than one mailbox holds."""
+    """The object does not fit in one mailbox."""
     servo = master.slaves[SHOULDER]
     stored = bytes(k * 7 & 0xFF for k in range(BLOB_BYTES))
     assert stored in tries(lambda: servo.sdo_read(0x2100, 0, 4096))
@@ -182,8 +180,8 @@ def test_a_servo_goes_through_its_states_to_a_position(master: Any) -> None:
     cycle_until(master, arrived)
 
 
-def test_a_pause_of_the_segment_leaves_no_old_answers(veth: tuple[str, str], line: Path) -> None:
-    """SOEM finds answers by index modulo 16, in a socket that it does not empty."""
+def test_a_stalled_segment_leaves_no_old_answers(veth: tuple[str, str], line: Path) -> None:
+    """SOEM finds answers by index modulo 16, in a socket that it does not drain."""
     ours, theirs = veth
     with serving(theirs, line, max_age=0.002) as server, opened(6, ours) as master:
         try:
@@ -219,7 +217,7 @@ mailbox_bytes = 256
 
 @pytest.fixture
 def without_lrw(veth: tuple[str, str], tmp_path: Path) -> Iterator[Any]:
-    """Three servos with three SIIs; one answers LRD and LWR only."""
+    """Yield three servos with three SIIs; one supports only LRD and LWR."""
     ours, theirs = veth
     file = tmp_path / "without_lrw.toml"
     file.write_text(WITHOUT_LRW)
@@ -228,7 +226,7 @@ def without_lrw(veth: tuple[str, str], tmp_path: Path) -> Iterator[Any]:
 
 
 @again(devices=4)
-def test_servos_with_three_siis_reach_op_and_are_all_counted(without_lrw: Any) -> None:
+def test_servos_with_three_siis_reach_op_with_the_right_counter(without_lrw: Any) -> None:
     master = without_lrw
     to_operational(master)
     assert master.expected_wkc == 9
@@ -237,7 +235,7 @@ def test_servos_with_three_siis_reach_op_and_are_all_counted(without_lrw: Any) -
 
 @pytest.fixture
 def ring(line: Path, veth: tuple[str, str]) -> Iterator[tuple[str, str, Child]]:
-    """Both interfaces of a ring, and who serves it (serve_ring.py says what it obeys)."""
+    """Yield both interfaces of a ring, and the serving process (see serve_ring.py)."""
     script = str(Path(__file__).parent / "serve_ring.py")
     with private_network.veth_pair() as other:
         command = [script, str(line), veth[1], other[1], str(SHOULDER), str(ELBOW)]
@@ -246,8 +244,8 @@ def ring(line: Path, veth: tuple[str, str]) -> Iterator[tuple[str, str, Child]]:
             yield veth[0], other[0], server
 
 
-def test_a_ring_over_both_interfaces_survives_a_cut(ring: tuple[str, str, Child]) -> None:
-    """Cable redundancy of SOEM: a cut in the middle of cyclic operation, and joined again."""
+def test_a_ring_with_two_interfaces_survives_a_cut(ring: tuple[str, str, Child]) -> None:
+    """Test the cable redundancy of SOEM with a cut during cyclic operation, and a repair."""
     first, second, server = ring
     with opened(6, first, second) as master:
         to_operational(master)
@@ -263,7 +261,7 @@ def test_a_ring_over_both_interfaces_survives_a_cut(ring: tuple[str, str, Child]
 
 @contextlib.contextmanager
 def opened(devices: int, *interfaces: str) -> Iterator[Any]:
-    """Yield a master that has found its devices. Afterwards they are in INIT again."""
+    """Yield a master with its devices, and bring them to INIT at the end."""
     master = pysoem.Master()
     master.open(*interfaces)
     try:
@@ -276,8 +274,11 @@ def opened(devices: int, *interfaces: str) -> Iterator[Any]:
 
 
 def tries(ask: Callable[[], T], count: int = 10) -> Iterator[T | None]:
-    """What it answers, each time it is asked. SOEM waits 2 ms for a frame, three times: where this
-    machine stands still for longer, an answer is missing, and may come to the next question."""
+    """Yield the results of repeated calls.
+
+    SOEM waits 2 ms for a frame, three times. If this machine stalls for longer, an answer is
+    missing, and may arrive for the next call.
+    """
     for number in range(count):
         try:
             yield ask()
@@ -287,7 +288,7 @@ def tries(ask: Callable[[], T], count: int = 10) -> Iterator[T | None]:
 
 
 def find(master: Any, devices: int, seconds: float = 20.0) -> None:
-    """SOEM waits 2 ms for an answer, three times: a busy machine needs more tries."""
+    """Find all devices. SOEM waits 2 ms for an answer, three times; a busy machine needs more."""
     deadline = time.monotonic() + seconds
     while master.config_init() != devices:
         assert time.monotonic() < deadline
@@ -308,7 +309,7 @@ def request_operational(master: Any) -> None:
             return True
         master.read_state()
         if any(slave.state & pysoem.STATE_ACK for slave in master.slaves):
-            # the segment or this machine stood still for longer than a watchdog
+            # the segment or this machine stalled for longer than a watchdog
             master.state = pysoem.OP_STATE | pysoem.STATE_ACK
             master.write_state()
         return False
@@ -319,7 +320,7 @@ def request_operational(master: Any) -> None:
 def cycles_to(master: Any, controlword: int) -> int:
     """Return how many exchanges after the controlword the statusword follows it."""
     servo, wanted = master.slaves[SHOULDER], {0x06: 0x21, 0x00: 0x40}[controlword]
-    for _ in range(400):  # what came before has been received
+    for _ in range(400):  # earlier answers have been received
         exchange(master, 2_000)
     servo.output = SERVO.pack(controlword, 8, 0, 0, 0)
     for count in range(1000):
@@ -344,7 +345,7 @@ def exchange(master: Any, timeout_us: int = 200_000) -> int:
 
 @again(devices=4)
 def test_clocks_and_sync_pulses_up_to_op(clocked: Any) -> None:
-    """As SOEM's maintainer advises (SOEM#487): clocks first, then SYNC0, then the mapping."""
+    """The order is that of SOEM's maintainer (SOEM#487): clocks, SYNC0, mapping."""
     master = clocked
     assert master.config_dc()
     for servo in servos(master):
@@ -360,7 +361,7 @@ def test_clocks_and_sync_pulses_up_to_op(clocked: Any) -> None:
     cycle_until(master, together, 60.0)
     before = [next_pulse_ns(servo) for servo in servos(master)]
     cycle_until(master, lambda: next_pulse_ns(servos(master)[-1]) > before[-1])
-    # Steered to one time, they pulse at the same instants of it, whatever their crystals do.
+    # With a common time, they pulse at the same times of it, for any crystals.
     assert {instant % SYNC0_NS for instant in before} == {0}
 
 
@@ -385,7 +386,7 @@ def register(slave: Any, address: int, size: int) -> bytes:
 
 
 def difference_ns(slave: Any) -> int:
-    """Register 0x092C: sign and magnitude."""
+    """Return register 0x092C, which has sign and magnitude."""
     [raw] = struct.unpack("<I", register(slave, 0x092C, 4))
     return -(raw & 0x7FFF_FFFF) if raw >> 31 else int(raw)
 

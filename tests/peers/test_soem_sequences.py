@@ -1,5 +1,8 @@
-"""SOEM's habits against the segment: one SII for each identity, LRW decided by the SII alone, and
-answers found by their index modulo 16 in a socket that is never emptied."""
+"""Behaviour of SOEM on the virtual segment.
+
+SOEM reads one SII per identity, selects LRW by the SII only, and finds answers by their index
+modulo 16 in a socket that is never drained.
+"""
 
 from __future__ import annotations
 
@@ -37,12 +40,12 @@ def operate(segment: Segment) -> Soem:
 def test_devices_of_one_kind_share_an_sii() -> None:
     one = operate(Segment([Coupler(), Servo()]))
     two = operate(Segment([Coupler(), Servo(), Servo(name="second", alias=7)]))
-    assert two.sii_reads == one.sii_reads + 3  # of the second servo the identity alone
+    assert two.sii_reads == one.sii_reads + 3  # only the identity of the second servo
     assert not two.blocks_lrw
 
 
-def test_variants_with_another_sii_have_another_identity() -> None:
-    """With one revision for both, the second servo would get the mailbox of the first: 0x0016."""
+def test_variants_with_different_siis_have_different_identities() -> None:
+    """With the same revision, the second servo would get the mailbox of the first (0x0016)."""
     soem = operate(Segment([Servo(), Servo(mailbox_bytes=256), AnalogInputs(mailbox_bytes=64)]))
     assert len({record.identity for record in soem.records}) == 3
 
@@ -58,7 +61,7 @@ def test_a_device_without_lrw_reaches_op(denying: int) -> None:
 
 
 class Wire:
-    """One end of a socket pair; the packet loop has the other."""
+    """One end of a socket pair; the other one belongs to the packet loop."""
 
     def __init__(self, end: socket.socket, seconds: float) -> None:
         self._end = end
@@ -75,7 +78,7 @@ class Wire:
 
 
 def numbered(number: int) -> bytes:
-    """A write with the number of its frame in the answer."""
+    """Return a write with the number of its frame in the answer."""
     return encode_frame([Datagram(EcatCommand.BWR, USER_RAM << 16, struct.pack("<I", number))])
 
 
@@ -85,7 +88,7 @@ def number_in(frame: bytes | None) -> int | None:
 
 @contextmanager
 def answering(segment: Segment, end: socket.socket, max_age_ns: int) -> Iterator[None]:
-    """The packet loop of a served segment, on any socket."""
+    """Run the packet loop of a served segment on a socket."""
     stop = os.eventfd(0)
     thread = threading.Thread(
         target=segment.core.answer_packets, args=(end.fileno(), -1, stop, max_age_ns)
@@ -100,7 +103,7 @@ def answering(segment: Segment, end: socket.socket, max_age_ns: int) -> Iterator
 
 
 def after_a_pause(max_age_ns: int) -> tuple[Segment, Iterator[int | None]]:
-    """The segment stood still for PAUSE frames; then the lag of each answer, in frames."""
+    """Stall the segment for PAUSE frames, and return the lag of each answer [frames]."""
     segment = Segment([Coupler()], clock="monotonic")
 
     def lags() -> Iterator[int | None]:
@@ -111,7 +114,7 @@ def after_a_pause(max_age_ns: int) -> tuple[Segment, Iterator[int | None]]:
             port = Port(wire)
             for number in range(PAUSE):
                 port.exchange(numbered(number), 0)
-            time.sleep(0.005)  # older than max_age, whatever the machine does
+            time.sleep(0.005)  # older than max_age on any machine
             ours.settimeout(0.01)
             with answering(segment, theirs, max_age_ns):
                 for number in itertools.count(PAUSE):
@@ -121,14 +124,14 @@ def after_a_pause(max_age_ns: int) -> tuple[Segment, Iterator[int | None]]:
     return segment, lags()
 
 
-def test_answers_to_frames_that_waited_would_lag_for_ever() -> None:
+def test_without_an_age_limit_old_answers_lag_forever() -> None:
     segment, lags = after_a_pause(NEVER_NS)
     assert {lag for lag in itertools.islice(lags, 200)} <= {MAX_BUF, 2 * MAX_BUF, None}
     lags.close()  # type: ignore[attr-defined]
     assert segment.frames.expired == 0
 
 
-def test_frames_that_waited_are_lost_and_no_answer_lags() -> None:
+def test_old_frames_are_discarded_and_no_answer_lags() -> None:
     segment, lags = after_a_pause(2_000_000)
     deadline = time.monotonic() + SECONDS
     seen: list[int | None] = []

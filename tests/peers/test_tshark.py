@@ -1,5 +1,4 @@
-"""A foreign dissector judges our MainDevice: tshark reads what a bring-up and a run put on
-the wire, and what came back."""
+"""tshark dissects the frames of a bring-up and a run, in both directions."""
 
 from __future__ import annotations
 
@@ -23,7 +22,7 @@ CYCLES = 300
 
 @pytest.fixture(scope="module")
 def recording(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Scan, SDOs of all lengths, an abort, SAFE-OP, OP, some cycles, and the way back."""
+    """Record a scan, SDOs of all lengths, an abort, SAFE-OP, OP, some cycles, and the shutdown."""
     path = tmp_path_factory.mktemp("tshark") / "run.pcapng"
     with Recorder(demo_segment(clock="virtual"), path) as link, cat.MainDevice(link) as main:
         subs = main.scan()

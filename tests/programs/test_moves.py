@@ -1,4 +1,4 @@
-"""Programs that move drives: profiles of ours and of the drive, homing, torque limit, a fault."""
+"""Programs that move drives: CSP and PP moves, homing, torque limit, a fault."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ def test_homing(run_program: RunProgram) -> None:
 
 
 def test_fault_and_continue(run_program: RunProgram, capsys: pytest.CaptureFixture[str]) -> None:
-    fault = drive_fault(1, at=0.5, for_=2e-3)  # while the axes move; its cause is gone at once
+    fault = drive_fault(1, at=0.5, for_=2e-3)  # while the axes move; its cause ends after 2 ms
     names = run_program("fault_and_continue", Segment([Servo(), Servo()], faults=[fault]))
     arm = names["arm"]
     assert isinstance(arm, Drives)

@@ -1,4 +1,4 @@
-"""Programs written for PyIgH: over libethercat's double and over our own MainDevice."""
+"""Programs for PyIgH, on a double of libethercat and on our own MainDevice."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def master(library: Path, request: pytest.FixtureRequest) -> MasterBase:
 
 
 def cycle(master: MasterBase, *servos: SlaveServo, goal: int | None = None) -> bool:
-    """One cycle as published; whether all servos are enabled."""
+    """Run one cycle as published. Return True if all servos are enabled."""
     master.wait()
     master.ecat_master_receive()
     assert isinstance(master.ecat_domain_process(), bool)
@@ -71,7 +71,7 @@ def test_servos_move(master: MasterBase) -> None:
         assert master.ecat_get_slave_info(1).position == 1
 
 
-def test_the_calls_are_libethercats(library: Path) -> None:
+def test_each_function_makes_one_call_of_libethercat(library: Path) -> None:
     double = Double(library)
     servo = SlaveServo(0)
     with MasterBase(Master(library=library, virtual_time=True)) as master:
@@ -129,7 +129,7 @@ def test_an_object_that_is_mapped_twice_is_one_channel() -> None:
             terminal.read_analog(1)
 
 
-def test_any_object(library: Path) -> None:
+def test_any_object_can_be_exchanged(library: Path) -> None:
     double = Double(library)
     double.set(0, 0x6077, 0, 0xFFFE)
     slave = SlaveBase(0, 0xAA, 0x402, [RawObject(0x6077, 0, 16, Direction.INPUT, signed=True)])
@@ -140,7 +140,7 @@ def test_any_object(library: Path) -> None:
         assert slave.read(0x6077) == -2
 
 
-def test_mistakes(library: Path) -> None:
+def test_mistakes_of_a_program_are_errors(library: Path) -> None:
     Double(library)
     with MasterBase(Master(library=library, virtual_time=True)) as master:
         with pytest.raises(ConfigurationError, match="there is no slave 5"):
@@ -168,12 +168,12 @@ def run(name: str, *arguments: str) -> str:
     return done.stdout
 
 
-def test_the_measured_loop_is_short_and_runs() -> None:
+def test_the_example_is_short_and_runs() -> None:
     assert len((EXAMPLES / "pyigh_loop.py").read_text().splitlines()) <= 40
     out = run("pyigh_loop.py")
     assert out.startswith("3 servos")
     assert "al_states=8" in out
-    assert "us a cycle" in out
+    assert "us per cycle" in out
 
 
 def test_the_same_program_on_the_kernel_master(

@@ -1,7 +1,7 @@
-"""The quirks of virtual devices, one line each: name → a segment with a device that has it.
+"""Table of quirks: name → segment with a device that has the quirk.
 
-Every segment is a coupler, a digital output, the device with the quirk (position 2) and a servo
-without one (position 3).
+Every segment has a coupler, a digital output, the device with the quirk (position 2) and a servo
+without quirks (position 3).
 """
 
 from __future__ import annotations
@@ -24,45 +24,45 @@ from catenary.virtual import (
 from catenary.virtual.op_modes import EASYCAT, EASYCAT_STORED, EL3702, SYNC1_ALONE
 
 QUIRKY, SOUND = 2, 3  # positions
-CONTROL = "\x1b[2J\r\n\x07\x9b"  # clears the screen, begins a line, rings, and a C1 sequence
+CONTROL = "\x1b[2J\r\n\x07\x9b"  # clear screen, carriage return, bell and a C1 sequence
 
 
 @dataclass(frozen=True)
 class Quirk:
-    """A device with a quirk, and what the quirk makes impossible."""
+    """A device with a quirk, and the functions that the quirk prevents."""
 
     make: Callable[[], Device]
-    broken: str = ""  # the device cannot be brought to PRE-OP: part of its error
-    moves: bool = True  # it follows its targets
-    notes: str = ""  # part of a note of the scan
-    clock: DistributedClock | bool = True  # `dc=` that its SII needs
+    broken: str = ""  # part of the error if the device cannot reach PRE-OP
+    moves: bool = True  # True if it follows its targets
+    notes: str = ""  # part of a note from the scan
+    clock: DistributedClock | bool = True  # `dc=` that its SII requires
 
     def segment(self) -> Segment:
         return Segment([Coupler(), DigitalOutputs(), self.make(), Servo(serial=2)])
 
 
 def servo(**quirks: object) -> Callable[[], Device]:
-    """A servo that differs from CiA 402."""
+    """Return a servo that differs from CiA 402."""
     return lambda: Servo(serial=1, quirks=ServoQuirks(**quirks))  # type: ignore[arg-type]
 
 
 def mailbox(**quirks: object) -> Callable[[], Device]:
-    """A servo with a mailbox that differs from ETG.1000.6."""
+    """Return a servo with a mailbox that differs from ETG.1000.6."""
     return lambda: Servo(serial=1, mailbox_quirks=MailboxQuirks(**quirks))  # type: ignore[arg-type]
 
 
 def sii(**quirks: object) -> Callable[[], Device]:
-    """A servo with an SII that differs from ETG.2010."""
+    """Return a servo with an SII that differs from ETG.2010."""
     return lambda: Servo(serial=1, sii_quirks=SiiQuirks(**quirks))  # type: ignore[arg-type]
 
 
 def mapping(**quirks: object) -> Callable[[], Device]:
-    """A servo with PDOs that differ from ETG.1000.6."""
+    """Return a servo with PDOs that differ from ETG.1000.6."""
     return lambda: Servo(serial=1, mapping_quirks=MappingQuirks(**quirks))  # type: ignore[arg-type]
 
 
 def device(**options: object) -> Callable[[], Device]:
-    """A servo with options that are no quirks, but rare."""
+    """Return a servo with rare options that are not quirks."""
     return lambda: Servo(serial=1, **options)  # type: ignore[arg-type]
 
 

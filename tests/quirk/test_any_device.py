@@ -1,5 +1,7 @@
-"""Random CoE servers and random SIIs: they never end a scan of the other devices, every error names
-its device, and all of it takes a bounded time."""
+"""Random CoE servers and random SIIs.
+
+The other devices are always found, every error names its device, and the time is bounded.
+"""
 
 from __future__ import annotations
 
@@ -25,7 +27,7 @@ SCAN_MAX, LIST_MAX, PLAN_MAX = 65.0, 120.0, 70.0  # [s] of virtual time
 COE = 3
 SDO_REQUEST, SDO_RESPONSE, SDO_INFORMATION = 2, 3, 8
 
-Answers = list[tuple[int, bytes]]  # protocol of the mailbox, its data
+Answers = list[tuple[int, bytes]]  # mailbox protocol and data
 Misdeed = Callable[[Random, bytes, Answers], Answers]
 
 
@@ -76,7 +78,7 @@ def abort(random: Random, request: bytes, _answers: Answers) -> Answers:
 
 
 def drip(random: Random, request: bytes, _answers: Answers) -> Answers:
-    """Announce a size, then send a byte at a time, the last one never."""
+    """Announce a size and send single bytes, except the last one."""
     command = request[8]
     if command >> 5 == 3:
         return [(COE, struct.pack("<HB", SDO_RESPONSE << 12, command & 0x10 | 6 << 1) + bytes(7))]
@@ -109,7 +111,7 @@ def flipped(random: Random, data: bytes) -> bytes:
 
 
 class StrangeServo(Servo):
-    """Owns a servo that chooses one of its misdeeds for every request."""
+    """Servo that misbehaves in a random way for every request."""
 
     def __init__(self, misdeeds: list[Misdeed], seed: int) -> None:
         super().__init__(serial=1, sii_quirks=cat.virtual.SiiQuirks(pdos="absent"))
@@ -128,7 +130,7 @@ class StrangeServo(Servo):
 
 
 class StrangeEeprom(Servo):
-    """Owns a servo with another content of its EEPROM. It accepts any configuration."""
+    """Servo with a different EEPROM content. It accepts any configuration."""
 
     def __init__(self, change: Callable[[bytes], bytes]) -> None:
         super().__init__(serial=1)
@@ -147,7 +149,7 @@ def segment_with(device: Servo) -> Segment:
 
 
 def assert_others_are_found(segment: Segment) -> None:
-    """Scan: the other devices are in PRE-OP and answer; the error of the strange one names it."""
+    """Check that the other devices answer in PRE-OP, and that the error names the strange one."""
     with cat.MainDevice(segment) as main:
         before = segment.now_ns
         subs = main.scan(strict=False)
@@ -165,7 +167,7 @@ def assert_others_are_found(segment: Segment) -> None:
 
 
 def assert_planned(main: cat.MainDevice, position: int) -> None:
-    """A plan is made in a bounded time, or the error names the strange device."""
+    """Check that a plan is made in bounded time, or that the error names the strange device."""
     request = DeviceRequest(
         inputs=(ObjectReference(0x6041, 0, 16), ObjectReference(0x60F4, 0, 32, required=False)),
         start_up=((0x6060, 0, b"\x08"),),
@@ -179,18 +181,18 @@ def assert_planned(main: cat.MainDevice, position: int) -> None:
 
 
 def assert_listed(main: cat.MainDevice, sub: cat.SubDevice) -> None:
-    """Its dictionary can be listed in a bounded time, or the error names the device."""
+    """Check that the dictionary is listed in bounded time, or that the error names the device."""
     before = main.link.now()
     try:
         sub.sdo.list()
-    except CatenaryError as error:  # or it may succeed: the device is random
+    except CatenaryError as error:  # success is possible, too
         assert_named(error)
     assert main.link.now() - before < LIST_MAX * 1e9
 
 
 def assert_named(error: Exception | None) -> None:
     assert error is None or str(error).startswith(f"device {STRANGE}"), error
-    assert "its data cannot be used" not in str(error), error  # no decoder's bare error
+    assert "its data cannot be used" not in str(error), error  # not an error of the decoder
 
 
 @settings(max_examples=100)
@@ -203,7 +205,7 @@ def test_random_coe_servers(misdeeds: list[Misdeed], seed: int) -> None:
 
 
 def with_checksum(image: bytes) -> bytes:
-    """The image with a right checksum, or a controller would not load its configuration."""
+    """Return the image with a valid checksum, without which a controller loads no configuration."""
     return image[:14] + bytes([checksum(image[:14])]) + image[15:]
 
 

@@ -1,4 +1,4 @@
-"""The same scan, bring-up, motion, objects and clocks over every quirk of the table."""
+"""Scan, bring-up, motion, objects and clocks with every quirk of the table."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ def test_scan(quirk: Quirk) -> None:
 
 
 @each(BROKEN)
-def test_scan_of_a_device_that_cannot_be_used(quirk: Quirk) -> None:
+def test_scan_reports_an_unusable_device(quirk: Quirk) -> None:
     with cat.MainDevice(quirk.segment()) as main:
         subs = main.scan(strict=False)
         error = subs[QUIRKY].error
@@ -103,7 +103,7 @@ def test_objects(quirk: Quirk) -> None:
     with cat.MainDevice(quirk.segment()) as main:
         main.scan()
         sub = main.subs[QUIRKY]
-        for value in (1, 1, 2, 2, 2):  # equal questions and answers in a row
+        for value in (1, 1, 2, 2, 2):  # consecutive equal requests and answers
             assert sub.sdo.read(*SERIAL, type=UDINT) == 1
             sub.sdo.write(SCRATCH, 0, value, type=UINT)
             assert sub.sdo.read(SCRATCH, type=UINT) == value
@@ -141,14 +141,14 @@ def test_clocks(quirk: Quirk) -> None:
             assert loop.clocks.locked
             assert {device.state for device in segment} == {OP}
             assert all(
-                abs(math.remainder(difference, 2**32 * 1e-9)) < 1e-6  # a clock may have 32 bits
+                abs(math.remainder(difference, 2**32 * 1e-9)) < 1e-6  # a clock can have 32 bits
                 for difference in true_differences(segment).values()
             )
 
 
 @each(WORKING)
 def test_names(quirk: Quirk) -> None:
-    """Of the SII, else of the dictionary, and without control characters."""
+    """Names come from the SII or the dictionary, without control characters."""
     with cat.MainDevice(quirk.segment()) as main:
         main.scan()
         names = cat.Inputs(main.subs[QUIRKY]).names
@@ -160,8 +160,11 @@ def test_names(quirk: Quirk) -> None:
 @pytest.mark.parametrize("name", [name for name in QUIRKS if name.startswith("counter")])
 @pytest.mark.parametrize("seed", range(3))
 def test_lost_frames_with_every_counter(name: str, seed: int) -> None:
-    """3 % of the frames are lost in each direction. Values differ from one to the next:
-    with a counter that says nothing, an equal answer cannot be told from a repetition."""
+    """3 % of the frames are lost in each direction.
+
+    Successive values differ, because without a useful counter an equal answer cannot be
+    distinguished from a repetition.
+    """
     link = FaultInjector(QUIRKS[name].segment(), seed=seed)
     with cat.MainDevice(link) as main:
         main.scan()

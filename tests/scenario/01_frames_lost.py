@@ -1,6 +1,6 @@
-"""Frames of the cycle get lost, or come back too late to count.
-Two in a row are a hiccup: the last inputs stay, the motion goes on, the counts tell.
-Three in a row are the end: an error with the log, and everything stands.
+"""Frames of the cycle are lost, or return too late.
+Two consecutive losses are only counted: the last inputs stay valid, and the motion continues.
+Three consecutive losses end the loop with an error and its log, and all drives stop.
 """
 
 import math
@@ -20,7 +20,7 @@ def sine(arm: cat.Drives, home: np.ndarray, time: float) -> None:
 
 
 @pytest.mark.parametrize("run", RUNS)
-def test_two_lost_cycles_are_counted_and_the_motion_goes_on(cell: Cell, run: str) -> None:
+def test_two_lost_cycles_are_counted_and_the_motion_continues(cell: Cell, run: str) -> None:
     arm = cell.drives()
     seen = []
     with cat.Loop(arm, execution=run) as loop:  # type: ignore[arg-type]
@@ -42,7 +42,7 @@ def test_two_lost_cycles_are_counted_and_the_motion_goes_on(cell: Cell, run: str
 
 
 @pytest.mark.parametrize("run", RUNS)
-def test_three_in_a_row_end_the_loop_with_its_log(cell: Cell, run: str) -> None:
+def test_three_consecutive_losses_end_the_loop_with_its_log(cell: Cell, run: str) -> None:
     arm = cell.drives()
     with (
         pytest.raises(WorkingCounterError, match="3 cycles in a row") as caught,
@@ -57,11 +57,11 @@ def test_three_in_a_row_end_the_loop_with_its_log(cell: Cell, run: str) -> None:
     log = caught.value.log
     assert log is not None
     assert log["lost_in_row"][-1] == 3  # type: ignore[index]
-    assert "frames are lost" in caught.value.hint  # every device answers when it is asked alone
+    assert "frames are lost" in caught.value.hint  # every device answers a separate request
     cell.assert_safe()
 
 
-def test_a_frame_too_late_is_a_frame_lost(cell: Cell) -> None:
+def test_a_late_frame_counts_as_lost(cell: Cell) -> None:
     arm = cell.drives()
     with cat.Loop(arm) as loop:
         for cycle in loop:
@@ -71,11 +71,11 @@ def test_a_frame_too_late_is_a_frame_lost(cell: Cell) -> None:
                 break
         counters = loop.timing.counters
     assert counters["lost"] == 1
-    assert counters["stale"] == 1  # it came after all, and was taken for what it is
+    assert counters["stale"] == 1  # it arrived late, and counts as stale
     cell.assert_safe()
 
 
-def test_a_limit_of_one_is_one(cell: Cell) -> None:
+def test_one_lost_cycle_ends_a_loop_with_a_limit_of_one(cell: Cell) -> None:
     arm = cell.drives()
     with (
         pytest.raises(WorkingCounterError, match="1 cycles"),

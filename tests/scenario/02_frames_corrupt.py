@@ -1,6 +1,6 @@
-"""Bits of frames are inverted on the way, more than any cable does.
-Nothing crashes and nothing waits for ever: broken frames are counted.
-Whatever comes of it, everything stands at the end.
+"""Bits of frames are inverted, more often than by any cable.
+Nothing crashes or waits forever. Broken frames are counted.
+In every case, all drives stand still at the end.
 """
 
 import pytest
@@ -13,7 +13,7 @@ from tests.scenario.cell import Cell
 INDEX_OF_FIRST_DATAGRAM = 17
 
 
-def test_a_frame_with_a_wrong_index_is_not_ours(cell: Cell) -> None:
+def test_a_frame_with_a_wrong_index_is_ignored(cell: Cell) -> None:
     arm = cell.drives()
     with cat.Loop(arm) as loop:
         for cycle in loop:
@@ -43,7 +43,7 @@ def test_noise_on_the_line_never_crashes(cell: Cell, seed: int) -> None:
     assert ended is None or ended.message
 
 
-def test_duplicates_are_taken_once(cell: Cell) -> None:
+def test_duplicate_frames_are_used_once(cell: Cell) -> None:
     arm = cell.drives()
     with cat.Loop(arm) as loop:
         cell.link.inject(Fault(kind="duplicate", traffic="cyclic"))

@@ -1,6 +1,6 @@
-"""The cable behind the third device is pulled while all drives move.
-The error names who is silent; who still answers stands still, out of OP.
-Plugged in again, a scan finds the same handles and a new loop runs.
+"""The cable after the third device is pulled while all drives move.
+The error names the silent devices. The others stop, out of OP.
+After the cable is plugged in, a scan finds the same handles, and a new loop runs.
 """
 
 import pytest
@@ -30,13 +30,13 @@ def test_the_silent_device_is_named(cell: Cell) -> None:
     assert cell.drive_states[0] != "OPERATION ENABLED"
 
 
-def test_the_drive_that_is_cut_off_stops_by_its_watchdog(cell: Cell) -> None:
+def test_the_watchdog_stops_an_unreachable_drive(cell: Cell) -> None:
     run_until_it_ends(cell, cell.drives())
     cell.let_pass(0.5)
     cell.assert_safe()
 
 
-def test_nobody_left_is_the_cable(cell: Cell) -> None:
+def test_without_any_answer_the_error_suggests_the_cable(cell: Cell) -> None:
     arm = cell.drives()
     with pytest.raises(WorkingCounterError, match="no device answers"), cat.Loop(arm) as loop:
         for cycle in loop:
@@ -44,13 +44,13 @@ def test_nobody_left_is_the_cable(cell: Cell) -> None:
                 cell.segment.unplug()
             assert cycle.number < 30
     cell.let_pass(0.5)
-    # simple terminals show the state they were told last: their watchdogs took the outputs
+    # simple terminals keep their last requested state; their watchdogs cleared the outputs
     assert all(servo.state & 0x0F < OP for servo in cell.servos)
     assert "OPERATION ENABLED" not in cell.drive_states
     cell.segment.plug()
 
 
-def test_plugged_in_again_the_same_handles_work(cell: Cell) -> None:
+def test_the_same_handles_work_after_the_cable_is_plugged_in(cell: Cell) -> None:
     arm = cell.drives()
     before = list(cell.subs)
     run_until_it_ends(cell, arm)

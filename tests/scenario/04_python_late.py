@@ -1,6 +1,6 @@
-"""The body computes too long. The native thread goes on feeding the devices.
-A position holds; a velocity and a torque ramp to zero; then the drive stops quickly and for good:
-targets that come after all move nothing before the application asks.
+"""The body of the loop computes too long. The native thread keeps exchanging process data.
+A position holds; velocity and torque ramp to zero. After the late limit, the drives stop quickly.
+Late targets then move nothing until the application requests it.
 """
 
 import pytest
@@ -33,7 +33,7 @@ def test_a_position_holds_while_python_is_a_little_late(cell: Cell) -> None:
     cell.assert_safe()
 
 
-def test_after_the_late_limit_the_axes_stop_and_stay(cell: Cell) -> None:
+def test_after_the_late_limit_the_axes_stop_and_stay_stopped(cell: Cell) -> None:
     arm = cell.drives()
     with cat.Loop(arm, stop=cat.StopPolicy(on_axis_stopped="event")) as loop:
         home = arm.actual.position.copy()
@@ -45,19 +45,19 @@ def test_after_the_late_limit_the_axes_stop_and_stay(cell: Cell) -> None:
                 assert "OPERATION ENABLED" not in cell.drive_states
                 stopped = [servo.position_rad for servo in cell.servos]
             else:
-                arm.target.position[:] = home + 1.0  # nobody asked for this to be followed
+                arm.target.position[:] = home + 1.0  # must not be followed
             if cycle.time > 1.5:
                 break
         assert [servo.position_rad for servo in cell.servos] == pytest.approx(stopped, abs=1e-3)
         assert not arm.enabled.any()
         assert arm.stopped == (StopReason.UNDERRUN,) * 2
-        assert cell.states == [OP] * 4  # the devices were fed all the time
+        assert cell.states == [OP] * 4  # the cycle never stopped
     stops = [e for e in cell.main.events if isinstance(e, events.AxisStopped)]
     assert [(e.axis, e.reason) for e in stops] == [(n, StopReason.UNDERRUN) for n in arm.names]
     cell.assert_safe()
 
 
-def test_the_iteration_says_which_axes_were_stopped_and_what_was_late(cell: Cell) -> None:
+def test_the_iteration_names_the_stopped_axes_and_the_reason(cell: Cell) -> None:
     arm = cell.drives()
     with pytest.raises(DriveError, match=r"in cycle .*late_limit") as caught, cat.Loop(arm) as loop:
         for cycle in loop:
@@ -71,7 +71,7 @@ def test_the_iteration_says_which_axes_were_stopped_and_what_was_late(cell: Cell
     cell.assert_safe()
 
 
-def test_enabling_again_starts_from_where_it_stands(cell: Cell) -> None:
+def test_enabling_again_starts_at_the_actual_position(cell: Cell) -> None:
     arm = cell.drives()
     with cat.Loop(arm) as loop:
         for cycle in loop:
@@ -105,7 +105,7 @@ def test_velocity_and_torque_ramp_to_zero_and_stop(cell: Cell, mode: str) -> Non
     cell.assert_safe()
 
 
-def test_the_limit_is_off_only_when_asked(cell: Cell) -> None:
+def test_the_late_limit_is_disabled_only_on_request(cell: Cell) -> None:
     arm = cell.drives()
     with cat.Loop(arm, stop=cat.StopPolicy(late_limit=0)) as loop:
         for cycle in loop:
@@ -116,7 +116,7 @@ def test_the_limit_is_off_only_when_asked(cell: Cell) -> None:
     cell.assert_safe()
 
 
-def test_inline_a_late_body_stops_the_bus_and_the_watchdog_is_the_guard(cell: Cell) -> None:
+def test_a_late_inline_body_stops_the_bus_and_the_watchdog_expires(cell: Cell) -> None:
     arm = cell.drives()
     with (
         pytest.raises(cat.CatenaryError, match="SAFE-OP"),

@@ -1,5 +1,5 @@
-"""Drives stand anywhere and the target arrays hold anything when they are enabled.
-They hold where they are: what was written before counts for nothing.
+"""Drives are enabled at arbitrary positions, with arbitrary values in the target arrays.
+They hold their positions. Targets that were written before have no effect.
 """
 
 import numpy as np
@@ -11,7 +11,7 @@ from tests.scenario.cell import Cell, cell_of
 
 
 def moved(cell: Cell, places: np.ndarray) -> float:
-    """How far the furthest axis is from where it stood."""
+    """Return the largest distance of an axis from its start [rad]."""
     return float(np.max(np.abs([s.position_rad for s in cell.servos] - places)))
 
 
@@ -24,7 +24,7 @@ def test_entering_holds_every_axis_where_it_stands(cell: Cell) -> None:
         assert set(cell.drive_states) == {"OPERATION ENABLED"}
         assert arm.enabled.all()
         assert arm.actual.position == pytest.approx(places, abs=1e-3)
-        for cycle in loop:  # a body that writes nothing
+        for cycle in loop:  # without targets
             assert moved(cell, places) < 1e-3
             if cycle.number == 100:
                 break
@@ -51,7 +51,7 @@ def test_what_was_written_while_disabled_is_ignored(cell: Cell) -> None:
 
 
 @pytest.mark.parametrize("junk", [np.nan, np.inf, -np.inf, 1e300])
-def test_junk_moves_nothing(cell: Cell, junk: float) -> None:
+def test_invalid_targets_move_nothing(cell: Cell, junk: float) -> None:
     arm = cell.drives(velocity_limit=1.0)
     with cat.Loop(arm, enable=False) as loop:
         for cycle in loop:
@@ -64,7 +64,7 @@ def test_junk_moves_nothing(cell: Cell, junk: float) -> None:
     cell.assert_safe()
 
 
-def test_a_position_counter_beyond_32_bits_is_followed_round() -> None:
+def test_a_position_counter_is_followed_across_its_overflow() -> None:
     with cell_of(Coupler(), Servo(counts_per_turn=2**24)) as cell:
         turn = 2 * np.pi
         cell.servos[0].move_to(127.9 * turn)  # the counter wraps at 128 turns
@@ -79,7 +79,7 @@ def test_a_position_counter_beyond_32_bits_is_followed_round() -> None:
             assert cell.servos[0].position_rad == pytest.approx(127.9 * turn + 4.0, abs=0.1)
 
 
-def test_enable_false_leaves_the_drives_alone(cell: Cell) -> None:
+def test_enable_false_does_not_enable_the_drives(cell: Cell) -> None:
     arm = cell.drives()
     with cat.Loop(arm, enable=False) as loop:
         for cycle in loop:

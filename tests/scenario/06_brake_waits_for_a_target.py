@@ -1,5 +1,5 @@
-"""A vertical axis in CST hangs on its brake. Entering the loop must not open it at 0 N·m.
-The drive is enabled with the first torque the application commits, and has it from the start.
+"""A brake holds a vertical axis in CST. Entering the loop must not open it at 0 N·m.
+The drive is enabled with the first torque that the application commits, and applies it at once.
 """
 
 import pytest
@@ -19,7 +19,7 @@ def test_the_drive_is_not_enabled_before_the_first_target(cell: Cell, mode: str)
         cycles = iter(loop)
         next(cycles)
         cell.let_pass(0.0)
-        assert "OPERATION ENABLED" not in cell.drive_states  # the body has not spoken yet
+        assert "OPERATION ENABLED" not in cell.drive_states  # no target has been committed yet
         for cycle in cycles:
             arm.target.torque[:] = HOLDING
             if cycle.number == 50:
@@ -28,7 +28,7 @@ def test_the_drive_is_not_enabled_before_the_first_target(cell: Cell, mode: str)
     cell.assert_safe()
 
 
-def test_the_first_torque_is_there_when_the_brake_opens(cell: Cell) -> None:
+def test_the_first_torque_is_applied_when_the_brake_opens(cell: Cell) -> None:
     arm = cell.drives(mode="cst")
     with cat.Loop(arm) as loop:
         opened: list[float] = []
@@ -42,7 +42,7 @@ def test_the_first_torque_is_there_when_the_brake_opens(cell: Cell) -> None:
     assert opened == pytest.approx([HOLDING] * 3, abs=0.01)
 
 
-def test_a_body_that_never_speaks_keeps_the_brake_closed(cell: Cell) -> None:
+def test_without_a_target_the_brake_stays_closed(cell: Cell) -> None:
     arm = cell.drives(mode="cst")
     with cat.Loop(arm, enable=False) as loop:
         for cycle in loop:

@@ -1,6 +1,6 @@
-"""A drive falls into fault while all move.
-By default that is a DriveError with the drive's own code, and everybody stops.
-An application that wants to go on sees the fault, and nothing of that axis moves before it asks.
+"""A drive reports a fault while all drives move.
+By default, this is a DriveError with the error code of the drive, and all drives stop.
+An application may continue. The faulty axis then moves only after a request.
 """
 
 import pytest
@@ -14,7 +14,7 @@ from tests.scenario.clocked import clocked_cell
 OVER_CURRENT = 0x2310
 
 
-def test_a_fault_ends_the_loop_with_the_drives_own_code(cell: Cell) -> None:
+def test_a_fault_ends_the_loop_with_the_error_code_of_the_drive(cell: Cell) -> None:
     arm = cell.drives()
     with pytest.raises(DriveError) as caught, cat.Loop(arm) as loop:
         home = arm.actual.position.copy()
@@ -32,8 +32,8 @@ def test_a_fault_ends_the_loop_with_the_drives_own_code(cell: Cell) -> None:
 
 @pytest.mark.parametrize("mode", ["csp", "csv", "cst"])
 def test_a_new_loop_resets_the_fault(mode: str) -> None:
-    """As the error's hint says. In CSV and CST the first targets come after the reset, and the
-    clocks may have an event before. (Found by the soak.)"""
+    """The reset is as in the hint of the error. In CSV and CST, the first targets follow the reset,
+    and a clock event may precede it. (Found by the soak test.)"""
     with clocked_cell(2) as cell:
         arm = cell.drives(mode=mode, dc=True)
         with pytest.raises(DriveError, match="in fault") as caught, cat.Loop(arm) as loop:
@@ -49,7 +49,7 @@ def test_a_new_loop_resets_the_fault(mode: str) -> None:
             assert arm.enabled.all()
 
 
-def test_an_application_may_go_on_and_decide_itself(cell: Cell) -> None:
+def test_an_application_may_continue_after_a_fault(cell: Cell) -> None:
     arm = cell.drives()
     faulty = cell.servos[1]
     with cat.Loop(arm, stop=cat.StopPolicy(raise_faults=False)) as loop:
@@ -64,7 +64,7 @@ def test_an_application_may_go_on_and_decide_itself(cell: Cell) -> None:
                 stopped = faulty.position_rad
                 faulty.inject_fault(0)  # the cause is gone
             if cycle.number == 300:
-                assert arm.faults == (1,)  # nobody resets a fault unasked
+                assert arm.faults == (1,)  # a fault is reset only on request
                 arm.reset_faults()
             if cycle.number == 400:
                 assert arm.faults == ()
@@ -97,7 +97,7 @@ def test_reset_alone_moves_nothing(cell: Cell) -> None:
         assert [servo.position_rad for servo in cell.servos] == pytest.approx(stopped, abs=1e-3)
 
 
-def test_a_drive_that_stays_in_fault_cannot_be_entered_with(cell: Cell) -> None:
+def test_a_loop_cannot_be_entered_with_a_persistent_fault(cell: Cell) -> None:
     cell.servos[0].inject_fault(OVER_CURRENT)
     arm = cell.drives()
     with pytest.raises(DriveError, match=r"cannot be enabled.*0x2310"), cat.Loop(arm):
@@ -105,7 +105,7 @@ def test_a_drive_that_stays_in_fault_cannot_be_entered_with(cell: Cell) -> None:
     cell.assert_safe()
 
 
-def test_an_old_fault_is_reset_by_entering(cell: Cell) -> None:
+def test_entering_a_loop_resets_an_old_fault(cell: Cell) -> None:
     cell.servos[0].inject_fault(OVER_CURRENT)
     cell.let_pass(0.1)
     cell.servos[0].inject_fault(0)

@@ -1,5 +1,5 @@
-"""Somebody opens the guard: STO takes the torque away. Closing it again must move nothing.
-The goal has dropped to disabled; only the application's request brings the axis back.
+"""A guard is opened, and STO removes the torque. Closing the guard must move nothing.
+The requested state is then disabled. Only a request of the application enables the axis again.
 """
 
 import pytest
@@ -10,7 +10,7 @@ from catenary.plan.stop_reason import StopReason
 from tests.scenario.cell import OP, Cell
 
 
-def test_nothing_moves_after_sto_until_the_application_asks(cell: Cell) -> None:
+def test_nothing_moves_after_sto_until_the_application_requests_it(cell: Cell) -> None:
     arm = cell.drives()
     servo = cell.servos[0]
     with cat.Loop(arm, stop=cat.StopPolicy(raise_faults=False)) as loop:
@@ -41,7 +41,7 @@ def test_nothing_moves_after_sto_until_the_application_asks(cell: Cell) -> None:
     cell.assert_safe()
 
 
-def test_sto_ends_the_loop_unless_faults_are_the_applications_business(cell: Cell) -> None:
+def test_sto_ends_the_loop_unless_the_application_handles_faults(cell: Cell) -> None:
     arm = cell.drives()
     with pytest.raises(DriveError, match="left OPERATION_ENABLED") as caught, cat.Loop(arm) as loop:
         for cycle in loop:
@@ -54,7 +54,7 @@ def test_sto_ends_the_loop_unless_faults_are_the_applications_business(cell: Cel
     cell.assert_safe()
 
 
-def test_without_release_of_sto_entering_says_what_to_look_at(cell: Cell) -> None:
+def test_entering_with_active_sto_fails_with_a_hint(cell: Cell) -> None:
     cell.servos[1].switch_sto(True)
     arm = cell.drives()
     with pytest.raises(DriveError, match="SWITCH_ON_DISABLED") as caught, cat.Loop(arm):

@@ -1,5 +1,5 @@
-"""Whatever the application writes, an axis keeps its limits, and `cycle.limited` shows it.
-NaN is not a place to go: the axis holds, and `cycle.refused` shows it.
+"""An axis keeps its limits for all targets, and `cycle.limited` reports a clamped target.
+For NaN, the axis holds its position, and `cycle.refused` reports it.
 """
 
 import numpy as np
@@ -10,7 +10,7 @@ from catenary.errors import DriveError
 from catenary.plan.stop_reason import StopReason
 from tests.scenario.cell import Cell
 
-SLACK = 0.03  # [rad] the servo's own overshoot when its set-point stops at the limit
+SLACK = 0.03  # [rad] overshoot of the servo when its set-point stops at the limit
 
 
 def test_position_and_step_are_clamped_in_csp(cell: Cell) -> None:
@@ -66,14 +66,14 @@ def test_a_torque_is_clamped_and_stops_at_the_position_limit(cell: Cell) -> None
             assert all(servo.torque_nm < 0.051 for servo in cell.servos if arm.enabled.all())
             if cycle.time > 1.0:
                 break
-        assert "OPERATION ENABLED" not in cell.drive_states  # nothing else could brake it
+        assert "OPERATION ENABLED" not in cell.drive_states  # only disabling can brake it
         assert arm.stopped == (StopReason.POSITION_LIMIT,) * 2
         assert all(servo.position_rad < 0.6 for servo in cell.servos)
     cell.assert_safe()
 
 
 @pytest.mark.parametrize("junk", [np.nan, np.inf, -np.inf])
-def test_what_is_no_number_is_refused_and_the_axis_holds(cell: Cell, junk: float) -> None:
+def test_a_target_that_is_not_finite_is_refused_and_the_axis_holds(cell: Cell, junk: float) -> None:
     arm = cell.drives()
     refused = 0
     with cat.Loop(arm) as loop:
@@ -88,7 +88,7 @@ def test_what_is_no_number_is_refused_and_the_axis_holds(cell: Cell, junk: float
     cell.assert_safe()
 
 
-def test_within_the_limits_nothing_is_said(cell: Cell) -> None:
+def test_targets_within_the_limits_are_not_reported(cell: Cell) -> None:
     arm = cell.drives(position_min=-1.0, position_max=1.0, velocity_limit=5.0, torque_limit=1.0)
     with cat.Loop(arm) as loop:
         for cycle in loop:

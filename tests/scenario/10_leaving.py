@@ -1,5 +1,5 @@
-"""The block is left at full speed: by its end, by an exception, by Ctrl-C in the body.
-The drives brake by quick stop while the devices are still fed; then the states go down.
+"""The block of the loop is left at full speed: at its end, by an exception or by Ctrl-C.
+The drives brake with a quick stop while the cycle continues. Then the states go down.
 """
 
 import pytest
@@ -28,7 +28,9 @@ def spin(cell: Cell, arm: cat.Drives, run: str, end: BaseException | None) -> No
 
 @pytest.mark.parametrize("run", ["threaded", "inline"])
 @pytest.mark.parametrize("end", [None, Stumble("body"), KeyboardInterrupt(), SystemExit(3)])
-def test_everything_stands_and_is_down(cell: Cell, run: str, end: BaseException | None) -> None:
+def test_all_drives_stop_and_all_states_go_down(
+    cell: Cell, run: str, end: BaseException | None
+) -> None:
     arm = cell.drives()
     if end is None:
         spin(cell, arm, run, end)
@@ -44,7 +46,7 @@ def test_everything_stands_and_is_down(cell: Cell, run: str, end: BaseException 
 
 
 @pytest.mark.parametrize(("mode", "target"), [("csv", "velocity"), ("cst", "torque")])
-def test_the_same_in_every_mode(cell: Cell, mode: str, target: str) -> None:
+def test_leaving_stops_the_drives_in_every_mode(cell: Cell, mode: str, target: str) -> None:
     arm = cell.drives(mode=mode, velocity_limit=FAST)
     with cat.Loop(arm) as loop:
         for cycle in loop:
@@ -56,7 +58,7 @@ def test_the_same_in_every_mode(cell: Cell, mode: str, target: str) -> None:
     assert cell.states == [PRE_OP] * 4
 
 
-def test_a_drive_that_cannot_brake_has_a_deadline(cell: Cell) -> None:
+def test_leaving_does_not_wait_forever_for_a_drive_that_cannot_brake(cell: Cell) -> None:
     arm = cell.drives()
     start = 0
     with cat.Loop(arm, stop=cat.StopPolicy(stop_deadline=0.2)) as loop:

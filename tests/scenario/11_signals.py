@@ -1,6 +1,6 @@
-"""Ctrl-C or SIGTERM arrives at any moment: while the loop is entered, in it, while it is left.
-Whatever line it hits, nothing stays in OP and no drive stays enabled.
-A signal while leaving hurries, it does not interrupt.
+"""Ctrl-C or SIGTERM arrives at any time: while the loop is entered, runs or is left.
+At every line of code, no device stays in OP and no drive stays enabled.
+A signal while leaving shortens the process, but does not interrupt it.
 """
 
 import signal
@@ -44,7 +44,7 @@ with cat.MainDevice(segment) as main:
 
 
 class Tripwire:
-    """Sends a signal to this process at the n-th line that the loop's own code executes."""
+    """Tracer that sends a signal to this process at the n-th executed line of the loop's code."""
 
     def __init__(self, line: int, number: signal.Signals) -> None:
         self.left = line
@@ -62,7 +62,7 @@ class Tripwire:
     def _lines(self, frame: FrameType, event: str, argument: Any) -> Callable[..., Any]:
         if event == "line":
             self.left -= 1
-            # Where the loop does not have SIGTERM yet, or any more, it ends the process.
+            # Before and after the loop handles SIGTERM, the signal ends the process.
             if self.left == 0 and signal.getsignal(self._number) is not signal.SIG_DFL:
                 signal.raise_signal(self._number)
         return self._lines
@@ -79,7 +79,7 @@ def enter_run_leave(cell: Cell, cycles: int = 5) -> None:
 
 
 def lines_of_a_life() -> int:
-    """How many lines of the loop's code one entering, running and leaving takes."""
+    """Return the number of executed lines of the loop's code for one run."""
     wire = Tripwire(1_000_000, signal.SIGINT)
     with cell_of() as cell, wire:
         enter_run_leave(cell)
@@ -87,7 +87,7 @@ def lines_of_a_life() -> int:
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_whatever_line_it_hits_nothing_stays_in_op(number: signal.Signals) -> None:
+def test_a_signal_at_any_line_leaves_no_device_in_op(number: signal.Signals) -> None:
     total = lines_of_a_life()
     assert total > 300
     ended = {KeyboardInterrupt: 0, SystemExit: 0, None: 0}
@@ -105,7 +105,7 @@ def test_whatever_line_it_hits_nothing_stays_in_op(number: signal.Signals) -> No
             assert all(state <= PRE_OP for state in cell.states), (line, cell.states)
             assert signal.getsignal(number) is before
     assert ended[KeyboardInterrupt if number == signal.SIGINT else SystemExit] > 5
-    assert ended[None] > 0  # while it was left: hurried, not interrupted
+    assert ended[None] > 0  # while leaving: shortened, not interrupted
 
 
 def first_words(child: subprocess.Popen[str], word: str) -> None:
@@ -115,7 +115,7 @@ def first_words(child: subprocess.Popen[str], word: str) -> None:
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 @pytest.mark.parametrize("moment", ["entering", "running"])
-def test_a_real_process_comes_down_by_itself(number: signal.Signals, moment: str) -> None:
+def test_a_real_process_brings_its_devices_down(number: signal.Signals, moment: str) -> None:
     with subprocess.Popen(
         [sys.executable, "-c", SCRIPT], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
     ) as child:
@@ -142,7 +142,7 @@ def test_a_second_signal_shortens_the_wait_for_standstill(cell: Cell) -> None:
             arm.target.position[:] = home + 20.0 * cycle.time
             if cycle.time > 0.5:
                 break
-        cell.servos[0].apply_load(50.0)  # it will not stand
+        cell.servos[0].apply_load(50.0)  # it cannot stop
         start = cell.link.now()
         loop._guard.hurry = True  # what the handler does, see tests/loop/test_signals.py
     assert cell.link.now() - start < 5e9

@@ -1,6 +1,6 @@
-"""The process is killed, or its machine crashes: nobody says goodbye.
-The watchdogs, set from the plan, take the outputs down and the drives stop by themselves.
-The next process finds the segment as it is and starts anew.
+"""The process is killed, or its machine crashes, without a shutdown of the devices.
+The watchdogs, set from the plan, switch the outputs off, and the drives stop by themselves.
+The next process finds the segment in this state and starts normally.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from tests.scenario.cell import Cell, cell_of
 from tests.scenario.vertical import VerticalCell, vertical_cell
 
 WATCHDOG = 0.1  # [s], the default of Loop
-# In real time: the machine may stop for a while without the scenario being over.
+# In real time: the machine may stall for a while without a failure of the scenario.
 PATIENT = "period=2e-3, watchdog=1.0, stop=cat.StopPolicy(lost_limit=1000, late_limit=0)"
 
 SCRIPT = f"""
@@ -39,7 +39,7 @@ with cat.MainDevice(sys.argv[1]) as main:
 """
 
 
-def test_without_frames_the_watchdog_takes_everything_down(cell: Cell) -> None:
+def test_without_frames_the_watchdogs_stop_all_devices(cell: Cell) -> None:
     arm, lamps = cell.drives(), cat.Outputs(cell.subs[1])
     with cat.Loop(arm, lamps) as loop:
         home = arm.actual.position.copy()
@@ -49,7 +49,7 @@ def test_without_frames_the_watchdog_takes_everything_down(cell: Cell) -> None:
             if cycle.number == 200:
                 break
         assert cell.segment[1].outputs == 0b1111  # type: ignore[attr-defined]
-        loop._opened.engine.stop()  # as if the process were gone: no more frames
+        loop._opened.engine.stop()  # as after a kill: no more frames
         cell.let_pass(WATCHDOG / 2)
         assert cell.segment[1].outputs == 0b1111  # type: ignore[attr-defined]
         cell.let_pass(WATCHDOG)
@@ -57,13 +57,13 @@ def test_without_frames_the_watchdog_takes_everything_down(cell: Cell) -> None:
         cell.let_pass(0.2)
         assert "OPERATION ENABLED" not in cell.drive_states
         assert all(abs(servo.velocity_rad_s) < 0.05 for servo in cell.servos)
-        loop._opened.engine.start()  # so that leaving finds what it expects
+        loop._opened.engine.start()  # so that the loop can be left
     cell.assert_safe()
 
 
 @pytest.mark.parametrize("checks_watchdog", [False, True])
-def test_a_drive_stops_whose_sii_lacks_the_watchdog_trigger(checks_watchdog: bool) -> None:
-    """Control byte 0x24. With `checks_watchdog` it would refuse SAFE-OP as its SII says."""
+def test_a_drive_stops_although_its_sii_lacks_the_watchdog_trigger(checks_watchdog: bool) -> None:
+    """The control byte is 0x24. With `checks_watchdog`, the SII value would be refused."""
     quirks = ServoQuirks(watchdog_trigger=False, checks_watchdog=checks_watchdog)
     with cell_of(Coupler(), Servo(quirks=quirks)) as cell:
         arm = cell.drives()
@@ -84,7 +84,7 @@ def test_a_drive_stops_whose_sii_lacks_the_watchdog_trigger(checks_watchdog: boo
 def kill_in_cst(cell: VerticalCell, watchdog: float) -> tuple[float, float]:
     """Kill the process while the arm is lifted by 10 N·m more than its load.
 
-    Returns the way [rad] from then until the arm stands, and the velocity at the kill [rad/s].
+    Returns the distance until the arm stands [rad], and the velocity at the kill [rad/s].
     """
     arm = cell.drives(mode="cst", velocity_limit=6.0)
     with cat.Loop(arm, watchdog=watchdog, stop=cat.StopPolicy(raise_faults=False)) as loop:
@@ -103,8 +103,8 @@ def kill_in_cst(cell: VerticalCell, watchdog: float) -> tuple[float, float]:
 
 @pytest.mark.parametrize("watchdog", [0.010, 0.100])
 def test_a_stale_torque_lasts_as_long_as_the_watchdog(watchdog: float) -> None:
-    """Bound upwards: the way of the watchdog's time, then the drive's ramp (0x6085). Downwards: the
-    fall until the brake has closed."""
+    """The upward bound is the distance in the watchdog's time plus the drive's ramp (0x6085). The
+    downward bound is the fall until the brake has closed."""
     with vertical_cell() as cell:
         travelled, velocity = kill_in_cst(cell, watchdog)
         acceleration = cell.g_eff * 10.0 / cell.gravity
@@ -119,16 +119,16 @@ def test_a_stale_torque_lasts_as_long_as_the_watchdog(watchdog: float) -> None:
 
 
 def until(condition: Callable[[], bool], seconds: float) -> bool:
-    """Whether it comes true in real time."""
+    """Return True if a condition becomes true in real time."""
     deadline = time.monotonic() + seconds
     while time.monotonic() < deadline:
         if condition():
             return True
-        time.sleep(0.005)  # real time, over a real wire: there is no virtual clock to wait on
+        time.sleep(0.005)  # real time over a real wire, without a virtual clock
     return False
 
 
-def test_a_killed_process_leaves_nothing_turning_and_nothing_locked(veth: tuple[str, str]) -> None:
+def test_after_a_kill_no_drive_turns_and_no_lock_is_held(veth: tuple[str, str]) -> None:
     lamps, servo = DigitalOutputs(), Servo()
     segment = Segment([Coupler(), lamps, servo], clock="monotonic")
     with (

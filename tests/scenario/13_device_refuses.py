@@ -1,5 +1,5 @@
-"""A device does not go where it is asked to: it never gets there, or it says no and why.
-The error names the device, what was asked and what came back; everybody comes down again.
+"""A device does not reach a requested state, or refuses it with a reason.
+The error names the device, the requested state and the reply. All devices are brought down.
 """
 
 import pytest
@@ -13,7 +13,7 @@ NO_SYNC = 0x002D
 
 
 @pytest.mark.parametrize("state", [AlState.SAFE_OP, AlState.OP])
-def test_a_device_that_never_gets_there_is_named(cell: Cell, state: AlState) -> None:
+def test_a_device_that_does_not_reach_a_state_is_named(cell: Cell, state: AlState) -> None:
     cell.servos[1].delay_state(state, None)
     with pytest.raises(StateError, match=rf"did not .*{state}.*: it is in") as caught:
         enter(cell)
@@ -25,7 +25,7 @@ def test_a_device_that_never_gets_there_is_named(cell: Cell, state: AlState) -> 
 
 
 @pytest.mark.parametrize("state", [AlState.SAFE_OP, AlState.OP])
-def test_a_device_that_says_no_is_told_with_its_code(cell: Cell, state: AlState) -> None:
+def test_a_refused_state_is_reported_with_its_code(cell: Cell, state: AlState) -> None:
     cell.servos[1].refuse_state(state, NO_SYNC)
     with pytest.raises(StateError, match="0x002D") as caught:
         enter(cell)
@@ -35,7 +35,7 @@ def test_a_device_that_says_no_is_told_with_its_code(cell: Cell, state: AlState)
     comes_down(cell)
 
 
-def test_the_device_may_change_its_mind(cell: Cell) -> None:
+def test_a_device_that_refuses_once_is_accepted_later(cell: Cell) -> None:
     cell.servos[1].refuse_state(AlState.OP, NO_SYNC)
     with pytest.raises(StateError):
         enter(cell)

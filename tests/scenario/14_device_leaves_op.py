@@ -1,5 +1,5 @@
-"""A device leaves OP by itself while everything moves; its inputs go on coming back as if nothing
-had happened. The AL status that rides in every cycle tells: the error has the device's own code.
+"""A device leaves OP by itself while all drives move. Its inputs still return as usual.
+The AL status in every cycle shows it. The error has the AL status code of the device.
 """
 
 import pytest
@@ -14,7 +14,7 @@ SYNC_ERROR = 0x001A
 
 
 @pytest.mark.parametrize("position", [0, 1, 3])
-def test_the_device_and_its_reason_are_told(cell: Cell, position: int) -> None:
+def test_the_error_names_the_device_and_the_reason(cell: Cell, position: int) -> None:
     arm = cell.drives()
     with pytest.raises(StateError) as caught, cat.Loop(arm) as loop:
         home = arm.actual.position.copy()
@@ -30,9 +30,11 @@ def test_the_device_and_its_reason_are_told(cell: Cell, position: int) -> None:
     cell.assert_safe()
 
 
-def test_one_that_was_off_for_a_moment_has_forgotten_its_address(cell: Cell) -> None:
-    """So short that fewer cycles are lost than the loop endures; the coupler has no process data
-    that would be missed. (Found by the soak: `python -m benchmarks soak --minutes 1 --seed 52`.)"""
+def test_a_short_power_loss_of_a_device_ends_the_loop(cell: Cell) -> None:
+    """Fewer cycles are lost than the limit, and the coupler has no process data that are missed.
+
+    Found by the soak test: `python -m benchmarks soak --minutes 1 --seed 52`.
+    """
     arm = cell.drives()
     with pytest.raises(StateError) as caught, cat.Loop(arm) as loop:
         home = arm.actual.position.copy()

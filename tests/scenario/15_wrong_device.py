@@ -1,5 +1,5 @@
-"""The devices on the cable are not those the program was written for.
-That is refused before SAFE-OP, with what was expected and what was found.
+"""The devices on the cable differ from those that the program expects.
+This is refused before SAFE-OP, with the expected and the found identities.
 """
 
 import pytest
@@ -29,13 +29,13 @@ def test_a_missing_device_is_refused(cell: Cell) -> None:
     assert all(state <= PRE_OP for state in cell.states)
 
 
-def test_the_right_devices_are_taken(cell: Cell) -> None:
+def test_the_expected_devices_are_accepted(cell: Cell) -> None:
     cell.main.scan(expected=[None, LAMPS, SERVO, SERVO])
     with cat.Loop(cell.drives()):
         assert set(cell.drive_states) == {"OPERATION ENABLED"}
 
 
-def test_a_terminal_is_no_drive(cell: Cell) -> None:
+def test_a_terminal_is_refused_as_a_drive(cell: Cell) -> None:
     with pytest.raises(ValueError, match=r"device 1 \(.*\) is not a drive"):
         cat.Drives([cell.subs[1]], counts_per_turn=1, velocity_limit=100.0, rated_torque=1.0)
     assert all(state <= PRE_OP for state in cell.states)
@@ -50,12 +50,12 @@ def test_an_object_the_drive_cannot_map_is_named(cell: Cell) -> None:
     assert all(state <= PRE_OP for state in cell.states)
 
 
-def test_a_device_exchanged_since_the_scan_is_noticed() -> None:
+def test_a_device_replaced_after_the_scan_is_detected() -> None:
     with cell_of(Coupler(), DigitalOutputs(bits=4), Servo()) as cell:
         arm = cell.drives()
         with cat.Loop(arm):
             pass
-        cell.segment.plug(2)  # the servo is gone
+        cell.segment.plug(2)  # without the servo
         with pytest.raises(CatenaryError), cat.Loop(arm):
             pytest.fail("entered without its servo")
         assert all(state <= PRE_OP for state in cell.states[:2])

@@ -1,5 +1,5 @@
-"""A cell of terminals and drives of many kinds: everything has a name, down to single bits.
-Inputs are read and outputs written by it; the terminals themselves tell whether it is true.
+"""A cell of terminals and drives of many kinds: all process data have names, even single bits.
+Inputs are read and outputs are written by name. The virtual terminals confirm the values.
 """
 
 import pytest
@@ -48,7 +48,7 @@ def test_an_analogue_value_has_the_unit_it_is_given() -> None:
             assert volts[value] == pytest.approx(2.5, abs=1e-3)
 
 
-def test_any_drives_process_data_has_names_too(cell: Cell) -> None:
+def test_process_data_of_drives_have_names(cell: Cell) -> None:
     words = cat.Inputs(cell.subs[2])
     arm = cell.drives()
     with cat.Loop(arm, words) as loop:
@@ -59,7 +59,7 @@ def test_any_drives_process_data_has_names_too(cell: Cell) -> None:
         assert words["Statusword"] & 0x6F == 0x27
 
 
-def test_columns_beside_the_axes(cell: Cell) -> None:
+def test_additional_columns_of_the_axes(cell: Cell) -> None:
     arm = cell.drives(columns=["following_error", "torque_offset", "error_code"])
     with cat.Loop(arm) as loop:
         home = arm.actual.position.copy()
@@ -73,7 +73,7 @@ def test_columns_beside_the_axes(cell: Cell) -> None:
         assert arm.actual["error_code"].tolist() == [0, 0]
 
 
-def test_mixed_drives_are_one_arm() -> None:
+def test_different_drives_form_one_arm() -> None:
     servos = (
         Servo(axes=2, counts_per_turn=2**20),
         Servo(counts_per_turn=2**17, velocity_counts_per_turn=1000, rated_torque=0.5),

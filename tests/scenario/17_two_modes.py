@@ -1,5 +1,5 @@
-"""An axis changes from position to torque and back while the loop runs, its neighbour holding.
-A change of mode moves nothing by itself: set-points count once the drive shows the new mode.
+"""An axis changes from position to torque and back in the loop, while another axis holds.
+A mode change alone moves nothing. Set-points take effect when the drive shows the new mode.
 """
 
 import pytest
@@ -38,7 +38,7 @@ def test_modes_change_without_a_jump(cell: Cell) -> None:
     cell.assert_safe()
 
 
-def test_a_mode_not_wished_for_cannot_be_switched_to(cell: Cell) -> None:
+def test_a_mode_that_was_not_requested_is_refused(cell: Cell) -> None:
     arm = cell.drives()
     with cat.Loop(arm), pytest.raises(ValueError, match="other_modes"):
         arm.switch("cst")

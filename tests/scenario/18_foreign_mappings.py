@@ -1,5 +1,5 @@
-"""Drives and terminals with a mapping that must stay: other PDOs at power-up than the SII says,
-PDOs that are fixed, alternatives that exclude each other, one object in two PDOs.
+"""Drives and terminals have mappings that must stay: other PDOs at power-up than in the SII,
+fixed PDOs, PDOs that exclude each other, or one object in two PDOs.
 The axes move, the terminals are read, and nothing is written without a request.
 """
 
@@ -30,14 +30,14 @@ QUIRKS = {
 
 
 @pytest.mark.parametrize("name", QUIRKS)
-def test_a_drive_moves_whatever_its_mapping(name: str) -> None:
+def test_a_drive_moves_with_any_mapping(name: str) -> None:
     with cell_of(Coupler(), Servo(mapping_quirks=QUIRKS[name])) as cell:
         arm = cell.drives()
         move(cell, arm)
 
 
 def move(cell: Cell, arm: cat.Drives) -> None:
-    """Half a radian in half a second, without a mapping that was written."""
+    """Move by 0.5 rad in 0.5 s, and check that no mapping was written."""
     with cat.Loop(arm) as loop:
         home = arm.actual.position.copy()
         for cycle in loop:
@@ -49,7 +49,7 @@ def move(cell: Cell, arm: cat.Drives) -> None:
     cell.assert_safe()
 
 
-def test_a_mode_that_the_assigned_pdos_lack_exchanges_them() -> None:
+def test_pdos_are_replaced_for_a_mode_that_the_assigned_ones_lack() -> None:
     quirks = MappingQuirks(power_up=(0x1601, 0x1A01), exclusive=True, fixed_pdos="declared")
     with cell_of(Coupler(), Servo(mapping_quirks=quirks)) as cell:
         arm = cell.drives(mode="csv")
@@ -60,11 +60,11 @@ def test_a_mode_that_the_assigned_pdos_lack_exchanges_them() -> None:
                 if cycle.time > 1.0:
                     break
             assert cell.servos[0].velocity_rad_s == pytest.approx(1.0, rel=0.1)
-            assert "0x6060:00" not in loop.plan.devices[1].left_out  # optional, carried as well
+            assert "0x6060:00" not in loop.plan.devices[1].left_out  # optional, but mapped, too
         assert cell.subs[1].sdo.read(0x1C12, 1, type=UINT) == 0x1600
 
 
-def test_a_column_that_fixed_pdos_lack_is_refused_before_anything_is_written() -> None:
+def test_a_column_missing_in_fixed_pdos_is_refused_before_any_write() -> None:
     quirks = MappingQuirks(fixed_pdos="declared")
     with cell_of(Coupler(), Servo(mapping_quirks=quirks)) as cell:
         arm = cell.drives(columns=["position_demand"])
@@ -72,7 +72,7 @@ def test_a_column_that_fixed_pdos_lack_is_refused_before_anything_is_written() -
             pytest.fail("entered without the column")
 
 
-def test_pdos_are_written_down_by_the_application() -> None:
+def test_the_application_selects_the_pdos() -> None:
     with cell_of(Coupler(), Servo(mapping_quirks=MappingQuirks(coe_details=0x23))) as cell:
         pdos = {0x1601: [], 0x1A00: [(0x6041, 0, 16), (0x6064, 0, 32), (0x6062, 0, 32)]}
         arm = cell.drives(pdos=pdos, columns=["position_demand"])

@@ -1,6 +1,6 @@
-"""The published experiment, three ways: by analysis, on a virtual clock, and on this machine.
-Three tasks spend 3, 5 and 10 ms every 10, 20 and 40 ms on one processor.
-All three say that their responses take 3, 8 and 29 ms.
+"""A published experiment by analysis, on a virtual clock and on this machine.
+Three tasks execute 3, 5 and 10 ms every 10, 20 and 40 ms on one processor.
+All three methods result in response times of 3, 8 and 29 ms.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ def run(clock: VirtualClock | None, seconds: float) -> tuple[Verdict, list[Stati
         return running.verdict(), [handle.statistics for handle in running]
 
 
-def test_by_analysis():
+def test_analysis():
     demands = [
         Demand(name=name, period=period, execution=execution, priority=priority)
         for name, period, execution, priority in TASKS
@@ -47,7 +47,7 @@ def test_by_analysis():
     assert [one.response for one in verdict.responses] == RESPONSES
 
 
-def test_on_a_virtual_clock_twice_the_same():
+def test_two_runs_on_a_virtual_clock_are_equal():
     with VirtualClock() as clock:
         verdict, first = run(clock, 4.0)
     with VirtualClock() as clock:
@@ -59,9 +59,12 @@ def test_on_a_virtual_clock_twice_the_same():
     assert times == [(one.period, one.jitter, one.response, one.execution) for one in second]
 
 
-def test_on_this_machine():
-    """The medians agree, and so does the verdict on what was measured. What else the machine does
-    may delay a job, never hasten it: where it does so in three runs, nothing is said."""
+def test_measurement_on_this_machine():
+    """The medians and the verdict on the measured times agree.
+
+    Other load of the machine can delay a job, but not speed it up. If this happens in three runs,
+    the test has no result.
+    """
     for _ in range(3):
         try:
             verdict, found = run(None, 2.0)

@@ -1,5 +1,6 @@
-"""A compiled law goes wrong while the drives turn: they stop natively, the bus goes on, and the
-error says what it was."""
+"""A compiled law fails while the drives move.
+The cycle thread stops the drives, the bus continues, and the error gives the cause.
+"""
 
 import math
 from collections.abc import Callable
@@ -36,7 +37,7 @@ def hangs(actual, target, memory, time):
     ("law", "said"),
     [(divides, "NaN or infinity"), (indexes, "IndexError"), (hangs, "did not return")],
 )
-def test_the_drives_stop_and_the_bus_goes_on(
+def test_the_drives_stop_and_the_bus_continues(
     cell: Cell, law: Callable, said: str, run: str
 ) -> None:
     arm = cell.drives(mode="csv")
@@ -48,7 +49,7 @@ def test_the_drives_stop_and_the_bus_goes_on(
                     assert all(servo.velocity_rad_s > 1.0 for servo in cell.servos)
         assert not turning.running
         for cycle in loop:
-            arm.target.velocity[:] = 2.0  # nobody asked for this to be followed
+            arm.target.velocity[:] = 2.0  # must not be followed
             if cycle.time > 1.5:
                 break
         assert all(abs(servo.velocity_rad_s) < 1e-3 for servo in cell.servos)

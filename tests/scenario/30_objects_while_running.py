@@ -1,6 +1,6 @@
-"""While the drives move, parameters are read and written: from inside the loop by request, from
-another thread by plain calls. The cycle does not notice: none is lost, none is late.
-An answer takes four cycles; a call that would stop the loop is refused at once.
+"""While the drives move, objects are read and written: by requests in the loop, and by plain calls
+in another thread. No cycle is lost or late. An answer takes four cycles.
+A call that would block the loop is refused at once.
 """
 
 import threading
@@ -48,7 +48,7 @@ def test_all_drives_answer_in_the_same_four_cycles(cell: Cell) -> None:
     assert [answer.result() for answer in answers] == [1, 2]
 
 
-def test_what_is_written_inside_the_loop_is_there(cell: Cell) -> None:
+def test_an_object_written_in_the_loop_can_be_read_back(cell: Cell) -> None:
     arm = cell.drives()
     drive = cell.subs.drives[0]
     blob = bytes(range(200)) * 3
@@ -72,7 +72,7 @@ def test_what_is_written_inside_the_loop_is_there(cell: Cell) -> None:
 
 
 @pytest.mark.parametrize("run", RUNS)
-def test_a_call_that_would_stop_the_loop_is_refused_at_once(cell: Cell, run: str) -> None:
+def test_a_call_that_would_block_the_loop_is_refused_at_once(cell: Cell, run: str) -> None:
     arm = cell.drives()
     drive = cell.subs.drives[0]
     with cat.Loop(arm, execution=run) as loop:  # type: ignore[arg-type]
@@ -103,9 +103,7 @@ def test_another_thread_reads_and_writes(cell: Cell) -> None:
                 thread.start()
             if not thread.is_alive():
                 break
-            thread.join(
-                1e-4
-            )  # virtual time goes on whatever that thread does: let it have its turn
+            thread.join(1e-4)  # virtual time does not wait for that thread, so let it run
         assert loop.timing.counters["lost"] == 0
     assert found == [bytes(k * 7 & 0xFF for k in range(2048)), 7, True]
 
@@ -130,7 +128,7 @@ def test_a_request_is_cancelled_and_the_next_gets_its_own_answer(cell: Cell) -> 
     assert after.result() == drive.identity.vendor
 
 
-def test_who_waits_when_the_loop_ends_is_told(cell: Cell) -> None:
+def test_the_end_of_the_loop_ends_waiting_calls_with_an_error(cell: Cell) -> None:
     arm = cell.drives()
     drive = cell.subs.drives[0]
     with cat.Loop(arm) as loop:
@@ -144,7 +142,7 @@ def test_who_waits_when_the_loop_ends_is_told(cell: Cell) -> None:
     assert drive.sdo.request(0x1018, 1, type=UDINT).result() == drive.identity.vendor  # without one
 
 
-def test_twice_the_same_run_is_the_same_run() -> None:
+def test_two_runs_are_equal() -> None:
     from tests.scenario.cell import cell_of
 
     def story() -> list[tuple[int, bool]]:

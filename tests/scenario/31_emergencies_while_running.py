@@ -1,6 +1,6 @@
-"""A drive sends an emergency while the loop runs, and nobody has asked it anything.
-A bit in the cycle says that its mailbox is full; where no FMMU was left for it, the register does.
-It becomes an event with its text; the cycle goes on, and so does a conversation with that drive.
+"""A drive sends an emergency while the loop runs, without a request.
+A bit in the cycle shows a full mailbox; without a free FMMU, a register is polled instead.
+The emergency becomes an event with a text. The cycle and other mailbox transfers continue.
 """
 
 from collections.abc import Iterator
@@ -16,7 +16,7 @@ from tests.scenario.cell import Cell
 
 
 def with_fmmus(sub: SubDevice, count: int) -> None:
-    """As if its controller had no more."""
+    """Limit the number of FMMUs of a controller."""
     controller = replace(sub.description.controller, fmmu_count=count)
     sub.description = replace(sub.description, controller=controller)
 
@@ -35,7 +35,7 @@ def emergencies(loop: cat.Loop, cell: Cell, cycles: int) -> Iterator[tuple[int, 
 
 
 @pytest.mark.parametrize("run", ["threaded", "inline"])
-def test_the_bit_in_the_cycle_tells_at_once(cell: Cell, run: str) -> None:
+def test_the_mailbox_bit_in_the_cycle_reports_at_once(cell: Cell, run: str) -> None:
     arm = cell.drives()
     with cat.Loop(arm, execution=run, stop=cat.StopPolicy(raise_faults=False)) as loop:  # type: ignore[arg-type]
         assert loop.plan.mailboxes.devices == (2, 3)
@@ -50,7 +50,7 @@ def test_the_bit_in_the_cycle_tells_at_once(cell: Cell, run: str) -> None:
     cell.assert_safe()
 
 
-def test_without_an_fmmu_to_spare_the_register_is_asked(cell: Cell) -> None:
+def test_without_a_free_fmmu_the_register_is_polled(cell: Cell) -> None:
     for drive in cell.subs.drives:
         with_fmmus(drive, 2)
     arm = cell.drives()
@@ -62,7 +62,7 @@ def test_without_an_fmmu_to_spare_the_register_is_asked(cell: Cell) -> None:
     assert event.sub is cell.subs[3]
 
 
-def test_one_with_and_one_without(cell: Cell) -> None:
+def test_one_device_with_and_one_without_a_free_fmmu(cell: Cell) -> None:
     with_fmmus(cell.subs[2], 2)
     arm = cell.drives()
     with cat.Loop(arm, stop=cat.StopPolicy(raise_faults=False)) as loop:
@@ -71,7 +71,7 @@ def test_one_with_and_one_without(cell: Cell) -> None:
     assert when <= 28
 
 
-def test_a_conversation_with_the_drive_hears_it_too(cell: Cell) -> None:
+def test_an_emergency_during_a_transfer_is_reported(cell: Cell) -> None:
     arm = cell.drives()
     drive = cell.subs.drives[1]
     answers = []
@@ -91,7 +91,7 @@ def test_a_conversation_with_the_drive_hears_it_too(cell: Cell) -> None:
     assert len(answers) > 15
 
 
-def test_nothing_is_asked_where_nothing_is_said(cell: Cell) -> None:
+def test_without_emergencies_registers_are_polled_rarely(cell: Cell) -> None:
     arm = cell.drives()
     with cat.Loop(arm) as loop:
         for cycle in loop:
@@ -99,4 +99,4 @@ def test_nothing_is_asked_where_nothing_is_said(cell: Cell) -> None:
                 sent = loop.timing.counters["acyclic_sent"]
             if cycle.number == 1000:
                 break
-        assert loop.timing.counters["acyclic_sent"] - sent <= 11  # a register each 100 ms
+        assert loop.timing.counters["acyclic_sent"] - sent <= 11  # one register per 100 ms

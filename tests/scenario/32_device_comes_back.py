@@ -1,6 +1,6 @@
-"""A tool at the end of the arm is switched off and on again, unplugged, exchanged, while the arm
-moves on. Nobody requires it: the loop goes on, events say what happened, and by policy it is led
-back to OP with its start-up list replayed. Its handle stays the same.
+"""A tool at the end of the arm is switched off and on, unplugged or replaced while the arm moves.
+The tool is optional: the loop continues, and events report the changes.
+By policy, the tool returns to OP with its start-up list, and keeps its handle.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ TOOL, GRIPPER = 3, 4
 
 @pytest.fixture
 def cell() -> Iterator[Cell]:
-    """A coupler, two servos of the arm, a servo and lamps of the tool behind them."""
+    """Yield a cell: a coupler, two servos of the arm, then a servo and lamps of the tool."""
     devices = (
         Coupler(),
         Servo(serial=1),
@@ -64,7 +64,7 @@ def run(
     each: Callable[[cat.Cycle, cat.Drives, cat.Drives, cat.Outputs, cat.Loop], None] | None = None,
     **options: object,
 ) -> list[event_types.Event]:
-    """The arm moves throughout and never misses a cycle; what happened meanwhile."""
+    """Move the arm without a missed cycle, and return the events."""
     arm, tool, gripper = requests(cell)
     with cat.Loop(arm, tool, gripper, **grouped(options)) as loop:  # type: ignore[arg-type]
         cell.main.events.get()
@@ -86,8 +86,7 @@ def run(
 
 
 def kinds(events: list[event_types.Event]) -> list[tuple[str, int]]:
-    """What was told of devices; what they told themselves, and what the error counters say of
-    their cables and power, are other scenarios."""
+    """Return the events about devices, without emergencies and without faults found by counters."""
     return [
         (type(e).__name__, e.sub.position)
         for e in events
@@ -102,7 +101,7 @@ LOST = [("DeviceLost", TOOL), ("DeviceLost", GRIPPER)]
 BACK = [("DeviceReturned", TOOL), ("DeviceReturned", GRIPPER)]
 
 
-def test_switched_off_and_on_it_is_led_back(cell: Cell) -> None:
+def test_a_device_switched_off_and_on_returns_to_op(cell: Cell) -> None:
     states: list[bool] = []
 
     def look(cycle, arm, tool, gripper, loop) -> None:
@@ -116,7 +115,9 @@ def test_switched_off_and_on_it_is_led_back(cell: Cell) -> None:
             assert gripper.present == (True,)
             assert cell.states == [OP] * 5
             assert cell.segment[GRIPPER].outputs == 0x0F
-            assert cell.segment.core.peek(TOOL, 0x0500, 1) == b"\x01"  # the EEPROM is its own
+            assert (
+                cell.segment.core.peek(TOOL, 0x0500, 1) == b"\x01"
+            )  # the device has access to its EEPROM
             assert not tool.enabled.any()
             tool.enable()
 
@@ -127,8 +128,8 @@ def test_switched_off_and_on_it_is_led_back(cell: Cell) -> None:
     assert states[-1]
 
 
-def test_nothing_moves_by_itself_when_it_is_back(cell: Cell) -> None:
-    """The application asks again, and it starts from where it stands."""
+def test_a_returned_drive_moves_only_after_a_request(cell: Cell) -> None:
+    """The application enables the drive again, which starts at its actual position."""
 
     def look(cycle, arm, tool, gripper, loop) -> None:
         tool.target.position[:] = 3.0
@@ -139,9 +140,11 @@ def test_nothing_moves_by_itself_when_it_is_back(cell: Cell) -> None:
     run(cell, power_cycle(TOOL, at=0.05, for_=0.5), each=look)
 
 
-def test_what_was_mapped_and_written_at_the_start_is_replayed(cell: Cell) -> None:
-    """After power-up the servo has its default mapping and interpolation time; the loop asked for
-    others. With another mapping its answers would not fit its sync unit."""
+def test_the_start_up_list_is_written_again(cell: Cell) -> None:
+    """After power-up, the servo has its default mapping and interpolation time.
+
+    The loop requested others. With another mapping, its data would not fit its sync unit.
+    """
     tool = cell.subs[TOOL]
     drives = cat.Drives(
         [tool],
@@ -166,7 +169,7 @@ def test_what_was_mapped_and_written_at_the_start_is_replayed(cell: Cell) -> Non
         assert [answer.result() for answer in answers] == [4, -3]
 
 
-def test_unplugged_it_keeps_its_address_and_comes_back_all_the_same(cell: Cell) -> None:
+def test_an_unplugged_device_keeps_its_address_and_returns(cell: Cell) -> None:
     events = run(cell, unplug(TOOL, at=0.2, for_=0.5))
     assert sorted(kinds(events)) == sorted(LOST + BACK)
     assert all(sub.state is not None for sub in cell.subs)
@@ -181,7 +184,7 @@ def test_unplugged_it_keeps_its_address_and_comes_back_all_the_same(cell: Cell) 
     ids=["unplugged", "switched off"],
 )
 def test_optional_devices_alone_survive_a_silent_bus(cell: Cell, faults: list[Fault]) -> None:
-    """No device is required, so none is missing: not even the coupler before them."""
+    """No device is required, so no loss ends the loop, not even that of the coupler."""
     _, tool, gripper = requests(cell)
     with cat.Loop(tool, gripper) as loop:
         cell.main.events.get()
@@ -201,7 +204,7 @@ def test_optional_devices_alone_survive_a_silent_bus(cell: Cell, faults: list[Fa
     assert set(LOST + BACK) <= set(told)
 
 
-def test_optional_devices_alone_may_be_left_behind(cell: Cell) -> None:
+def test_a_loop_can_be_left_while_its_optional_devices_are_silent(cell: Cell) -> None:
     """The devices are still silent when the loop is left."""
     _, tool, gripper = requests(cell)
     with cat.Loop(tool, gripper) as loop:
@@ -212,7 +215,7 @@ def test_optional_devices_alone_may_be_left_behind(cell: Cell) -> None:
     assert not tool.present.any()
 
 
-def test_held_by_policy_until_it_is_released(cell: Cell) -> None:
+def test_a_device_is_held_by_policy_until_it_is_released(cell: Cell) -> None:
     def look(cycle, arm, tool, gripper, loop) -> None:
         if cycle.number == 1000:
             assert cell.states[TOOL:] == [PRE_OP, PRE_OP]
@@ -229,7 +232,7 @@ def test_held_by_policy_until_it_is_released(cell: Cell) -> None:
     )
 
 
-def test_another_one_of_its_kind_is_told_and_held(cell: Cell) -> None:
+def test_a_replacement_is_reported_and_held(cell: Cell) -> None:
     new = Servo(name="tool", serial=99)
     events = run(cell, swap(TOOL, new, at=0.2, for_=0.3))
     [replaced] = [e for e in events if isinstance(e, event_types.DeviceReplaced)]
@@ -238,10 +241,10 @@ def test_another_one_of_its_kind_is_told_and_held(cell: Cell) -> None:
     assert ("DeviceReturned", TOOL) not in kinds(events)
 
 
-def test_one_whose_eeprom_cannot_be_read_is_not_taken_for_the_one_before(
+def test_a_device_with_an_unreadable_eeprom_is_not_taken_for_the_former_one(
     cell: Cell, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """It was given the address of the place to be asked who it is, and does not say."""
+    """The device was given the station address, but its identity cannot be read."""
     asked: list[Station] = []
 
     def unreadable(station: Station) -> Procedure[Identity]:
@@ -251,14 +254,14 @@ def test_one_whose_eeprom_cannot_be_read_is_not_taken_for_the_one_before(
 
     monkeypatch.setattr(restore, "identify", unreadable)
     events = run(cell, swap(TOOL, with_=Servo(name="tool", serial=99), at=0.1))
-    assert len(asked) > 3  # at every look again
+    assert len(asked) > 3  # at every poll
     [held] = [e for e in events if isinstance(e, event_types.DeviceHeld)]
     assert "identity of the device in its place cannot be read" in held.reason
     assert ("DeviceReturned", TOOL) not in kinds(events)
     assert cell.states[TOOL] & 0x0F < PRE_OP
 
 
-def test_another_one_of_its_kind_is_taken_by_policy(cell: Cell) -> None:
+def test_a_replacement_is_accepted_by_policy(cell: Cell) -> None:
     def look(cycle, arm, tool, gripper, loop) -> None:
         if cycle.number == 1400:
             assert cell.states == [OP] * 5
@@ -274,8 +277,8 @@ def test_another_one_of_its_kind_is_taken_by_policy(cell: Cell) -> None:
     assert ("DeviceReturned", TOOL) in kinds(events)
 
 
-def test_one_that_was_let_in_belongs_there_from_then_on(cell: Cell) -> None:
-    """It is switched off once more, later: nobody has to let it in again."""
+def test_an_accepted_replacement_stays_accepted(cell: Cell) -> None:
+    """After another power cycle, the device needs no second release."""
 
     def look(cycle, arm, tool, gripper, loop) -> None:
         if cycle.number == 600:
@@ -295,8 +298,8 @@ def test_one_that_was_let_in_belongs_there_from_then_on(cell: Cell) -> None:
     assert kinds(events).count(("DeviceReturned", TOOL)) == 2
 
 
-def test_one_held_because_it_refused_comes_back_when_it_is_released(cell: Cell) -> None:
-    """Wherever it was when it was given up: here it had not even reached PRE-OP."""
+def test_a_device_held_after_a_refusal_returns_when_released(cell: Cell) -> None:
+    """The device was held in any state; here, it had not reached PRE-OP."""
 
     def look(cycle, arm, tool, gripper, loop) -> None:
         if cycle.number == 1000:
@@ -311,8 +314,8 @@ def test_one_held_because_it_refused_comes_back_when_it_is_released(cell: Cell) 
     assert kinds(events).count(("DeviceHeld", TOOL)) == 1
 
 
-def test_a_question_it_was_asked_before_it_fell_does_not_hold_it_up(cell: Cell) -> None:
-    """Its mailbox is made anew, so nobody will answer: told at once, not after two seconds."""
+def test_a_pending_request_does_not_delay_the_return(cell: Cell) -> None:
+    """Its mailbox is reset, so the request fails at once, not after two seconds."""
     answers = []
 
     def look(cycle, arm, tool, gripper, loop) -> None:
@@ -327,7 +330,7 @@ def test_a_question_it_was_asked_before_it_fell_does_not_hold_it_up(cell: Cell) 
     run(cell, silent, leave_state(TOOL, at=0.2, state="INIT", code=0x001A), each=look)
 
 
-def test_another_product_is_never_taken(cell: Cell) -> None:
+def test_another_product_is_never_accepted(cell: Cell) -> None:
     def look(cycle, arm, tool, gripper, loop) -> None:
         if cycle.number == 1400:
             assert cell.states[TOOL] != OP
@@ -344,7 +347,7 @@ def test_another_product_is_never_taken(cell: Cell) -> None:
     assert replaced.found.product != replaced.expected.product
 
 
-def test_one_that_leaves_op_by_itself_is_led_back(cell: Cell) -> None:
+def test_a_device_that_leaves_op_is_brought_back(cell: Cell) -> None:
     def look(cycle, arm, tool, gripper, loop) -> None:
         if cycle.number == 900:
             assert cell.states == [OP] * 5
@@ -354,33 +357,33 @@ def test_one_that_leaves_op_by_itself_is_led_back(cell: Cell) -> None:
     assert (lost.sub, lost.state, lost.code) == (cell.subs[TOOL], 4, 0x001B)
 
 
-def test_a_required_one_ends_the_loop(cell: Cell) -> None:
+def test_the_loss_of_a_required_device_ends_the_loop(cell: Cell) -> None:
     with pytest.raises(WorkingCounterError):
         run(cell, power_cycle(1, at=0.2, for_=0.5), good=False)
     cell.let_pass(1.0)
     assert "OPERATION ENABLED" not in cell.drive_states
 
 
-def test_a_required_one_that_leaves_op_ends_the_loop_while_another_is_astray(cell: Cell) -> None:
+def test_a_required_device_that_leaves_op_ends_the_loop_while_another_is_lost(cell: Cell) -> None:
     with pytest.raises(StateError, match="device 2"):
         run(cell, power_cycle(TOOL, at=0.2, for_=0.5), leave_state(2, at=0.9), good=False)
     cell.let_pass(0.5)
 
 
-def test_two_that_changed_places_are_both_told(cell: Cell) -> None:
-    """One is the arm's: the loop ends; the scan after it finds what is there."""
+def test_two_exchanged_devices_are_both_reported(cell: Cell) -> None:
+    """One of the devices belongs to the arm, so the loop ends. The next scan finds both devices."""
     with pytest.raises(WorkingCounterError):
         run(cell, exchange(2, TOOL, at=0.2, for_=0.3), good=False)
 
 
 @pytest.mark.parametrize("name", ["on_return", "on_replacement"])
-def test_a_policy_there_is_not(name: str) -> None:
+def test_an_unknown_policy_is_refused(name: str) -> None:
     with pytest.raises(ValueError, match=name):
         cat.StopPolicy(**{name: "maybe"})  # type: ignore[arg-type]
 
 
-def test_an_object_of_a_device_that_came_back_can_be_read(cell: Cell) -> None:
-    """The handle is the same, its mailbox too."""
+def test_objects_of_a_returned_device_can_be_read(cell: Cell) -> None:
+    """The handle and its mailbox are the same."""
     answers = []
 
     def look(cycle, arm, tool, gripper, loop) -> None:
@@ -392,14 +395,16 @@ def test_an_object_of_a_device_that_came_back_can_be_read(cell: Cell) -> None:
     assert answers[0].result() & 0x4F
 
 
-def test_a_watch_that_fails_is_no_secret(cell: Cell, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Nobody waits for its result while the loop runs: leaving tells."""
+def test_an_internal_error_of_the_watch_is_raised_on_leaving(
+    cell: Cell, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """No caller waits for its result while the loop runs, so leaving raises it."""
 
     def broken(at_most: int) -> Procedure[list[restore.Presence]]:
         yield []
         raise ZeroDivisionError(f"of {at_most}")
 
-    monkeypatch.setattr(restore, "look_around", broken)
+    monkeypatch.setattr(restore, "find_devices", broken)
     with pytest.raises(ZeroDivisionError):
         run(cell, unplug(TOOL, at=0.1), seconds=0.3)
     assert cell.states[:TOOL] == [PRE_OP] * TOOL

@@ -1,6 +1,6 @@
-"""Every device is asked something all the time, while the drives move.
-The cycle loses nothing and moves the same; the devices share the frames; each answer is its own.
-A large object crawls along beside the small ones and arrives whole.
+"""Objects of all devices are read without a pause while the drives move.
+No cycle is lost, and the motion is the same. The devices share frames, and answers are not mixed.
+A large object is transferred slowly next to the small ones, and arrives complete.
 """
 
 import math
@@ -22,7 +22,7 @@ def devices(count: int) -> list[Device]:
 
 
 def positions(run: str, *, storm: bool) -> list[tuple[float, ...]]:
-    """Where the drives were in every cycle."""
+    """Return the positions of the drives in every cycle."""
     with cell_of(*devices(4)) as cell:
         arm = cell.drives()
         answers: dict[int, Pending[int]] = {}
@@ -45,17 +45,17 @@ def positions(run: str, *, storm: bool) -> list[tuple[float, ...]]:
             assert loop.timing.counters["late"] == 0
             lane = loop.timing.counters["acyclic_sent"]
         assert not storm or answered >= 4 * CYCLES / 4.1
-        assert lane <= CYCLES + 50  # one frame a cycle for all
+        assert lane <= CYCLES + 50  # one frame per cycle for all
         cell.assert_safe()
         return found
 
 
 @pytest.mark.parametrize("run", ["threaded", "inline"])
-def test_the_motion_is_the_same_with_and_without(run: str) -> None:
+def test_the_motion_is_the_same_with_and_without_a_storm(run: str) -> None:
     assert positions(run, storm=True) == positions(run, storm=False)
 
 
-def test_a_large_object_arrives_beside_the_small_ones() -> None:
+def test_a_large_object_arrives_during_a_storm() -> None:
     with cell_of(*devices(3)) as cell:
         arm = cell.drives()
         slow, *others = cell.subs.drives

@@ -1,6 +1,6 @@
-"""While the drives move, one device answers twice, with nonsense, without end, or not for a while.
-Whoever asked gets a specific error in time; the next question gets its own answer.
-The cycle, the other devices and the stop at the end know nothing of it.
+"""While the drives move, one device answers twice, wrongly, endlessly or late.
+The request fails in time with a specific error. The next request gets its own answer.
+The cycle, the other devices and the stop at the end are not affected.
 """
 
 import struct
@@ -22,7 +22,7 @@ COE, EOE, SDO_RESPONSE = 3, 2, 3
 SERIAL, LARGE, SCRATCH = (0x1018, 4), 0x2100, 0x2102
 
 Answers = list[tuple[int, bytes]]  # protocol of the mailbox, its data
-Misdeed = Callable[[bytes, Answers], Answers]  # the request, the right answers → what is sent
+Misdeed = Callable[[bytes, Answers], Answers]  # (request, correct answers) to sent answers
 
 
 def twice(_request: bytes, right: Answers) -> Answers:
@@ -50,7 +50,7 @@ def noise(_request: bytes, right: Answers) -> Answers:
 
 
 def without_end(request: bytes, _right: Answers) -> Answers:
-    """Announces 4 GiB, then segment after segment, none of them the last."""
+    """Announce 4 GiB, then send segments without end."""
     command = request[8]
     if command >> 5 == 3:
         return [(COE, struct.pack("<HB", SDO_RESPONSE << 12, command & 0x10) + bytes(100))]
@@ -60,7 +60,7 @@ def without_end(request: bytes, _right: Answers) -> Answers:
 
 
 def drip(request: bytes, right: Answers) -> Answers:
-    """Announces no more than it may have, then a byte at a time, and more than it announced."""
+    """Announce a valid size, then send single bytes beyond that size."""
     command = request[8]
     if command >> 5 == 3:
         # 6 of the 7 bytes are none
@@ -82,7 +82,7 @@ MISDEEDS: list[tuple[Misdeed, type[CatenaryError] | None, str]] = [
 
 
 def misbehave(servo: Servo, misdeed: Misdeed | None) -> None:
-    """What it sends instead of its answers, until it is told None."""
+    """Replace the answers of a device until the replacement is None."""
     mailbox = servo.application.mailbox
     if "_answers" in vars(mailbox):
         del mailbox._answers  # type: ignore[method-assign]
@@ -99,7 +99,7 @@ def misbehave(servo: Servo, misdeed: Misdeed | None) -> None:
 @pytest.mark.parametrize(
     ("misdeed", "error", "words"), MISDEEDS, ids=[misdeed.__name__ for misdeed, *_ in MISDEEDS]
 )
-def test_the_question_fails_and_nothing_else(
+def test_only_the_request_fails(
     cell: Cell, misdeed: Misdeed, error: type[CatenaryError] | None, words: str
 ) -> None:
     bad, good = cell.subs.drives
@@ -134,7 +134,7 @@ def test_the_question_fails_and_nothing_else(
     cell.assert_safe()
 
 
-def test_a_mailbox_that_is_silent_for_a_moment_is_waited_for(cell: Cell) -> None:
+def test_a_short_silence_of_a_mailbox_is_tolerated(cell: Cell) -> None:
     drive, _ = cell.subs.drives
     arm = cell.drives()
     with cat.Loop(arm) as loop:
@@ -149,7 +149,7 @@ def test_a_mailbox_that_is_silent_for_a_moment_is_waited_for(cell: Cell) -> None
     assert answer.result() == 1
 
 
-def test_one_that_is_silent_for_long_is_named_and_comes_back(cell: Cell) -> None:
+def test_a_long_silence_of_a_mailbox_is_an_error_and_the_mailbox_recovers(cell: Cell) -> None:
     drive, _ = cell.subs.drives
     arm = cell.drives()
     with cat.Loop(arm) as loop:
@@ -168,7 +168,7 @@ def test_one_that_is_silent_for_long_is_named_and_comes_back(cell: Cell) -> None
     cell.assert_safe()
 
 
-def test_one_that_thinks_for_long_is_waited_for(cell: Cell) -> None:
+def test_a_slow_answer_is_accepted(cell: Cell) -> None:
     drive, _ = cell.subs.drives
     arm = cell.drives()
     with cat.Loop(arm) as loop:
@@ -184,8 +184,8 @@ def test_one_that_thinks_for_long_is_waited_for(cell: Cell) -> None:
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_whatever_frames_are_lost_each_answer_is_right(cell: Cell, seed: int) -> None:
-    """A fifth of the acyclic frames, half of them on their way out."""
+def test_all_answers_are_correct_although_frames_are_lost(cell: Cell, seed: int) -> None:
+    """A fifth of the acyclic frames is lost, half of them on the way out."""
     drive, _ = cell.subs.drives
     arm = cell.drives()
     for direction in ("sent", "received"):

@@ -1,7 +1,6 @@
-"""A cable breaks every twentieth frame while the drives move; frames between still come through.
-The loop goes on, and an event names the cable within two seconds, once.
-When it breaks every frame, the error that ends the loop names the same cable.
-A device that answers, but gives no process data, is named too.
+"""A cable corrupts every twentieth frame while the drives move. The loop continues, and one event
+names the cable within two seconds. If the cable corrupts every frame, the final error names it.
+A device that answers without process data is named, too.
 """
 
 import pytest
@@ -19,7 +18,7 @@ def found(cell: Cell) -> list[FaultFound]:
     return [event for event in cell.main.events if isinstance(event, FaultFound)]
 
 
-def test_a_cable_that_spoils_some_frames_is_named_while_the_loop_goes_on(cell: Cell) -> None:
+def test_a_cable_that_corrupts_some_frames_is_named_while_the_loop_continues(cell: Cell) -> None:
     arm = cell.drives()
     with cat.Loop(arm, period=1e-3) as loop:
         home = arm.actual.position.copy()
@@ -40,7 +39,7 @@ def test_a_cable_that_spoils_some_frames_is_named_while_the_loop_goes_on(cell: C
     cell.assert_safe()
 
 
-def test_a_cable_that_spoils_every_frame_is_named_by_the_error(cell: Cell) -> None:
+def test_a_cable_that_corrupts_every_frame_is_named_by_the_error(cell: Cell) -> None:
     with pytest.raises(WorkingCounterError) as caught, cat.Loop(cell.drives()) as loop:
         for cycle in loop:
             if cycle.number == 1500:
@@ -62,7 +61,7 @@ def test_a_loose_plug_is_named(cell: Cell) -> None:
     assert "1 lost link" in event.message
 
 
-def test_a_sound_segment_has_nothing_to_tell(cell: Cell) -> None:
+def test_a_sound_segment_produces_no_events(cell: Cell) -> None:
     with cat.Loop(cell.drives()) as loop:
         for cycle in loop:
             if cycle.number == 3000:
@@ -70,7 +69,7 @@ def test_a_sound_segment_has_nothing_to_tell(cell: Cell) -> None:
     assert found(cell) == []
 
 
-def test_a_device_that_lets_process_data_pass_is_named(cell: Cell) -> None:
+def test_a_device_that_ignores_process_data_is_named(cell: Cell) -> None:
     with pytest.raises(WorkingCounterError) as caught, cat.Loop(cell.drives()) as loop:
         for cycle in loop:
             if cycle.number == 100:

@@ -1,6 +1,6 @@
-"""A loop in the wiring or a second sender repeats every cyclic frame 128 cycles later, while the
-drives move. An event names the suspicion within two seconds. With exact matching no repeated frame
-is taken for a current one; also in a ring, and with a divider.
+"""A loop in the wiring or a second sender repeats every cyclic frame 128 cycles later.
+An event reports the suspicion within two seconds. With exact matching, no repeated frame is
+accepted as a current one, also in a ring and with a divider.
 """
 
 from __future__ import annotations
@@ -31,8 +31,10 @@ INDICES = 128
 
 
 class RepeatingLink:
-    """Owner of the last frames of a link. While `repeats`, each cyclic frame that comes back is
-    preceded by the one that had its index before."""
+    """Owns the last frames of a link.
+
+    While `repeats` is True, each received cyclic frame follows the earlier one with its index.
+    """
 
     name = "repeating"
 
@@ -93,8 +95,11 @@ class RepeatingLink:
 
 
 def false_steps(segment: Segment, links: list[RepeatingLink], **options: bool) -> tuple[int, list]:
-    """Move for 3 s while frames are repeated. Returns the cycles in which the actual position was
-    further from the target than an axis can be, and the events."""
+    """Move for 3 s while frames are repeated.
+
+    Returns the cycles in which the actual position was implausibly far from the target, and the
+    events.
+    """
     false = 0
     with cat.MainDevice(*links) as main:
         arm = cat.Drives(main.scan().drives, counts_per_turn=2**20)
@@ -115,7 +120,7 @@ def segment_of(*, ring: bool = False) -> Segment:
     return Segment([Coupler(), Servo(serial=1), Servo(serial=2)], ring=ring)
 
 
-def test_repeated_frames_are_an_event() -> None:
+def test_repeated_frames_are_reported_as_an_event() -> None:
     segment = segment_of()
     false, told = false_steps(segment, [RepeatingLink(segment.open_link())])
     assert false > 2000
@@ -124,7 +129,7 @@ def test_repeated_frames_are_an_event() -> None:
     assert "loop in the wiring" in event.message
 
 
-def test_with_exact_matching_none_of_them_passes() -> None:
+def test_exact_matching_accepts_no_repeated_frame() -> None:
     segment = segment_of()
     links = [RepeatingLink(segment.open_link())]
     false, told = false_steps(segment, links, exact_matching=True)
@@ -133,11 +138,11 @@ def test_with_exact_matching_none_of_them_passes() -> None:
 
 
 @pytest.mark.parametrize("exact", [False, True])
-def test_a_ring_takes_part(exact: bool) -> None:
+def test_repeated_frames_in_a_ring(exact: bool) -> None:
     segment = segment_of(ring=True)
     links = [RepeatingLink(end.open_link()) for end in (segment.first, segment.second)]
     for link in links:
-        link.table.flags = 1 | 16  # virtual time; the ring asks for the next arrival
+        link.table.flags = 1 | 16  # virtual time; the ring requests the next arrival
         link.table.due = NOW(lambda _, link=link: due_of(link))
     false, told = false_steps(segment, links, exact_matching=exact)
     assert (false == 0) == exact
@@ -149,7 +154,7 @@ def due_of(link: RepeatingLink) -> int:
     return table.now(table.self) if link.waiting else table.due(table.self)
 
 
-def test_the_plan_prints_what_exact_matching_costs() -> None:
+def test_the_plan_prints_the_cost_of_exact_matching() -> None:
     with cat.MainDevice(segment_of()) as main:
         arm = cat.Drives(main.scan().drives, counts_per_turn=2**20)
         with cat.Loop(arm, scheduling=cat.Scheduling(exact_matching=True)) as loop:

@@ -1,7 +1,7 @@
-"""Drives that keep time by SYNC0 want new outputs before every pulse, and say how often they were
-missing. The frame sits before the beat, in whatever order the loop runs, and none is missed; with
-a pulse moved to before the frame the drive takes what came a cycle earlier, and none is missed
-either."""
+"""Drives with SYNC0 need new outputs before every pulse, and count missing ones.
+The frame is sent before the pulse in every execution mode, and no pulse misses its outputs.
+If the pulse is shifted before the frame, the drive takes the outputs of the previous cycle.
+"""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def missed(cell: Cell) -> list[int]:
 
 @pytest.mark.parametrize("run", ["threaded", "inline"])
 @pytest.mark.parametrize("clock", ["reference", "main"])
-def test_no_pulse_is_missed(run: str, clock: str) -> None:
+def test_no_pulse_misses_its_outputs(run: str, clock: str) -> None:
     with clocked_cell(2) as cell:
         arm = cell.drives(dc=True)
         with cat.Loop(arm, period=1e-3, execution=run, clocks=cat.ClockOptions(lead=clock)) as loop:  # type: ignore[arg-type]
@@ -35,7 +35,7 @@ def test_no_pulse_is_missed(run: str, clock: str) -> None:
 
 
 @pytest.mark.parametrize("shift", [-300e-6, -50e-6, 300e-6])
-def test_a_shifted_pulse(shift: float) -> None:
+def test_a_shifted_pulse_misses_no_outputs(shift: float) -> None:
     with clocked_cell(2) as cell:
         arm = cell.drives(dc=cat.DistributedClock(shift=shift))
         with cat.Loop(arm, period=1e-3) as loop:
@@ -44,8 +44,8 @@ def test_a_shifted_pulse(shift: float) -> None:
             assert [cell.segment.core.synchronous(p)[2] for p in (2, 3)] == before
 
 
-def test_a_sine_through_drives_that_step_at_sync0() -> None:
-    """They follow as those without clocks do."""
+def test_drives_with_sync0_follow_a_sine() -> None:
+    """They follow like drives without clocks."""
     import math
 
     with clocked_cell(2) as cell:
@@ -62,7 +62,7 @@ def test_a_sine_through_drives_that_step_at_sync0() -> None:
         cell.assert_safe()
 
 
-def test_clocks_of_32_bits_among_others() -> None:
+def test_clocks_of_32_and_64_bits() -> None:
     with (
         cell_of(
             Coupler(crystal=Crystal(ppm=30)),
@@ -78,7 +78,7 @@ def test_clocks_of_32_bits_among_others() -> None:
         assert [cell.segment.core.synchronous(p)[2] for p in (1, 2)] == before
 
 
-def test_a_reference_of_32_bits() -> None:
+def test_a_reference_clock_of_32_bits() -> None:
     with (
         cell_of(
             Servo(serial=1, clock_bits=32, crystal=Crystal(ppm=50)),
@@ -92,7 +92,7 @@ def test_a_reference_of_32_bits() -> None:
         assert loop.clocks.jumps == 0
 
 
-def test_without_a_request_drives_run_freely() -> None:
+def test_without_a_request_drives_use_free_run() -> None:
     with clocked_cell(2) as cell, cat.Loop(cell.drives(), period=1e-3) as loop:
         run_for(loop, 0.1)
         assert cell.segment.core.pulses(2) == (0, 0)
@@ -101,11 +101,11 @@ def test_without_a_request_drives_run_freely() -> None:
 
 
 def test_a_loop_without_clocks_after_one_with() -> None:
-    """The SYNC signals of the first do not haunt the second."""
+    """The SYNC signals of the first loop do not affect the second."""
     with clocked_cell(2) as cell:
         with cat.Loop(cell.drives(dc=True), period=1e-3) as loop:
             run_for(loop, 0.1)
         pulses = cell.segment.core.pulses(2)[0]
         with cat.Loop(cell.drives(), period=1e-3) as loop:
             run_for(loop, 0.1)
-        assert cell.segment.core.pulses(2)[0] - pulses < 200  # those before it was told
+        assert cell.segment.core.pulses(2)[0] - pulses < 200  # pulses before the deactivation

@@ -1,8 +1,8 @@
-"""Somebody writes the reference clock's offset: its time jumps by 300 us. The other clocks follow
-as fast as they can, and so does the wake-up: the frames stay before the pulses of drives that are
-on their way, nothing is missed, and events say what happened. A jump of one reading alone is a
-stray and changes nothing. A jump by many periods leads the drives' pulses across the frames: they
-say so, the loop ends with their reason, and everything is safe."""
+"""The offset of the reference clock is overwritten, and its time jumps by 300 us. The other clocks
+and the cycle follow as fast as they can, no pulse misses its outputs, and events report the jump.
+A single wrong reading changes nothing. After a jump of many periods, the drives report missing
+outputs, and the loop ends safely with their reason.
+"""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def jump(cell: Cell, position: int, by_ns: int) -> None:
 
 
 @pytest.mark.parametrize("by_ns", [-300_000, 300_000])
-def test_the_instants_follow_as_fast_as_the_clocks_do(by_ns: int) -> None:
+def test_the_cycle_starts_follow_as_fast_as_the_clocks(by_ns: int) -> None:
     with clocked_cell(2) as cell:
         arm = cell.drives(dc=True)
         with cat.Loop(arm, period=1e-3) as loop:
@@ -41,7 +41,7 @@ def test_the_instants_follow_as_fast_as_the_clocks_do(by_ns: int) -> None:
             assert cell.drive_states == ["OPERATION ENABLED"] * 2
 
 
-def test_there_and_back_within_a_cycle_is_a_stray() -> None:
+def test_a_single_wrong_reading_is_ignored() -> None:
     with clocked_cell(2) as cell, cat.Loop(cell.drives(dc=True), period=1e-3) as loop:
         loop.wait_locked()
         jump(cell, 0, 400_000)
@@ -51,7 +51,7 @@ def test_there_and_back_within_a_cycle_is_a_stray() -> None:
         assert loop.clocks.jumps == 0
 
 
-def test_a_follower_that_jumps_comes_back_by_itself() -> None:
+def test_a_follower_that_jumps_returns_by_itself() -> None:
     with clocked_cell(2) as cell, cat.Loop(cell.drives(dc=True), period=1e-3) as loop:
         loop.wait_locked()
         jump(cell, 3, 50_000)
@@ -62,7 +62,7 @@ def test_a_follower_that_jumps_comes_back_by_itself() -> None:
         assert loop.clocks.jumps == 0
 
 
-def test_a_jump_no_drive_can_follow() -> None:
+def test_a_jump_that_no_drive_can_follow_ends_the_loop() -> None:
     with clocked_cell(2) as cell:
         with (
             pytest.raises(StateError, match="Synchronization error"),

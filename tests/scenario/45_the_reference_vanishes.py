@@ -1,7 +1,8 @@
-"""The device whose clock all others follow is switched off and on again. The others keep time by
-what the frame carries, at the rate that was found, and miss no pulse; what comes back has forgotten
-the time and must not spread it: its clock is set by the others' before it leads again. A follower
-that is switched off gets its time, and its SYNC0, back in the same way."""
+"""The device with the reference clock is switched off and on. The other clocks continue with the
+expected time in the frame, at the measured rate, and no pulse misses its outputs.
+The returned reference clock is set by the others before it is the reference again.
+A follower that is switched off gets its time and its SYNC0 back in the same way.
+"""
 
 from __future__ import annotations
 
@@ -22,7 +23,7 @@ FIRST, SECOND, THIRD = 1, 2, 3
 
 @pytest.fixture
 def star() -> Iterator[Cell]:
-    """A junction with three servos, each at a port of its own: each can vanish alone."""
+    """Yield a junction with three servos at separate ports, so that each can fail alone."""
     random = Random(3)
     servos = [Servo(serial=k, crystal=crystal(random)) for k in (1, 2, 3)]
     behind = {1: (0, 3), 2: (0, 1), 3: (0, 2)}
@@ -31,7 +32,7 @@ def star() -> Iterator[Cell]:
 
 
 def ride(cell: Cell, vanishing: int, seconds: float = 6.0) -> list[event_types.Event]:
-    """The others hold while one is without power for half a second."""
+    """Switch one device off for half a second, and check the others."""
     others = [cell.subs[p] for p in (FIRST, SECOND, THIRD) if p != vanishing]
     arm = cat.Drives(others, counts_per_turn=2**20, velocity_limit=100.0, dc=True)
     tool = cat.Drives(
@@ -73,7 +74,7 @@ def kinds(events: list[event_types.Event]) -> list[str]:
     return [type(e).__name__ for e in events if isinstance(e, told)]
 
 
-def test_the_reference(star: Cell) -> None:
+def test_the_reference_is_switched_off_and_on(star: Cell) -> None:
     events = ride(star, FIRST)
     assert set(kinds(events)) == {"ClockUnlocked", "ClockLocked", "DeviceLost", "DeviceReturned"}
     left = next(e for e in events if isinstance(e, event_types.ClockUnlocked))
@@ -82,6 +83,6 @@ def test_the_reference(star: Cell) -> None:
     assert kinds(events)[-1] == "ClockLocked"
 
 
-def test_a_follower(star: Cell) -> None:
+def test_a_follower_is_switched_off_and_on(star: Cell) -> None:
     events = ride(star, SECOND)
     assert {"DeviceLost", "DeviceReturned"} <= set(kinds(events))

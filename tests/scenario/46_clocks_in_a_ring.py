@@ -1,6 +1,7 @@
-"""Clocks in a ring. In a closed ring no frame comes back through the ports it left by, so nothing
-tells how long its cables are: for the moment of the measurement the ring is a line. The SYNC pulses
-of its drives then coincide as those of a line do; a ring that is cut says so instead."""
+"""In a closed ring, no frame returns through the ports it left by, so delays cannot be measured.
+The ring is opened for the measurement. The SYNC pulses then coincide as in a line.
+In a cut ring, clocks are refused with an error.
+"""
 
 from __future__ import annotations
 
@@ -43,25 +44,21 @@ def drives(main: cat.MainDevice) -> cat.Drives:
 
 def assert_together(segment: Segment, loop: cat.Loop) -> None:
     loop.wait_locked(within=1e-6, timeout=2.0)
-    run_for(loop, 16.0)  # four times what the controllers' own filters take
+    run_for(loop, 16.0)  # four times the settling time of the controllers' filters
     found = true_differences(segment)
     assert len(found) == COUNT - 1
     assert max(map(abs, found.values())) < 50e-9
 
 
-def test_its_clocks_come_together_as_those_of_a_line(
-    segment: Segment, main: cat.MainDevice
-) -> None:
+def test_clocks_of_a_ring_synchronise_as_in_a_line(segment: Segment, main: cat.MainDevice) -> None:
     with cat.Loop(drives(main)) as loop:
         assert_together(segment, loop)
         assert loop.timing.counters["lost"] == 0
     assert main.clock_delays_ns[-1] == pytest.approx(1560, abs=50)
 
 
-def test_the_ring_is_closed_again_behind_the_measurement(
-    segment: Segment, main: cat.MainDevice
-) -> None:
-    """A cut costs nothing afterwards: frames go round by both ends."""
+def test_the_ring_is_closed_after_the_measurement(segment: Segment, main: cat.MainDevice) -> None:
+    """A later cut loses no data, because frames reach all devices from both ends."""
     with cat.Loop(drives(main)) as loop:
         for cycle in loop:
             assert cycle.ok
@@ -71,42 +68,44 @@ def test_the_ring_is_closed_again_behind_the_measurement(
                 break
 
 
-def test_cut_at_its_second_end_it_is_a_line(segment: Segment, main: cat.MainDevice) -> None:
+def test_a_ring_cut_at_its_second_end_works_as_a_line(
+    segment: Segment, main: cat.MainDevice
+) -> None:
     segment.inject(cut(between=LAST_CABLE, at=0))
     with cat.Loop(drives(main)) as loop:
         assert_together(segment, loop)
 
 
 @pytest.mark.parametrize("cable", [("main", 0), (1, 2)])
-def test_a_cut_ring_has_no_common_time(
+def test_clocks_in_a_cut_ring_are_refused(
     segment: Segment, main: cat.MainDevice, cable: tuple[int | str, int | str]
 ) -> None:
     segment.inject(cut(between=cable, at=0))
     arm = drives(main)
     with pytest.raises(ClockError, match="the ring is cut between"), cat.Loop(arm):
-        raise AssertionError("it opened")
+        raise AssertionError("the loop was opened")
     assert all(device.state & 0x0F <= 2 for device in segment)
 
 
 @pytest.mark.parametrize("cable", [(1, 2), LAST_CABLE])
-def test_mended_since_the_scan_it_is_scanned_again(
+def test_a_ring_repaired_after_the_scan_needs_a_new_scan(
     segment: Segment, main: cat.MainDevice, cable: tuple[int | str, int | str]
 ) -> None:
-    """What was read of the ports tells no more where the second end is."""
+    """The port states of the scan no longer show the second end."""
     segment.inject(cut(between=cable, at=0))
     arm = drives(main)
     segment.inject(join(between=cable, at=0))
     with pytest.raises(ClockError, match="scan again"), cat.Loop(arm):
-        raise AssertionError("it opened")
+        raise AssertionError("the loop was opened")
     with cat.Loop(drives(main)) as loop:
         assert_together(segment, loop)
 
 
 @pytest.mark.parametrize("cable", [("main", 0), (1, 2), (3, 4)])
-def test_behind_a_cut_they_are_led_by_the_time_that_is_expected(
+def test_clocks_after_a_cut_follow_the_expected_time(
     cable: tuple[int | str, int | str],
 ) -> None:
-    """Not as well as by the reference clock, but no SYNC pulse runs away from the frames."""
+    """They are less accurate than with the reference clock, but pulses stay after the frames."""
     segment = segment_of(jitter=0.2e-6)
     with cat.MainDevice(segment.first, segment.second) as main, cat.Loop(drives(main)) as loop:
         loop.wait_locked(within=1e-6, timeout=2.0)
@@ -115,7 +114,7 @@ def test_behind_a_cut_they_are_led_by_the_time_that_is_expected(
         for _ in range(30):
             run_for(loop, 2.0)
             assert max(map(abs, true_differences(segment).values())) < 5e-6
-            assert not loop.clocks.locked  # nothing on the bus compares them with the reference
+            assert not loop.clocks.locked  # they cannot be compared with the reference
         segment.inject(join(between=cable, at=0))
         run_for(loop, 5.0)
         assert loop.clocks.locked
@@ -125,7 +124,7 @@ def test_behind_a_cut_they_are_led_by_the_time_that_is_expected(
     assert "the ring is cut" in told[1].message
 
 
-def test_cut_behind_the_last_clock_they_are_together(
+def test_clocks_stay_synchronised_if_the_cut_is_after_the_last_clock(
     segment: Segment, main: cat.MainDevice
 ) -> None:
     with cat.Loop(drives(main)) as loop:

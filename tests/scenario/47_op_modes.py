@@ -1,5 +1,7 @@
-"""OpModes of real devices: SYNC1 once a period beside a faster SYNC0, SYNC1 alone, a shift of two
-seconds in an EasyCAT's EEPROM. A last device of a ring that cannot close its port is named."""
+"""OpModes of real devices: SYNC1 once per period with a faster SYNC0, SYNC1 alone, and a shift of
+two seconds in the EEPROM of an EasyCAT.
+The error names the last device of a ring that cannot close its port.
+"""
 
 from __future__ import annotations
 
@@ -27,7 +29,7 @@ def cell_with(*op_modes: OpMode, by_sync1: bool = False) -> Iterator[Cell]:
 
 
 def pulses_of_a_second(cell: Cell, dc: cat.DistributedClock | bool) -> tuple[int, int]:
-    """SYNC0 and SYNC1 pulses that the device gets in 1000 periods; it stays in OP and in step."""
+    """Return the SYNC0 and SYNC1 pulses in 1000 periods. The device stays synchronised in OP."""
     core = cell.segment.core
     with cat.Loop(cell.drives(dc=dc), period=1e-3) as loop:
         loop.wait_locked()
@@ -39,7 +41,7 @@ def pulses_of_a_second(cell: Cell, dc: cat.DistributedClock | bool) -> tuple[int
     return after[0] - before[0], after[1] - before[1]
 
 
-def test_sync1_once_a_period_beside_a_faster_sync0() -> None:
+def test_sync1_once_per_period_with_a_faster_sync0() -> None:
     with cell_with(*EL3702, by_sync1=True) as cell:
         sync0, sync1 = pulses_of_a_second(cell, cat.DistributedClock(op_mode="DcSync4"))
         assert sync0 == pytest.approx(4000, abs=8)
@@ -77,26 +79,26 @@ def test_a_drive_with_sync1_alone_refuses_sync0() -> None:
         assert refused.value.code == 0x0030
 
 
-def test_an_implausible_shift_is_named_as_the_eeproms() -> None:
+def test_an_implausible_shift_is_reported_as_that_of_the_eeprom() -> None:
     with cell_with(*EASYCAT) as cell:
         with (
             pytest.raises(ConfigurationError, match=r"its EEPROM .*'DC_Sync'.* shift of 2 s") as no,
             cat.Loop(cell.drives(dc=True), period=1e-3),
         ):
-            raise AssertionError("this loop cannot be")
+            raise AssertionError("the loop was opened")
         assert "cat.DistributedClock(shift=0.0)" in no.value.hint
         sync0, sync1 = pulses_of_a_second(cell, cat.DistributedClock(shift=0.0))
         assert (sync0, sync1) == (pytest.approx(1000, abs=2), 0)
 
 
-def test_an_unknown_op_mode_lists_those_of_the_device() -> None:
+def test_the_error_for_an_unknown_op_mode_lists_those_of_the_device() -> None:
     with cell_with(*EL3702) as cell:
         drives = cell.drives(dc=cat.DistributedClock(op_mode="DcSync8"))
         with (
             pytest.raises(ConfigurationError, match="it has 'FreeRun', 'DC Sync0', 'DcSync4'"),
             cat.Loop(drives, period=1e-3),
         ):
-            raise AssertionError("this loop cannot be")
+            raise AssertionError("the loop was opened")
 
 
 def test_the_plan_shows_the_op_mode() -> None:
@@ -107,7 +109,7 @@ def test_the_plan_shows_the_op_mode() -> None:
         assert "AssignActivate 0x0730, OpMode 'DcSync4'" in text
 
 
-def test_a_ring_whose_port_cannot_be_closed_says_so() -> None:
+def test_a_ring_whose_port_cannot_be_closed_is_refused() -> None:
     last = Servo(quirks=ServoQuirks(closes_ports=False))
     segment = Segment([Coupler(), Servo(), last], ring=True)
     with cat.MainDevice(segment.first, segment.second) as main:

@@ -1,6 +1,6 @@
-"""A ring between two ports: a cable is pulled and put in again while all axes move, at any moment.
-No cycle is lost but those whose frames were on their way, or sent before the controllers saw that
-the cable is dark. Events say between which devices. Cut twice, an island stands between.
+"""A cable of a ring is pulled and plugged in at any time while all axes move. The only lost cycles
+are those with frames in flight, or sent before the controllers detected the dead cable.
+Events name the devices at its ends. With two cuts, the devices between them are unreachable.
 """
 
 from __future__ import annotations
@@ -30,13 +30,13 @@ def segment() -> Segment:
 
 
 def cable_of(between: tuple[int | None, int | None]) -> tuple[int | str, int | str]:
-    """As the segment names cables."""
+    """Return the ends of a cable as the segment names them."""
     first, second = between
     return ("main" if first is None else first, "main" if second is None else second)
 
 
 @pytest.mark.parametrize("between", CABLES)
-def test_any_cable_may_be_pulled_and_put_in_again(
+def test_any_cable_may_be_pulled_and_plugged_in(
     segment: Segment, between: tuple[int | None, int | None]
 ) -> None:
     with cat.MainDevice(segment.first, segment.second) as main:
@@ -63,7 +63,7 @@ def test_any_cable_may_be_pulled_and_put_in_again(
 
 
 @pytest.mark.parametrize("between", CABLES)
-def test_it_starts_with_any_cable_missing(between: tuple[int | None, int | None]) -> None:
+def test_a_loop_starts_with_any_cable_missing(between: tuple[int | None, int | None]) -> None:
     segment = segment_of(cut(between=cable_of(between), at=0))
     with cat.MainDevice(segment.first, segment.second) as main:
         subs = main.scan()
@@ -79,7 +79,7 @@ def test_it_starts_with_any_cable_missing(between: tuple[int | None, int | None]
                     break
 
 
-def test_cut_twice_an_island_of_required_devices_ends_the_loop(segment: Segment) -> None:
+def test_two_cuts_that_isolate_required_devices_end_the_loop(segment: Segment) -> None:
     with cat.MainDevice(segment.first, segment.second) as main:
         arm = cat.Drives(main.scan().drives, counts_per_turn=2**20, velocity_limit=100.0)
         with pytest.raises(WorkingCounterError, match="device 3") as caught, cat.Loop(arm) as loop:
@@ -96,7 +96,7 @@ def test_cut_twice_an_island_of_required_devices_ends_the_loop(segment: Segment)
     assert "OPERATION ENABLED" not in [segment[k].drive_state() for k in range(1, COUNT)]
 
 
-def test_cut_twice_an_island_that_is_not_required_is_named_and_comes_back(
+def test_optional_devices_isolated_by_two_cuts_are_named_and_return(
     segment: Segment,
 ) -> None:
     with cat.MainDevice(segment.first, segment.second) as main:
@@ -123,8 +123,8 @@ def test_cut_twice_an_island_that_is_not_required_is_named_and_comes_back(
     assert all("devices 3 to 4 are unreachable" in e.message for e in lost)
 
 
-def test_before_a_cut_a_device_that_was_switched_off_comes_back(segment: Segment) -> None:
-    """Positions count from the first port: who is behind the cut has none just now."""
+def test_a_device_before_a_cut_returns_after_power_off(segment: Segment) -> None:
+    """Positions count from the first port, so devices after the cut have no position there."""
     with cat.MainDevice(segment.first, segment.second) as main:
         subs = main.scan()
         arm = cat.Drives([subs[k] for k in (1, 2, 5)], counts_per_turn=2**20, velocity_limit=100.0)
@@ -144,11 +144,11 @@ def test_before_a_cut_a_device_that_was_switched_off_comes_back(segment: Segment
 
 
 @pytest.mark.parametrize(("detection", "at_most"), [("enhanced", 1), ("standard", 5)])
-def test_a_thousand_cuts_and_joins_cost_no_frame_that_could_have_come(
-    detection: str, at_most: int
-) -> None:
-    """At random moments, within frames too. Every cycle that is lost is one whose frame the segment
-    lost: on its way, or sent before the light was seen to be gone."""
+def test_a_thousand_cuts_lose_only_unavoidable_frames(detection: str, at_most: int) -> None:
+    """The cuts are at random times, even within frames.
+
+    Every lost cycle has a frame that was in flight, or was sent before the dead cable was detected.
+    """
     chance = random.Random(7)
     segment = segment_of(detection=detection)
     with cat.MainDevice(segment.first, segment.second) as main:
@@ -170,5 +170,5 @@ def test_a_thousand_cuts_and_joins_cost_no_frame_that_could_have_come(
                     changes += 1
                 if changes == 1000 and cycle.number % 12 == 11:
                     break
-    print(f"{detection}: 1000 cuts and joins, {lost} cycles lost, at most {longest} in a row")
+    print(f"{detection}: 1000 cuts and joins, {lost} cycles lost, at most {longest} consecutive")
     assert longest <= at_most

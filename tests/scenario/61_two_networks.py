@@ -1,5 +1,6 @@
-"""Two networks in one loop: upper and lower body, one schedule. Both are complete; one that dies
-does not hold the other; leaving stops every network that answers.
+"""Two networks in one loop, an upper and a lower body with one schedule. Both are complete.
+The failure of one network does not delay the other.
+Leaving the loop stops every network that answers.
 """
 
 from __future__ import annotations
@@ -50,7 +51,7 @@ def bodies(upper_axes: int, lower_axes: int) -> Iterator[Body]:
             yield Body(upper, lower, first, second)
 
 
-def test_both_follow_in_every_cycle(body: Body) -> None:
+def test_both_networks_follow_in_every_cycle(body: Body) -> None:
     upper, lower = body.requests()
     with cat.Loop(upper, lower, period=1e-3) as loop:
         homes = upper.actual.position.copy(), lower.actual.position.copy()
@@ -72,8 +73,8 @@ def test_both_follow_in_every_cycle(body: Body) -> None:
 
 
 @pytest.mark.parametrize("hertz", [4000, 8000])
-def test_the_axes_of_a_humanoid_at_four_and_eight_kilohertz(hertz: int) -> None:
-    """18 + 15 axes, as TOCABI has them: all complete."""
+def test_33_axes_at_4_and_8_khz(hertz: int) -> None:
+    """All cycles of 18 + 15 axes, as in TOCABI, are complete."""
     for body in bodies(18, 15):
         upper, lower = body.requests()
         with cat.Loop(upper, lower, period=1 / hertz) as loop:
@@ -87,7 +88,7 @@ def test_the_axes_of_a_humanoid_at_four_and_eight_kilohertz(hertz: int) -> None:
         body.assert_safe()
 
 
-def test_one_that_dies_ends_the_loop_and_the_other_is_stopped(body: Body) -> None:
+def test_a_lost_network_ends_the_loop_and_the_other_is_stopped(body: Body) -> None:
     upper, lower = body.requests()
     with pytest.raises(WorkingCounterError, match="no device answers"):
         run_and_kill(body, upper, lower)
@@ -113,7 +114,7 @@ def run_and_kill(
     return seen
 
 
-def test_with_a_quorum_the_other_goes_on(body: Body) -> None:
+def test_with_a_quorum_the_other_network_continues(body: Body) -> None:
     upper, lower = body.requests()
     seen = run_and_kill(body, upper, lower, quorum=1)
     assert seen[50] == (True, True, True)
@@ -123,8 +124,8 @@ def test_with_a_quorum_the_other_goes_on(body: Body) -> None:
     body.upper.plug()
 
 
-def test_one_that_is_plugged_in_again_does_not_stop_the_other(body: Body) -> None:
-    """Its devices are out of OP by their watchdogs. They are led back, and stand until asked."""
+def test_a_returning_network_does_not_stop_the_other(body: Body) -> None:
+    """Watchdogs took its devices out of OP. They return to OP, and move only after a request."""
     upper, lower = body.requests()
     with cat.Loop(upper, lower, scheduling=cat.Scheduling(quorum=1)) as loop:
         home = lower.actual.position.copy()
@@ -148,7 +149,7 @@ def test_one_that_is_plugged_in_again_does_not_stop_the_other(body: Body) -> Non
 
 @pytest.mark.parametrize("quorum", [1, 2])
 def test_a_network_that_answers_out_of_op_does_not_count(body: Body, quorum: int) -> None:
-    """Unplugged for so long only that watchdogs stop its drives, and nobody calls it lost."""
+    """It is unplugged long enough for watchdogs to stop its drives, but not to count as lost."""
     upper, lower = body.requests()
     with (
         pytest.raises((WorkingCounterError, StateError)),
@@ -166,18 +167,18 @@ def test_a_network_that_answers_out_of_op_does_not_count(body: Body, quorum: int
     body.lower.plug()
 
 
-def test_a_device_that_refuses_op_brings_both_down(body: Body) -> None:
+def test_a_device_that_refuses_op_brings_both_networks_down(body: Body) -> None:
     from catenary.virtual.faults import refuse_state
 
     body.lower.inject(refuse_state(1, "OP", code=0x001B, at=0))
     upper, lower = body.requests()
     with pytest.raises(StateError, match="device 1"), cat.Loop(upper, lower):
-        raise AssertionError("it opened")
+        raise AssertionError("the loop was opened")
     body.assert_safe()
 
 
 def test_their_clocks_follow_the_main_device() -> None:
-    """Two reference clocks are two times; one schedule needs one, which the clocks follow."""
+    """Two reference clocks have two times. One schedule needs one time, which both follow."""
     with VirtualClock() as clock:
         crystals = [Crystal(ppm=100.0), Crystal(ppm=-60.0)]
         segments = [Segment([Coupler(crystal=c), Servo()], clock=clock) for c in crystals]
@@ -200,7 +201,7 @@ def test_their_clocks_follow_the_main_device() -> None:
                 cat.Loop(*requests, clocks=cat.ClockOptions(lead="reference"))
 
 
-def test_clocks_that_nobody_wished_for_cannot_be_waited_for(body: Body) -> None:
+def test_waiting_for_clocks_without_a_request_is_refused(body: Body) -> None:
     with (
         cat.Loop(*body.requests()) as loop,
         pytest.raises(RuntimeError, match="dc=True"),
@@ -209,7 +210,7 @@ def test_clocks_that_nobody_wished_for_cannot_be_waited_for(body: Body) -> None:
 
 
 def test_a_device_is_released_in_its_own_network(body: Body) -> None:
-    """Both have a device at that position, switched off and on, and held."""
+    """In both networks, the device at the position was switched off and on, and is held."""
     upper, lower = [
         cat.Drives(main.subs.drives, counts_per_turn=2**20, velocity_limit=100.0, required=False)
         for main in (body.upper_main, body.lower_main)
@@ -232,7 +233,7 @@ def test_a_device_is_released_in_its_own_network(body: Body) -> None:
             loop.restore(other.scan()[2])
 
 
-def test_what_several_networks_cannot_have(body: Body) -> None:
+def test_options_for_one_network_only_are_refused(body: Body) -> None:
     upper, lower = body.requests()
     with pytest.raises(ValueError, match="threaded"):
         cat.Loop(upper, lower, execution="inline")
@@ -243,7 +244,7 @@ def test_what_several_networks_cannot_have(body: Body) -> None:
         cat.Loop(cat.Drives(both, counts_per_turn=2**20, velocity_limit=100.0))
 
 
-def test_segments_with_clocks_of_their_own_are_refused() -> None:
+def test_segments_with_separate_clocks_are_refused() -> None:
     segments = Segment([Servo()]), Segment([Servo(), Servo()])
     with cat.MainDevice(segments[0]) as first, cat.MainDevice(segments[1]) as second:
         requests = [
@@ -251,4 +252,4 @@ def test_segments_with_clocks_of_their_own_are_refused() -> None:
             for main in (first, second)
         ]
         with pytest.raises(ValueError, match="VirtualClock"), cat.Loop(*requests):
-            raise AssertionError("it opened")
+            raise AssertionError("the loop was opened")

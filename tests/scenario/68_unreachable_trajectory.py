@@ -1,7 +1,6 @@
-"""The next goal of a moving arm lies beyond a limit; then it is too fast to stop before one.
-
-Both are errors that name axis and limit before a row is written; the motion under way goes on to
-its end, and the arm holds there, enabled.
+"""The next target of a moving arm is beyond a limit, or too fast to stop before one.
+Both errors name the axis and the limit before a row is written.
+The current motion continues to its end, and the arm holds there, enabled.
 """
 
 from __future__ import annotations
@@ -17,7 +16,7 @@ from tests.scenario.cell import cell_of
 LIMITS = control.MotionLimits(2.0, 10.0, 200.0, position_min=-1.0, position_max=1.0)
 
 
-def test_the_arm_ends_the_motion_it_had_and_holds() -> None:
+def test_the_arm_finishes_its_motion_and_holds() -> None:
     with cell_of(Coupler(), Servo(), Servo()) as cell:
         arm = cell.drives(mode="csp")
         with cat.Loop(arm, period=1e-3) as loop:

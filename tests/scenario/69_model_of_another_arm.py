@@ -1,7 +1,6 @@
-"""The model for gravity compensation is another arm's: joints too many, misnamed, of no one axis.
-
-All of it is told, with the joints there are, before a drive is enabled. A law that gets a model of
-another number of joints all the same stops the drives instead of reading beyond.
+"""The model for gravity compensation belongs to another arm: too many joints, wrong names or types.
+The error lists the joints before a drive is enabled.
+A law with a model of another size stops the drives instead of reading out of bounds.
 """
 
 from __future__ import annotations
@@ -42,7 +41,7 @@ def model(tmp_path: Path) -> Path:
         (["turn", "ball"], "joint 'ball' is neither hinge nor slide"),
     ],
 )
-def test_it_is_refused_before_a_drive_is_enabled(
+def test_the_model_is_refused_before_a_drive_is_enabled(
     model: Path, joints: list[str], message: str
 ) -> None:
     with cell_of() as cell:
@@ -52,7 +51,7 @@ def test_it_is_refused_before_a_drive_is_enabled(
         cell.assert_safe()
 
 
-def test_a_law_with_it_stops_the_drives(model: Path) -> None:
+def test_a_law_with_a_wrong_model_stops_the_drives(model: Path) -> None:
     pytest.importorskip("numba", reason="laws are compiled by Numba: pip install 'catenary[law]'")
     dynamics = control.Dynamics(model, joints=JOINTS)
     with cell_of() as cell:

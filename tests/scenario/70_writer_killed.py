@@ -1,7 +1,6 @@
-"""A loop is killed (kill -9) in the middle of its cycles, while other processes read along.
-They are told, whether asleep or not, and a client with its next command; every cycle that was
-shared can still be read, and is whole. A new loop takes the name; who was attached to the old one
-sees its last cycles, not the new ones.
+"""A loop is killed (kill -9) while other processes read its share.
+Waiting and polling readers are notified, and a client with its next command. All shared cycles stay
+readable and consistent. A new loop takes the name. Old readers see the last cycles of the old one.
 """
 
 import numpy as np
@@ -25,7 +24,7 @@ with cat.attach(sys.argv[1]) as arm:
 """
 
 
-def test_readers_are_told_and_keep_what_was_shared() -> None:
+def test_readers_are_notified_and_keep_the_shared_cycles() -> None:
     with own_name("writer") as name, started(LOOP, name) as loop:
         assert loop.line() == "running"
         with started(READER, name) as other, cat.attach(name) as arm:
@@ -37,7 +36,7 @@ def test_readers_are_told_and_keep_what_was_shared() -> None:
                 pass
             assert arm.state == "dead"
             rows, _ = arm.rows(after=0)
-            assert len(rows) >= arm.layout.rows.count - 1  # but one that was being written
+            assert len(rows) >= arm.layout.rows.count - 1  # except one that was being written
             assert (np.diff(rows["number"]) == 1).all()
             assert rows["number"][-1] == arm.number
             steps = np.diff(rows["commanded_position"], axis=0)
@@ -45,7 +44,7 @@ def test_readers_are_told_and_keep_what_was_shared() -> None:
             assert_replaced(name, arm)
 
 
-def test_a_client_is_told() -> None:
+def test_a_client_is_notified() -> None:
     with own_name("commanded") as name, started(LOOP, name) as loop:
         assert loop.line() == "running"
         with cat.attach(name) as arm:

@@ -1,5 +1,5 @@
-"""Readers are killed (kill -9) in the middle of their reading, and of their sleep.
-The loop goes on without a missing cycle, other readers too, and nothing is left behind.
+"""Readers are killed (kill -9) while they read or wait.
+The loop and the other readers miss no cycle, and nothing is left behind.
 """
 
 import signal
@@ -32,8 +32,8 @@ while True:
 """
 
 
-def test_nobody_waits_for_one_that_is_stopped() -> None:
-    """A reader that was woken hands the wake-up on; one that is stopped just then does not."""
+def test_a_stopped_reader_delays_no_other_reader() -> None:
+    """A woken reader passes the wake-up on, but a stopped one does not."""
     with own_name("stopped") as name, started(LOOP, name) as loop:
         assert loop.line() == "running"
         with (
@@ -50,13 +50,13 @@ def test_nobody_waits_for_one_that_is_stopped() -> None:
 
 
 def has_every_cycle(arm: cat.share.Reader) -> bool:
-    """False where this process was kept waiting between the two calls."""
+    """Return False if this process was delayed between the two calls."""
     rows, lost = arm.rows(after=arm.number - 500)
     return lost == 0 and bool((np.diff(rows["number"]) == 1).all())
 
 
 @pytest.mark.parametrize("text", [READING, SLEEPING])
-def test_nobody_misses_them(text: str) -> None:
+def test_killed_readers_affect_neither_loop_nor_readers(text: str) -> None:
     with own_name("reader") as name, started(LOOP, name) as loop:
         assert loop.line() == "running"
         with cat.attach(name) as arm:

@@ -1,6 +1,6 @@
 """A client commands an axis of a moving arm from another process and is killed (kill -9).
-The loop is told that it died, long before the lease would be over; the axis holds where it is
-commanded to be, and the next client may have it.
+The loop detects its death long before the lease ends. The axis holds its commanded position.
+The next client can lease the axis.
 """
 
 import pytest
@@ -26,7 +26,7 @@ with cat.attach(sys.argv[1]) as arm, arm.lease(axes=[1], for_=3600.0) as command
 """
 
 
-def test_its_axis_holds_and_is_free_again() -> None:
+def test_the_axis_of_a_killed_client_holds_and_becomes_free() -> None:
     with own_name("lease") as name, cat.MainDevice(Segment([Servo(), Servo()])) as main:
         arm = cat.Drives(main.scan().drives, counts_per_turn=2**20, velocity_limit=100.0)
         with cat.Share(name) as share, cat.Loop(arm, sink=share) as loop:

@@ -1,5 +1,6 @@
-"""A process is killed (kill -9) while it has a mutex: one of its own, and the one of a loop's desk.
-The lock goes to the next who asks, who is told; leases work as before; the loop never waited.
+"""A process is killed (kill -9) while it holds a mutex: its own, or that of a loop's lease desk.
+The next owner gets the mutex and is informed.
+Leases work as before, and the loop never waits.
 """
 
 import catenary as cat
@@ -27,7 +28,7 @@ with cat.attach(sys.argv[1]) as arm:
 """
 
 
-def test_the_next_owner_is_told() -> None:
+def test_the_next_owner_is_informed() -> None:
     with own_name("mutex") as name:
         with started(OWNER, name) as owner:
             assert owner.line() == "mine"
@@ -40,7 +41,7 @@ def test_the_next_owner_is_told() -> None:
             assert not mutex.recovered
 
 
-def test_a_lease_can_be_taken_where_another_client_died_taking_one() -> None:
+def test_a_lease_is_available_after_a_client_died_during_its_request() -> None:
     with own_name("desk") as name, cat.MainDevice(Segment([Servo(), Servo()])) as main:
         arm = cat.Drives(main.scan().drives, counts_per_turn=2**20, velocity_limit=100.0)
         with cat.Share(name) as share, cat.Loop(arm, sink=share) as loop:
@@ -48,7 +49,7 @@ def test_a_lease_can_be_taken_where_another_client_died_taking_one() -> None:
             with started(IN_MID_LEASE, name) as client:
                 assert client.line() == "mine"
                 next(loop)
-                share.apply(arm)  # with the mutex in other hands
+                share.apply(arm)  # while another process holds the mutex
                 client.kill()
             with cat.attach(name) as reader, reader.lease(for_=3600.0) as command:
                 command.send(position=[0.001, 0.002])

@@ -1,5 +1,5 @@
-"""What lies under the name of a share was written by another release, is cut off, or is no share.
-Readers refuse it and say both versions; a writer does not overwrite what it does not understand.
+"""The file of a share was written by another release, is truncated, or is not a share.
+Readers refuse it and name both versions. A writer does not overwrite an unknown file.
 """
 
 from collections.abc import Iterator
@@ -17,7 +17,7 @@ from tests.share.names import own_name, state_file
 
 @pytest.fixture
 def shared() -> Iterator[tuple[str, Path]]:
-    """A name, and a file there as a loop has written it."""
+    """Yield a name, and the file of a share that a loop has written."""
     with own_name("version") as name, cat.MainDevice(Segment([Servo()])) as main:
         arm = cat.Drives(main.scan().drives, counts_per_turn=2**20, velocity_limit=100.0)
         path = state_file(name)
@@ -35,22 +35,22 @@ def assert_refused(name: str, said: str) -> None:
         pass
 
 
-def test_another_version(shared: tuple[str, Path]) -> None:
+def test_another_version_is_refused(shared: tuple[str, Path]) -> None:
     name, path = shared
-    cat.attach(name)  # as it is
+    cat.attach(name)  # unchanged
     content = path.read_bytes()
     path.write_bytes(MAGIC + (VERSION + 1).to_bytes(4, "little") + content[12:])
     assert_refused(name, f"version {VERSION + 1}, but this program reads version {VERSION}")
 
 
 @pytest.mark.parametrize("kept", [5, HEADER.size, 300, -1])
-def test_cut_off(shared: tuple[str, Path], kept: int) -> None:
+def test_a_truncated_file_is_refused(shared: tuple[str, Path], kept: int) -> None:
     name, path = shared
     path.write_bytes(path.read_bytes()[:kept])
     assert_refused(name, "truncated" if kept != 5 else "not a Catenary share")
 
 
-def test_a_description_that_is_broken(shared: tuple[str, Path]) -> None:
+def test_a_broken_description_is_refused(shared: tuple[str, Path]) -> None:
     name, path = shared
     content = path.read_bytes()
     path.write_bytes(content[: HEADER.size] + b"[" + content[HEADER.size + 1 :])
@@ -65,7 +65,7 @@ def test_a_description_that_is_broken(shared: tuple[str, Path]) -> None:
         (b'"size":1024', b'"size":9999'),
     ],
 )
-def test_a_description_of_another_size(
+def test_a_description_of_another_size_is_refused(
     shared: tuple[str, Path], says: bytes, instead: bytes
 ) -> None:
     name, path = shared
@@ -77,7 +77,7 @@ def test_a_description_of_another_size(
 
 
 @pytest.mark.parametrize("content", [b"", b"something else", bytes(8192)])
-def test_something_else(content: bytes) -> None:
+def test_a_file_that_is_not_a_share_is_refused(content: bytes) -> None:
     with own_name("else") as name:
         own_folder().mkdir(0o700, exist_ok=True)
         state_file(name).write_bytes(content)

@@ -1,6 +1,6 @@
-"""A share is left behind: its writer was killed, or the machine was started anew since.
-It is known for stale, even where another process has the writer's number by now; reading it does
-not remove it; a new writer replaces it, and a living one is not replaced.
+"""A share is left behind: its writer was killed, or the machine was restarted.
+It is recognised as stale, even if another process has the writer's ID. Reading does not remove it.
+A new writer replaces a stale share, but not a live one.
 """
 
 import os
@@ -23,7 +23,7 @@ LISTEN = "import sys, catenary as cat; print(cat.attach(sys.argv[1], stale=True)
 
 @contextmanager
 def open_share(name: str) -> Iterator[None]:
-    """A loop with a share, in this process."""
+    """Yield a loop with a share, in this process."""
     with cat.MainDevice(Segment([Servo()])) as main:
         arm = cat.Drives(main.scan().drives, counts_per_turn=2**20, velocity_limit=100.0)
         with cat.Share(name) as share, cat.Loop(arm, sink=share) as loop:
@@ -31,7 +31,7 @@ def open_share(name: str) -> Iterator[None]:
             yield
 
 
-def test_reading_does_not_remove_it() -> None:
+def test_reading_does_not_remove_a_stale_share() -> None:
     with own_name("stale") as name, started(LOOP, name) as loop:
         assert loop.line() == "running"
         with pytest.raises(ShareError, match=f"belongs to process {loop.process.pid}"):
@@ -49,8 +49,8 @@ def test_reading_does_not_remove_it() -> None:
 
 
 @pytest.mark.parametrize("field", ["start_time", "boot_id"])
-def test_another_process_with_the_number_of_the_writer(field: str) -> None:
-    """As if this process had got the number of the writer, or the machine had been started anew."""
+def test_another_process_with_the_id_of_the_writer(field: str) -> None:
+    """Simulate that this process has the ID of the writer, or that the machine was restarted."""
     me = this_process()
     assert me.is_alive
     written = f'"{field}":' + (f"{me.start_time}" if field == "start_time" else f'"{me.boot_id}"')
@@ -69,11 +69,11 @@ def test_another_process_with_the_number_of_the_writer(field: str) -> None:
         assert not path.exists()
 
 
-def test_a_process_that_waits_to_be_buried_is_dead() -> None:
+def test_a_zombie_process_counts_as_dead() -> None:
     with own_name("zombie") as name, started(LOOP, name) as loop:
         assert loop.line() == "running"
         reader = cat.attach(name)
         os.kill(loop.process.pid, 9)
         while reader.wait():
             pass
-        assert reader.state == "dead"  # nobody has asked for its exit status yet
+        assert reader.state == "dead"  # its exit status has not been read yet

@@ -1,6 +1,6 @@
-"""A humanoid of 33 axes runs at 1 kHz in real time; another process records it, and nothing more.
-Every cycle must be in the file, with what was sent and measured, as those who read ROS 2 bags see
-it; the machine may stand still meanwhile, since the share remembers.
+"""A humanoid of 33 axes runs at 1 kHz in real time, and another process records it.
+The file must contain every cycle, as sent and measured, for readers of ROS 2 bags.
+The machine may stall during the recording, because the share buffers the cycles.
 """
 
 import subprocess
@@ -20,7 +20,7 @@ from tests.share.names import own_name
 
 AXES, CYCLES = 33, 3000
 
-# In real time, on a machine that may stop for a while: patient, and with a long memory.
+# In real time, on a machine that may stall: with long timeouts and a large buffer.
 WRITER = f"""
 import sys
 import numpy as np
@@ -92,12 +92,14 @@ def judged_by_rosbags(path: Path, recording: record.Recording) -> None:
     assert np.array_equal(commands, recording["commanded_position"], equal_nan=True)
     steps = np.diff(np.array(commands)[-1500:-500, 0])  # before it stops
     assert np.median(steps) == pytest.approx(1e-6)  # the ramp that the program wrote
-    assert abs(steps).max() < 1e-4  # a late commit is continued, and returned to
+    assert abs(steps).max() < 1e-4  # set-points are continued after a late commit, without a jump
 
 
-def test_in_virtual_time_a_task_takes_what_came(name: str, tmp_path: Path) -> None:
-    """A hundred times faster than life nobody in another process keeps up: the program's own task
-    takes the cycles, as often as its logging would."""
+def test_a_task_records_every_cycle_in_virtual_time(name: str, tmp_path: Path) -> None:
+    """At a hundred times real time, no other process can keep up.
+
+    A task of the program reads the cycles, at the rate of its logging.
+    """
     with VirtualClock() as clock:
         segment = cat.Segment([cat.virtual.Servo() for _ in range(6)], clock=clock)
         with cat.MainDevice(segment) as main, cat.Share(name) as share:
@@ -110,7 +112,7 @@ def test_in_virtual_time_a_task_takes_what_came(name: str, tmp_path: Path) -> No
                         recorder.take()
                     if cycle.time > 5.0:
                         break
-            recorder.close()  # what the loop did while it ended too
+            recorder.close()  # includes the cycles of the end of the loop
     recording = record.read(tmp_path / "x.mcap")
     assert recording.lost == 0
     assert set(np.diff(recording["number"].astype(int))) == {1}

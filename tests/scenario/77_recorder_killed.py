@@ -1,6 +1,6 @@
-"""The recorder is killed with `kill -9` in the middle: nobody ends its file.
-The loop does not notice. The file is readable up to the last half second, and `--repair` gives it
-the index that PlotJuggler asks for.
+"""The recorder is killed (kill -9) during a recording and does not finish its file.
+The loop is not affected. The file is readable up to the last half second.
+`--repair` adds the index that PlotJuggler needs.
 """
 
 import subprocess
@@ -22,7 +22,7 @@ def name() -> Iterator[str]:
         yield name
 
 
-def test_a_killed_recorder_leaves_a_file_that_can_be_read(name: str, tmp_path: Path) -> None:
+def test_a_killed_recorder_leaves_a_readable_file(name: str, tmp_path: Path) -> None:
     path = tmp_path / "arm.mcap"
     with shared_loop(name) as shared:
         with recorder(name, path) as child:
@@ -30,7 +30,7 @@ def test_a_killed_recorder_leaves_a_file_that_can_be_read(name: str, tmp_path: P
             assert until(has_bytes(path, 100_000))
             child.kill()
             child.wait(DEADLINE)
-        shared.run(10)  # cycles go on as before
+        shared.run(10)  # the cycles continue
     recording = record.read(path)
     assert recording.ended == "cut off"
     assert len(recording) >= 500

@@ -1,6 +1,6 @@
-"""The disk is full, or the quota of the file reached, while a recording is made.
-The recorder gives up with status 1 and says how far it got; the file is whole and has its index,
-for which it gave up its last chunk. The loop does not notice.
+"""The disk is full, or the file reaches its quota, during a recording.
+The recorder ends with status 1 and reports how far it got. The file is valid and has an index,
+which replaces its last chunk. The loop is not affected.
 """
 
 import shutil
@@ -25,7 +25,7 @@ def name() -> Iterator[str]:
 
 
 def judge(path: Path) -> None:
-    """Whole for others, and without a gap up to its end."""
+    """Check that other programs can read the file, and that it has no gaps."""
     assert path.stat().st_size <= ROOM
     recording = record.read(path)
     assert len(recording) >= 500
@@ -39,7 +39,7 @@ def judge(path: Path) -> None:
     assert seen == summary.statistics.message_count >= 3 * len(recording)
 
 
-def test_a_file_that_may_not_grow(name: str, tmp_path: Path) -> None:
+def test_a_file_with_a_quota(name: str, tmp_path: Path) -> None:
     path = tmp_path / "arm.mcap"
     with shared_loop(name) as shared:
         with recorder(name, path, wrap=("prlimit", f"--fsize={ROOM}")) as child:
@@ -52,7 +52,7 @@ def test_a_file_that_may_not_grow(name: str, tmp_path: Path) -> None:
     assert record.read(path).ended == "File too large"
 
 
-def test_a_disk_that_is_full(name: str, tmp_path: Path) -> None:
+def test_a_full_disk(name: str, tmp_path: Path) -> None:
     disk, kept = tmp_path / "disk", tmp_path / "kept.mcap"
     disk.mkdir()
     script = (

@@ -1,6 +1,6 @@
-"""Somebody lets the arm go: CST at zero torque opens the brakes, and it sinks under its weight.
-The application catches it in position control: it stops and stays where it was caught.
-Its drives then hold with gravity's torque, as MuJoCo's inverse dynamics say.
+"""An arm is released: in CST at zero torque, the brakes open, and it sinks under its weight.
+The application catches it with position control. It stops and stays there.
+The drives then hold it with the torque of gravity, as computed by MuJoCo's inverse dynamics.
 """
 
 from __future__ import annotations
@@ -37,15 +37,15 @@ def test_an_arm_without_torque_sags_and_is_caught() -> None:
 
 
 def gravity(plant_model: mujoco.MjModel, joints: np.ndarray) -> np.ndarray:
-    """What holds the arm at rest [N·m at the joints], by MuJoCo's inverse dynamics."""
+    """Return the torques that hold the arm at rest [N·m], by MuJoCo's inverse dynamics."""
     data = mujoco.MjData(plant_model)
     data.qpos[:] = joints
     mujoco.mj_inverse(plant_model, data)
     return data.qfrc_inverse.copy()
 
 
-def test_at_rest_the_drives_give_gravitys_torque() -> None:
-    """Dry friction may carry a part of it: at most its own torque."""
+def test_at_rest_the_drives_apply_the_torque_of_gravity() -> None:
+    """Dry friction may carry a part of it, up to the friction torque."""
     with arm_cell(start=START) as cell:
         arm = cell.drives()
         with cat.Loop(arm) as loop:
@@ -57,5 +57,5 @@ def test_at_rest_the_drives_give_gravitys_torque() -> None:
         dry = [
             s.coulomb_friction * j.gear for s, j in zip(cell.servos, cell.plant.joints, strict=True)
         ]
-        assert expected[1] < -40  # N·m: there is something to hold
+        assert expected[1] < -40  # [N·m] a considerable load
         assert (np.abs(asked - expected) <= np.array(dry) + 0.1).all()

@@ -1,6 +1,6 @@
-"""A drive falls into fault while the whole arm is moving.
-By default all stop, and the brakes of all axes close where they stand: nothing falls.
-With safe torque off no motor helps: the brake alone catches the joint, within its torque.
+"""A drive reports a fault while the whole arm moves.
+By default, all drives stop, and the brakes of all axes close: nothing falls.
+After safe torque off, the brake alone stops the joint, within its torque.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ SHOULDER = 1
 OVER_CURRENT = 0x2310
 
 
-def test_a_fault_in_mid_motion_ends_in_closed_brakes() -> None:
+def test_a_fault_during_a_motion_closes_all_brakes() -> None:
     with arm_cell(start=START) as cell:
         arm = cell.drives()
         with pytest.raises(DriveError, match="shoulder"), cat.Loop(arm) as loop:
@@ -38,7 +38,7 @@ def test_a_fault_in_mid_motion_ends_in_closed_brakes() -> None:
 
 
 def sto_in_motion(**joint: object) -> float:
-    """How far the shoulder goes on after safe torque off at some 1 rad/s [rad]."""
+    """Return the distance of the shoulder after safe torque off at about 1 rad/s [rad]."""
     with arm_cell(start=START, **joint) as cell:
         arm = cell.drives()
         with cat.Loop(arm, stop=cat.StopPolicy(raise_faults=False)) as loop:
@@ -56,7 +56,7 @@ def sto_in_motion(**joint: object) -> float:
 
 
 def test_a_brake_alone_stops_a_joint_within_its_torque() -> None:
-    """Stopping distance: v² J / 2 (brake - gravity), J some 6 kg m² at the shoulder."""
+    """The stopping distance is v² J / 2 (brake - gravity), J about 6 kg·m² at the shoulder."""
     strong, weak = sto_in_motion(brake=300.0), sto_in_motion(brake=150.0)
     assert 0.005 < strong < 0.02
     assert 1.5 * strong < weak < 0.1

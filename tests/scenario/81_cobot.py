@@ -1,6 +1,6 @@
-"""The cobot of `examples/cobot`: six tasks, an arm under torque control, up and down, a key hit on
-the way. It tracks, never leaves its limits, stops within one cycle and goes on when the key is
-back. The whole program runs as a user runs it, in virtual time.
+"""The cobot of `examples/cobot`: six tasks, an arm under torque control, and a key press during a
+motion. The arm tracks the reference, keeps its limits, stops within one cycle and then continues.
+The complete program runs as for a user, in virtual time.
 """
 
 from __future__ import annotations
@@ -22,17 +22,17 @@ from catenary import record
 
 COBOT = Path(__file__).resolve().parents[2] / "examples" / "cobot" / "cobot.py"
 LIMITS = {1: 1.5, 2: 4.0, 3: 40.0}  # of the motions: velocity, acceleration, jerk
-TORQUE = np.array([431.97, 431.97, 197.23, 79.79, 79.79, 79.79])  # what the gears bear, arm.xml
-CASCADE = np.array([430, 430, 195, 79, 79, 79])  # what the cascade may ask for
+TORQUE = np.array([431.97, 431.97, 197.23, 79.79, 79.79, 79.79])  # limits of the gears, arm.xml
+CASCADE = np.array([430, 430, 195, 79, 79, 79])  # limits of the cascade
 SPEED = np.array([2.6, 2.6, 2.6, 3.1, 3.1, 3.1])
-GIVEN = 1.001  # torques go to the drives in whole per mille of the rated one
+GIVEN = 1.001  # torques are sent in whole per mille of the rated one
 QUICK_STOP, ENABLE_VOLTAGE = 0x04, 0x02  # controlword
 OPERATION_ENABLED = 0x27  # statusword, masked by 0x6F
 PERIOD = 1e-3
 
 
 def run(folder: Path, *options: str) -> str:
-    """The whole program, in virtual time; what it printed."""
+    """Run the whole program in virtual time, and return its output."""
     program = [sys.executable, str(COBOT), "--name", f"cobot-of-{os.getpid()}"]
     done = subprocess.run(
         [*program, "--headless", "--out", str(folder), *options],
@@ -53,13 +53,13 @@ def out(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-def test_it_tracks_and_without_compensation_it_does_not(out: Path) -> None:
+def test_the_arm_tracks_only_with_gravity_compensation(out: Path) -> None:
     found = json.loads((out / "cobot.json").read_text())
     assert found["rms_deg"] <= 0.5
     assert found["rms_deg_without"] >= 5 * found["rms_deg"]
 
 
-def test_all_deadlines_hold(out: Path) -> None:
+def test_all_deadlines_are_met(out: Path) -> None:
     found = json.loads((out / "cobot.json").read_text())
     assert found["schedulable"]
     assert 0 < found["utilisation"] < 0.737
@@ -74,7 +74,7 @@ def test_all_deadlines_hold(out: Path) -> None:
 
 
 def motions(recording: record.Recording) -> list[np.ndarray]:
-    """The reference [rad] from each stand to the next, where it does not follow the arm."""
+    """Return the reference [rad] of each motion, without the parts that follow the arm."""
     reference = recording["target_position"]
     free = (reference != recording["position"]).any(axis=1)
     edges = np.flatnonzero(np.diff(np.concatenate([[False], free, [False]])))
@@ -90,7 +90,7 @@ def test_every_cycle_is_recorded_and_no_sample_exceeds_a_limit(out: Path) -> Non
     assert (abs(recording["torque"]) <= TORQUE).all()
     assert (abs(recording["commanded_torque"]) <= TORQUE).all()
     assert (abs(recording["target_torque"]) <= CASCADE).all()
-    assert abs(recording["target_torque"][:, 1]).max() > 30  # gravity: these are not zeros
+    assert abs(recording["target_torque"][:, 1]).max() > 30  # the torque of gravity, not zero
     found = motions(recording)
     assert len(found) >= 2  # up and down, up to the stop; from there; down
     for motion in found:
@@ -100,8 +100,8 @@ def test_every_cycle_is_recorded_and_no_sample_exceeds_a_limit(out: Path) -> Non
             assert difference > limit * 0.5 or order == 1  # limits that are used
 
 
-def test_the_stop_is_on_the_wire_within_a_cycle_and_the_arm_goes_on(out: Path) -> None:
-    """Counted in the recording: the marker of the cause, and the controlwords that were sent."""
+def test_the_stop_is_sent_within_a_cycle_and_the_arm_continues_later(out: Path) -> None:
+    """The recording has the marker of the cause, and the controlwords that were sent."""
     recording = record.read(out / "cobot.mcap")
     [cause] = [event for event in recording.events if event.kind == "Marker"]
     assert cause.message == "stop: key"
@@ -112,21 +112,19 @@ def test_the_stop_is_on_the_wire_within_a_cycle_and_the_arm_goes_on(out: Path) -
     assert enabled[begun]
     assert braking[begun]  # the first frame of a cycle that began after the key was hit
     assert not braking[enabled][: np.count_nonzero(enabled[: begun - 1])].any()  # none before
-    assert 0.5 < recording["position"][begun].max() < 1.5  # in mid-motion
+    assert 0.5 < recording["position"][begun].max() < 1.5  # during the motion
     found = json.loads((out / "cobot.json").read_text())
     [stop], [reaction] = found["stops"], found["reactions"]
     assert stop["reason"] == reaction["reason"] == "key"
     assert 0 <= reaction["cycles"] <= 1
-    assert 0 < reaction["seconds"] <= PERIOD + 130e-6  # and the execution declared
+    assert 0 < reaction["seconds"] <= PERIOD + 130e-6  # and the declared execution time
     assert (abs(recording["velocity"][-1]) < 0.05).all()
-    assert abs(recording["target_position"][-1]).max() < 1e-6  # it came home all the same
+    assert abs(recording["target_position"][-1]).max() < 1e-6  # it still returned home
 
 
 @pytest.mark.shared_data
-def test_the_published_arm_by_the_path_of_its_description(
-    shared_data: Path, tmp_path: Path
-) -> None:
-    """The Indy7's own URDF, for the plant and for the model: masses as identified by its maker."""
+def test_the_published_arm_from_its_description_file(shared_data: Path, tmp_path: Path) -> None:
+    """The URDF of the Indy7 is used for the plant and the model, with the masses of its maker."""
     description = shared_data / "robots/indy7/derived_indy7_flat.urdf"
     plant, devices = (COBOT.parent / "segment.toml").read_text().split("[[device]]", 1)
     plant = plant.replace('model = "arm.xml"', f'model = "{description}"\ncontacts = false')

@@ -1,6 +1,6 @@
-"""A vertical axis under gravity: the rig of the scenarios that follow, tested for itself.
-In CSP the drive carries the load. Without torque the arm falls until its brake has closed.
-The fall stays within the stated bound; after it the brake holds.
+"""A vertical axis under gravity: a test of the rig of the following scenarios.
+In CSP the drive carries the load. Without torque, the arm falls until its brake has closed.
+The fall stays within the stated bound, and the brake then holds.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ def hold(cell: VerticalCell, cycles: int = 300) -> float:
     raise AssertionError("the loop ended")
 
 
-def test_the_load_is_what_the_rig_says() -> None:
+def test_the_load_matches_the_parameters_of_the_rig() -> None:
     with vertical_cell() as cell:
         assert cell.gravity == pytest.approx(LOAD, rel=1e-4)
         assert 15 < cell.g_eff < 18  # 9.81 m/s² / 0.5 m, less the inertia of motor and gear
@@ -34,7 +34,7 @@ def test_the_load_is_what_the_rig_says() -> None:
         assert cell.gravity == pytest.approx(LOAD / 2, rel=1e-4)
 
 
-def test_the_brake_holds_the_arm_before_anything_runs() -> None:
+def test_the_brake_holds_the_arm_before_a_loop() -> None:
     with vertical_cell(start=0.3) as cell:
         cell.let_pass(2.0)
         assert cell.joint == pytest.approx(0.3, abs=1e-4)

@@ -108,7 +108,7 @@ def test_csp_and_csv_decelerate_and_hold_without_limit(mode: str) -> None:
             assert abs(trace.joint[1000:] - trace.joint[-1]).max() < 1e-4
 
 
-def test_the_application_that_is_in_time_takes_the_load_over() -> None:
+def test_an_application_in_time_takes_the_load_over() -> None:
     with vertical_cell() as cell:
         arm = cell.drives(mode="cst", velocity_limit=6.0)
         with cat.Loop(arm) as loop:
@@ -141,7 +141,7 @@ def served_arm(nic: str) -> tuple[Server, Servo, Plant]:
     return Server(Segment([servo], plant=plant, clock="monotonic"), nic, max_age=None), servo, plant
 
 
-def test_on_the_machines_clock_and_real_frames(veth: tuple[str, str]) -> None:
+def test_in_real_time_with_real_frames(veth: tuple[str, str]) -> None:
     """The torque is that of gravity, so that the bound does not depend on the machine's timing."""
     with vertical_cell() as twin:
         bound = twin.fall_bound() + RESOLUTION

@@ -56,7 +56,7 @@ def test_a_late_commit_in_cst(torque: float) -> None:
         assert trace.fall(before) < kept.ramp_bound() + cell.fall_bound() + RESOLUTION
 
 
-def test_the_late_limit_is_three_cycles_at_least() -> None:
+def test_the_late_limit_is_at_least_three_cycles() -> None:
     with vertical_cell() as cell:
         arm = cell.drives(mode="cst", velocity_limit=6.0)
         with cat.Loop(arm, stop=cat.StopPolicy(on_axis_stopped="event"), period=8e-3) as loop:

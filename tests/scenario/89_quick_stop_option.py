@@ -1,4 +1,4 @@
-"""What a quick stop does is the drive's decision (0x605A): a ramp, torque off, or nothing at all.
+"""The drive determines the effect of a quick stop (0x605A): a ramp, torque off, or nothing.
 The settings are read and printed. CST on a drive whose quick stop does not brake needs `on_loss=`.
 Each reaction is a motion with its bound, after an application that is late in CST.
 """
@@ -26,7 +26,7 @@ TORQUE = 15.0  # N·m at the joint: the arm sinks already
 
 
 @pytest.mark.parametrize("option", [0, -1, "absent"])
-def test_cst_needs_on_loss_where_a_quick_stop_does_not_brake(option: Option) -> None:
+def test_cst_needs_on_loss_if_a_quick_stop_does_not_brake(option: Option) -> None:
     with rig(quirks=ServoQuirks(quick_stop_option=option)) as cell:
         arm = cell.drives(mode="cst", velocity_limit=6.0)
         with pytest.raises(ConfigurationError, match="0x605A") as caught, cat.Loop(arm):
@@ -37,7 +37,7 @@ def test_cst_needs_on_loss_where_a_quick_stop_does_not_brake(option: Option) -> 
 
 
 @pytest.mark.parametrize("option", [0, -1, "absent"])
-def test_csp_does_not_need_it(option: Option) -> None:
+def test_csp_does_not_need_on_loss(option: Option) -> None:
     """Bound: without torque from the quick stop on, the fall until the brake has closed."""
     with rig(quirks=ServoQuirks(quick_stop_option=option)) as cell:
         arm = cell.drives(velocity_limit=6.0)

@@ -105,7 +105,9 @@ def test_the_commanded_velocity_changes_by_at_most_a_t(pause: int, tmp_path: Pat
 
 
 @pytest.mark.parametrize("pause", [2, 7])
-def test_a_trajectory_that_waits_for_the_application_is_no_jump(pause: int, tmp_path: Path) -> None:
+def test_a_trajectory_that_waits_for_the_application_does_not_jump(
+    pause: int, tmp_path: Path
+) -> None:
     """The application counts set-points instead of reading the time: after a pause they go on
     where they were. The set-point that is `pause` cycles old lies on the extrapolation, the next
     one is velocity * pause behind it: the command must return to it without a step.
@@ -199,7 +201,7 @@ def test_a_closed_stream_is_not_continued(ends_at_rest: bool) -> None:
         assert trace.joint.max() < last + beyond + RESOLUTION
 
 
-def test_pairs_of_set_points_that_alternate_are_not_continued() -> None:
+def test_alternating_set_points_are_not_continued() -> None:
     """A single step is not a velocity. Bound: the step."""
     with vertical_cell() as cell:
         arm = cell.drives(**LIMITS)

@@ -60,7 +60,7 @@ def test_a_drive_without_bit_12_is_trusted_after_one_second() -> None:
             assert cell.joint - before == pytest.approx(0.15, abs=0.02)
 
 
-def test_in_cst_the_committed_torque_carries_the_load_meanwhile() -> None:
+def test_in_cst_the_committed_torque_carries_the_load() -> None:
     """Bound: the fall of a few cycles between the brake and the torque: none, as it is sent before
     the brake opens."""
     with vertical_cell(quirks=NEVER) as cell:

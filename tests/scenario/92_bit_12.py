@@ -63,7 +63,7 @@ def lose_bit_12(
 
 
 @pytest.mark.parametrize("velocity", [-VELOCITY, VELOCITY])
-def test_three_cycles_without_it_change_nothing(velocity: float, tmp_path: Path) -> None:
+def test_three_cycles_without_bit_12_change_nothing(velocity: float, tmp_path: Path) -> None:
     """Bound: the drive stands for 3 ms, and its lag."""
     recording = tmp_path / "frames.pcapng"
     with vertical_cell(record=recording) as cell:
@@ -81,7 +81,7 @@ def test_three_cycles_without_it_change_nothing(velocity: float, tmp_path: Path)
 
 @pytest.mark.parametrize("columns", [[], ["position_demand"]])
 @pytest.mark.parametrize("velocity", [-VELOCITY, VELOCITY])
-def test_longer_the_command_is_where_the_drive_stands(
+def test_after_three_cycles_the_command_is_the_actual_position(
     velocity: float, columns: list[str], tmp_path: Path
 ) -> None:
     """Bound: the drive stands for 7 ms, the way back within the acceleration, and its lag."""
@@ -100,7 +100,7 @@ def test_longer_the_command_is_where_the_drive_stands(
 
 
 @pytest.mark.parametrize("velocity", [-VELOCITY, 0.0, VELOCITY])
-def test_after_10_ms_the_axis_is_given_up(velocity: float) -> None:
+def test_after_10_ms_the_axis_is_stopped(velocity: float) -> None:
     """Bound: v² / 2a of 0x6085 and the lag of the drive, the fall until the brake has closed."""
     with vertical_cell() as cell:
         arm = cell.drives(**LIMITS)
@@ -112,7 +112,7 @@ def test_after_10_ms_the_axis_is_given_up(velocity: float) -> None:
         assert trace.fall(start) < way + cell.fall_bound() + RESOLUTION
 
 
-def test_in_cst_the_torque_stays_until_the_axis_is_given_up() -> None:
+def test_in_cst_the_torque_stays_until_the_axis_is_stopped() -> None:
     """Bound: the fall until the brake has closed."""
     with vertical_cell() as cell:
         arm = cell.drives(mode="cst", velocity_limit=6.0)
@@ -125,7 +125,7 @@ def test_in_cst_the_torque_stays_until_the_axis_is_given_up() -> None:
         assert trace.fall(before) < cell.fall_bound() + RESOLUTION
 
 
-def test_a_drive_that_follows_all_the_same_stays_where_it_is() -> None:
+def test_a_drive_that_follows_without_bit_12_keeps_its_position() -> None:
     """A flickering bit: the drive obeys. Bound: it is led from its actual position, and stops."""
     with vertical_cell(quirks=ServoQuirks(follows_without_bit_12=True)) as cell:
         arm = cell.drives(**LIMITS)

@@ -102,7 +102,7 @@ def test_a_change_that_takes_too_long_in_cst_is_a_quick_stop(tmp_path: Path) -> 
 
 
 @pytest.mark.parametrize("refused", [CSV, CST])
-def test_a_refused_mode_is_reported_and_the_old_one_goes_on(refused: int) -> None:
+def test_a_refused_mode_is_reported_and_the_old_one_continues(refused: int) -> None:
     """Bound: the arm holds."""
     with vertical_cell(quirks=ServoQuirks(refused_modes=(refused,))) as cell:
         arm = cell.drives(mode="csp", other_modes=["csv", "cst"], velocity_limit=6.0)

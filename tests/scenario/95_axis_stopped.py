@@ -67,7 +67,7 @@ def test_the_iteration_raises_and_names_axis_cycle_and_reason(mode: str) -> None
         assert cell.fall(before) < cell.fall_bound() + RESOLUTION
 
 
-def test_on_request_there_is_only_the_event_and_the_axis_can_be_enabled_again() -> None:
+def test_with_the_event_policy_the_axis_can_be_enabled_again() -> None:
     """Bound: the fall until the brake has closed; enabling moves nothing."""
     with vertical_cell() as cell:
         arm = cell.drives(mode="cst", velocity_limit=6.0)
@@ -88,7 +88,7 @@ def test_on_request_there_is_only_the_event_and_the_axis_can_be_enabled_again() 
             assert abs(cell.fall(fallen)) < RESOLUTION
 
 
-def test_what_the_application_requests_is_no_event() -> None:
+def test_a_stop_by_the_application_is_not_an_event() -> None:
     with vertical_cell() as cell:
         arm = cell.drives(velocity_limit=6.0)
         with cat.Loop(arm) as loop:

@@ -1,6 +1,6 @@
 """The process of a vertical axis is killed. The drive applies its last torque until the watchdog of
-its outputs expires: 10 ms in CST by default. Its trigger bit is set whatever the SII says.
-What follows is the drive's decision (0x6007): a ramp, torque off, or nothing.
+its outputs expires: 10 ms in CST by default. Its trigger bit is set for any content of the SII.
+The drive determines the reaction (0x6007): a ramp, torque off, or nothing.
 """
 
 from __future__ import annotations
@@ -47,9 +47,7 @@ def kill(cell: VerticalCell, torque: float, **options: object) -> tuple[Trace, f
 @pytest.mark.parametrize("trigger", [True, False])
 @pytest.mark.parametrize("checks", [True, False])
 @pytest.mark.parametrize("torque", [LOAD, 15.0])
-def test_the_watchdog_expires_whatever_the_sii_says(
-    trigger: bool, checks: bool, torque: float
-) -> None:
+def test_the_watchdog_expires_with_any_sii(trigger: bool, checks: bool, torque: float) -> None:
     """Bound: the way with the kept torque, the drive's ramp, the fall until the brake closes."""
     quirks = ServoQuirks(watchdog_trigger=trigger, checks_watchdog=checks)
     with vertical_cell(quirks=quirks) as cell:
@@ -75,7 +73,7 @@ def test_each_reaction_of_the_drive_is_a_bounded_motion(reaction: int, watchdog:
 
 
 def test_a_drive_that_takes_no_action_is_printed() -> None:
-    """No bound: such a drive applies its last torque for ever. Write 1 to 3 to its 0x6007."""
+    """No bound: such a drive applies its last torque forever. Write 1 to 3 to its 0x6007."""
     with vertical_cell(quirks=ServoQuirks(abort_connection_option=NO_ACTION)) as cell:
         arm = cell.drives(mode="cst", velocity_limit=6.0)
         with cat.Loop(arm) as loop:

@@ -1,4 +1,4 @@
-"""The cell of the scenarios with a simulated arm, that of examples/cobot."""
+"""Cell with the simulated arm of examples/cobot."""
 
 from __future__ import annotations
 
@@ -31,11 +31,11 @@ class ArmCell:
 
     @property
     def joints(self) -> npt.NDArray[np.float64]:
-        """MuJoCo's own joint angles [rad]."""
+        """Joint angles in MuJoCo [rad]."""
         return self.plant.data.qpos.copy()
 
     def let_pass(self, seconds: float) -> None:
-        """Time goes by without a MainDevice."""
+        """Let time pass without a MainDevice."""
         self.link.wait_until(self.link.now() + round(seconds * 1e9), False)
 
     def drives(self, **options: object) -> cat.Drives:
@@ -52,7 +52,7 @@ class ArmCell:
 
 @contextmanager
 def arm_cell(*, start: list[float], **joint: object) -> Iterator[ArmCell]:
-    """The example's arm at `start` [rad], `joint` said of all its joints."""
+    """Yield the arm of the example at `start` [rad], with the options `joint` for all joints."""
     example = read_segment(COBOT / "segment.toml")
     assert example.plant is not None
     servos = [servo for servo in example if isinstance(servo, Servo)]

@@ -1,6 +1,6 @@
-"""A cell for scenarios: a virtual segment, a fault injector round its link, a MainDevice on it.
+"""Cell for scenarios: a virtual segment, a fault injector on its link, and a MainDevice.
 
-What is asserted is the segment's own truth: `cell.states`, `cell.servos[i].drive_state()`.
+Assertions check the true state of the segment: `cell.states`, `cell.servos[i].drive_state()`.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ class Cell:
 
     @property
     def states(self) -> list[int]:
-        """The AL state every device shows, error bit included."""
+        """AL states of all devices, including the error bit."""
         return [device.state for device in self.segment]
 
     @property
@@ -43,22 +43,22 @@ class Cell:
         return [servo.drive_state() for servo in self.servos]
 
     def drives(self, **options: object) -> cat.Drives:
-        """All servos, counted in the segment's default resolution."""
+        """Return all servos, with the default resolution of the segment."""
         given = {"counts_per_turn": 2**20, "velocity_limit": 100.0, **options}
         return cat.Drives(self.subs.drives, **given)  # type: ignore[arg-type]
 
     def spoil(self, fault: str, cycles: int, **options: object) -> None:
-        """Does this to the next cycles' frames."""
+        """Apply a fault to the frames of the next cycles."""
         now = self.link.seen(traffic="cyclic")
         frames = range(now, now + cycles)
         self.link.inject(Fault(kind=fault, traffic="cyclic", frames=frames, **options))  # type: ignore[arg-type]
 
     def let_pass(self, seconds: float) -> None:
-        """Time goes by without a MainDevice."""
+        """Let time pass without a MainDevice."""
         self.link.wait_until(self.link.now() + round(seconds * 1e9), False)
 
     def assert_safe(self) -> None:
-        """Nothing turns, nothing is under power, nobody is in OP."""
+        """Check that no axis turns, no drive is powered and no device is in OP."""
         assert all(state & 0x0F < OP for state in self.states), self.states
         assert "OPERATION ENABLED" not in self.drive_states, self.drive_states
         assert all(abs(servo.velocity_rad_s) < 0.05 for servo in self.servos)
@@ -68,8 +68,10 @@ class Cell:
 def cell_of(
     *devices: Device, behind: Mapping[int, tuple[int, int]] | None = None
 ) -> Iterator[Cell]:
-    """A cell that has been scanned; by default a coupler, lamps and two servos. `behind`: as of
-    `Segment`."""
+    """Yield a scanned cell, by default of a coupler, lamps and two servos.
+
+    `behind` is that of `Segment`.
+    """
     chosen = devices or (Coupler(), DigitalOutputs(), Servo(serial=1), Servo(serial=2))
     segment = Segment(chosen, behind=behind)
     link = FaultInjector(segment)

@@ -1,4 +1,4 @@
-"""Segments whose clocks differ, for the scenarios of distributed clocks."""
+"""Segments with different clocks, for the scenarios of distributed clocks."""
 
 from __future__ import annotations
 
@@ -10,16 +10,16 @@ import catenary as cat
 from catenary.virtual import Coupler, Crystal, Device, DigitalOutputs, Segment, Servo
 from tests.scenario.cell import Cell, cell_of
 
-STAMP_JITTER = 0.5e-6  # [s]; a difference is made of two stamps and scatters over 1 us
+STAMP_JITTER = 0.5e-6  # [s]; a difference uses two time stamps and has 1 us of jitter
 
 
 def crystal(random: Random, jitter: float = STAMP_JITTER) -> Crystal:
-    """Within ±100 ppm of the machine's, drifting with the temperature."""
+    """Return a crystal within ±100 ppm of the machine's that drifts with the temperature."""
     return Crystal(ppm=random.uniform(-100, 100), drift_ppm=2.0, drift_period=600.0, jitter=jitter)
 
 
 def clocked_devices(servos: int, seed: int, jitter: float) -> list[Device]:
-    """A coupler with the first clock, lamps without any, servos."""
+    """Return a coupler with the first clock, lamps without a clock, and servos."""
     random = Random(seed)
     return [
         Coupler(crystal=crystal(random, jitter)),
@@ -35,8 +35,10 @@ def clocked_cell(servos: int = 2, seed: int = 1, jitter: float = STAMP_JITTER) -
 
 
 def true_differences(segment: Segment, reference: int = 0) -> dict[int, float]:
-    """What each clock says less what the reference says, at one moment: the segment's own truth,
-    which nobody on the bus can read [s]."""
+    """Return the true difference of each clock from the reference at one time [s].
+
+    It is taken from the model. It cannot be read on the bus.
+    """
     core = segment.core
     of_reference = core.system_time(reference)
     return {
@@ -47,7 +49,7 @@ def true_differences(segment: Segment, reference: int = 0) -> dict[int, float]:
 
 
 def run_for(loop: cat.Loop, seconds: float) -> None:
-    """Cycles so long, nobody moving anything."""
+    """Run cycles for a time [s] without motion."""
     first: float | None = None
     for cycle in loop:
         first = cycle.time if first is None else first

@@ -7,6 +7,6 @@ from tests.scenario.cell import Cell, cell_of
 
 @pytest.fixture
 def cell() -> Iterator[Cell]:
-    """A coupler, lamps, two servos."""
+    """Yield a cell of a coupler, lamps and two servos."""
     with cell_of() as cell:
         yield cell

@@ -49,18 +49,18 @@ def test_a_virtual_segment_on_the_clock_of_the_machine(
     assert not in_virtual_time("eth0")
 
 
-def test_a_file_that_is_not_there_is_named() -> None:
+def test_a_missing_file_is_named() -> None:
     with pytest.raises(CatenaryError, match="no_such_file"):
         parse("virtual:no_such_file.toml")
 
 
 @pytest.mark.parametrize("target", ["", " ", "virtual:", "eth0:1", "a b", "dev/eth0"])
-def test_what_is_no_target(target: str) -> None:
+def test_an_invalid_target_is_refused(target: str) -> None:
     with pytest.raises(ConfigurationError, match="invalid target"):
         parse(target)
 
 
-def test_a_master_of_the_kernel_module_has_a_number() -> None:
+def test_the_number_of_an_igh_master_is_required() -> None:
     source = parse("igh:1")
     assert isinstance(source, Master)
     assert source.index == 1
@@ -73,12 +73,12 @@ def test_a_ring_of_two_interfaces() -> None:
 
 
 @pytest.mark.parametrize("target", ["eth0,eth0", "eth0,eth1,eth2", "eth0,virtual:x.toml"])
-def test_what_is_no_ring(target: str) -> None:
+def test_an_invalid_ring_is_refused(target: str) -> None:
     with pytest.raises(CatenaryError, match=r"ring|x\.toml"):
         parse(target)
 
 
-def test_a_main_device_takes_a_name_or_a_source() -> None:
+def test_a_main_device_accepts_a_name_or_a_source() -> None:
     with MainDevice("virtual") as main:
         assert len(main.scan()) == 6
     with MainDevice(Segment([Coupler()])) as main:

@@ -1,4 +1,4 @@
-"""`import catenary as cat`: the names, and what they cost."""
+"""`import catenary as cat`: the names, and the modules that they import."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import catenary as cat
 
 
 @pytest.mark.parametrize("name", cat.__all__)
-def test_every_public_name_is_there(name: str) -> None:
+def test_every_public_name_exists(name: str) -> None:
     assert getattr(cat, name) is not None
 
 
@@ -49,7 +49,7 @@ def test_numpy_is_not_imported_before_it_is_needed(use: str) -> None:
     subprocess.run([sys.executable, "-c", code], check=True)
 
 
-def test_errors_of_a_loop_are_at_the_top() -> None:
+def test_errors_of_a_loop_are_top_level_names() -> None:
     assert cat.DriveError is cat.errors.DriveError
     assert issubclass(cat.WorkingCounterError, cat.LoopError)
     assert issubclass(cat.LoopError, cat.CatenaryError)

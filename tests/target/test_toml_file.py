@@ -27,20 +27,20 @@ def test_the_target_in_the_file_is_parsed(tmp_path: Path) -> None:
     assert isinstance(parse(named(tmp_path, "virtual")), Segment)
 
 
-def test_a_virtual_segment_counts_from_the_folder_of_the_file(tmp_path: Path) -> None:
+def test_the_path_of_a_segment_is_relative_to_the_machine_file(tmp_path: Path) -> None:
     (tmp_path / "line.toml").write_text('[[device]]\nkind = "coupler"\n')
     with MainDevice(named(tmp_path, "virtual:line.toml")) as main:
         assert len(main.scan()) == 1
 
 
-def test_the_suffix_decides() -> None:
+def test_the_suffix_identifies_a_machine_file() -> None:
     assert is_machine_file("cell/machine.toml")
     assert not is_machine_file("virtual:line.toml")
     assert not is_machine_file("eth0")
 
 
 @pytest.mark.parametrize("target", ["other.toml", "", " ", "two words", "virtual:"])
-def test_what_is_not_a_target(target: str, tmp_path: Path) -> None:
+def test_an_invalid_target_is_refused(target: str, tmp_path: Path) -> None:
     with pytest.raises(ConfigurationError, match=r"target|is not"):
         parse(named(tmp_path, target))
 

@@ -1,4 +1,4 @@
-"""Clocks by hand: what tests of the virtual controllers' time need of a MainDevice."""
+"""Manual configuration of clocks, for tests of the virtual controllers' time."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ START_TIME, NEXT_SYNC1, SYNC0_CYCLE, SYNC1_CYCLE = 0x0990, 0x0998, 0x09A0, 0x09A
 
 
 class Clocks(MainDevice):
-    """Owns a link into a segment whose clocks it sets, reads and distributes."""
+    """Link to a segment, with functions that set, read and distribute its clocks."""
 
     def __init__(self, segment: Segment) -> None:
         super().__init__(segment)
@@ -37,7 +37,7 @@ class Clocks(MainDevice):
         return -(raw & 0x7FFF_FFFF) if raw >> 31 else raw
 
     def latch(self) -> list[tuple[int, int, int]]:
-        """(port 0, port 1, processing unit) of every device, local times [ns]."""
+        """Return the receive times (port 0, port 1, processing unit) of every device [ns]."""
         self.exchange(EcatCommand.BWR, 0, RECEIVE_TIMES, bytes(4))
         times = []
         for k in range(len(self.segment)):
@@ -46,7 +46,7 @@ class Clocks(MainDevice):
         return times
 
     def align(self, latches: int = 16) -> None:
-        """Delays and offsets of a line of 64-bit clocks, in the terms of the first, by a mean."""
+        """Align a line of 64-bit clocks to the first: delays and offsets from a mean."""
         count = len(self.segment)
         delays, last = [0.0] * count, []
         for _ in range(latches):
@@ -67,7 +67,7 @@ class Clocks(MainDevice):
             self.distribute()
 
     def run(self, milliseconds: int) -> None:
-        """A cycle of 1 ms that carries nothing but the time."""
+        """Run cycles of 1 ms that only distribute the time."""
         for _ in range(milliseconds):
             start = self.link.now()
             self.distribute()

@@ -1,4 +1,4 @@
-"""Compiles hostile_frames.c on the package's own headers, under sanitizers."""
+"""Compilation of hostile_frames.c with the headers of the package, under sanitizers."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def compile_frames(folder: Path) -> Path:
 def send_frames(
     program: Path, frames: int, seed: int, seconds: float
 ) -> subprocess.CompletedProcess[str]:
-    """Run it; TimeoutExpired if the segment hangs."""
+    """Run the program. Raises TimeoutExpired if the segment hangs."""
     environment = {name: value for name, value in os.environ.items() if name != "LD_PRELOAD"}
     return subprocess.run(
         [program, str(frames), str(seed)],
@@ -54,7 +54,7 @@ def send_frames(
 
 
 def main(frames: int) -> int:
-    """Send one long sequence, and print its figures: for tools/sanitize."""
+    """Send one long sequence and print its statistics, for tools/sanitize."""
     with tempfile.TemporaryDirectory() as folder:
         result = send_frames(compile_frames(Path(folder)), frames, os.getpid(), frames / 1000)
     print(result.stdout + result.stderr, end="")

@@ -1,4 +1,4 @@
-"""A MainDevice as small as can be, for judging the segment datagram by datagram."""
+"""Minimal MainDevice, for tests of single datagrams."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ class Answer(NamedTuple):
 
 
 class MainDevice:
-    """Owns a link into a segment and the counter of its mailbox."""
+    """Link to a segment, with a mailbox counter."""
 
     def __init__(self, segment: Segment) -> None:
         self.segment = segment
@@ -58,7 +58,7 @@ class MainDevice:
             self.exchange(EcatCommand.APWR, -k, 0x0010, struct.pack("<H", STATION + k))
 
     def request(self, station: int, state: int) -> tuple[int, int]:
-        """(AL status, AL status code) a while after asking for `state`."""
+        """Request `state`, wait, and return (AL status, AL status code)."""
         self.write(station, AL_CONTROL, struct.pack("<H", state))
         self.let_pass(3)
         return self.al_status(station)
@@ -72,7 +72,7 @@ class MainDevice:
 
     def fmmu(self, station: int, n: int, logical: int, bits: tuple[int, int, int], physical: int,
              kind: int) -> None:  # fmt: skip
-        """`bits`: length in bytes, start bit, stop bit."""
+        """Configure an FMMU. `bits`: length [bytes], start bit, stop bit."""
         length, start, stop = bits
         block = struct.pack("<IHBBHBBB3x", logical, length, start, stop, physical, 0, kind, 1)
         self.write(station, FMMU0 + 16 * n, block)
@@ -104,7 +104,7 @@ class MainDevice:
         return self.write(station, 0x1000, (header + payload).ljust(size, b"\0"))
 
     def fetch(self, station: int, size: int = 128) -> bytes | None:
-        """The next answer with its header, or None if there is none within 5 ms."""
+        """Return the next answer with its header, or None after 5 ms."""
         for _ in range(25):
             answer = self.exchange(EcatCommand.FPRD, station, 0x1000 + size, bytes(size))
             if answer.working_counter:
@@ -114,7 +114,7 @@ class MainDevice:
         return None
 
     def ask(self, station: int, payload: bytes, size: int = 128) -> bytes:
-        """One CoE request and the answer's payload, its mailbox header taken off."""
+        """Send a CoE request and return the payload of the answer."""
         assert self.put(station, payload, size=size) == 1
         answer = self.fetch(station, size)
         assert answer is not None
@@ -122,11 +122,11 @@ class MainDevice:
         return answer[6:]
 
     def sdo(self, station: int, payload: bytes, size: int = 128) -> bytes:
-        """An SDO request; the answer without its CoE header."""
+        """Send an SDO request and return the answer without its CoE header."""
         return self.ask(station, struct.pack("<H", 0x2000) + payload, size)[2:]
 
     def upload(self, station: int, index: int, subindex: int, size: int = 128) -> bytes | int:
-        """The object's bytes, expedited, normal or segmented; or the abort code."""
+        """Return the bytes of an object, or the abort code."""
         answer = self.sdo(station, struct.pack("<BHB4x", 0x40, index, subindex), size)
         if answer[0] == 0x80:
             return int(struct.unpack_from("<I", answer, 4)[0])
@@ -145,7 +145,7 @@ class MainDevice:
         return data
 
     def download(self, station: int, index: int, subindex: int, data: bytes) -> int:
-        """Expedited or normal; 0 or the abort code."""
+        """Write an object (expedited or normal). Return 0 or the abort code."""
         if len(data) <= 4:
             head = struct.pack("<BHB", 0x23 | (4 - len(data)) << 2, index, subindex)
             answer = self.sdo(station, head + data.ljust(4, b"\0"))

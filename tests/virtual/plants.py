@@ -1,4 +1,4 @@
-"""Small models for plants, their physics by hand, and time that passes without a MainDevice."""
+"""Small models for plants with known physics, and a clock that runs without a MainDevice."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from pathlib import Path
 
 from catenary.virtual import Joint, Plant, Segment, Servo
 
-MASS, LENGTH, GRAVITY = 2.0, 0.5, 9.81  # a point mass on a rod without mass
+MASS, LENGTH, GRAVITY = 2.0, 0.5, 9.81  # point mass on a massless rod
 INERTIA = MASS * LENGTH**2
 STEP = 250e-6
 
@@ -65,7 +65,7 @@ URDF = """<?xml version="1.0"?>
 
 
 def frictionless(**options: object) -> Servo:
-    """A servo that adds nothing to the joint but what `options` says."""
+    """Return a servo that adds neither friction nor inertia, except as `options` specify."""
     given = {"inertia": 1e-12, "viscous_friction": 0.0, "coulomb_friction": 0.0, **options}
     return Servo(**given)  # type: ignore[arg-type]
 
@@ -77,14 +77,14 @@ def model(folder: Path, text: str, name: str = "arm.xml") -> Path:
 
 
 def pendulum(folder: Path, servo: Servo, **joint: object) -> Segment:
-    """A pendulum on one servo; without a brake unless `joint` says so."""
+    """Return a pendulum on one servo. It has no brake unless `joint` specifies one."""
     options = {"brake": 0.0, **joint}
     path = model(folder, PENDULUM)
     return Segment([servo], plant=Plant(path, [Joint("swing", **options)]))  # type: ignore[arg-type]
 
 
 class Time:
-    """Owns a link that only lets a segment's time pass."""
+    """Link that only lets the time of a segment pass."""
 
     def __init__(self, segment: Segment) -> None:
         self._link = segment.open_link()

@@ -1,4 +1,4 @@
-"""A cyclic exchange with one virtual servo, datagram by datagram: for tests of the drive alone."""
+"""Cyclic exchange with one virtual servo by single datagrams, for tests of the drive alone."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ class Inputs:
 
 
 class Drive:
-    """Owns a cyclic exchange with one servo in OP."""
+    """Cyclic exchange with one servo in OP."""
 
     def __init__(self, servo: Servo, *, control: int = 0x64) -> None:
         self.servo = servo

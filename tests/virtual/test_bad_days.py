@@ -1,5 +1,4 @@
-"""Any faults in any order, beside loops closed by any hand: the segment stands it, and whole again
-it answers from end to end."""
+"""Random faults and random loop control: the segment survives, and recovers after repair."""
 
 from __future__ import annotations
 
@@ -57,7 +56,7 @@ def any_fault(dice: random.Random, tree: bool) -> Fault:
 
 
 def any_loops(dice: random.Random) -> bytes:
-    """A frame that writes DL control of one device, or of all."""
+    """Return a frame that writes DL control of one device or of all devices."""
     command = dice.choice([EcatCommand.BWR, EcatCommand.APWR])
     data = bytes([dice.choice([1, 3]), dice.randrange(256)])
     address = (-dice.randrange(8) & 0xFFFF) | 0x0100 << 16
@@ -66,7 +65,7 @@ def any_loops(dice: random.Random) -> bytes:
 
 @pytest.mark.parametrize("tree", [False, True])
 @pytest.mark.parametrize("seed", range(8))
-def test_after_any_bad_day_everybody_answers(seed: int, tree: bool) -> None:
+def test_segment_recovers_after_any_faults(seed: int, tree: bool) -> None:
     dice = random.Random(seed)
     segment = Segment(devices(), ring=True, behind=BEHIND if tree else None)
     links = segment.first.open_link(), segment.second.open_link()
@@ -87,7 +86,7 @@ def test_after_any_bad_day_everybody_answers(seed: int, tree: bool) -> None:
     for k in range(8):
         segment.inject(power_cycle(k, for_=0.001))
     links[0].wait_until(links[0].now() + 10 * MILLISECOND, False)
-    for _ in range(40):  # what is left of faults that hit frames
+    for _ in range(40):  # remaining frame faults
         links[0].send(LATCH)
         links[0].wait_until(links[0].now() + MILLISECOND, False)
     while links[1].receive():

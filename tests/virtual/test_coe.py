@@ -1,4 +1,4 @@
-"""CoE as any client sees it: transfers, aborts, complete access, information, emergencies."""
+"""CoE server: transfers, aborts, complete access, SDO information and emergencies."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def test_mailboxes_of_any_size(size: int) -> None:
     assert main.upload(STATION, 0x2100, 0, size) == bytes(k * 7 & 0xFF for k in range(2048))
 
 
-def test_a_segmented_download(main: MainDevice) -> None:
+def test_segmented_download(main: MainDevice) -> None:
     data = bytes(range(256)) * 5
     head = struct.pack("<BHBI", 0x21, 0x2101, 0, len(data))
     assert main.sdo(STATION, head + data[:112])[0] == 0x60
@@ -82,7 +82,7 @@ def test_download_aborts(
         assert main.download(STATION, index, subindex, data) == code
 
 
-def test_a_wrong_toggle_and_a_segment_out_of_nowhere_abort(main: MainDevice) -> None:
+def test_wrong_toggle_and_unexpected_segment_abort(main: MainDevice) -> None:
     main.sdo(STATION, struct.pack("<BHB4x", 0x40, 0x2100, 0))
     answer = main.sdo(STATION, struct.pack("<B7x", 0x70))
     assert struct.unpack("<BHBI", answer) == (0x80, 0x2100, 0, 0x05030000)
@@ -100,7 +100,7 @@ def test_complete_access_reads_and_writes_records(main: MainDevice) -> None:
     assert main.upload(STATION, 0x607D, 2) == struct.pack("<I", 200)
 
 
-def test_the_default_process_data(main: MainDevice) -> None:
+def test_default_process_data(main: MainDevice) -> None:
     rx = [main.upload(STATION, 0x1600, k) for k in range(6)]
     tx = [main.upload(STATION, 0x1A00, k) for k in range(6)]
     packed = [
@@ -127,7 +127,7 @@ def test_mapping_is_written_with_the_count_first_and_last(main: MainDevice) -> N
     assert main.download(STATION, 0x1600, 0, b"\x30") == 0x06040042
 
 
-def test_a_changed_mapping_changes_the_length_asked_for(main: MainDevice) -> None:
+def test_changed_mapping_changes_the_expected_length(main: MainDevice) -> None:
     main.download(STATION, 0x1C12, 0, b"\x00")
     assert main.download(STATION, 0x1C12, 1, b"\x00\x17") == 0x06040041
     assert main.download(STATION, 0x1C12, 1, b"\x01\x16") == 0
@@ -157,7 +157,7 @@ def test_information_lists_and_describes_the_objects(main: MainDevice) -> None:
     assert answer[2] == 7
 
 
-def test_another_protocol_gets_a_mailbox_error(main: MainDevice) -> None:
+def test_unsupported_protocol_gets_a_mailbox_error(main: MainDevice) -> None:
     main.put(STATION, bytes(8), kind=4)
     answer = main.fetch(STATION)
     assert answer is not None
@@ -165,7 +165,7 @@ def test_another_protocol_gets_a_mailbox_error(main: MainDevice) -> None:
     assert answer[6:] == b"\x01\x00\x02\x00"
 
 
-def test_answers_count_from_one_to_seven(main: MainDevice) -> None:
+def test_answer_counter_runs_from_one_to_seven(main: MainDevice) -> None:
     counters = []
     for _ in range(9):
         main.put(STATION, struct.pack("<HBHB4x", 0x2000, 0x40, 0x1018, 1))
@@ -175,7 +175,7 @@ def test_answers_count_from_one_to_seven(main: MainDevice) -> None:
     assert counters == [1, 2, 3, 4, 5, 6, 7, 1, 2]
 
 
-def test_a_fault_sends_an_emergency(main: MainDevice) -> None:
+def test_fault_sends_an_emergency(main: MainDevice) -> None:
     servo = main.segment[0]
     assert isinstance(servo, Servo)
     servo.inject_fault(0x2310)
@@ -186,7 +186,7 @@ def test_a_fault_sends_an_emergency(main: MainDevice) -> None:
     assert main.upload(STATION, 0x1001, 0) == b"\x01"
 
 
-def test_a_silent_mailbox_stays_full(main: MainDevice) -> None:
+def test_silent_mailbox_stays_full(main: MainDevice) -> None:
     servo = main.segment[0]
     assert isinstance(servo, Servo)
     servo.mailbox_silent = True
@@ -197,7 +197,7 @@ def test_a_silent_mailbox_stays_full(main: MainDevice) -> None:
     assert main.fetch(STATION) is not None
 
 
-def test_an_analogue_value_with_its_status_bits(main: MainDevice) -> None:
+def test_analogue_value_and_its_status_bits(main: MainDevice) -> None:
     terminal = main.segment[1]
     assert isinstance(terminal, AnalogInputs)
     terminal.apply_volts(1, 5.0)

@@ -1,4 +1,4 @@
-"""Segments from TOML: what is read, and how errors name the file and the field."""
+"""Segments from TOML files. Errors name the file and the field."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ channels = 4
 """
 
 
-def test_a_segment_is_read(tmp_path: Path) -> None:
+def test_segment_is_read_from_toml(tmp_path: Path) -> None:
     path = tmp_path / "cell.toml"
     path.write_text(GOOD)
     segment = read_segment(path)
@@ -73,7 +73,7 @@ def test_errors_name_the_file_and_the_field(tmp_path: Path, text: str, says: str
     assert "cell.toml" in caught.value.message
 
 
-def test_a_file_that_is_not_there(tmp_path: Path) -> None:
+def test_missing_file_is_reported(tmp_path: Path) -> None:
     with pytest.raises(ConfigurationError, match="No such file"):
         read_segment(tmp_path / "none.toml")
 

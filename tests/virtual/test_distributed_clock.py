@@ -1,6 +1,8 @@
-"""Local and system times, latches and the time control loop, register by register.
+"""Distributed clocks at register level: local and system times, latches, time control loop.
 
-Golden behaviours: Beckhoff, EtherCAT Slave Controller, section I §9.1 and section II §3.49."""
+Source of the expected behaviour: Beckhoff, EtherCAT Slave Controller, section I §9.1 and section
+II §3.49.
+"""
 
 from __future__ import annotations
 
@@ -27,7 +29,7 @@ from tests.virtual.clocks import (
 )
 from tests.virtual.main_device import STATION
 
-HOP, RETURN = 390, 350  # [ns] from one coupler to the next, processed; and back
+HOP, RETURN = 390, 350  # [ns] from one coupler to the next, and back
 
 
 def couplers(*crystals: Crystal) -> Clocks:
@@ -47,27 +49,30 @@ def test_reset_values(pair: Clocks) -> None:
     assert pair.number(1, ACTIVATION, "<B") == 0
 
 
-def test_a_write_latches_the_times_at_the_ports() -> None:
+def test_write_latches_the_receive_times() -> None:
     main = couplers(*[Crystal()] * 3)
     times = main.latch()
     spans = [(port1 - port0) % 2**32 for port0, port1, _ in times[:2]]
-    assert spans == [3 * HOP + RETURN, 2 * HOP]  # the last one processes too, and turns it round
-    assert times[2][1] == 0  # nothing behind the last: the register is not touched
+    assert spans == [
+        3 * HOP + RETURN,
+        2 * HOP,
+    ]  # the last device also processes the frame, and returns it
+    assert times[2][1] == 0  # no device behind the last: the register is not changed
     assert all(port0 == unit % 2**32 for port0, _, unit in times)
     again = main.latch()
     assert again[0][0] > times[0][0]
 
 
-def test_local_times_begin_apart_and_are_not_moved_by_offsets(pair: Clocks) -> None:
+def test_local_times_differ_and_do_not_depend_on_offsets(pair: Clocks) -> None:
     first = pair.latch()
-    assert first[0][2] != first[1][2] - HOP  # no one starts them at the same moment
+    assert first[0][2] != first[1][2] - HOP  # devices start at different times
     pair.put_number(1, OFFSET, "<Q", 10**15)
     second = pair.latch()
     assert second[1][2] - first[1][2] == second[0][2] - first[0][2]
 
 
-def test_the_system_time_is_local_time_and_offset_less_the_delay(pair: Clocks) -> None:
-    """A frame reads when it passed the reference clock: section I, table 30."""
+def test_system_time_is_local_time_plus_offset_minus_delay(pair: Clocks) -> None:
+    """A frame reads the time at which it passed the reference clock: section I, table 30."""
     pair.latch()
     before = pair.system_time(1)
     pair.put_number(1, OFFSET, "<Q", 10**15)
@@ -77,13 +82,13 @@ def test_the_system_time_is_local_time_and_offset_less_the_delay(pair: Clocks) -
     assert plain - 400_000_000 < pair.system_time(1) < plain
 
 
-def test_a_negative_offset_is_one_modulo_the_width(pair: Clocks) -> None:
+def test_negative_offset_wraps_at_the_clock_width(pair: Clocks) -> None:
     before = pair.system_time(1)
     pair.put_number(1, OFFSET, "<q", -1_000_000)
     assert -1_000_000 < pair.system_time(1) - before < 0
 
 
-def test_a_received_time_is_compared_at_the_beginning_of_the_frame(pair: Clocks) -> None:
+def test_received_time_is_compared_with_the_start_of_the_frame(pair: Clocks) -> None:
     pair.put_number(1, FILTERS, "<B", 0)
     pair.align()
     pair.distribute()
@@ -91,7 +96,7 @@ def test_a_received_time_is_compared_at_the_beginning_of_the_frame(pair: Clocks)
 
 
 @pytest.mark.parametrize(("ahead", "sign"), [(5_000, 0), (-5_000, 1)])
-def test_the_difference_is_sign_and_magnitude(pair: Clocks, ahead: int, sign: int) -> None:
+def test_difference_is_in_sign_magnitude_format(pair: Clocks, ahead: int, sign: int) -> None:
     pair.put_number(1, FILTERS, "<B", 0)
     pair.align()
     offset = pair.number(1, OFFSET, "<q")
@@ -101,7 +106,7 @@ def test_the_difference_is_sign_and_magnitude(pair: Clocks, ahead: int, sign: in
     assert (raw >> 31, abs((raw & 0x7FFF_FFFF) - 5_000) <= 1) == (sign, True)
 
 
-def test_only_the_low_half_is_compared(pair: Clocks) -> None:
+def test_only_the_low_32_bits_are_compared(pair: Clocks) -> None:
     pair.put_number(1, FILTERS, "<B", 0)
     pair.align()
     offset = pair.number(1, OFFSET, "<q")
@@ -110,8 +115,8 @@ def test_only_the_low_half_is_compared(pair: Clocks) -> None:
     assert abs(pair.difference(1)) <= 1
 
 
-def test_the_difference_is_a_mean_of_its_depth(pair: Clocks) -> None:
-    """One of 16 at depth 4; a bandwidth so small that the loop does not move it meanwhile."""
+def test_difference_is_a_mean_over_the_filter_depth(pair: Clocks) -> None:
+    """Depth 4: one of 16. The bandwidth is so small that the loop has no influence."""
     pair.align()
     pair.put_number(1, SPEED_START, "<H", 0x3FFF)
     offset = pair.number(1, OFFSET, "<q")
@@ -122,7 +127,7 @@ def test_the_difference_is_a_mean_of_its_depth(pair: Clocks) -> None:
     assert pair.difference(1) == pytest.approx(1_000 + 15_000 / 16, abs=60)
 
 
-def test_writing_the_speed_start_resets_the_filters(pair: Clocks) -> None:
+def test_write_to_the_speed_start_resets_the_filters(pair: Clocks) -> None:
     pair.align()
     pair.put_number(1, OFFSET, "<q", pair.number(1, OFFSET, "<q") + 20_000)
     pair.burst(100)
@@ -133,8 +138,8 @@ def test_writing_the_speed_start_resets_the_filters(pair: Clocks) -> None:
 
 
 @pytest.mark.parametrize("start", [0x0080, 0x0400, 0x1000, 0x3FFF])
-def test_the_speed_difference_is_bounded_and_says_the_deviation(start: int) -> None:
-    """±(start - 0x7F), section II table 105; and the formula of its note, the rate."""
+def test_speed_difference_is_bounded_and_determines_the_rate(start: int) -> None:
+    """The limit is ±(start - 0x7F), section II table 105. Its note defines the rate."""
     main = couplers(Crystal(), Crystal())
     main.align()
     main.put_number(1, SPEED_START, "<H", start)
@@ -152,7 +157,7 @@ def test_the_speed_difference_is_bounded_and_says_the_deviation(start: int) -> N
 
 
 @pytest.mark.parametrize("ppm", [-100.0, -7.0, 40.0])
-def test_a_clock_is_caught_and_the_speed_difference_is_its_deviation(ppm: float) -> None:
+def test_loop_locks_and_the_speed_difference_is_the_deviation(ppm: float) -> None:
     main = couplers(Crystal(), Crystal(ppm=ppm))
     main.align()
     main.burst(30_000)
@@ -163,17 +168,17 @@ def test_a_clock_is_caught_and_the_speed_difference_is_its_deviation(ppm: float)
     assert deviation == pytest.approx(-ppm * 1e-6, rel=0.02)
 
 
-def test_a_plain_cycle_catches_a_clock_too() -> None:
+def test_plain_cycle_also_locks_a_clock() -> None:
     main = couplers(Crystal(), Crystal(ppm=50))
     main.align()
     main.run(1_000)
-    assert 500 < main.difference(1) < 3_000  # 15 000 frames are advised, not 1 000
+    assert 500 < main.difference(1) < 3_000  # the documents recommend 15 000 frames, not 1 000
     main.run(19_000)
     assert abs(main.difference(1)) < 100
 
 
-def test_thirty_three_clocks_hold_together_within_two_seconds() -> None:
-    """±100 ppm, time stamps scattered over 1 us, temperature drifting: the speed to reach."""
+def test_33_clocks_synchronise_within_two_seconds() -> None:
+    """Crystals of ±100 ppm with drift, and time stamps with 1 us of jitter."""
     numbers = random.Random(4)
     crystals = [
         Crystal(ppm=numbers.uniform(-100, 100), drift_ppm=2, jitter=1e-6) for _ in range(33)
@@ -187,7 +192,7 @@ def test_thirty_three_clocks_hold_together_within_two_seconds() -> None:
     for _ in range(10):
         main.run(50)
         assert max(abs(main.difference(k)) for k in range(1, 33)) < 1_000
-    # and what is behind the scatter: one comparison without it
+    # one comparison without jitter
     for k, device in enumerate(main.segment):
         device.crystal = replace(device.crystal, jitter=0)
         main.put_number(k, FILTERS, "<B", 0)
@@ -195,7 +200,7 @@ def test_thirty_three_clocks_hold_together_within_two_seconds() -> None:
     assert max(abs(main.difference(k)) for k in range(1, 33)) < 1_000
 
 
-def test_a_clock_of_32_bits() -> None:
+def test_clock_with_32_bits() -> None:
     main = Clocks(Segment([Coupler(), Coupler(clock_bits=32)]))
     assert main.number(1, 0x0008, "<H") & 0x000C == 0x0004
     main.put_number(1, OFFSET, "<Q", 0xFFFF_FFFF_FFFF_0000)
@@ -205,7 +210,7 @@ def test_a_clock_of_32_bits() -> None:
     main.latch()
     assert main.number(1, UNIT_TIME, "<Q") < 2**32
     main.let_pass(4_500)
-    assert main.system_time(1) < 2**32  # round it goes, every 4.3 s
+    assert main.system_time(1) < 2**32  # it wraps every 4.3 s
     main.put_number(1, OFFSET, "<I", 0)
     main.put_number(1, FILTERS, "<B", 0)
     [low] = struct.unpack("<I", main.read(STATION, SYSTEM_TIME, 4))
@@ -214,7 +219,7 @@ def test_a_clock_of_32_bits() -> None:
     assert abs(main.difference(1)) < 100_000
 
 
-def test_a_device_without_a_clock_has_none_of_it() -> None:
+def test_device_without_a_clock_has_no_clock_registers() -> None:
     from catenary.virtual import DigitalInputs
 
     main = Clocks(Segment([Coupler(), DigitalInputs()]))
@@ -225,7 +230,7 @@ def test_a_device_without_a_clock_has_none_of_it() -> None:
     assert main.exchange(EcatCommand.FRMW, STATION, SYSTEM_TIME, bytes(4)).working_counter == 1
 
 
-def test_a_crystal_counts_too_fast_by_its_error() -> None:
+def test_crystal_runs_fast_by_its_error() -> None:
     main = couplers(Crystal(), Crystal(ppm=80))
     first = main.latch()
     main.let_pass(1_000)
@@ -233,7 +238,7 @@ def test_a_crystal_counts_too_fast_by_its_error() -> None:
     assert second[1][2] - first[1][2] - (second[0][2] - first[0][2]) == pytest.approx(80_000, abs=5)
 
 
-def test_a_crystal_drifts_with_the_temperature_and_comes_back() -> None:
+def test_crystal_drifts_periodically() -> None:
     main = couplers(Crystal(), Crystal(drift_ppm=10, drift_period=8))
     start = main.latch()
 
@@ -247,7 +252,7 @@ def test_a_crystal_drifts_with_the_temperature_and_comes_back() -> None:
     assert abs(gone()) < 500
 
 
-def test_a_crystal_may_change_while_it_counts() -> None:
+def test_crystal_can_change_while_the_segment_runs() -> None:
     main = couplers(Crystal(), Crystal())
     before = main.latch()
     main.segment[1].crystal = Crystal(ppm=100)
@@ -256,7 +261,7 @@ def test_a_crystal_may_change_while_it_counts() -> None:
     assert after[1][2] - before[1][2] == pytest.approx(after[0][2] - before[0][2], abs=100)
 
 
-def test_time_stamps_scatter_over_their_jitter_the_same_in_every_run() -> None:
+def test_time_stamp_scatter_is_reproducible() -> None:
     def stamps() -> list[int]:
         main = couplers(Crystal(), Crystal(jitter=1e-6))
         times = [main.latch() for _ in range(200)]
@@ -278,6 +283,6 @@ def test_time_stamps_scatter_over_their_jitter_the_same_in_every_run() -> None:
         ({"ppm": float("nan")}, "ppm must be finite"),
     ],
 )
-def test_a_crystal_of_no_use_is_refused(fields: dict[str, float], message: str) -> None:
+def test_invalid_crystal_is_refused(fields: dict[str, float], message: str) -> None:
     with pytest.raises(ValueError, match=message):
         Crystal(**fields)

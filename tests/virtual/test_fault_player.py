@@ -1,4 +1,4 @@
-"""Faults on a segment: each happens at its instant, to what it names, and is written down."""
+"""Faults on a segment: times, effects and the log."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ def servo(main: MainDevice, position: int = 2) -> Servo:
 
 
 def devices(main: MainDevice) -> int | None:
-    """How many answer, or None: the frame does not come back."""
+    """Return the number of devices that answer, or None if the frame does not return."""
     main.link.send(BRD)
     if not main.link.wait_until(main.link.now() + MILLISECOND, True):
         return None
@@ -62,7 +62,7 @@ def devices(main: MainDevice) -> int | None:
 
 
 def counts(main: MainDevice, frames: int) -> list[int | None]:
-    """Of one frame each millisecond, from the next one on."""
+    """Return the results of one frame per millisecond."""
     found = []
     for _ in range(frames):
         start = main.link.now()
@@ -72,7 +72,7 @@ def counts(main: MainDevice, frames: int) -> list[int | None]:
 
 
 def serial(main: MainDevice, station: int) -> int:
-    """From the object dictionary; the device is taken to PRE-OP for it."""
+    """Bring the device to PRE-OP and read its serial number."""
     main.start_mailbox(station)
     answer = main.ask(station, UPLOAD_SERIAL)
     return int(struct.unpack_from("<I", answer, 6)[0])
@@ -81,7 +81,7 @@ def serial(main: MainDevice, station: int) -> int:
 # -- frames -----------------------------------------------------------------------------------
 
 
-def test_frames_are_lost_from_their_instant_on() -> None:
+def test_frames_are_lost_from_the_start_time_on() -> None:
     main = line(lose_frames(2, at=0.003))
     assert counts(main, 8) == [5, 5, 5, None, None, 5, 5, 5]
     assert main.segment.faults_done
@@ -92,14 +92,14 @@ def test_every_third_frame_is_lost() -> None:
     assert counts(main, 8) == [5, 5, None, 5, 5, None, 5, 5]
 
 
-def test_a_frame_lost_on_its_way_back_has_been_there() -> None:
+def test_frame_lost_on_the_way_back_was_processed() -> None:
     for way, station in (("out", 0), ("back", 0x4321)):
         main = line(lose_frames(1, way=way))
         main.link.send(encode_frame([Datagram(EcatCommand.APWR, 0x0010 << 16, b"\x21\x43")]))
         assert struct.unpack("<H", main.segment.core.peek(0, 0x0010, 2)) == (station,)
 
 
-def test_frames_are_lost_until_the_end() -> None:
+def test_frames_are_lost_until_the_end_of_the_fault() -> None:
     main = line(lose_frames(at=0.002, for_=0.003))
     assert counts(main, 7) == [5, 5, None, None, None, 5, 5]
 
@@ -114,14 +114,14 @@ def test_corrupt_frames_are_counted_behind_the_bad_cable() -> None:
     assert [e[12] for e in errors] == [0, 0, 3, 3, 3]  # processing units
 
 
-def test_a_corrupt_frame_changes_nothing_behind_the_bad_cable() -> None:
+def test_corrupt_frame_has_no_effect_behind_the_bad_cable() -> None:
     main = line(corrupt(1, between=(1, 2)))
     main.link.send(encode_frame([Datagram(EcatCommand.BWR, 0x0F80 << 16, b"\x55")]))
     memory = [main.segment.core.peek(k, 0x0F80, 1) for k in range(5)]
     assert memory == [b"\x55", b"\x55", b"\0", b"\0", b"\0"]
 
 
-def test_garbled_frames_come_back_with_other_bytes() -> None:
+def test_garbled_frames_return_with_wrong_bytes() -> None:
     main = line(garble(1, offset=20))
     answers = []
     for _ in range(2):
@@ -135,7 +135,7 @@ def test_garbled_frames_come_back_with_other_bytes() -> None:
     assert broken[:20] + broken[21:] == whole[:20] + whole[21:]
 
 
-def test_a_delayed_frame_is_overtaken() -> None:
+def test_delayed_frame_is_overtaken() -> None:
     main = line(delay(1, by=50e-6))
     main.link.send(BRD)
     main.link.send(encode_frame([Datagram(EcatCommand.NOP, 0, b"")]))
@@ -147,7 +147,7 @@ def test_a_delayed_frame_is_overtaken() -> None:
     assert commands == [EcatCommand.NOP, EcatCommand.BRD]
 
 
-def test_a_duplicate_comes_back_twice() -> None:
+def test_duplicated_frame_returns_twice() -> None:
     main = line(duplicate(1))
     main.link.send(BRD)
     frames = []
@@ -160,13 +160,13 @@ def test_a_duplicate_comes_back_twice() -> None:
 # -- cables and power -------------------------------------------------------------------------
 
 
-def test_behind_a_cut_nobody_answers_until_it_is_joined() -> None:
+def test_devices_behind_a_cut_do_not_answer_until_it_is_joined() -> None:
     main = line(cut(between=(2, 3), at=0.002, for_=0.003))
-    # the frame at 2 ms runs into the dark: the controllers see the cut 15 us later
+    # the frame at 2 ms is lost, because the controllers detect the cut 15 us later
     assert counts(main, 7) == [5, 5, None, 3, 3, 5, 5]
 
 
-def test_a_standard_phy_takes_three_milliseconds_to_see_it() -> None:
+def test_standard_phy_detects_a_cut_after_three_milliseconds() -> None:
     segment = Segment(
         [Coupler() for _ in range(5)],
         faults=[cut(between=(2, 3), at=0.002)],
@@ -175,7 +175,7 @@ def test_a_standard_phy_takes_three_milliseconds_to_see_it() -> None:
     assert counts(MainDevice(segment), 7) == [5, 5, None, None, None, 3, 3]
 
 
-def test_frames_under_way_are_lost_with_the_cable() -> None:
+def test_frames_on_a_cut_cable_are_lost() -> None:
     main = line()
     main.link.send(BRD)
     main.link.wait_until(main.link.now() + 2_000, False)
@@ -185,34 +185,34 @@ def test_frames_under_way_are_lost_with_the_cable() -> None:
     assert (loss.cause, loss.link) == ("in flight", 0)
 
 
-def test_a_frame_that_passed_the_cable_before_comes_back() -> None:
+def test_frame_that_has_passed_the_cable_returns() -> None:
     main = line()
     main.link.send(BRD)
-    main.link.wait_until(main.link.now() + 10_200, False)  # its last byte is on the way home
+    main.link.wait_until(main.link.now() + 10_200, False)  # its last byte has passed the cable
     main.segment.inject(cut(between=(3, 4)))
     assert main.link.wait_until(main.link.now() + MILLISECOND, True)
 
 
-def test_cut_and_join_by_word() -> None:
+def test_cut_and_join_are_injected() -> None:
     main = line(unplug(3, at=0.001), replug(3, at=0.003), cut(between=("main", 0), at=0.005),
                 join(between=(0, "main"), at=0.006))  # fmt: skip
     assert counts(main, 7) == [5, None, 3, 5, 5, None, 5]
 
 
-def test_a_lost_link_is_counted_and_shown() -> None:
+def test_lost_link_is_counted_and_shown() -> None:
     main = line(cut(between=(2, 3), at=0.002))
     counts(main, 4)
     assert main.segment.core.peek(2, 0x0311, 1) == b"\x01"
     assert main.segment.core.peek(2, 0x0111, 1) == b"\x56"
 
 
-def test_a_device_without_power_takes_the_line_behind_it_along() -> None:
+def test_devices_behind_an_unpowered_device_do_not_answer() -> None:
     main = line(power_cycle(2, at=0.002, for_=0.004))
     assert counts(main, 8) == [5, 5, None, 2, 2, 2, 5, 5]
     assert main.segment[2].state == 1
 
 
-def test_a_device_comes_back_with_its_defaults() -> None:
+def test_device_returns_with_its_defaults() -> None:
     main = line()
     main.number_stations()
     main.start_mailbox(STATION + 2)
@@ -230,34 +230,36 @@ def test_a_device_comes_back_with_its_defaults() -> None:
     assert read[6:8] == b"\0\0"
 
 
-def test_what_a_device_was_about_to_do_is_not_done_after_a_power_cycle() -> None:
+def test_power_cycle_cancels_pending_actions() -> None:
     main = line()
     main.number_stations()
-    main.write(STATION + 2, 0x0120, b"\x02\x00")  # PRE-OP without mailbox: refused, a little later
+    main.write(
+        STATION + 2, 0x0120, b"\x02\x00"
+    )  # PRE-OP without a mailbox is refused after a short time
     main.segment.inject(power_cycle(2, for_=0.0001))
     main.let_pass(5)
     assert main.segment[2].state == 1
 
 
-def test_an_alias_written_to_the_eeprom_survives() -> None:
+def test_alias_in_the_eeprom_survives_a_power_cycle() -> None:
     main = line()
     main.segment[2].write_alias(0x55)
     main.segment.inject(power_cycle(2, for_=0.001))
     main.let_pass(2)
-    assert main.segment.core.peek(2, 0x0012, 2) == b"\0\0"  # the register alone does not
+    assert main.segment.core.peek(2, 0x0012, 2) == b"\0\0"  # the register alone does not survive
 
 
-def test_another_device_in_its_place() -> None:
+def test_device_is_swapped() -> None:
     main = line(swap(2, with_=Servo(serial=99, axes=2), at=0.001, for_=0.002))
     old = main.segment[2]
     assert counts(main, 6) == [5, None, 2, 5, 5, 5]
     assert (old.position, main.segment[2].position, servo(main).axes) == (-1, 2, 2)
     main.number_stations()
     assert serial(main, STATION + 2) == 99
-    Segment([old])  # free for another one
+    Segment([old])  # it can be used in another segment
 
 
-def test_two_devices_change_places() -> None:
+def test_two_devices_are_exchanged() -> None:
     main = line(exchange(2, 3, at=0.001, for_=0.001))
     servo(main, 2).move_to(1.25)
     assert counts(main, 4) == [5, None, 5, 5]
@@ -270,7 +272,7 @@ def test_two_devices_change_places() -> None:
 # -- devices ----------------------------------------------------------------------------------
 
 
-def test_a_silent_mailbox() -> None:
+def test_mailbox_silent() -> None:
     main = line()
     main.number_stations()
     main.start_mailbox(STATION + 2)
@@ -281,7 +283,7 @@ def test_a_silent_mailbox() -> None:
     assert main.fetch(STATION + 2) is not None
 
 
-def test_a_late_mailbox() -> None:
+def test_late_mailbox() -> None:
     main = line(late_mailbox(2, by=0.02))
     main.number_stations()
     main.start_mailbox(STATION + 2)
@@ -291,7 +293,7 @@ def test_a_late_mailbox() -> None:
     assert main.fetch(STATION + 2) is not None
 
 
-def test_a_state_is_refused_as_often_as_asked() -> None:
+def test_state_is_refused_the_given_number_of_times() -> None:
     main = line(refuse_state(2, "PRE-OP", 0x0016, times=2))
     main.number_stations()
     main.sync_manager(STATION + 2, 0, 0x1000, 128, 0x26)
@@ -300,7 +302,7 @@ def test_a_state_is_refused_as_often_as_asked() -> None:
     assert answers == [(0x11, 0x0016), (0x11, 0x0016), (2, 0)]
 
 
-def test_a_device_leaves_a_state_by_itself() -> None:
+def test_device_leaves_a_state() -> None:
     main = line()
     main.number_stations()
     main.start_mailbox(STATION + 2)
@@ -308,7 +310,7 @@ def test_a_device_leaves_a_state_by_itself() -> None:
     assert main.al_status(STATION + 2) == (0x11, 0x001A)
 
 
-def test_a_device_that_lets_process_data_pass() -> None:
+def test_device_ignores_logical_datagrams() -> None:
     main = line(wrong_working_counter(2, at=0.2, for_=0.1))
     main.number_stations()
     main.let_pass(30)
@@ -320,12 +322,12 @@ def test_a_device_that_lets_process_data_pass() -> None:
     assert counter() == 3
     main.link.wait_until(200 * MILLISECOND, False)
     assert counter() == 0
-    assert main.read(STATION + 2, 0x0130, 1) == b"\x04"  # it is there all the same
+    assert main.read(STATION + 2, 0x0130, 1) == b"\x04"  # the device still answers other datagrams
     main.link.wait_until(300 * MILLISECOND, False)
     assert counter() == 3
 
 
-def test_drive_fault_sto_and_a_model_that_stands_still() -> None:
+def test_drive_fault_sto_and_frozen_model() -> None:
     main = line(drive_fault(2, 0x3210), safe_torque_off(3), freeze(3, at=0.04))
     main.let_pass(30)
     assert servo(main, 2).drive_state() == "FAULT"
@@ -334,8 +336,8 @@ def test_drive_fault_sto_and_a_model_that_stands_still() -> None:
     assert main.segment.fault_log[-1].fault == freeze(3, at=0.04)
 
 
-def test_a_frozen_device_may_be_taken_away_before_it_thaws() -> None:
-    """(Found by the soak: `python -m benchmarks soak --minutes 1 --seed 24`.)"""
+def test_frozen_device_can_be_removed() -> None:
+    """Found by `python -m benchmarks soak --minutes 1 --seed 24`."""
     other = Servo()
     main = line(freeze(3, at=0.01, for_=0.05), swap(3, other, at=0.02))
     main.let_pass(100)
@@ -343,12 +345,12 @@ def test_a_frozen_device_may_be_taken_away_before_it_thaws() -> None:
     assert main.segment.fault_log[-1] == FaultEvent(0.06, freeze(3, at=0.01, for_=0.05), "ends")
 
 
-def test_a_crystal_that_drifts() -> None:
+def test_drift_changes_the_clock_rate() -> None:
     main = line(drift(0, ppm=100.0, at=1.0, for_=1.0))
     main.number_stations()
 
     def ahead() -> int:
-        """Of the second device's clock [ns]."""
+        """Return the lead of the second device's clock [ns]."""
         times = [
             struct.unpack("<Q", main.read(STATION + k, 0x0910, 8))[0] - main.link.now()
             for k in (0, 2)
@@ -362,10 +364,10 @@ def test_a_crystal_that_drifts() -> None:
     assert ahead() - start == pytest.approx(100_000, abs=200)
 
 
-# -- planning and writing down ----------------------------------------------------------------
+# -- schedule and log -------------------------------------------------------------------------
 
 
-def test_what_was_injected_when() -> None:
+def test_log_records_faults_with_their_times() -> None:
     off = power_cycle(2, at=0.002, for_=0.004)
     main = line(off, lose_frames(1, at=0.001))
     assert not main.segment.faults_done
@@ -376,22 +378,22 @@ def test_what_was_injected_when() -> None:
         (0.006, "power_cycle", "ends"),
     ]
     assert main.segment.fault_log[1] == FaultEvent(0.002, off, "begins")
-    assert not main.segment.faults_done  # no frame came that could be lost
+    assert not main.segment.faults_done  # no frame was sent, so none was lost
     devices(main)
     assert main.segment.faults_done
 
 
-def test_a_fault_can_be_injected_while_it_runs() -> None:
+def test_fault_can_be_injected_at_run_time() -> None:
     main = line()
     main.let_pass(5)
     main.segment.inject(cut(between=(0, 1), at=0.007))
-    main.segment.inject(lose_frames(1, at=0.001))  # has passed: at once
+    main.segment.inject(lose_frames(1, at=0.001))  # the time has passed: immediately
     main.let_pass(5)
     assert [round(event.time, 6) for event in main.segment.fault_log] == [0.005, 0.007]
     assert main.segment.time == 0.010
 
 
-def test_lost_frames_are_declared() -> None:
+def test_lost_frames_are_reported_with_their_cause() -> None:
     main = line(lose_frames(1, at=0.001), corrupt(1, at=0.002), cut(between=(2, 3), at=0.003))
     counts(main, 5)
     losses = main.segment.take_losses()
@@ -403,13 +405,13 @@ def test_lost_frames_are_declared() -> None:
     assert main.segment.take_losses() == []
 
 
-def test_a_fault_that_finds_its_device_gone_misses() -> None:
+def test_fault_of_a_removed_device_misses() -> None:
     main = line(swap(2, with_=Coupler(), at=0.001), drive_fault(2, at=0.002))
     main.let_pass(5)
     assert [event.what for event in main.segment.fault_log] == ["begins", "ends", "misses"]
 
 
-def test_more_faults_of_frames_than_there_is_room_for_miss() -> None:
+def test_excess_frame_faults_miss() -> None:
     main = line(*(lose_frames(at=0.001 * k, for_=1.0) for k in range(40)))
     main.let_pass(50)
     whats = [event.what for event in main.segment.fault_log]
@@ -432,7 +434,7 @@ def test_more_faults_of_frames_than_there_is_room_for_miss() -> None:
         (exchange(2, 9), "other: device 9 does not exist"),
     ],
 )
-def test_a_fault_that_does_not_fit_names_the_field(fault: Fault, says: str) -> None:
+def test_unsuitable_fault_is_refused_with_the_field(fault: Fault, says: str) -> None:
     with pytest.raises(ValueError, match=says):
         line(fault)
 

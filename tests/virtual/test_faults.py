@@ -1,4 +1,4 @@
-"""The words for faults: what they take, and how bad values name the field."""
+"""Fault types: their fields, and errors that name the field."""
 
 from __future__ import annotations
 
@@ -29,13 +29,13 @@ def test_faults_are_values() -> None:
         power_cycle(2).at = 1.0  # type: ignore[misc]
 
 
-def test_how_many_frames_are_hit() -> None:
+def test_number_of_affected_frames() -> None:
     assert lose_frames().frames == 1
     assert lose_frames(for_=0.1).frames is None
     assert lose_frames(5, for_=0.1).frames == 5
 
 
-def test_a_fault_says_its_word() -> None:
+def test_fault_has_its_kind() -> None:
     assert power_cycle(2).kind == "power_cycle"
     assert repr(drift(1, ppm=20.0, at=1.0)) == "Drift(device=1, ppm=20.0, at=1.0, for_=None)"
 
@@ -58,12 +58,12 @@ def test_a_fault_says_its_word() -> None:
         (lambda: drift(1, ppm=1e6), "ppm"),
     ],
 )
-def test_bad_values_name_the_field(make: Callable[[], Fault], says: str) -> None:
+def test_invalid_values_are_refused_with_the_field(make: Callable[[], Fault], says: str) -> None:
     with pytest.raises(ValueError, match=says):
         make()
 
 
-def test_a_swap_holds_the_other_device() -> None:
+def test_swap_contains_the_new_device() -> None:
     other = Servo(serial=7)
     assert swap(2, with_=other, at=1.0).with_ is other
     assert corrupt().between == ("main", 0)

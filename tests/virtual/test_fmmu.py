@@ -1,4 +1,4 @@
-"""FMMUs: bits of the logical image to bits of the memory, counted once a device."""
+"""FMMUs: bit-wise mapping of the logical image, and working counters."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from tests.virtual.main_device import STATION, MainDevice
 
 @pytest.fixture
 def main() -> MainDevice:
-    """Two outputs of four bits and two inputs share the bytes 0x40 and 0x41."""
+    """Map two outputs of four bits and two inputs to the bytes 0x40 and 0x41."""
     segment = Segment([DigitalOutputs(), DigitalOutputs(), DigitalInputs(), DigitalInputs()])
     main = MainDevice(segment)
     main.number_stations()
@@ -28,12 +28,12 @@ def outputs(main: MainDevice) -> list[int]:
     return [d.outputs for d in found if isinstance(d, DigitalOutputs)]
 
 
-def test_each_device_takes_its_own_bits(main: MainDevice) -> None:
+def test_each_device_uses_its_own_bits(main: MainDevice) -> None:
     assert main.exchange_logical(EcatCommand.LWR, 0x40, b"\xa5").working_counter == 2
     assert outputs(main) == [0x5, 0xA]
 
 
-def test_inputs_are_put_into_their_bits_only(main: MainDevice) -> None:
+def test_inputs_change_only_their_bits(main: MainDevice) -> None:
     for device, value in zip((main.segment[2], main.segment[3]), (0x3, 0xC), strict=True):
         assert isinstance(device, DigitalInputs)
         device.inputs = value
@@ -48,12 +48,12 @@ def test_read_write_counts_two_for_outputs_and_one_for_inputs(main: MainDevice) 
     assert outputs(main) == [0x1, 0x2]
 
 
-def test_addresses_beside_the_mapping_are_left_alone(main: MainDevice) -> None:
+def test_unmapped_addresses_are_not_changed(main: MainDevice) -> None:
     assert main.exchange_logical(EcatCommand.LRW, 0x42, b"\xff\xff").working_counter == 0
     assert main.exchange_logical(EcatCommand.LRW, 0xFFFFFFF0, bytes(64)).working_counter == 0
 
 
-def test_a_mapping_across_bytes_and_bits() -> None:
+def test_mapping_across_byte_boundaries() -> None:
     segment = Segment([DigitalOutputs(bits=16)])
     main = MainDevice(segment)
     main.number_stations()
@@ -64,7 +64,7 @@ def test_a_mapping_across_bytes_and_bits() -> None:
     assert segment.core.output_image(0, 0) == value.to_bytes(2, "little")
 
 
-def test_a_device_without_lrw_answers_lrd_and_lwr() -> None:
+def test_device_without_lrw_answers_lrd_and_lwr() -> None:
     main = MainDevice(Segment([Servo(lrw=False)]))
     main.number_stations()
     main.start_servo(STATION, 0)
@@ -73,12 +73,14 @@ def test_a_device_without_lrw_answers_lrd_and_lwr() -> None:
     assert main.exchange_logical(EcatCommand.LRD, 13, bytes(13)).working_counter == 1
 
 
-def test_a_mailbox_status_can_be_mapped_into_the_cycle() -> None:
+def test_mailbox_status_can_be_mapped() -> None:
     main = MainDevice(Segment([Servo()]))
     main.number_stations()
     main.start_mailbox(STATION)
     main.fmmu(STATION, 2, 0x200, (1, 0, 0), 0x080D, 1)
-    block = bytes([0x00, 0x02, 0, 0, 1, 0, 0, 0, 0x0D, 0x08, 3, 1, 1, 0, 0, 0])  # its bit 3
+    block = bytes(
+        [0x00, 0x02, 0, 0, 1, 0, 0, 0, 0x0D, 0x08, 3, 1, 1, 0, 0, 0]
+    )  # bit 3 of the register
     main.write(STATION, 0x0620, block)
     assert main.exchange_logical(EcatCommand.LRD, 0x200, b"\0") == (b"\x00", 1, 0x200)
     main.put(STATION, bytes.fromhex("0020401810010000000000"))

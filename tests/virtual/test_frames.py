@@ -1,4 +1,4 @@
-"""Whatever bytes come: frames are answered, refused or left alone, never a crash."""
+"""Random frames are answered, refused or ignored, and never cause a crash."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def test_any_bytes_after_the_ethernet_header(body: bytes) -> None:
 
 
 def loops_are_set(line: Segment) -> bool:
-    """A MainDevice that closes or opens loops by hand may lose its frames to that."""
+    """Return True if the frame can write loop control, after which frames may be lost."""
     return any(line.core.peek(k, 0x0101, 1) != b"\0" for k in range(len(line)))
 
 
@@ -40,7 +40,7 @@ DATAGRAM = st.tuples(
 
 @settings(max_examples=150)
 @given(st.lists(st.lists(DATAGRAM, min_size=1, max_size=5), max_size=8))
-def test_any_datagrams_into_any_register_in_any_order(
+def test_any_datagrams_to_any_register(
     frames: list[list[tuple[int, int, bytes]]],
 ) -> None:
     line = segment()
@@ -56,7 +56,7 @@ def test_any_datagrams_into_any_register_in_any_order(
     link.wait_until(link.now() + 20_000_000, False)
 
 
-def test_a_length_beyond_the_frame_leaves_it_unprocessed() -> None:
+def test_frame_with_an_excessive_length_is_not_processed() -> None:
     line = segment()
     body = struct.pack("<BBIHH", EcatCommand.BRD, 1, 0, 100, 0) + bytes(12)
     frame = HEADER + struct.pack("<H", len(body) | 0x1000) + body
@@ -66,7 +66,7 @@ def test_a_length_beyond_the_frame_leaves_it_unprocessed() -> None:
     assert line.frames.malformed == 1
 
 
-def test_datagrams_before_a_broken_one_are_processed() -> None:
+def test_datagrams_before_a_malformed_one_are_processed() -> None:
     line = segment()
     good = struct.pack("<BBIHH", EcatCommand.BRD, 1, 0, 1 | 0x8000, 0) + bytes(3)
     broken = struct.pack("<BBIHH", EcatCommand.BRD, 2, 0, 1000, 0) + bytes(3)
@@ -77,13 +77,13 @@ def test_datagrams_before_a_broken_one_are_processed() -> None:
     assert returned[16 + 13 :] == frame[16 + 13 :]
 
 
-def test_foreign_frames_do_not_come_back() -> None:
+def test_foreign_frames_do_not_return() -> None:
     line = segment()
     assert line.core.pass_frame(HEADER[:12] + b"\x08\x00" + bytes(46)) is None
     assert line.frames.foreign == 1
 
 
-def test_several_datagrams_in_a_frame_are_worked_in_order() -> None:
+def test_datagrams_of_a_frame_are_processed_in_order() -> None:
     line = segment()
     datagrams = [
         Datagram(EcatCommand.APWR, 0x0010_0000, b"\x34\x12"),

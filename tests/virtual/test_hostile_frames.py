@@ -1,4 +1,4 @@
-"""No frame hangs a segment or makes its controllers compute what C does not define."""
+"""No frame hangs a segment or causes undefined behaviour in its controllers."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ def line() -> MainDevice:
 
 @pytest.mark.parametrize("start", EDGES)
 @pytest.mark.parametrize("offset", EDGES)
-def test_clocks_at_the_edges_of_their_numbers_go_on(offset: int, start: int) -> None:
+def test_clocks_continue_at_the_limits_of_their_range(offset: int, start: int) -> None:
     main = line()
     for address, form, value in (
         (OFFSET, "<Q", offset),
@@ -74,8 +74,8 @@ def test_clocks_at_the_edges_of_their_numbers_go_on(offset: int, start: int) -> 
 
 
 @pytest.mark.parametrize("ahead", [10 * MS, 2**63 - 1])
-def test_pulses_come_where_the_system_time_wraps(ahead: int) -> None:
-    """The start time is on the other side of 2^63."""
+def test_pulses_continue_when_the_system_time_wraps(ahead: int) -> None:
+    """The start time is beyond 2^63."""
     main = line()
     [now] = struct.unpack("<Q", main.read(STATION, 0x0910, 8))
     main.write(STATION, OFFSET, struct.pack("<Q", 2**63 - 5 * MS - now))
@@ -103,12 +103,12 @@ WRITES = st.lists(
 
 @settings(max_examples=60)
 @given(writes=WRITES, mailbox=st.binary(max_size=128))
-def test_random_writes_never_end_the_application(
+def test_random_writes_cause_no_exception(
     writes: Sequence[tuple[int, bytes]], mailbox: bytes
 ) -> None:
-    """An exception of an application comes out of the link.
+    """The link would raise an exception of an application.
 
-    Loop control is left out: it can cut devices off.
+    Loop control is excluded, because it can disconnect devices.
     """
     main = line()
     for position in (1, 2):
@@ -120,8 +120,8 @@ def test_random_writes_never_end_the_application(
     main.let_pass(30)
 
 
-def test_a_sync0_cycle_changed_after_the_check_is_not_used() -> None:
-    """A frame between the request of SAFE-OP and its answer; the device goes by what it checked."""
+def test_sync0_cycle_changed_after_the_check_is_ignored() -> None:
+    """A frame arrives between the request for SAFE-OP and its answer. The checked value applies."""
     main = line()
     main.map_servo(STATION + 1, 0)
     main.write(STATION + 1, START_TIME, struct.pack("<Q", 2**62))
@@ -134,8 +134,8 @@ def test_a_sync0_cycle_changed_after_the_check_is_not_used() -> None:
     assert main.al_status(STATION + 1) == (4, 0)
 
 
-def test_a_sync1_cycle_beyond_32_bits_is_refused() -> None:
-    """SYNC1 comes with the first SYNC0 after its time: up to 2^32 ns and one cycle later."""
+def test_sync1_cycle_beyond_32_bits_is_refused() -> None:
+    """SYNC1 occurs with the first SYNC0 after its time: up to 2^32 ns and one cycle later."""
     main = MainDevice(Segment([Servo(quirks=ServoQuirks(sync_signal="sync1"))]))
     main.number_stations()
     main.map_servo(STATION, 0)
@@ -145,8 +145,8 @@ def test_a_sync1_cycle_beyond_32_bits_is_refused() -> None:
     assert main.request(STATION, 4) == (2 | 0x10, 0x0030)
 
 
-def test_more_objects_than_a_device_can_map_are_refused() -> None:
-    """16 PDOs of 32 objects fit the dictionary, not the device."""
+def test_too_many_mapped_objects_are_refused() -> None:
+    """16 PDOs of 32 objects fit into the dictionary, but exceed the limit of the device."""
     main = MainDevice(Segment([Servo(axes=8)]))
     main.number_stations()
     main.start_mailbox(STATION)

@@ -92,12 +92,12 @@ def test_mailbox_errors(kind: str, size: int) -> None:
     assert (answer[5] & 0xF, answer[6:]) == (0, b"\x01\x00\x02\x00"[:size])
 
 
-def test_uploads_that_drip() -> None:
+def test_uploads_with_one_byte_per_segment() -> None:
     main = with_quirks(drip=True)
     assert main.upload(STATION, 0x2100, 0) == bytes(k * 7 & 0xFF for k in range(2048))
 
 
-def test_a_prefix_before_every_name() -> None:
+def test_every_name_has_the_prefix() -> None:
     main = with_quirks(text_prefix="\x1b[2J")
     assert main.ask(STATION, object_request(0x1000))[12:] == b"\x1b[2JDevice type"
     assert main.upload(STATION, 0x1008, 0) == b"\x1b[2JCatenary virtual servo"
@@ -112,7 +112,7 @@ def test_quirks_of_analogue_inputs() -> None:
         assert answer[5] >> 4 == 1
 
 
-def test_quirks_in_toml(tmp_path: Path) -> None:
+def test_quirks_are_read_from_toml(tmp_path: Path) -> None:
     path = tmp_path / "segment.toml"
     path.write_text(
         '[[device]]\nkind = "servo"\nmailbox_quirks = { counter = "echoed" }\n'
@@ -128,7 +128,7 @@ def test_quirks_in_toml(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("quirks", ["mailbox_size = 65536", "sync_managers = 256", "pdos = 1"])
-def test_impossible_quirks_are_refused(quirks: str, tmp_path: Path) -> None:
+def test_invalid_quirks_are_refused(quirks: str, tmp_path: Path) -> None:
     path = tmp_path / "segment.toml"
     path.write_text(f'[[device]]\nkind = "servo"\nsii_quirks = {{ {quirks} }}\n')
     with pytest.raises(ConfigurationError, match="sii_quirks"):

@@ -1,4 +1,4 @@
-"""Quirks of PDO objects: refused writes, other PDOs at power-up, alternatives, an object twice."""
+"""Quirks of PDO objects: refused writes, PDOs at power-up, exclusive PDOs, repeated objects."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ def test_fixed_lists_refuse_other_pdos(how: str) -> None:
     assert main.upload(STATION, 0x1C12, 1) == b"\x00\x16"
 
 
-def test_a_refusal_has_the_abort_code_of_the_device() -> None:
+def test_refusal_has_the_abort_code_of_the_device() -> None:
     main = servo(fixed_lists="silent", abort_code=LOCAL_CONTROL)
     assert write(main, 0x1C12, 0, b"\x00") == LOCAL_CONTROL
 
@@ -62,14 +62,14 @@ def test_only_declared_fixed_pdos_are_flagged_in_the_sii() -> None:
         assert {pdo.flags for pdo in sii.receive_pdos + sii.transmit_pdos} == {flag}
 
 
-def test_the_permissions_of_the_sii_can_be_taken_away() -> None:
+def test_sii_can_deny_changes() -> None:
     device = Servo(mapping_quirks=MappingQuirks(coe_details=0x03))
     sii = decode_sii(make_sii_image(device.description()))
     assert sii.general is not None
     assert sii.general.coe == CoeDetails.SDO | CoeDetails.SDO_INFORMATION
 
 
-def test_a_device_powers_up_with_other_pdos_than_its_sii_says() -> None:
+def test_pdos_at_power_up_can_differ_from_the_sii() -> None:
     main = servo(power_up=(0x1602, 0x1A01))
     assert main.upload(STATION, 0x1C12, 1) == b"\x02\x16"
     assert main.upload(STATION, 0x1C13, 1) == b"\x01\x1a"
@@ -84,21 +84,21 @@ def test_exclusive_pdos_are_not_assigned_together() -> None:
     assert write(main, 0x1C13, 0, b"\x02") == 0
 
 
-def test_an_object_is_refused_though_the_dictionary_allows_it() -> None:
+def test_mappable_object_can_be_refused() -> None:
     main = servo(refused_objects=(0x60F4,))
     assert write(main, 0x1C13, 0, b"\x00") == 0
     assert write(main, 0x1A00, 0, b"\x00") == 0
     assert write(main, 0x1A00, 1, b"\x20\x00\xf4\x60") == CANNOT_BE_MAPPED
 
 
-def test_an_object_is_in_two_pdos_with_different_sizes() -> None:
+def test_object_in_two_pdos_with_different_sizes() -> None:
     main = in_pre_op(AnalogInputs(channels=1, second_pdo="twice"))
     assert main.upload(STATION, 0x1C13, 0) == b"\x02"
     assert main.upload(STATION, 0x1A10, 1) == b"\x08\x11\x00\x60"
     assert main.upload(STATION, 0x1A00, 6) == b"\x10\x11\x00\x60"
 
 
-def test_quirks_are_fields_of_a_file(tmp_path: Path) -> None:
+def test_quirks_are_read_from_toml(tmp_path: Path) -> None:
     path = tmp_path / "segment.toml"
     path.write_text(
         '[[device]]\nkind = "servo"\n'
@@ -115,7 +115,7 @@ def test_quirks_are_fields_of_a_file(tmp_path: Path) -> None:
         read_segment(path)
 
 
-def test_impossible_codes_are_refused() -> None:
+def test_invalid_codes_are_refused() -> None:
     with pytest.raises(ValueError, match="abort_code"):
         MappingQuirks(abort_code=1 << 32)
     with pytest.raises(ValueError, match="coe_details"):

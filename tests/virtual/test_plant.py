@@ -1,4 +1,4 @@
-"""A plant judged by formulas: pendulum, gears, motor inertia, friction, brakes, encoder."""
+"""Plant, compared with formulas: pendulum, gears, inertia, friction, brakes and encoder."""
 
 from __future__ import annotations
 
@@ -32,13 +32,13 @@ def servo_of(segment: Segment, position: int = 0) -> Servo:
 
 
 def agm(a: float, b: float) -> float:
-    """The arithmetic-geometric mean."""
+    """Return the arithmetic-geometric mean."""
     while abs(a - b) > 1e-14:
         a, b = (a + b) / 2, math.sqrt(a * b)
     return a
 
 
-def test_a_pendulum_swings_in_the_time_of_the_formula(tmp_path: Path) -> None:
+def test_pendulum_has_the_period_of_the_formula(tmp_path: Path) -> None:
     """T = 2 pi sqrt(l / g) / agm(1, cos(amplitude / 2)): exact for any amplitude."""
     amplitude = 0.8
     segment = pendulum(tmp_path, frictionless(), start=amplitude)
@@ -57,7 +57,7 @@ def test_a_pendulum_swings_in_the_time_of_the_formula(tmp_path: Path) -> None:
     assert period == pytest.approx(expected, rel=1e-4)
 
 
-def test_a_free_pendulum_keeps_its_energy(tmp_path: Path) -> None:
+def test_free_pendulum_conserves_energy(tmp_path: Path) -> None:
     segment = pendulum(tmp_path, frictionless(), start=1.0)
     servo, time = servo_of(segment), Time(segment)
     top = MASS * GRAVITY * LENGTH * (1 - math.cos(1.0))
@@ -68,7 +68,7 @@ def test_a_free_pendulum_keeps_its_energy(tmp_path: Path) -> None:
         assert energy == pytest.approx(top, rel=5e-3)
 
 
-def test_viscous_friction_takes_the_energy(tmp_path: Path) -> None:
+def test_viscous_friction_dissipates_energy(tmp_path: Path) -> None:
     segment = pendulum(tmp_path, frictionless(viscous_friction=2.0), start=1.0)
     Time(segment).pass_by(10)
     assert abs(servo_of(segment).position_rad) < 1e-3
@@ -76,10 +76,10 @@ def test_viscous_friction_takes_the_energy(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("direction", [1, -1])
 @pytest.mark.parametrize("gear", [1.0, 50.0])
-def test_the_gear_carries_torque_to_the_joint_and_inertia_of_the_motor_too(
+def test_gear_transforms_torque_and_motor_inertia(
     tmp_path: Path, gear: float, direction: int
 ) -> None:
-    """From rest at the bottom: angle = torque t² / 2 J, J = joint + gear² motor."""
+    """From rest at the bottom: angle = torque t² / 2 J, J = joint + gear² · motor."""
     motor, torque, seconds = 2e-3, 0.5 / gear, 0.05
     segment = pendulum(tmp_path, frictionless(inertia=motor), gear=gear, direction=direction)
     servo, time = servo_of(segment), Time(segment)
@@ -92,7 +92,7 @@ def test_the_gear_carries_torque_to_the_joint_and_inertia_of_the_motor_too(
     assert servo.position_rad == pytest.approx(direction * gear * joint, rel=1e-12)
 
 
-def test_the_encoder_counts_the_motors_turns_from_the_zero_of_the_joint(tmp_path: Path) -> None:
+def test_encoder_counts_motor_turns_from_the_joint_zero(tmp_path: Path) -> None:
     segment = pendulum(
         tmp_path, frictionless(counts_per_turn=1000), gear=20.0, direction=-1, zero=0.3, brake=None,
         start=1.0,
@@ -104,7 +104,7 @@ def test_the_encoder_counts_the_motors_turns_from_the_zero_of_the_joint(tmp_path
     assert counts == round(servo.position_rad / TURN * 1000)
 
 
-def test_dry_friction_holds_up_to_its_torque_and_no_further(tmp_path: Path) -> None:
+def test_dry_friction_holds_up_to_its_torque(tmp_path: Path) -> None:
     gear, dry = 10.0, 0.2  # 2 N·m at the joint
     segment = pendulum(tmp_path, frictionless(coulomb_friction=dry), gear=gear)
     servo, time = servo_of(segment), Time(segment)
@@ -117,7 +117,7 @@ def test_dry_friction_holds_up_to_its_torque_and_no_further(tmp_path: Path) -> N
     assert servo.position_rad / gear == pytest.approx(expected, rel=0.03)
 
 
-def test_a_brake_holds_without_power_and_slips_beyond_its_torque(tmp_path: Path) -> None:
+def test_brake_holds_without_power_and_slips_beyond_its_torque(tmp_path: Path) -> None:
     load = MASS * GRAVITY * LENGTH  # at 90 degrees
     for brake, holds in ((1.1 * load, True), (0.9 * load, False)):
         segment = pendulum(tmp_path, frictionless(), start=math.pi / 2, brake=brake)
@@ -125,8 +125,8 @@ def test_a_brake_holds_without_power_and_slips_beyond_its_torque(tmp_path: Path)
         assert (abs(servo_of(segment).position_rad - math.pi / 2) < 1e-5) is holds
 
 
-def test_by_default_the_brake_holds_what_the_motor_can_do(tmp_path: Path) -> None:
-    """MASS g LENGTH = 9.81 N·m; the motor's 2 N·m · 3 hold with a gear of 2, not with 1.5."""
+def test_default_brake_torque_is_the_maximum_motor_torque(tmp_path: Path) -> None:
+    """MASS g LENGTH = 9.81 N·m. A motor of 3 · 2 N·m holds it with a gear of 2, but not of 1.5."""
     for gear, holds in ((2.0, True), (1.5, False)):
         servo = frictionless(rated_torque=2.0, max_torque_ratio=3.0)
         segment = pendulum(tmp_path, servo, start=math.pi / 2, brake=None, gear=gear)
@@ -134,8 +134,8 @@ def test_by_default_the_brake_holds_what_the_motor_can_do(tmp_path: Path) -> Non
         assert (abs(servo.position_rad / gear - math.pi / 2) < 1e-5) is holds
 
 
-def test_two_axes_of_one_servo_and_one_of_another_turn_one_model(tmp_path: Path) -> None:
-    """The motor torques that hold are gravity's: m g x of the point masses, by hand."""
+def test_axes_of_two_servos_drive_one_model(tmp_path: Path) -> None:
+    """The holding torques equal those of gravity: m g x of the point masses."""
     text = DOUBLE.replace("</mujoco>", "").replace(
         "</worldbody>",
         """<body pos="0 0 2"><joint name="slide" type="slide" axis="0 0 1"/>
@@ -158,7 +158,7 @@ def test_two_axes_of_one_servo_and_one_of_another_turn_one_model(tmp_path: Path)
     assert positions == pytest.approx([0, 0, 0], abs=1e-6)
 
 
-def test_a_joints_range_is_a_hard_stop(tmp_path: Path) -> None:
+def test_joint_range_is_a_hard_stop(tmp_path: Path) -> None:
     joints = [Joint("shoulder", brake=100.0), Joint("elbow", brake=0.0)]
     segment = Segment([Servo(axes=2)], plant=Plant(model(tmp_path, DOUBLE), joints))
     servo = servo_of(segment)
@@ -167,8 +167,8 @@ def test_a_joints_range_is_a_hard_stop(tmp_path: Path) -> None:
     assert servo.axis_position(1) == pytest.approx(2.0, abs=0.02)
 
 
-def test_the_model_and_the_motors_share_the_step(tmp_path: Path) -> None:
-    """Nobody looks, nothing is skipped: one step each 250 us."""
+def test_model_and_motors_step_together(tmp_path: Path) -> None:
+    """One step every 250 us, none is skipped, also without frames."""
     segment = pendulum(tmp_path, frictionless())
     Time(segment).pass_by(1.0)
     assert segment.plant is not None
@@ -176,7 +176,7 @@ def test_the_model_and_the_motors_share_the_step(tmp_path: Path) -> None:
     assert segment.plant.data.time == pytest.approx(1.0)
 
 
-def test_a_drive_without_power_is_turned_all_the_same(tmp_path: Path) -> None:
+def test_unpowered_drive_is_turned_by_the_model(tmp_path: Path) -> None:
     segment = pendulum(tmp_path, frictionless(), start=0.5)
     servo, time = servo_of(segment), Time(segment)
     segment.inject(power_cycle(0, for_=0.3))
@@ -187,11 +187,11 @@ def test_a_drive_without_power_is_turned_all_the_same(tmp_path: Path) -> None:
     assert servo.position_rad == segment.plant.data.joint("swing").qpos[0]
 
 
-def test_a_drive_that_is_replaced_gets_the_motor(tmp_path: Path) -> None:
+def test_replacement_drive_gets_the_motor(tmp_path: Path) -> None:
     segment = pendulum(tmp_path, frictionless(), start=0.5)
     time = Time(segment)
     old, new = servo_of(segment), frictionless(name="spare")
-    segment.inject(swap(0, Coupler(), for_=0.1))  # the wrong one first: nobody turns the motor
+    segment.inject(swap(0, Coupler(), for_=0.1))  # first a device without a motor
     segment.inject(swap(0, new, at=0.2, for_=0.1))
     time.pass_by(0.4)
     assert segment.plant is not None
@@ -200,7 +200,7 @@ def test_a_drive_that_is_replaced_gets_the_motor(tmp_path: Path) -> None:
     assert old.position == -1
 
 
-def test_drives_that_change_places_on_the_line_keep_their_motors(tmp_path: Path) -> None:
+def test_exchanged_drives_keep_their_motors(tmp_path: Path) -> None:
     joints = [Joint("shoulder", brake=100), Joint("elbow", brake=0, start=0.5)]
     servos = [frictionless(name="one"), frictionless(name="other")]
     segment = Segment(servos, plant=Plant(model(tmp_path, DOUBLE), joints))
@@ -224,7 +224,7 @@ FINGER = """
 
 
 @pytest.mark.parametrize(("contacts", "grips"), [(True, True), (False, False)])
-def test_a_finger_meets_an_object(tmp_path: Path, contacts: bool, grips: bool) -> None:
+def test_finger_stops_at_an_object(tmp_path: Path, contacts: bool, grips: bool) -> None:
     """A spindle of 500 rad/m closes 70 mm until the faces meet."""
     plant = Plant(model(tmp_path, FINGER), [Joint("grip", gear=500.0, brake=0)], contacts=contacts)
     servo = Servo(inertia=1e-5, coulomb_friction=0.0)
@@ -235,8 +235,8 @@ def test_a_finger_meets_an_object(tmp_path: Path, contacts: bool, grips: bool) -
     assert grips or servo.position_rad / 500 > 0.075
 
 
-def test_somebody_pushes_the_arm(tmp_path: Path) -> None:
-    """A force at the point mass of the hanging pendulum: angle = force t² / 2 m l, from rest."""
+def test_external_force_moves_the_arm(tmp_path: Path) -> None:
+    """Force at the point mass of a hanging pendulum at rest: angle = force t² / 2 m l."""
     segment = pendulum(tmp_path, frictionless())
     assert segment.plant is not None
     segment.plant.data.body("rod").xfrc_applied[0] = 5.0  # N, at its centre of mass
@@ -245,7 +245,7 @@ def test_somebody_pushes_the_arm(tmp_path: Path) -> None:
     assert angle == pytest.approx(-0.5 * 5.0 / (MASS * LENGTH) * 0.05**2, rel=0.01)
 
 
-def test_a_shaft_turned_by_hand_turns_the_joint(tmp_path: Path) -> None:
+def test_shaft_moved_by_hand_moves_the_joint(tmp_path: Path) -> None:
     segment = pendulum(tmp_path, frictionless(), gear=10.0, brake=None)
     servo, time = servo_of(segment), Time(segment)
     servo.move_to(5.0)
@@ -255,7 +255,7 @@ def test_a_shaft_turned_by_hand_turns_the_joint(tmp_path: Path) -> None:
     assert segment.plant.data.joint("swing").qpos[0] == pytest.approx(0.5)
 
 
-def test_two_runs_are_the_same_to_the_bit(tmp_path: Path) -> None:
+def test_two_runs_are_identical(tmp_path: Path) -> None:
     def run() -> bytes:
         joints = [Joint("shoulder", brake=0), Joint("elbow", gear=7, brake=0.01)]
         servos = [Servo(), Servo(inertia=1e-4)]

@@ -1,4 +1,4 @@
-"""Models for plants: MJCF, URDF, TOML, the arm of the example; errors that name what there is."""
+"""Models for plants: MJCF, URDF, TOML and the example arm. Errors list the existing names."""
 
 from __future__ import annotations
 
@@ -25,8 +25,8 @@ TOUCHING = """
 """
 
 
-def test_a_urdf_is_a_model_without_its_meshes(tmp_path: Path) -> None:
-    """Both links hang; at the elbow 30 degrees the motors hold m g l sin, by hand."""
+def test_urdf_is_read_without_meshes(tmp_path: Path) -> None:
+    """Both links hang. With the elbow at 30 degrees, the motors hold m g l sin(30°)."""
     angle = 30 * DEGREE
     path = model(tmp_path, URDF, "two.urdf")
     joints = [Joint("shoulder", brake=0), Joint("elbow", brake=0, start=angle)]
@@ -40,14 +40,14 @@ def test_a_urdf_is_a_model_without_its_meshes(tmp_path: Path) -> None:
     assert servo.axis_position(1) == pytest.approx(angle, abs=1e-6)
 
 
-def test_a_urdf_that_collides_needs_its_meshes(tmp_path: Path) -> None:
+def test_urdf_with_contacts_needs_its_meshes(tmp_path: Path) -> None:
     path = model(tmp_path, URDF, "two.urdf")
     with pytest.raises(ConfigurationError, match=r"upper.stl does not exist(.|\n)*contacts=False"):
         Plant(path)
 
 
 def test_meshes_are_found_below_the_package(tmp_path: Path) -> None:
-    """A tetrahedron; only collision shapes are read."""
+    """A tetrahedron; only collision shapes are used."""
     (tmp_path / "meshes").mkdir()
     (tmp_path / "meshes" / "upper.stl").write_bytes(stl())
     (tmp_path / "urdf").mkdir()
@@ -56,7 +56,7 @@ def test_meshes_are_found_below_the_package(tmp_path: Path) -> None:
 
 
 def stl() -> bytes:
-    """The corner of a cube, as binary STL."""
+    """Return the corner of a cube as binary STL."""
     facets = [(0, 2, 1), (0, 1, 3), (1, 2, 3), (2, 0, 3)]
     corners = [(0.0, 0.0, 0.0), (0.1, 0.0, 0.0), (0.0, 0.1, 0.0), (0.0, 0.0, 0.1)]
     body = b"".join(
@@ -66,7 +66,7 @@ def stl() -> bytes:
     return bytes(80) + struct.pack("<I", len(facets)) + body
 
 
-def test_no_joints_named_takes_the_models_in_their_order(tmp_path: Path) -> None:
+def test_all_joints_of_the_model_are_the_default(tmp_path: Path) -> None:
     plant = Plant(model(tmp_path, DOUBLE))
     assert [(joint.name, joint.gear) for joint in plant.joints] == [("shoulder", 1), ("elbow", 1)]
     segment = Segment([DigitalOutputs(), Servo(axes=2)], plant=plant)
@@ -85,7 +85,7 @@ def test_no_joints_named_takes_the_models_in_their_order(tmp_path: Path) -> None
         ([Joint("shoulder"), Joint("elbow", start=3.0)], (), "start at 3; its range is -2 to 2"),
     ],
 )  # fmt: skip
-def test_joints_that_do_not_match_name_those_there_are(
+def test_unknown_joints_are_refused_with_a_list(
     tmp_path: Path, joints: list[Joint], passive: tuple[str, ...], says: str
 ) -> None:
     with pytest.raises(ConfigurationError, match=says):
@@ -101,7 +101,7 @@ def test_joints_that_do_not_match_name_those_there_are(
         ([Joint("shoulder", axis=(1, 0)), Joint("elbow", axis=(1, 0))], 1, r"two joints .*1, 0"),
     ],
 )  # fmt: skip
-def test_joints_that_do_not_match_the_axes_name_those_there_are(
+def test_unknown_axes_are_refused_with_a_list(
     tmp_path: Path, joints: list[Joint], axes: int, says: str
 ) -> None:
     plant = Plant(model(tmp_path, DOUBLE), joints)
@@ -109,7 +109,7 @@ def test_joints_that_do_not_match_the_axes_name_those_there_are(
         Segment([DigitalOutputs(), Servo(axes=axes)], plant=plant)
 
 
-def test_axes_beside_the_model_keep_their_own_motors(tmp_path: Path) -> None:
+def test_axes_without_a_joint_keep_their_own_motors(tmp_path: Path) -> None:
     joints = [Joint("shoulder", axis=(0, 1), brake=20.0), Joint("elbow", axis=(1, 0))]
     alone = frictionless(inertia=1e-3, axes=2)
     segment = Segment([alone, Servo()], plant=Plant(model(tmp_path, DOUBLE), joints))
@@ -129,14 +129,16 @@ def test_axes_beside_the_model_keep_their_own_motors(tmp_path: Path) -> None:
         ("arm.urdf", URDF.replace('<mass value="1"/>', '<mass value="0"/>'), "MuJoCo rejects"),
     ],
 )
-def test_files_that_are_no_models(tmp_path: Path, name: str, text: str | None, says: str) -> None:
+def test_invalid_model_files_are_refused(
+    tmp_path: Path, name: str, text: str | None, says: str
+) -> None:
     if text is not None:
         model(tmp_path, text, name)
     with pytest.raises(ConfigurationError, match=says):
         Plant(tmp_path / name, contacts=False)
 
 
-def test_bodies_that_begin_in_one_another_are_named(tmp_path: Path) -> None:
+def test_bodies_that_overlap_at_the_start_are_named(tmp_path: Path) -> None:
     path = model(tmp_path, TOUCHING)
     with pytest.raises(ConfigurationError, match=r"'finger' and body 'world' overlap by 50.0 mm"):
         Plant(path)
@@ -156,24 +158,24 @@ def test_bodies_that_begin_in_one_another_are_named(tmp_path: Path) -> None:
         {"brake_delay": -0.1},
     ],
 )
-def test_joints_that_cannot_be(wrong: dict[str, float]) -> None:
+def test_invalid_joints_are_refused(wrong: dict[str, float]) -> None:
     with pytest.raises(ValueError, match="joint 'elbow'"):
         Joint("elbow", **wrong)  # type: ignore[arg-type]
 
 
-def test_a_step_that_is_too_long_says_why(tmp_path: Path) -> None:
+def test_too_long_step_is_refused_with_the_reason(tmp_path: Path) -> None:
     with pytest.raises(ValueError, match="dead time"):
         Plant(model(tmp_path, PENDULUM), step=2e-3)
 
 
-def test_a_plant_moves_in_one_segment(tmp_path: Path) -> None:
+def test_plant_belongs_to_one_segment(tmp_path: Path) -> None:
     plant = Plant(model(tmp_path, PENDULUM))
     Segment([Servo()], plant=plant)
     with pytest.raises(ValueError, match="another segment"):
         Segment([Servo()], plant=plant)
 
 
-def test_without_mujoco_one_line_names_the_extra(
+def test_error_without_mujoco_names_the_extra(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     imports = builtins.__import__
@@ -217,7 +219,7 @@ axes = 2
 """
 
 
-def test_a_plant_is_read_from_a_segments_file(tmp_path: Path) -> None:
+def test_plant_is_read_from_a_segment_file(tmp_path: Path) -> None:
     model(tmp_path, DOUBLE)
     segment = read_segment(model(tmp_path, GOOD, "cell.toml"))
     assert segment.plant is not None
@@ -239,7 +241,7 @@ def test_a_plant_is_read_from_a_segments_file(tmp_path: Path) -> None:
         (("axes = 2", "axes = 1"), r"cell.toml: .*no axis for joint 'elbow'"),
     ],
 )
-def test_a_plants_table_that_is_wrong(tmp_path: Path, change: tuple[str, str], says: str) -> None:
+def test_invalid_plant_table_is_refused(tmp_path: Path, change: tuple[str, str], says: str) -> None:
     model(tmp_path, DOUBLE)
     path = model(tmp_path, GOOD.replace(*change), "cell.toml")
     with pytest.raises(ConfigurationError, match=says):
@@ -249,8 +251,8 @@ def test_a_plants_table_that_is_wrong(tmp_path: Path, change: tuple[str, str], s
 # -- robots ------------------------------------------------------------------------------------
 
 
-def test_the_examples_arm_has_the_limits_of_an_indy7() -> None:
-    """Of its joint_limits.yaml: N·m, degrees a second, degrees."""
+def test_example_arm_has_the_limits_of_an_indy7() -> None:
+    """Values of its joint_limits.yaml: N·m, degrees per second, degrees."""
     segment = read_segment(COBOT / "segment.toml")
     assert segment.plant is not None
     efforts = [431.97, 431.97, 197.23, 79.79, 79.79, 79.79]
@@ -268,11 +270,11 @@ def test_the_examples_arm_has_the_limits_of_an_indy7() -> None:
     assert sum(segment.plant.model.body_mass) == pytest.approx(26.38, rel=0.01)  # as an Indy7's
 
 
-def test_an_indy7s_description_is_loaded_where_it_lies(shared_data: Path) -> None:
+def test_indy7_description_is_loaded_in_place(shared_data: Path) -> None:
     path = shared_data / "robots" / "indy7" / "derived_indy7_flat.urdf"
     servos = [Servo(name=f"joint{k}") for k in range(6)]
     plant = Plant(path, [Joint(f"joint{k}", gear=100.0) for k in range(6)], contacts=False)
     segment = Segment(servos, plant=plant)
     Time(segment).pass_by(0.1)
-    assert max(abs(plant.data.qpos)) < 1e-4  # upright, on its brakes
+    assert max(abs(plant.data.qpos)) < 1e-4  # upright, held by its brakes
     assert plant.model.jnt_range[5].tolist() == pytest.approx([-215 * DEGREE, 215 * DEGREE])

@@ -1,4 +1,4 @@
-"""The example's arm under a whole MainDevice: by SYNC0, in tasks' time, twice the same."""
+"""The example arm with a complete MainDevice: SYNC0, shared clock, reproducibility."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def example() -> Segment:
 
 
 def sway(segment: Segment, **options: object) -> tuple[Values, Values]:
-    """Positions and targets of 500 cycles of a smooth motion in CSP [rad]."""
+    """Return positions and targets of 500 cycles of a smooth motion in CSP [rad]."""
     positions, targets = [], []
     with cat.MainDevice(segment) as main:
         given = {"counts_per_turn": 131072, "velocity_limit": 3.0, **GEARS, **options}
@@ -41,31 +41,31 @@ def sway(segment: Segment, **options: object) -> tuple[Values, Values]:
 
 
 def worst(positions: Values, targets: Values, lag: int) -> float:
-    """The largest following error [rad], where a target shows its effect `lag` cycles later."""
+    """Return the largest following error [rad]. A target takes effect after `lag` cycles."""
     return float(np.abs(positions[lag:] - targets[:-lag]).max())
 
 
 def test_an_arm_follows_in_position_control() -> None:
-    """The largest speed is 1.2 rad/s: a cycle more or less would be 1.2e-3 rad."""
+    """The maximum speed is 1.2 rad/s, so an error of one cycle would be 1.2e-3 rad."""
     assert worst(*sway(example()), lag=2) < 4e-4
 
 
-def test_servos_that_keep_time_by_sync0_move_it_too() -> None:
-    """Six clocks, none of them the plant's: pulses fall between its steps."""
+def test_servos_synchronised_to_sync0_move_the_arm() -> None:
+    """The plant uses none of the six clocks, so pulses occur between its steps."""
     segment = example()
     for k, device in enumerate(segment):
         device.crystal = Crystal(ppm=20.0 * k - 50)
     assert worst(*sway(segment, dc=True), lag=3) < 6e-4
 
 
-def test_two_runs_are_the_same_to_the_bit() -> None:
+def test_two_runs_are_identical() -> None:
     first, second = sway(example()), sway(example())
     assert first[0].tobytes() == second[0].tobytes()
     assert first[1].tobytes() == second[1].tobytes()
 
 
-def test_it_lives_by_the_time_of_tasks() -> None:
-    """A clock that others share: as many steps as its time has."""
+def test_plant_runs_on_a_shared_clock() -> None:
+    """The number of steps agrees with the time of the shared clock."""
     plant = Plant(COBOT / "arm.xml")
     segment = Segment([Servo(axes=6)], plant=plant, clock=VirtualClock())
     link = segment.open_link()

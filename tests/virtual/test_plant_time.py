@@ -1,4 +1,4 @@
-"""A plant in real time: its own thread steps it, frames never wait for it."""
+"""Plant in real time: a separate thread steps it, and frames never wait for it."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def steps(segment: Segment) -> int:
     return segment.plant.steps
 
 
-def test_it_swings_while_nobody_sends(tmp_path: Path) -> None:
+def test_plant_moves_without_frames(tmp_path: Path) -> None:
     segment = swinging(tmp_path)
     servo = segment[0]
     assert isinstance(servo, Servo)
@@ -48,13 +48,13 @@ def test_it_swings_while_nobody_sends(tmp_path: Path) -> None:
     after = steps(segment)
     assert segment.plant is not None
     assert segment.plant.data.time == pytest.approx(after * 250e-6)
-    link = segment.open_link()  # and on from where it stood
+    link = segment.open_link()  # it continues from its last position
     until(lambda: steps(segment) > after + 40)
     link.close()
 
 
-def test_a_frame_is_answered_without_a_step(tmp_path: Path) -> None:
-    """The plant's thread stands still: nobody else does its work, and frames come back."""
+def test_frame_is_answered_without_a_step(tmp_path: Path) -> None:
+    """While the plant thread is stopped, no other thread steps the plant, and frames return."""
     segment = swinging(tmp_path)
     main = MainDevice(segment)
     until(lambda: steps(segment) > 10)
@@ -70,7 +70,7 @@ def test_a_frame_is_answered_without_a_step(tmp_path: Path) -> None:
     main.link.close()
 
 
-def test_a_served_arm_swings(tmp_path: Path, veth: tuple[str, str]) -> None:
+def test_served_arm_moves(tmp_path: Path, veth: tuple[str, str]) -> None:
     segment = swinging(tmp_path)
     with Server(segment, veth[1], max_age=None), wire(veth[0]) as near:
         for _ in range(20):
@@ -87,7 +87,7 @@ def free(folder: Path, text: str = PENDULUM, **options: object) -> tuple[Segment
     return Segment([servo], plant=plant, **options), servo  # type: ignore[arg-type]
 
 
-def test_a_simulation_beyond_all_bounds_stops_and_says_so(tmp_path: Path) -> None:
+def test_diverged_simulation_stops_with_an_error(tmp_path: Path) -> None:
     segment, servo = free(tmp_path)
     time = Time(segment)
     servo.apply_load(3e9)
@@ -97,10 +97,10 @@ def test_a_simulation_beyond_all_bounds_stops_and_says_so(tmp_path: Path) -> Non
         time.pass_by(0.01)
 
 
-def test_what_is_no_number_is_told_in_mujocos_words(
+def test_nan_is_reported_with_the_message_of_mujoco(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """And not in a file, which MuJoCo would write."""
+    """MuJoCo itself would write it to a file."""
     monkeypatch.chdir(tmp_path)
     segment, servo = free(tmp_path)
     time = Time(segment)
@@ -124,13 +124,13 @@ CROWDED = """<mujoco><size memory="{}K"/><worldbody><geom type="plane" size="3 3
 def test_too_little_memory_for_contacts_does_not_end_the_process(
     tmp_path: Path, kilobytes: int
 ) -> None:
-    """Boxes fall on the floor. MuJoCo warns, or ends the process where nobody hears its errors."""
+    """Boxes fall on the floor. Without an error handler, MuJoCo would end the process."""
     segment, _servo = free(tmp_path, CROWDED.format(kilobytes, BOXES))
     with pytest.raises(ConfigurationError, match=r"MuJoCo reports: .*memory"):
         Time(segment).pass_by(1.0)
 
 
-def test_in_real_time_it_stands_still_and_frames_are_answered_on(
+def test_frames_are_answered_after_the_simulation_has_stopped(
     tmp_path: Path, veth: tuple[str, str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     said: list[object] = []

@@ -1,5 +1,7 @@
-"""Ports: loops, links, trees, circulating frames and times of arrival (ET1100 datasheet, section I,
-chapter 3; section II, 0x0101, 0x0110, 0x0300 to 0x0313, 0x0900)."""
+"""Ports: loops, links, trees, circulating frames and receive times.
+
+ET1100 datasheet, section I, chapter 3; section II, 0x0101, 0x0110, 0x0300 to 0x0313, 0x0900.
+"""
 
 from __future__ import annotations
 
@@ -13,7 +15,7 @@ from catenary.wire.datagram import Datagram, EcatCommand
 from catenary.wire.frame import decode_frame, encode_frame
 from tests.virtual.main_device import MILLISECOND, STATION, MainDevice
 
-PROCESSED, BACK = 390, 350  # [ns] from one device to the next, with a processing unit or without
+PROCESSED, BACK = 390, 350  # [ns] from one device to the next, with and without the processing unit
 AUTO, AUTO_CLOSE, OPEN, CLOSED = range(4)
 DL_CONTROL, DL_STATUS = 0x0100, 0x0110
 
@@ -45,7 +47,7 @@ def answers(main: MainDevice) -> int | None:
 
 
 def loops(main: MainDevice, device: int) -> tuple[int, int]:
-    """(links, loops) of DL status."""
+    """Return (links, loops) from DL status."""
     status = main.segment.core.peek(device, DL_STATUS, 2)
     return status[0] >> 4, status[1]
 
@@ -57,7 +59,7 @@ def times(main: MainDevice, device: int) -> list[int]:
 # -- trees ------------------------------------------------------------------------------------
 
 
-def test_positions_count_along_the_way_of_the_frame() -> None:
+def test_positions_follow_the_frame_path() -> None:
     main = tree()
     assert main.segment.wires.processed(0) == [0, 1, 2, 3, 4, 5]
     assert [main.read(STATION + k, 0x0010, 2) for k in range(6)] == [
@@ -65,7 +67,7 @@ def test_positions_count_along_the_way_of_the_frame() -> None:
     ]
 
 
-def test_dl_status_shows_where_something_hangs() -> None:
+def test_dl_status_shows_connected_ports() -> None:
     main = tree()
     assert loops(main, 1) == (0b1111, 0b10101010)
     assert loops(main, 3) == (0b0001, 0b01010110)
@@ -73,16 +75,16 @@ def test_dl_status_shows_where_something_hangs() -> None:
     assert main.segment.core.peek(0, 0x0007, 1) == b"\x0f"
 
 
-def test_a_branch_that_is_cut_leaves_the_others() -> None:
+def test_cut_branch_does_not_affect_the_others() -> None:
     main = tree()
     main.segment.inject(cut(between=(1, 2)))
-    assert answers(main) is None  # not seen yet
+    assert answers(main) is None  # not detected yet
     assert answers(main) == 4
     assert main.segment.wires.processed(0) == [0, 1, 4, 5]
     assert loops(main, 1) == (0b0111, 0b01101010)
 
 
-def test_frames_come_back_to_each_port_after_its_branch() -> None:
+def test_frames_return_to_each_port_after_its_branch() -> None:
     main = tree()
     main.exchange(EcatCommand.BWR, 0, 0x0900, bytes(4))
     at = times(main, 1)
@@ -92,13 +94,13 @@ def test_frames_come_back_to_each_port_after_its_branch() -> None:
     assert at[2] - at[1] == BACK + PROCESSED
 
 
-def test_a_port_nothing_comes_to_keeps_its_time() -> None:
+def test_port_without_frames_keeps_its_receive_time() -> None:
     main = tree()
     main.exchange(EcatCommand.BWR, 0, 0x0900, bytes(4))
     assert times(main, 5)[1:] == [0, 0, 0]
 
 
-def test_a_longer_cable_takes_longer() -> None:
+def test_longer_cable_adds_delay() -> None:
     main = line(2)
     main.exchange(EcatCommand.BWR, 0, 0x0900, bytes(4))
     short = times(main, 0)
@@ -111,24 +113,24 @@ def test_a_longer_cable_takes_longer() -> None:
 # -- loop control -----------------------------------------------------------------------------
 
 
-def test_a_loop_closed_by_hand_ends_the_line() -> None:
+def test_manually_closed_loop_ends_the_line() -> None:
     main = line()
     main.write(STATION + 1, DL_CONTROL + 1, bytes([CLOSED << 2]))
     assert answers(main) == 2
-    assert loops(main, 1) == (0b0011, 0b01010110)  # the link is there, the loop is closed
+    assert loops(main, 1) == (0b0011, 0b01010110)  # the link exists, but the loop is closed
     assert loops(main, 2) == (0b0001, 0b01010110)
     main.write(STATION + 1, DL_CONTROL + 1, bytes([AUTO]))
     assert answers(main) == 3
 
 
-def test_a_loop_opened_by_hand_sends_into_the_void() -> None:
+def test_manually_opened_loop_loses_frames() -> None:
     main = line()
     main.write(STATION + 2, DL_CONTROL + 1, bytes([OPEN << 2]))
     assert answers(main) is None
     assert [loss.cause for loss in main.segment.take_losses()] == ["no light"]
 
 
-def test_a_port_that_is_not_there_stays_closed() -> None:
+def test_missing_port_stays_closed() -> None:
     main = line()
     main.write(STATION, DL_CONTROL + 1, bytes([OPEN << 6 | OPEN << 4]))
     assert answers(main) == 3
@@ -145,17 +147,17 @@ def test_temporary_use_lasts_a_second() -> None:
     assert main.read(STATION + 1, DL_CONTROL, 2) == b"\x01\x00"
 
 
-def test_auto_close_opens_when_it_is_written_again() -> None:
+def test_auto_close_opens_when_written_again() -> None:
     main = line()
     main.write(STATION, DL_CONTROL + 1, bytes([AUTO_CLOSE << 2]))
     main.segment.inject(cut(between=(0, 1), for_=0.01))
     main.let_pass(20)
-    assert answers(main) == 1  # joined, but closed until somebody says so
+    assert answers(main) == 1  # joined, but closed until DL control is written
     main.write(STATION, DL_CONTROL + 1, bytes([AUTO_CLOSE << 2]))
     assert answers(main) == 3
 
 
-def test_auto_close_opens_by_a_frame_that_comes_to_it() -> None:
+def test_auto_close_opens_when_a_frame_arrives() -> None:
     segment = Segment([Coupler(), Coupler()], ring=True)
     with segment.open_link() as link, segment.second.open_link() as other:
         control = Datagram(EcatCommand.APWR, (DL_CONTROL + 1) << 16, bytes([AUTO_CLOSE << 2]))
@@ -165,7 +167,9 @@ def test_auto_close_opens_by_a_frame_that_comes_to_it() -> None:
         segment.take_losses()
         assert segment.wires.processed(0) == [0]
         other.send(encode_frame([Datagram(EcatCommand.BRD, 0, b"\0")]))
-        assert not other.wait_until(other.now() + MILLISECOND, True)  # the one that opened it
+        assert not other.wait_until(
+            other.now() + MILLISECOND, True
+        )  # the frame that opened the loop
     assert [loss.cause for loss in segment.take_losses()] == ["closed port"]
     assert segment.wires.processed(0) == [0, 1]
 
@@ -184,15 +188,15 @@ def test_lost_links_are_counted_and_cleared_by_writing() -> None:
     assert main.read(STATION, 0x0310, 4) == b"\0\0\0\0"
 
 
-def test_light_that_is_back_in_time_was_never_gone() -> None:
+def test_short_loss_of_light_is_not_detected() -> None:
     main = line()
-    main.segment.inject(cut(between=(0, 1), for_=10e-6))  # enhanced detection takes 15
+    main.segment.inject(cut(between=(0, 1), for_=10e-6))  # enhanced detection takes 15 us
     main.let_pass(1)
     assert main.read(STATION, 0x0310, 4) == bytes(4)
     assert answers(main) == 3
 
 
-def test_a_change_of_links_is_an_event() -> None:
+def test_link_change_raises_an_event() -> None:
     main = line()
     main.read(STATION, DL_STATUS, 2)
     assert main.segment.core.peek(0, 0x0210, 1)[0] & 4 == 0
@@ -201,16 +205,16 @@ def test_a_change_of_links_is_an_event() -> None:
     assert main.segment.core.peek(0, 0x0210, 1)[0] & 4 == 4
 
 
-def test_a_frame_whose_lengths_do_not_fit_is_an_error_of_every_processing_unit() -> None:
+def test_malformed_frame_is_counted_by_every_processing_unit() -> None:
     main = line()
     frame = bytearray(encode_frame([Datagram(EcatCommand.BRD, 0, bytes(20))]))
-    frame[16 + 6] = 200  # the datagram is longer than the frame says
+    frame[16 + 6] = 200  # the datagram is longer than the frame
     main.link.send(bytes(frame))
     assert [main.segment.core.peek(k, 0x030C, 1) for k in range(3)] == [b"\x01"] * 3
     assert main.segment.frames.malformed == 1
 
 
 @pytest.mark.parametrize("seconds", [-1.0, 2.0, "slow"])
-def test_a_wrong_time_of_detection_is_refused(seconds: float | str) -> None:
+def test_invalid_detection_time_is_refused(seconds: float | str) -> None:
     with pytest.raises(ValueError, match="link_loss_detection"):
         Segment([Coupler()], link_loss_detection=seconds)  # type: ignore[arg-type]

@@ -1,4 +1,4 @@
-"""A ring from both ends: whole, cut, cut twice; what is processed where, and what is lost when."""
+"""Ring with two links: closed, cut once and cut twice."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ from catenary.wire.frame import Frame, decode_frame, encode_frame
 MILLISECOND = 1_000_000
 COUNT = 6
 BRD = encode_frame([Datagram(EcatCommand.BRD, 0x0130 << 16, bytes(2))])
-LOCAL = 0x02  # of the source address: a processing unit had it
+LOCAL = 0x02  # bit of the source address that a processing unit sets
 
 
 class Ends:
-    """Owns both links into a ring."""
+    """Both links to a ring."""
 
     def __init__(self, *faults: Fault, detection: float = 15e-6) -> None:
         devices = [Coupler() for _ in range(COUNT)]
@@ -28,7 +28,7 @@ class Ends:
         self.links = (self.segment.open_link(), self.segment.second.open_link())
 
     def exchange(self) -> tuple[Frame | None, Frame | None]:
-        """One frame into each end; what comes back at each within half a millisecond."""
+        """Send one frame into each end. Return the frames received within 0.5 ms."""
         for link in self.links:
             link.send(BRD)
         end = self.links[0].now() + MILLISECOND // 2
@@ -54,15 +54,15 @@ def _counter(frame: Frame | None) -> int | None:
     return None if frame is None else frame.datagrams[0].working_counter
 
 
-def test_a_whole_ring_processes_what_comes_from_the_first_end_only() -> None:
+def test_closed_ring_processes_only_frames_from_the_first_end() -> None:
     ring = Ends()
     assert ring.segment.wires.processed(0) == list(range(COUNT))
     assert ring.segment.wires.processed(1) == []
-    # the frame from the first end leaves at the second, and the other way round
+    # a frame from either end leaves at the other end
     assert ring.counters() == (0, COUNT)
 
 
-def test_an_unprocessed_frame_is_untouched() -> None:
+def test_unprocessed_frame_is_not_changed() -> None:
     ring = Ends()
     ring.links[1].send(BRD)
     assert ring.links[0].wait_until(MILLISECOND, True)
@@ -75,7 +75,7 @@ def test_an_unprocessed_frame_is_untouched() -> None:
 
 
 @pytest.mark.parametrize("at", range(1, COUNT))
-def test_behind_a_cut_each_end_has_its_part(at: int) -> None:
+def test_each_end_reaches_its_part_of_a_cut_ring(at: int) -> None:
     ring = Ends(cut(between=(at - 1, at)))
     ring.let_pass(1)
     assert ring.segment.wires.processed(0) == list(range(at))
@@ -85,13 +85,13 @@ def test_behind_a_cut_each_end_has_its_part(at: int) -> None:
     assert first is not None
     assert second is not None
     assert not first.datagrams[0].circulating
-    assert second.datagrams[0].circulating  # it came by a port 0 that had closed itself
+    assert second.datagrams[0].circulating  # it passed a port 0 that was closed automatically
 
 
 @pytest.mark.parametrize(
     ("between", "expected"), [(("main", 0), (None, COUNT)), ((COUNT - 1, "main"), (COUNT, None))]
 )
-def test_the_cables_of_the_main_device(
+def test_cables_of_the_main_device_can_be_cut(
     between: tuple[int | str, int | str], expected: tuple[int | None, int | None]
 ) -> None:
     ring = Ends(cut(between=between))  # type: ignore[arg-type]
@@ -99,14 +99,14 @@ def test_the_cables_of_the_main_device(
     assert ring.counters() == expected
 
 
-def test_two_cuts_leave_an_island() -> None:
+def test_devices_between_two_cuts_are_unreachable() -> None:
     ring = Ends(cut(between=(1, 2)), cut(between=(3, 4)))
     ring.let_pass(1)
     assert ring.counters() == (2, 2)
     assert ring.segment.wires.processed(1) == [4, 5]
 
 
-def test_a_device_without_power_cuts_at_both_sides() -> None:
+def test_unpowered_device_cuts_the_ring_on_both_sides() -> None:
     ring = Ends(power_cycle(2, at=0.001, for_=0.005))
     ring.let_pass(2)
     assert ring.counters() == (2, 3)
@@ -115,18 +115,18 @@ def test_a_device_without_power_cuts_at_both_sides() -> None:
     assert ring.segment[2].state == 1
 
 
-def test_until_a_cut_is_seen_both_frames_run_into_the_dark() -> None:
+def test_both_frames_are_lost_until_a_cut_is_detected() -> None:
     ring = Ends(detection=3e-3)
     ring.segment.inject(cut(between=(2, 3)))
-    found = [ring.counters() for _ in range(8)]  # one each half millisecond
+    found = [ring.counters() for _ in range(8)]  # one frame per half millisecond
     assert found == [(None, None)] * 6 + [(3, 3)] * 2
     assert {loss.cause for loss in ring.segment.take_losses()} == {"no light"}
 
 
-def test_a_frame_that_comes_by_a_second_closed_port_0_is_destroyed() -> None:
+def test_frame_at_a_second_closed_port_0_is_destroyed() -> None:
     ring = Ends()
     marked = bytearray(BRD)
-    marked[16 + 7] |= 0x40  # circulating, before it came
+    marked[16 + 7] |= 0x40  # already marked as circulating
     ring.segment.inject(cut(between=(2, 3)))
     ring.let_pass(1)
     ring.links[1].send(bytes(marked))
@@ -136,7 +136,7 @@ def test_a_frame_that_comes_by_a_second_closed_port_0_is_destroyed() -> None:
     assert ring.links[0].wait_until(ring.links[0].now() + MILLISECOND, True)
 
 
-def test_station_addresses_hold_on_both_sides_of_a_cut() -> None:
+def test_station_addresses_are_valid_on_both_sides_of_a_cut() -> None:
     ring = Ends()
     for k in range(COUNT):
         data = (0x1000 + k).to_bytes(2, "little")
@@ -162,8 +162,8 @@ def test_station_addresses_hold_on_both_sides_of_a_cut() -> None:
 
 
 @pytest.mark.parametrize("detection", [15e-6, 3e-3])
-def test_a_thousand_cuts_and_joins_lose_no_more_than_they_may(detection: float) -> None:
-    """Each cycle both copies go; a cycle is lost when no device answered in either, or not all."""
+def test_thousand_cuts_lose_a_bounded_number_of_frames(detection: float) -> None:
+    """Each cycle sends both frames. A cycle is lost unless together they reach all devices."""
     dice = random.Random(4)
     ring = Ends(detection=detection)
     lost = allowed = 0
@@ -181,7 +181,7 @@ def test_a_thousand_cuts_and_joins_lose_no_more_than_they_may(detection: float) 
     assert 0 < lost <= allowed
 
 
-def test_a_line_has_no_second_end() -> None:
+def test_line_has_no_second_end() -> None:
     with pytest.raises(ValueError, match="only a ring"):
         Segment([Coupler()]).second.open_link()
 
@@ -194,7 +194,7 @@ def test_both_links_are_exclusive() -> None:
     ring.segment.second.open_link().close()
 
 
-def test_without_somebody_at_the_second_end_a_ring_is_a_line() -> None:
+def test_ring_without_a_second_link_is_a_line() -> None:
     segment = Segment([Coupler(), Coupler()], ring=True)
     with segment.first.open_link() as link:
         link.send(BRD)
@@ -209,15 +209,15 @@ def test_without_somebody_at_the_second_end_a_ring_is_a_line() -> None:
         assert link.wait_until(link.now() + MILLISECOND, True)
 
 
-def test_a_ring_may_start_cut() -> None:
+def test_ring_can_start_with_a_cut() -> None:
     segment = Segment([Servo(), Servo()], ring=True, faults=[cut(between=(0, 1))])
     with segment.first.open_link() as link, segment.second.open_link():
         link.wait_until(MILLISECOND, False)
         assert (segment.wires.processed(0), segment.wires.processed(1)) == ([0], [1])
 
 
-def test_links_foretell_their_next_frame_for_those_who_wait_at_both_ends() -> None:
-    """`due` of native/link.h, by way of the MainDevice's ring: it wakes at the frame."""
+def test_links_report_the_arrival_time_of_the_next_frame() -> None:
+    """`due` of native/link.h lets the ring of the MainDevice wake when a frame arrives."""
     segment = Segment([Coupler() for _ in range(COUNT)], ring=True)
     with Ring(segment.first, segment.second).open_link() as link:
         link.send(BRD)

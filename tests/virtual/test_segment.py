@@ -1,4 +1,4 @@
-"""The segment as a whole: time, determinism, links, size."""
+"""Segment: time, determinism, links and size."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from tests.virtual.main_device import STATION, MainDevice
 BRD = encode_frame([Datagram(EcatCommand.BRD, 0, b"\0")])
 
 
-def test_time_stands_still_except_while_waiting() -> None:
+def test_time_advances_only_while_waiting() -> None:
     with demo_segment().open_link() as link:
         before = link.now()
         link.send(BRD)
@@ -25,17 +25,17 @@ def test_time_stands_still_except_while_waiting() -> None:
         assert link.now() == before + 5_000_000
 
 
-def test_a_frame_wakes_at_its_arrival() -> None:
+def test_wait_ends_when_a_frame_arrives() -> None:
     with demo_segment().open_link() as link:
         link.send(BRD)
         assert link.wait_until(10_000_000, True)
-        # 60 + 24 bytes at 100 Mbit/s; six devices there, five back, twelve cables
+        # 60 + 24 bytes at 100 Mbit/s; six devices out, five back, twelve cables
         assert link.now() == 84 * 80 + 6 * 340 + 5 * 300 + 12 * 50
         assert link.receive() is not None
         assert not link.wait_until(10_000_000, True)
 
 
-def test_frames_sent_together_arrive_one_after_the_other() -> None:
+def test_frames_sent_together_arrive_in_sequence() -> None:
     with demo_segment().open_link() as link:
         arrivals = []
         for _ in range(3):
@@ -46,7 +46,7 @@ def test_frames_sent_together_arrive_one_after_the_other() -> None:
         assert [b - a for a, b in itertools.pairwise(arrivals)] == [6720, 6720]
 
 
-def test_a_queue_that_is_full_says_so() -> None:
+def test_full_queue_raises_an_error() -> None:
     with demo_segment().open_link() as link:
         for _ in range(256):
             link.send(BRD)
@@ -69,13 +69,13 @@ def run(steps: int) -> list[bytes]:
     return answers
 
 
-def test_two_runs_are_the_same_bit_for_bit() -> None:
+def test_two_runs_are_identical() -> None:
     first, second = run(200), run(200)
     assert first == second
     assert len(set(first)) > 50
 
 
-def test_one_link_at_a_time() -> None:
+def test_only_one_link_can_be_open() -> None:
     segment = demo_segment()
     link = segment.open_link()
     with pytest.raises(ValueError, match="open link"):
@@ -84,7 +84,7 @@ def test_one_link_at_a_time() -> None:
     segment.open_link().close()
 
 
-def test_a_device_stands_in_one_segment() -> None:
+def test_device_belongs_to_one_segment() -> None:
     coupler = Coupler()
     Segment([coupler])
     with pytest.raises(ValueError, match="already in a segment"):
@@ -99,13 +99,13 @@ def test_three_hundred_devices() -> None:
     assert main.read(STATION + 299, 0x0010, 2) == struct.pack("<H", STATION + 299)
 
 
-def test_an_empty_line_swallows_frames() -> None:
+def test_empty_line_returns_no_frames() -> None:
     with Segment([]).open_link() as link:
         link.send(BRD)
         assert not link.wait_until(1_000_000, True)
 
 
-def test_an_exception_in_the_service_reaches_the_caller() -> None:
+def test_exception_in_the_service_reaches_the_caller() -> None:
     segment = Segment([DigitalOutputs()])
 
     def fail() -> None:

@@ -1,4 +1,4 @@
-"""Served segments: what cannot be served, and a ring on two wires."""
+"""Served segments: invalid options, rings on two interfaces, faults and failures."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def wire(interface: str) -> socket.socket:
 
 
 def answer(at: socket.socket) -> int:
-    """The working counter of the next frame that came from the segment."""
+    """Return the working counter of the next frame from the segment."""
     while True:
         data, (_name, _protocol, kind, *_rest) = at.recvfrom(2048)
         if kind != socket.PACKET_OUTGOING:
@@ -48,7 +48,7 @@ def test_only_a_ring_has_two_interfaces() -> None:
         Server(Segment([Coupler()], clock="monotonic"), "veth0", second="veth1")
 
 
-def test_the_ends_of_a_ring_are_two(veth: tuple[str, str]) -> None:
+def test_ring_needs_two_different_interfaces(veth: tuple[str, str]) -> None:
     with pytest.raises(LinkError, match="cannot be both ends"):
         Server(ring(), veth[0], second=veth[0])
 
@@ -71,14 +71,14 @@ def test_frames_leave_a_ring_at_the_other_interface(veth: tuple[str, str]) -> No
         assert (answer(first), answer(second)) == (1, 2)
 
 
-def test_a_ring_on_one_interface_is_a_line(veth: tuple[str, str]) -> None:
+def test_ring_on_one_interface_is_a_line(veth: tuple[str, str]) -> None:
     with Server(ring(), veth[1], max_age=None), wire(veth[0]) as first:
         first.send(BRD)
         assert answer(first) == 3
 
 
 @pytest.mark.filterwarnings("ignore::pytest.PytestUnhandledThreadExceptionWarning")
-def test_an_application_that_fails_ends_the_server(
+def test_failed_application_ends_the_server(
     veth: tuple[str, str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     segment = ring()
@@ -97,12 +97,12 @@ def raise_failure_soon(server: Server) -> None:
         server.raise_failure()
 
 
-def test_faults_reach_a_served_segment(veth: tuple[str, str]) -> None:
+def test_served_segment_plays_faults(veth: tuple[str, str]) -> None:
     segment = Segment(
         [Coupler() for _ in range(3)], clock="monotonic", faults=[cut(between=(0, 1), at=0.01)]
     )
     with Server(segment, veth[1], max_age=None), wire(veth[0]) as first:
-        first.settimeout(0.5)  # what runs into the dark does not come back
+        first.settimeout(0.5)  # frames in the dark cable are lost
         counters = []
         while not counters or counters[-1] != 1:
             first.send(BRD)
@@ -115,7 +115,7 @@ def test_faults_reach_a_served_segment(veth: tuple[str, str]) -> None:
     assert set(counters) <= {3, None, 1}
 
 
-def test_a_forked_child_does_not_end_it(veth: tuple[str, str]) -> None:
+def test_forked_child_does_not_end_the_server(veth: tuple[str, str]) -> None:
     segment = Segment([Coupler()], clock="monotonic")
     with Server(segment, veth[1], max_age=None) as server, wire(veth[0]) as first:
         child = os.fork()

@@ -1,4 +1,4 @@
-"""The servo as a drive: states, modes, limits, faults, stopping; physics at its own cycle."""
+"""Virtual servo: states, modes, limits, faults, stops and physics."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def drive() -> Drive:
     return Drive(Servo())
 
 
-def test_the_way_up_step_by_step(drive: Drive) -> None:
+def test_drive_is_enabled_step_by_step(drive: Drive) -> None:
     assert drive.state() & 0x4F == 0x40
     for drive.word, expected in ((SHUTDOWN, 0x21), (SWITCH_ON, 0x23), (ENABLE, 0x27)):
         assert drive.state() == expected
@@ -64,7 +64,7 @@ def test_csv_reaches_the_velocity(drive: Drive) -> None:
     assert drive.servo.velocity_rad_s == pytest.approx(4 * math.pi, rel=1e-3)
 
 
-def test_cst_accelerates_as_newton_says() -> None:
+def test_cst_acceleration_is_torque_over_inertia() -> None:
     drive = Drive(Servo(inertia=1e-3, viscous_friction=0, coulomb_friction=0))
     drive.enable(CST)
     drive.torque = 100  # a tenth of 2 N·m
@@ -88,7 +88,7 @@ def test_torque_is_limited() -> None:
     assert drive.cycle(3).torque == 500
 
 
-def test_a_jump_in_csp_is_a_following_error(drive: Drive) -> None:
+def test_csp_jump_causes_a_following_error(drive: Drive) -> None:
     drive.enable(CSP)
     drive.position += 50 * TURN
     assert drive.cycle(200).status & 0x4F == 0x08
@@ -98,7 +98,7 @@ def test_a_jump_in_csp_is_a_following_error(drive: Drive) -> None:
     assert drive.main.upload(STATION, 0x603F, 0) == struct.pack("<H", 0x8611)
 
 
-def test_a_fault_is_reset_by_an_edge_once_its_cause_is_gone(drive: Drive) -> None:
+def test_fault_is_reset_by_an_edge_after_its_cause_has_ended(drive: Drive) -> None:
     drive.enable(CSP)
     drive.servo.inject_fault(0x2310)
     assert drive.cycle(50).status & 0x4F == 0x08
@@ -113,7 +113,7 @@ def test_a_fault_is_reset_by_an_edge_once_its_cause_is_gone(drive: Drive) -> Non
 
 
 @pytest.mark.parametrize(("option", "end"), [(0, 0x40), (2, 0x40), (6, 0x07)])
-def test_quick_stop_by_its_option(option: int, end: int) -> None:
+def test_quick_stop_follows_its_option_code(option: int, end: int) -> None:
     drive = Drive(Servo())
     drive.main.download(STATION, 0x605A, 0, struct.pack("<h", option))
     drive.enable(CSV)
@@ -127,7 +127,7 @@ def test_quick_stop_by_its_option(option: int, end: int) -> None:
     assert moving is (option == 0)
 
 
-def test_sto_takes_the_torque_and_returns_only_to_disabled(drive: Drive) -> None:
+def test_sto_removes_the_torque_and_disables_the_drive(drive: Drive) -> None:
     drive.enable(CSP)
     drive.servo.switch_sto(True)
     assert drive.cycle(3).status & 0x5F == 0x40
@@ -170,13 +170,13 @@ def test_positions_wrap_at_32_bits() -> None:
     assert inputs.status & STATE_MASK == 0x27
 
 
-def test_an_unknown_mode_leaves_the_display(drive: Drive) -> None:
+def test_unknown_mode_does_not_change_the_display(drive: Drive) -> None:
     drive.enable(CSP)
     drive.mode = 4
     assert drive.cycle(3).mode == CSP
 
 
-def test_a_second_axis_has_its_objects_0x800_later() -> None:
+def test_objects_of_the_second_axis_have_an_offset_of_0x800() -> None:
     servo = Servo(axes=2)
     main = MainDevice(Segment([servo]))
     main.number_stations()

@@ -1,4 +1,4 @@
-"""Homing of the virtual servo, mode 6: as the profile's statusword tells it."""
+"""Homing of the virtual servo (mode 6), checked by its statusword."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ PROGRESS = 0x3400  # bits 10, 12, 13
 
 
 class Homing(Drive):
-    """A drive in mode 6, whose shaft meets stops from outside."""
+    """A drive in mode 6 with external hard stops."""
 
     def __init__(self, method: int, offset: int = 0) -> None:
         super().__init__(Servo(coulomb_friction=0.0))
@@ -29,7 +29,7 @@ class Homing(Drive):
         self.enable(HM)
 
     def run(self, cycles: int, stop: float | None = None) -> int:
-        """Bits 10, 12, 13; a stop: a spring beyond this angle."""
+        """Return bits 10, 12 and 13. `stop`: angle beyond which a spring acts."""
         for _ in range(cycles):
             status = self.cycle().status
             if stop is not None:
@@ -55,7 +55,7 @@ def test_zero_is_home_plus_offset() -> None:
     assert drive.cycle().position == -1000
 
 
-def test_csp_goes_on_from_the_new_zero() -> None:
+def test_csp_continues_from_the_new_zero() -> None:
     drive = Homing(37)
     drive.word = START
     drive.run(5)
@@ -72,17 +72,17 @@ def test_csp_goes_on_from_the_new_zero() -> None:
 
 
 @pytest.mark.parametrize(("method", "stop"), [(-3, 0.6), (-4, -0.1)])
-def test_against_a_hard_stop(method: int, stop: float) -> None:
+def test_homing_against_a_hard_stop(method: int, stop: float) -> None:
     drive = Homing(method)
     drive.word = START
-    assert drive.run(100, stop) == 0  # on its way
+    assert drive.run(100, stop) == 0  # still searching
     assert drive.run(1500, stop) == 0x1400
     assert drive.servo.position_rad == pytest.approx(stop, abs=0.08)
     assert abs(drive.cycle().position) < TURN * 0.08 / (2 * math.pi)
-    assert abs(drive.servo.torque_nm) < 0.3 * 2.0  # the threshold is the most it pushed with
+    assert abs(drive.servo.torque_nm) < 0.3 * 2.0  # the threshold limits the torque
 
 
-def test_without_bit_4_the_search_ends() -> None:
+def test_clearing_bit_4_ends_the_search() -> None:
     drive = Homing(-3)
     drive.word = START
     drive.run(100)
@@ -94,7 +94,7 @@ def test_without_bit_4_the_search_ends() -> None:
     assert before == pytest.approx(drive.servo.position_rad * TURN / (2 * math.pi), abs=2)
 
 
-def test_a_method_it_does_not_have_is_a_homing_error() -> None:
+def test_unknown_method_is_a_homing_error() -> None:
     drive = Homing(5)
     drive.word = START
     assert drive.run(5) == 0x2400

@@ -1,4 +1,4 @@
-"""Profile position and profile velocity of the servo, as IEC 61800-7-201 / CiA 402-2 state them."""
+"""Profile position and profile velocity of the servo, IEC 61800-7-201 / CiA 402-2."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def enabled(mode: int, servo: Servo | None = None) -> Drive:
 
 
 def set_point(drive: Drive, radians: float, bits: int = AT_ONCE) -> Inputs:
-    """One set-point with the whole handshake."""
+    """Send one set-point with the complete handshake."""
     drive.position = round(radians * RADIAN)
     drive.word = ENABLE | NEW | bits
     assert drive.cycle(3).status & ACKNOWLEDGED
@@ -43,14 +43,14 @@ def set_point(drive: Drive, radians: float, bits: int = AT_ONCE) -> Inputs:
     return drive.cycle(3)
 
 
-def test_a_target_without_bit_4_has_no_effect() -> None:
+def test_target_without_bit_4_has_no_effect() -> None:
     drive = enabled(PP)
     drive.position = TURN
     drive.cycle(200)
     assert drive.servo.position_rad == pytest.approx(0.0, abs=1e-3)
 
 
-def test_a_set_point_is_acknowledged_and_reached() -> None:
+def test_set_point_is_acknowledged_and_reached() -> None:
     drive = enabled(PP)
     drive.position = round(1.0 * RADIAN)
     drive.word = ENABLE | NEW | AT_ONCE
@@ -58,7 +58,7 @@ def test_a_set_point_is_acknowledged_and_reached() -> None:
     assert inputs.status & ACKNOWLEDGED
     assert not inputs.status & REACHED
     inputs = drive.cycle(20)
-    assert inputs.status & ACKNOWLEDGED  # for as long as bit 4 is set
+    assert inputs.status & ACKNOWLEDGED  # while bit 4 is set
     drive.word = ENABLE
     assert not drive.cycle(3).status & ACKNOWLEDGED
     inputs = drive.cycle(800)
@@ -66,7 +66,7 @@ def test_a_set_point_is_acknowledged_and_reached() -> None:
     assert drive.servo.position_rad == pytest.approx(1.0, abs=1e-3)
 
 
-def test_the_motion_is_the_trapezoid_of_its_objects() -> None:
+def test_motion_is_the_specified_trapezoid() -> None:
     drive = enabled(PP)
     set_point(drive, 1.0)
     fastest, cycles = 0.0, 0
@@ -74,10 +74,10 @@ def test_the_motion_is_the_trapezoid_of_its_objects() -> None:
         fastest = max(fastest, drive.servo.velocity_rad_s)
         cycles += 1
     assert fastest == pytest.approx(2.0, rel=0.02)
-    assert cycles == pytest.approx(600, abs=30)  # 1 rad at 2 rad/s, and 0.1 s for the ramps
+    assert cycles == pytest.approx(600, abs=30)  # 1 rad at 2 rad/s, plus 0.1 s for the ramps
 
 
-def test_a_second_set_point_waits_in_the_buffer() -> None:
+def test_second_set_point_waits_in_the_buffer() -> None:
     drive = enabled(PP)
     set_point(drive, 0.5)
     drive.position = round(-0.5 * RADIAN)
@@ -95,7 +95,7 @@ def test_a_second_set_point_waits_in_the_buffer() -> None:
     assert inputs.status & REACHED
 
 
-def test_change_at_once_turns_round() -> None:
+def test_immediate_change_reverses_the_motion() -> None:
     drive = enabled(PP)
     set_point(drive, 2.0)
     drive.cycle(300)
@@ -104,7 +104,7 @@ def test_change_at_once_turns_round() -> None:
     assert drive.servo.position_rad == pytest.approx(0.0, abs=1e-3)
 
 
-def test_a_relative_set_point_counts_from_the_last_target() -> None:
+def test_relative_set_point_starts_from_the_last_target() -> None:
     drive = enabled(PP)
     set_point(drive, 0.3)
     drive.cycle(500)
@@ -113,7 +113,7 @@ def test_a_relative_set_point_counts_from_the_last_target() -> None:
     assert drive.servo.position_rad == pytest.approx(0.5, abs=1e-3)
 
 
-def test_halt_slows_down_and_the_motion_goes_on_afterwards() -> None:
+def test_motion_continues_after_halt() -> None:
     drive = enabled(PP)
     set_point(drive, 2.0)
     drive.cycle(300)
@@ -121,7 +121,7 @@ def test_halt_slows_down_and_the_motion_goes_on_afterwards() -> None:
     drive.cycle(30)
     assert 0.5 < drive.servo.velocity_rad_s < 1.8  # on the ramp of 20 rad/s²
     inputs = drive.cycle(120)
-    assert inputs.status & REACHED  # with halt: it stands
+    assert inputs.status & REACHED  # with halt: standstill
     held = drive.servo.position_rad
     drive.cycle(100)
     assert drive.servo.position_rad == pytest.approx(held, abs=1e-3)
@@ -130,7 +130,7 @@ def test_halt_slows_down_and_the_motion_goes_on_afterwards() -> None:
     assert drive.servo.position_rad == pytest.approx(2.0, abs=1e-3)
 
 
-def test_a_quick_stop_ends_the_motion_for_good() -> None:
+def test_quick_stop_ends_the_motion() -> None:
     drive = enabled(PP)
     set_point(drive, 2.0)
     drive.cycle(300)
@@ -143,14 +143,14 @@ def test_a_quick_stop_ends_the_motion_for_good() -> None:
     assert drive.servo.position_rad == pytest.approx(stopped, abs=5e-3)
 
 
-def test_the_target_stays_within_the_software_limits() -> None:
+def test_target_stays_within_the_software_limits() -> None:
     drive = enabled(PP, Servo(position_limits=(-0.2, 0.2)))
     set_point(drive, 1.0)
     assert drive.cycle(500).status & LIMIT
     assert drive.servo.position_rad == pytest.approx(0.2, abs=1e-3)
 
 
-def test_csp_goes_on_from_where_pp_has_stopped() -> None:
+def test_csp_continues_from_the_end_of_pp() -> None:
     drive = enabled(PP)
     set_point(drive, 0.5)
     drive.mode, drive.position = CSP, drive.cycle(600).position
@@ -159,7 +159,7 @@ def test_csp_goes_on_from_where_pp_has_stopped() -> None:
     assert drive.servo.position_rad == pytest.approx(0.5, abs=2e-3)
 
 
-def test_profile_velocity_ramps_and_shows_that_it_is_there() -> None:
+def test_profile_velocity_ramps_and_reports_target_reached() -> None:
     drive = enabled(PV)
     assert drive.cycle().status & ACKNOWLEDGED  # bit 12: the speed is 0
     drive.velocity = round(4.0 * RADIAN)
@@ -175,7 +175,7 @@ def test_profile_velocity_ramps_and_shows_that_it_is_there() -> None:
     assert drive.servo.velocity_rad_s == pytest.approx(0.0, abs=0.01)
 
 
-def test_bit_12_of_the_cyclic_modes_says_nothing_here() -> None:
+def test_bit_12_quirks_do_not_affect_profile_modes() -> None:
     drive = enabled(PP, Servo(quirks=ServoQuirks(bit_12="never")))
     set_point(drive, 0.2)
     drive.cycle(400)

@@ -1,4 +1,4 @@
-"""Quirks of the virtual servo, and the option codes that tell what a drive does when it stops."""
+"""Quirks of the virtual servo, and the option codes for stops."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from tests.virtual.servo_drive import (
 )
 
 BIT_12 = 0x1000
-STEP = 250e-6  # s, the servo's own cycle
+STEP = 250e-6  # [s] internal cycle of the servo
 NO_SUCH_OBJECT = 0x0602_0000
 INVALID_WATCHDOG_CONFIGURATION = 0x001F
 DL_CONTROL, DL_STATUS = 0x0100, 0x0110
@@ -34,7 +34,7 @@ def drive_with(**quirks: object) -> Drive:
 
 
 def turning(drive: Drive) -> Drive:
-    """In CSV at one turn a second."""
+    """Return a drive in CSV at one turn per second."""
     drive.enable(CSV)
     drive.velocity = TURN
     drive.cycle(200)
@@ -50,7 +50,7 @@ def parameter(drive: Drive, index: int) -> int:
 # -- bit 12 ------------------------------------------------------------------------------------
 
 
-def test_while_bit_12_is_hidden_csp_holds_its_demand() -> None:
+def test_csp_holds_its_demand_while_bit_12_is_hidden() -> None:
     drive = drive_with()
     drive.enable(CSP)
     for _ in range(50):
@@ -69,7 +69,7 @@ def test_while_bit_12_is_hidden_csp_holds_its_demand() -> None:
 
 
 @pytest.mark.parametrize("mode", [CSV, CST])
-def test_while_bit_12_is_hidden_a_target_changes_nothing(mode: int) -> None:
+def test_targets_are_ignored_while_bit_12_is_hidden(mode: int) -> None:
     drive = Drive(Servo(coulomb_friction=0.2))
     drive.enable(mode)
     drive.velocity, drive.torque = TURN, 50
@@ -84,7 +84,7 @@ def test_while_bit_12_is_hidden_a_target_changes_nothing(mode: int) -> None:
     assert abs(drive.servo.velocity_rad_s) < 1e-3
 
 
-def test_bit_12_flickers_for_single_steps() -> None:
+def test_bit_12_can_be_hidden_for_single_steps() -> None:
     drive = drive_with()
     drive.enable(CSP)
     drive.servo.hide_bit_12(4 * STEP)
@@ -93,7 +93,7 @@ def test_bit_12_flickers_for_single_steps() -> None:
     assert shown[-1]
 
 
-def test_a_cosmetic_loss_of_bit_12_moves_on() -> None:
+def test_drive_with_the_quirk_follows_without_bit_12() -> None:
     drive = drive_with(follows_without_bit_12=True)
     drive.enable(CSP)
     drive.servo.hide_bit_12(1.0)
@@ -104,13 +104,13 @@ def test_a_cosmetic_loss_of_bit_12_moves_on() -> None:
     assert abs(inputs.position - drive.position) < 5000
 
 
-def test_a_drive_without_bit_12_follows_if_it_says_so() -> None:
+def test_drive_that_never_shows_bit_12_can_follow() -> None:
     drive = drive_with(bit_12="never", follows_without_bit_12=True)
     assert turning(drive).cycle().velocity == pytest.approx(TURN, rel=1e-2)
     assert not drive.cycle().status & BIT_12
 
 
-def test_a_drive_without_bit_12_stands_where_it_was_enabled() -> None:
+def test_drive_without_bit_12_holds_its_position() -> None:
     drive = drive_with(bit_12="never")
     drive.enable(CSP)
     drive.position += 10000
@@ -119,7 +119,7 @@ def test_a_drive_without_bit_12_stands_where_it_was_enabled() -> None:
     assert abs(inputs.position) < 10
 
 
-def test_bit_12_of_an_axis_that_the_servo_does_not_have() -> None:
+def test_hide_bit_12_of_a_missing_axis_is_refused() -> None:
     servo = Servo(axes=2)
     Segment([servo])
     with pytest.raises(IndexError, match="no axis 2"):
@@ -129,7 +129,7 @@ def test_bit_12_of_an_axis_that_the_servo_does_not_have() -> None:
 # -- stopping ----------------------------------------------------------------------------------
 
 
-def test_a_drive_ignores_the_quick_stop() -> None:
+def test_drive_ignores_the_quick_stop() -> None:
     drive = turning(drive_with(ignores_quick_stop=True))
     drive.word = QUICK_STOP
     assert drive.cycle(300).status & 0x6F == 0x27
@@ -138,7 +138,7 @@ def test_a_drive_ignores_the_quick_stop() -> None:
     assert drive.cycle(300).status & 0x6F == 0x23
 
 
-def test_a_drive_ignores_both_and_obeys_disable_voltage() -> None:
+def test_drive_that_ignores_both_accepts_disable_voltage() -> None:
     drive = turning(drive_with(ignores_quick_stop=True, ignores_disable=True))
     for drive.word in (QUICK_STOP, SWITCH_ON):
         assert drive.cycle(100).status & 0x6F == 0x27
@@ -147,32 +147,32 @@ def test_a_drive_ignores_both_and_obeys_disable_voltage() -> None:
     assert drive.servo.torque_nm == 0
 
 
-def test_shutdown_is_obeyed_by_a_drive_that_ignores_disable() -> None:
+def test_drive_that_ignores_disable_accepts_shutdown() -> None:
     drive = turning(drive_with(ignores_disable=True))
     drive.word = SHUTDOWN
     assert drive.cycle(2).status & 0x6F == 0x21
 
 
 @pytest.mark.parametrize("option", [0, -1, 6])
-def test_the_initial_quick_stop_option(option: int) -> None:
+def test_initial_quick_stop_option(option: int) -> None:
     drive = drive_with(quick_stop_option=option)
     assert parameter(drive, 0x605A) == option
 
 
-def test_a_negative_option_disables_the_quick_stop() -> None:
+def test_negative_option_disables_the_quick_stop() -> None:
     drive = turning(drive_with(quick_stop_option=-1))
     drive.word = QUICK_STOP
     assert drive.cycle(300).status & 0x6F == 0x27
 
 
-def test_option_0_takes_the_torque_at_once() -> None:
+def test_option_0_removes_the_torque_immediately() -> None:
     drive = turning(drive_with(quick_stop_option=0))
     drive.word = QUICK_STOP
     assert drive.cycle(2).status & 0x4F == 0x40
     assert drive.servo.torque_nm == 0
 
 
-def test_without_the_option_object_the_drive_still_ramps() -> None:
+def test_drive_without_the_option_object_still_ramps() -> None:
     drive = drive_with(quick_stop_option="absent")
     assert drive.main.upload(STATION, 0x605A, 0) == NO_SUCH_OBJECT
     assert drive.main.download(STATION, 0x605A, 0, b"\2\0") == NO_SUCH_OBJECT
@@ -183,7 +183,7 @@ def test_without_the_option_object_the_drive_still_ramps() -> None:
 
 
 def stopping_time(option: int) -> int:
-    """Cycles from the quick stop until the drive stands, from 20 turns a second."""
+    """Return the number of cycles from a quick stop at 20 turns per second to standstill."""
     drive = drive_with(quick_stop_option=option)
     drive.enable(CSV)
     drive.velocity = 20 * TURN
@@ -196,7 +196,7 @@ def stopping_time(option: int) -> int:
     return count
 
 
-def test_options_choose_between_the_two_ramps() -> None:
+def test_options_select_one_of_two_ramps() -> None:
     """0x6084 is half of 0x6085."""
     quick, slow = stopping_time(6), stopping_time(5)
     assert stopping_time(2) == quick
@@ -204,7 +204,7 @@ def test_options_choose_between_the_two_ramps() -> None:
     assert slow > 1.5 * quick
 
 
-def test_the_demand_of_a_braking_axis_is_its_position() -> None:
+def test_demand_of_a_braking_axis_is_its_position() -> None:
     drive = drive_with(quick_stop_option=6)
     drive.enable(CSP)
     for _ in range(100):
@@ -224,7 +224,7 @@ def test_the_demand_of_a_braking_axis_is_its_position() -> None:
         (3, "SWITCH ON DISABLED"),
     ],
 )
-def test_what_a_drive_does_when_its_process_data_stops(option: int, state: str) -> None:
+def test_reaction_to_the_loss_of_process_data(option: int, state: str) -> None:
     drive = turning(drive_with(abort_connection_option=option))
     assert parameter(drive, 0x6007) == option
     drive.main.let_pass(500)
@@ -247,7 +247,7 @@ def test_disable_voltage_coasts_and_a_quick_stop_brakes() -> None:
     assert travelled[2] > 10 * travelled[3]
 
 
-def test_a_lost_connection_does_not_enable_an_axis_again() -> None:
+def test_axis_is_not_enabled_after_a_lost_connection() -> None:
     drive = turning(drive_with(abort_connection_option=3, quick_stop_option=6))
     drive.main.let_pass(1000)
     assert drive.servo.drive_state() == "QUICK STOP ACTIVE"
@@ -262,7 +262,7 @@ def test_the_abort_option_can_be_written() -> None:
 # -- modes -------------------------------------------------------------------------------------
 
 
-def test_a_mode_takes_its_time_and_the_old_one_is_obeyed_meanwhile() -> None:
+def test_old_mode_stays_active_during_the_mode_delay() -> None:
     drive = turning(drive_with(mode_delay=0.02))
     drive.mode, drive.torque = CST, 0
     assert drive.cycle(15).mode == CSV
@@ -273,14 +273,14 @@ def test_a_mode_takes_its_time_and_the_old_one_is_obeyed_meanwhile() -> None:
     assert drive.servo.torque_nm == 0
 
 
-def test_a_withdrawn_request_begins_anew() -> None:
+def test_withdrawn_mode_request_restarts_the_delay() -> None:
     drive = turning(drive_with(mode_delay=0.02))
     for drive.mode in (CST, CSV, CST, CSV, CST):
         assert drive.cycle(10).mode == CSV
     assert drive.cycle(15).mode == CST
 
 
-def test_a_refused_mode_is_never_shown() -> None:
+def test_refused_mode_is_never_shown() -> None:
     drive = turning(drive_with(refused_modes=(CST,)))
     drive.mode = CST
     assert drive.cycle(500).mode == CSV
@@ -294,13 +294,13 @@ def test_a_refused_mode_is_never_shown() -> None:
 
 
 @pytest.mark.parametrize(("trigger", "control"), [(True, 0x64), (False, 0x24)])
-def test_the_sii_has_the_trigger_bit_or_not(trigger: bool, control: int) -> None:
+def test_sii_shows_the_watchdog_trigger_bit(trigger: bool, control: int) -> None:
     servo = Servo(quirks=ServoQuirks(watchdog_trigger=trigger))
     outputs = servo.description().sync_managers[2]
     assert outputs.control == control
 
 
-def test_without_the_trigger_bit_a_drive_never_misses_its_process_data() -> None:
+def test_watchdog_never_expires_without_the_trigger_bit() -> None:
     drive = Drive(Servo(), control=0x24)
     turning(drive)
     drive.main.let_pass(1000)
@@ -317,7 +317,7 @@ def test_without_the_trigger_bit_a_drive_never_misses_its_process_data() -> None
         (0x64, 0, INVALID_WATCHDOG_CONFIGURATION),
     ],
 )
-def test_a_device_that_checks_its_watchdog(control: int, time: int, code: int) -> None:
+def test_device_checks_its_watchdog_configuration(control: int, time: int, code: int) -> None:
     main = MainDevice(Segment([Servo(quirks=ServoQuirks(checks_watchdog=True))]))
     main.number_stations()
     main.let_pass(30)
@@ -329,7 +329,7 @@ def test_a_device_that_checks_its_watchdog(control: int, time: int, code: int) -
 # -- the options -------------------------------------------------------------------------------
 
 
-def test_quirks_come_from_toml(tmp_path: Path) -> None:
+def test_quirks_are_read_from_toml(tmp_path: Path) -> None:
     path = tmp_path / "segment.toml"
     path.write_text(
         '[[device]]\nkind = "servo"\n'
@@ -352,12 +352,12 @@ def test_quirks_come_from_toml(tmp_path: Path) -> None:
         ("abort_connection_option", 4),
     ],
 )
-def test_quirks_that_cannot_be(quirk: str, value: object) -> None:
+def test_invalid_servo_quirks_are_refused(quirk: str, value: object) -> None:
     with pytest.raises(ValueError, match=quirk):
         ServoQuirks(**{quirk: value})  # type: ignore[arg-type]
 
 
-def test_clock_quirks_come_from_toml(tmp_path: Path) -> None:
+def test_clock_quirks_are_read_from_toml(tmp_path: Path) -> None:
     path = tmp_path / "line.toml"
     path.write_text(
         '[[device]]\nkind = "servo"\n[device.quirks]\nsync_signal = "sync1"\ncloses_ports = false\n'
@@ -372,7 +372,7 @@ def test_clock_quirks_come_from_toml(tmp_path: Path) -> None:
     )
 
 
-def test_a_port_that_ignores_loop_control_stays_open() -> None:
+def test_port_that_ignores_loop_control_stays_open() -> None:
     main = MainDevice(Segment([Servo(quirks=ServoQuirks(closes_ports=False)), Servo()]))
     for _ in range(2):  # also after a power cycle
         main.number_stations()

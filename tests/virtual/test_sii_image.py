@@ -1,4 +1,4 @@
-"""Images made from descriptions, read by the decoder that judges real ones."""
+"""SII images from descriptions, read by the decoder for real ones."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ DEVICES: list[Device] = [
 
 
 @pytest.mark.parametrize("device", DEVICES, ids=lambda d: d.name)
-def test_the_decoder_finds_what_was_described(device: Device) -> None:
+def test_decoder_returns_the_description(device: Device) -> None:
     description = device.description()
     sii = decode_sii(make_sii_image(description))
     assert sii.header.vendor == VENDOR_ID
@@ -48,8 +48,10 @@ def test_the_decoder_finds_what_was_described(device: Device) -> None:
 
 @pytest.mark.parametrize("device", [Servo, DigitalOutputs, DigitalInputs, AnalogInputs])
 @pytest.mark.parametrize("lrw", [True, False])
-def test_lrw_is_denied_in_the_general_category(device: Callable[..., Device], lrw: bool) -> None:
-    """Byte 0x0B, bit 1: all that SOEM asks (src/ec_config.c, ecx_config_init)."""
+def test_general_category_shows_missing_lrw_support(
+    device: Callable[..., Device], lrw: bool
+) -> None:
+    """SOEM reads only byte 0x0B, bit 1 (src/ec_config.c, ecx_config_init)."""
     sii = decode_sii(make_sii_image(device(lrw=lrw).description()))
     assert sii.general is not None
     assert bool(sii.general.flags & GeneralFlags.NO_LRW) is not lrw
@@ -66,8 +68,8 @@ VARIANTS: list[Device] = [
 ]
 
 
-def test_one_identity_has_one_sii() -> None:
-    """SOEM copies the SII of the first device of an identity (ecx_lookup_prev_sii)."""
+def test_equal_identities_have_equal_siis() -> None:
+    """SOEM reads the SII only once for each identity (ecx_lookup_prev_sii)."""
     images: dict[tuple[int, int], set[bytes]] = {}
     for device in VARIANTS:
         plain = replace(device.whole_description(), name="", alias=0, serial=0)
@@ -82,6 +84,6 @@ def test_names_aliases_and_serial_numbers_do_not_change_the_revision() -> None:
     assert named.revision >> 16 == 1
 
 
-def test_the_checksum_of_a_real_image(shared_data: Path) -> None:
+def test_checksum_of_a_real_image(shared_data: Path) -> None:
     image = (shared_data / "sii" / "beckhoff_el2004.bin").read_bytes()
     assert checksum(image) == image[14]

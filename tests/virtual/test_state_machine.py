@@ -1,4 +1,4 @@
-"""AL states: each refusal with its code, acknowledge, injected faults, emulation."""
+"""AL state machine: refusals and their codes, acknowledgement, faults and emulation."""
 
 from __future__ import annotations
 
@@ -29,11 +29,11 @@ def servo_of(main: MainDevice) -> Servo:
     ("state", "code"),
     [(OP, 0x0011), (SAFE_OP, 0x0011), (BOOT, 0x0013), (0x0F, 0x0012), (0, 0x0012)],
 )
-def test_impossible_requests_from_init(main: MainDevice, state: int, code: int) -> None:
+def test_invalid_requests_from_init_are_refused(main: MainDevice, state: int, code: int) -> None:
     assert main.request(STATION, state) == (INIT | ERROR, code)
 
 
-def test_an_error_is_kept_until_acknowledged(main: MainDevice) -> None:
+def test_error_is_kept_until_acknowledged(main: MainDevice) -> None:
     main.sync_manager(STATION, 0, 0x1000, 128, 0x26)
     main.sync_manager(STATION, 1, 0x1080, 128, 0x22)
     assert main.request(STATION, OP) == (INIT | ERROR, 0x0011)
@@ -50,10 +50,10 @@ def test_init_needs_no_acknowledgement(main: MainDevice) -> None:
 
 
 @pytest.mark.parametrize("requested", [INIT, PRE_OP, SAFE_OP])
-def test_a_local_error_does_not_replace_a_request_to_go_down(
+def test_local_error_does_not_replace_a_request_for_a_lower_state(
     main: MainDevice, requested: int
 ) -> None:
-    """IgH stops its cycle and requests INIT: the watchdog expires before the device is there."""
+    """IgH stops its cycle and requests INIT. The watchdog expires before INIT is reached."""
     main.start_servo(STATION, 0)
     main.exchange_logical(EcatCommand.LRW, 0, bytes(26))
     assert main.request(STATION, OP) == (OP, 0)
@@ -65,7 +65,7 @@ def test_a_local_error_does_not_replace_a_request_to_go_down(
     assert main.al_status(STATION) == (requested, 0)
 
 
-def test_a_local_error_cancels_a_request_to_go_up(main: MainDevice) -> None:
+def test_local_error_cancels_a_request_for_a_higher_state(main: MainDevice) -> None:
     main.start_servo(STATION, 0)
     servo_of(main).delay_state(OP, 0.01)
     main.exchange_logical(EcatCommand.LRW, 0, bytes(26))
@@ -75,14 +75,14 @@ def test_a_local_error_cancels_a_request_to_go_up(main: MainDevice) -> None:
     assert main.al_status(STATION) == (SAFE_OP | ERROR, 0x001A)
 
 
-def test_a_mailbox_unlike_the_sii_is_refused(main: MainDevice) -> None:
+def test_mailbox_that_differs_from_the_sii_is_refused(main: MainDevice) -> None:
     assert main.request(STATION, PRE_OP) == (INIT | ERROR, 0x0016)
     main.sync_manager(STATION, 0, 0x1000, 64, 0x26)
     main.sync_manager(STATION, 1, 0x1080, 128, 0x22)
     assert main.request(STATION, PRE_OP | ACKNOWLEDGE) == (INIT | ERROR, 0x0016)
 
 
-def test_process_data_of_a_wrong_length_is_refused(main: MainDevice) -> None:
+def test_process_data_with_a_wrong_length_is_refused(main: MainDevice) -> None:
     main.start_mailbox(STATION)
     main.sync_manager(STATION, 2, 0x1100, 12, 0x64)
     assert main.request(STATION, SAFE_OP) == (PRE_OP | ERROR, 0x001D)
@@ -93,7 +93,7 @@ def test_process_data_of_a_wrong_length_is_refused(main: MainDevice) -> None:
     assert main.request(STATION, SAFE_OP | ACKNOWLEDGE) == (SAFE_OP, 0)
 
 
-def test_op_needs_outputs(main: MainDevice) -> None:
+def test_op_requires_outputs(main: MainDevice) -> None:
     main.start_servo(STATION, 0)
     assert main.request(STATION, OP) == (SAFE_OP, 0)
     main.let_pass(300)
@@ -102,7 +102,7 @@ def test_op_needs_outputs(main: MainDevice) -> None:
     assert main.request(STATION, OP | ACKNOWLEDGE) == (OP, 0)
 
 
-def test_outputs_that_come_late_take_it_up(main: MainDevice) -> None:
+def test_late_outputs_complete_the_transition_to_op(main: MainDevice) -> None:
     main.start_servo(STATION, 0)
     main.request(STATION, OP)
     main.exchange_logical(EcatCommand.LRW, 0, bytes(26))
@@ -110,7 +110,7 @@ def test_outputs_that_come_late_take_it_up(main: MainDevice) -> None:
     assert main.al_status(STATION) == (OP, 0)
 
 
-def test_silence_in_op_is_a_watchdog_error(main: MainDevice) -> None:
+def test_missing_process_data_in_op_is_a_watchdog_error(main: MainDevice) -> None:
     main.start_servo(STATION, 0)
     main.exchange_logical(EcatCommand.LRW, 0, bytes(26))
     assert main.request(STATION, OP) == (OP, 0)
@@ -120,7 +120,7 @@ def test_silence_in_op_is_a_watchdog_error(main: MainDevice) -> None:
     assert main.read(STATION, 0x0442, 1) == b"\x01"
 
 
-def test_down_from_anywhere_in_one_step(main: MainDevice) -> None:
+def test_lower_states_are_reached_in_one_step(main: MainDevice) -> None:
     main.start_servo(STATION, 0)
     main.exchange_logical(EcatCommand.LRW, 0, bytes(26))
     main.request(STATION, OP)
@@ -144,8 +144,8 @@ def test_injected_refusal_and_delay(main: MainDevice) -> None:
     assert main.al_status(STATION) == (PRE_OP, 0)
 
 
-def test_an_emulated_device_follows_with_the_error_bit() -> None:
-    # as the EK1100 and EL1004 in ecrab_soem-sdinfo-ek1100-el1004: 0x11 asked, 0x11 shown
+def test_emulated_device_copies_the_error_bit() -> None:
+    # as the EK1100 and EL1004 in ecrab_soem-sdinfo-ek1100-el1004: 0x11 requested, 0x11 shown
     main = MainDevice(Segment([Coupler()]))
     main.number_stations()
     assert main.request(STATION, 0x11) == (0x11, 0)

@@ -1,4 +1,4 @@
-"""SyncManagers: handshake, partial access, repeat, three buffers, who may when."""
+"""SyncManagers: handshake, partial access, repeat, three buffers and access rights."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def main() -> MainDevice:
     return main
 
 
-def test_a_full_mailbox_refuses_a_second_request(main: MainDevice) -> None:
+def test_full_mailbox_refuses_a_second_request(main: MainDevice) -> None:
     assert main.put(SERVO, IDENTITY) == 1
     assert main.read(SERVO, 0x0805, 1)[0] & FULL
     assert main.put(SERVO, IDENTITY) == 0
@@ -31,7 +31,7 @@ def test_a_full_mailbox_refuses_a_second_request(main: MainDevice) -> None:
     assert main.fetch(SERVO) is None
 
 
-def test_an_empty_mailbox_cannot_be_read_and_reading_empties_it(main: MainDevice) -> None:
+def test_read_empties_the_mailbox(main: MainDevice) -> None:
     assert main.exchange(EcatCommand.FPRD, SERVO, 0x1080, bytes(128)).working_counter == 0
     main.put(SERVO, IDENTITY)
     main.let_pass(2)
@@ -40,7 +40,7 @@ def test_an_empty_mailbox_cannot_be_read_and_reading_empties_it(main: MainDevice
     assert not main.read(SERVO, 0x080D, 1)[0] & FULL
 
 
-def test_access_begins_with_the_first_byte_and_ends_with_the_last(main: MainDevice) -> None:
+def test_access_starts_with_the_first_byte_and_ends_with_the_last(main: MainDevice) -> None:
     main.put(SERVO, IDENTITY)
     main.let_pass(2)
     assert main.exchange(EcatCommand.FPRD, SERVO, 0x1088, bytes(120)).working_counter == 0
@@ -51,12 +51,12 @@ def test_access_begins_with_the_first_byte_and_ends_with_the_last(main: MainDevi
     assert not main.read(SERVO, 0x080D, 1)[0] & FULL
 
 
-def test_the_wrong_direction_is_refused(main: MainDevice) -> None:
+def test_wrong_direction_is_refused(main: MainDevice) -> None:
     assert main.exchange(EcatCommand.FPRD, SERVO, 0x1000, bytes(128)).working_counter == 0
     assert main.exchange(EcatCommand.FPWR, SERVO, 0x1080, bytes(128)).working_counter == 0
 
 
-def test_a_repeat_brings_the_last_answer_again_before_the_next(main: MainDevice) -> None:
+def test_repeat_returns_the_last_answer_before_the_next(main: MainDevice) -> None:
     first = main.ask(SERVO, IDENTITY)
     main.put(SERVO, struct.pack("<HBHB4x", 0x2000, 0x40, 0x1018, 2))
     main.let_pass(2)
@@ -70,19 +70,19 @@ def test_a_repeat_brings_the_last_answer_again_before_the_next(main: MainDevice)
     assert struct.unpack_from("<HB", next_one, 9) == (0x1018, 2)
 
 
-def test_a_repeat_with_nothing_read_is_only_acknowledged(main: MainDevice) -> None:
+def test_repeat_before_any_answer_is_only_acknowledged(main: MainDevice) -> None:
     main.write(SERVO, 0x080E, b"\x03")
     main.let_pass(0.1)
     assert main.read(SERVO, 0x080F, 1) == b"\x02"
     assert main.fetch(SERVO) is None
 
 
-def test_an_active_sync_manager_cannot_be_configured(main: MainDevice) -> None:
+def test_active_sync_manager_cannot_be_configured(main: MainDevice) -> None:
     assert main.write(SERVO, 0x0800, struct.pack("<HH", 0x2000, 8)) == 0
     assert main.read(SERVO, 0x0800, 4) == struct.pack("<HH", 0x1000, 128)
 
 
-def test_disabling_gives_the_memory_free_and_empties_the_mailbox(main: MainDevice) -> None:
+def test_deactivation_releases_the_memory_and_empties_the_mailbox(main: MainDevice) -> None:
     main.put(SERVO, IDENTITY)
     main.write(SERVO, 0x0806, b"\x00")
     assert main.write(SERVO, 0x1010, b"\xab") == 1
@@ -91,12 +91,12 @@ def test_disabling_gives_the_memory_free_and_empties_the_mailbox(main: MainDevic
     assert not main.read(SERVO, 0x0805, 1)[0] & FULL
 
 
-def test_process_data_is_closed_until_the_application_opens_it(main: MainDevice) -> None:
+def test_process_data_is_blocked_until_the_application_releases_it(main: MainDevice) -> None:
     main.sync_manager(SERVO, 2, 0x1100, 13, 0x64)
     assert main.exchange(EcatCommand.FPWR, SERVO, 0x1100, bytes(13)).working_counter == 0
 
 
-def test_three_buffers_give_the_last_complete_write() -> None:
+def test_three_buffers_return_the_last_complete_write() -> None:
     segment = Segment([DigitalOutputs()])
     main = MainDevice(segment)
     main.number_stations()
@@ -110,7 +110,7 @@ def test_three_buffers_give_the_last_complete_write() -> None:
     assert main.exchange(EcatCommand.FPWR, STATION, 0x1002, bytes(2)).working_counter == 0
 
 
-def test_inputs_stay_whole_while_they_are_read_in_parts() -> None:
+def test_inputs_are_consistent_when_read_in_parts() -> None:
     inputs = DigitalInputs(bits=16)
     main = MainDevice(Segment([inputs]))
     main.number_stations()

@@ -1,4 +1,4 @@
-"""A servo that keeps time by SYNC0: when it takes and latches, what it counts, what it reports.
+"""Servo synchronised to SYNC0: output and input times, counters and errors.
 
 0x1C32, 0x1C33: ETG.1020 §5.2.1. AL status codes: ETG.1000.6 table 11."""
 
@@ -28,7 +28,7 @@ CSV = 9
 
 
 class Drive(Clocks):
-    """Owns a line with one servo and the SYNC unit's phase."""
+    """Line with one servo, and the phase of its SYNC unit."""
 
     def __init__(self, servo: Servo | None = None) -> None:
         super().__init__(Segment([Coupler(), servo or Servo()]))
@@ -49,13 +49,13 @@ class Drive(Clocks):
         self.put_number(DEVICE, ACTIVATION, "<B", activation)
 
     def until(self, phase: float) -> None:
-        """Waits for the next moment `phase` [us] after a pulse that is, or would be, due."""
+        """Wait for the next time `phase` [us] after an actual or expected pulse."""
         now = self.core_time() - self.first
         wait = (round(phase * 1e3) - now) % self.cycle
         self.link.wait_until(self.link.now() + wait, False)
 
     def core_time(self) -> int:
-        """The device's system time now, without a frame: its crystal is exact."""
+        """Return the system time of the device without a frame; its crystal is exact."""
         return self.link.now() + self._apart
 
     def operational(self, cycle: int = MS) -> None:
@@ -65,7 +65,7 @@ class Drive(Clocks):
     def operational_after_mailbox(self, cycle: int = MS) -> None:
         self.switch_on(cycle)
         before = self.link.now()
-        self._apart = self.system_time(DEVICE) - before - 600  # when the frame was there
+        self._apart = self.system_time(DEVICE) - before - 600  # arrival time of the frame
         assert self.safe_op() == (4, 0)
         self.write(SERVO, 0x0120, struct.pack("<H", 8))
         self.cycles(40 * MS // cycle)
@@ -79,7 +79,7 @@ class Drive(Clocks):
         return self.request(SERVO, 4)
 
     def swap(self) -> tuple[int, int, int, int, int]:
-        """Process data out and in."""
+        """Exchange process data."""
         answer = self.exchange_logical(EcatCommand.LRW, LOGICAL, self.targets + bytes(13))
         assert answer.working_counter == 3
         return OUTPUTS.unpack(answer.data[13:])
@@ -110,14 +110,14 @@ def value(drive: Drive, index: int, subindex: int) -> int:
 # -- choosing the type -------------------------------------------------------------------------
 
 
-def test_without_sync_the_device_runs_free(drive: Drive) -> None:
+def test_device_without_sync_runs_free(drive: Drive) -> None:
     drive.start_servo(SERVO, LOGICAL)
     assert value(drive, 0x1C32, 1) == 0
     assert value(drive, 0x1C32, 2) == 250_000
     assert not drive.segment.core.synchronous(DEVICE)[0]
 
 
-def test_sync0_switched_on_makes_it_dc_synchronous(drive: Drive) -> None:
+def test_active_sync0_makes_the_device_dc_synchronous(drive: Drive) -> None:
     drive.operational(cycle=2 * MS)
     for index in (0x1C32, 0x1C33):
         assert value(drive, index, 0x01) == 2
@@ -132,8 +132,11 @@ def test_sync0_switched_on_makes_it_dc_synchronous(drive: Drive) -> None:
 @pytest.mark.parametrize(
     ("prepare", "code"),
     [
-        (lambda d: d.download(SERVO, 0x1C32, 1, b"\x02\0"), INVALID_DC),  # asked, not switched on
-        (lambda d: d.switch_on(activation=0x05), INVALID_DC),  # SYNC1 alone
+        (
+            lambda d: d.download(SERVO, 0x1C32, 1, b"\x02\0"),
+            INVALID_DC,
+        ),  # requested but not activated
+        (lambda d: d.switch_on(activation=0x05), INVALID_DC),  # only SYNC1
         (lambda d: (d.download(SERVO, 0x1C32, 1, b"\0\0"), d.switch_on()), INVALID_DC),
         (lambda d: d.switch_on(cycle=50_000), DC_SYNC0_CYCLE),
         (lambda d: d.switch_on(cycle=0), DC_SYNC0_CYCLE),
@@ -143,7 +146,7 @@ def test_sync0_switched_on_makes_it_dc_synchronous(drive: Drive) -> None:
         ),
     ],
 )
-def test_a_configuration_that_cannot_work_is_refused(
+def test_invalid_clock_configuration_is_refused(
     drive: Drive, prepare: Callable[[Drive], object], code: int
 ) -> None:
     drive.start_mailbox(SERVO)
@@ -151,14 +154,14 @@ def test_a_configuration_that_cannot_work_is_refused(
     assert drive.safe_op() == (0x12, code)
 
 
-def test_types_it_does_not_know_are_aborted(drive: Drive) -> None:
+def test_unsupported_types_are_aborted(drive: Drive) -> None:
     drive.start_mailbox(SERVO)
     assert drive.download(SERVO, 0x1C32, 1, b"\x03\0") == 0x06090030
     assert drive.download(SERVO, 0x1C32, 1, b"\x02\0") == 0
     assert drive.download(SERVO, 0x10F1, 2, b"\0\0") == 0x06090030
 
 
-def test_the_sii_names_the_operation_modes(drive: Drive) -> None:
+def test_sii_contains_the_op_modes(drive: Drive) -> None:
     sii = decode_sii(drive.segment.core.sii_image(DEVICE))
     free, synchronous = sii.clock_modes
     assert (free.assign_activate, synchronous.assign_activate) == (0, 0x0300)
@@ -168,7 +171,7 @@ def test_the_sii_names_the_operation_modes(drive: Drive) -> None:
 # -- operational needs pulses ------------------------------------------------------------------
 
 
-def test_no_pulse_no_op(drive: Drive) -> None:
+def test_op_requires_pulses(drive: Drive) -> None:
     drive.start_mailbox(SERVO)
     drive.switch_on(ahead=60_000 * MS)
     assert drive.safe_op() == (4, 0)
@@ -180,7 +183,7 @@ def test_no_pulse_no_op(drive: Drive) -> None:
     assert drive.al_status(SERVO) == (0x14, NO_SYNC_ERROR)
 
 
-def test_a_start_in_the_past_ends_the_same_way(drive: Drive) -> None:
+def test_start_in_the_past_prevents_op(drive: Drive) -> None:
     drive.start_mailbox(SERVO)
     drive.switch_on(ahead=-1 * MS)
     assert drive.safe_op() == (4, 0)
@@ -207,7 +210,7 @@ def test_op_waits_for_the_first_pulse(drive: Drive) -> None:
 # -- pulses step it ----------------------------------------------------------------------------
 
 
-def test_outputs_are_taken_over_at_the_pulse(drive: Drive) -> None:
+def test_outputs_are_accepted_at_the_pulse(drive: Drive) -> None:
     drive.operational()
     drive.enable()
     drive.targets = OUTPUTS.pack(15, CSV, 1 << 20, 0, 0)
@@ -219,7 +222,7 @@ def test_outputs_are_taken_over_at_the_pulse(drive: Drive) -> None:
     assert drive.servo.torque_nm > 0
 
 
-def test_inputs_are_those_of_the_pulse(drive: Drive) -> None:
+def test_inputs_are_latched_at_the_pulse(drive: Drive) -> None:
     drive.operational()
     drive.until(100)
     before = drive.swap()[3]
@@ -232,8 +235,8 @@ def test_inputs_are_those_of_the_pulse(drive: Drive) -> None:
 
 
 @pytest.mark.parametrize("cycle", [125_000, 250_000, 1_000_000, 4_000_000])
-def test_it_steps_as_long_as_a_second_is(cycle: int) -> None:
-    """Its own cycle is a part of SYNC0's: a motor without friction shows the time that passed."""
+def test_internal_steps_add_up_to_the_elapsed_time(cycle: int) -> None:
+    """The internal cycle divides that of SYNC0. A frictionless motor shows the elapsed time."""
     drive = Drive(Servo(viscous_friction=0, coulomb_friction=0))
     drive.operational(cycle=cycle)
     start, speed = drive.servo.position_rad, drive.servo.velocity_rad_s
@@ -252,7 +255,7 @@ def test_it_steps_as_long_as_a_second_is(cycle: int) -> None:
 # -- missed ------------------------------------------------------------------------------------
 
 
-def test_two_missed_pulses_are_no_fault(drive: Drive) -> None:
+def test_two_missed_pulses_cause_no_fault(drive: Drive) -> None:
     drive.operational()
     drive.enable()
     drive.until(500)
@@ -265,7 +268,7 @@ def test_two_missed_pulses_are_no_fault(drive: Drive) -> None:
     assert drive.segment.core.synchronous(DEVICE)[2:] == (2, 0, 0, False)
 
 
-def test_three_missed_pulses_in_a_row_are_one(drive: Drive) -> None:
+def test_three_consecutive_missed_pulses_cause_a_fault(drive: Drive) -> None:
     drive.operational()
     drive.enable()
     drive.until(500)
@@ -302,8 +305,8 @@ def value_of_limit(drive: Drive) -> int:
     return value(drive, 0x10F1, 2)
 
 
-def test_outputs_that_come_too_shortly_before_the_pulse_wait_for_the_next(drive: Drive) -> None:
-    """20 us to copy them, after the frame's last byte: 7 us of a small one."""
+def test_outputs_shortly_before_a_pulse_wait_for_the_next(drive: Drive) -> None:
+    """The device needs 20 us to copy outputs after the end of the frame, which takes 7 us."""
     drive.operational()
     drive.cycles(5, phase=960)
     assert drive.segment.core.synchronous(DEVICE)[2:5] == (0, 0, 0)
@@ -315,7 +318,7 @@ def test_outputs_that_come_too_shortly_before_the_pulse_wait_for_the_next(drive:
     assert drive.al_status(SERVO) == (8, 0)
 
 
-def test_pulses_that_stop_are_a_fatal_error(drive: Drive) -> None:
+def test_lost_pulses_are_a_fatal_error(drive: Drive) -> None:
     drive.operational()
     drive.enable()
     drive.put_number(DEVICE, ACTIVATION, "<B", 0)
@@ -324,11 +327,13 @@ def test_pulses_that_stop_are_a_fatal_error(drive: Drive) -> None:
     assert drive.servo.drive_state() in ("FAULT", "FAULT REACTION ACTIVE")
     word = drive.swap()[0]
     drive.cycles(40)
-    assert drive.swap()[0] & 0x4F == 0x08  # the fault is shown, though nothing latches inputs
+    assert (
+        drive.swap()[0] & 0x4F == 0x08
+    )  # the fault is visible, although inputs are no longer latched
     assert word
 
 
-def test_it_comes_back_after_pulses_were_missed(drive: Drive) -> None:
+def test_device_recovers_after_missed_pulses(drive: Drive) -> None:
     drive.operational()
     drive.let_pass(10)
     assert drive.al_status(SERVO) == (0x14, SYNCHRONISATION_ERROR)
@@ -340,7 +345,7 @@ def test_it_comes_back_after_pulses_were_missed(drive: Drive) -> None:
     assert drive.al_status(SERVO) == (8, 0)
 
 
-def test_a_cycle_made_shorter_meanwhile_is_counted(drive: Drive) -> None:
+def test_shortened_cycle_is_counted(drive: Drive) -> None:
     drive.operational()
     drive.until(500)
     drive.put_number(DEVICE, SYNC0_CYCLE, "<I", 30_000)
@@ -348,14 +353,14 @@ def test_a_cycle_made_shorter_meanwhile_is_counted(drive: Drive) -> None:
     assert drive.segment.core.synchronous(DEVICE)[3] > 0
 
 
-def test_a_frozen_device_neither_steps_nor_counts(drive: Drive) -> None:
+def test_frozen_device_neither_steps_nor_counts(drive: Drive) -> None:
     drive.operational()
     drive.servo.freeze()
     drive.let_pass(5)
     assert drive.segment.core.synchronous(DEVICE)[2] == 0
 
 
-def test_a_power_cycle_ends_it_all_and_it_can_begin_again(drive: Drive) -> None:
+def test_synchronisation_restarts_after_a_power_cycle(drive: Drive) -> None:
     drive.operational()
     drive.segment.inject(power_cycle(DEVICE, for_=0.01))
     drive.let_pass(20)
@@ -369,8 +374,8 @@ def test_a_power_cycle_ends_it_all_and_it_can_begin_again(drive: Drive) -> None:
 
 
 @pytest.mark.parametrize("phase", [100.0, 900.0])
-def test_a_device_that_nobody_steers_misses_no_pulse(phase: float) -> None:
-    """A device 100 ppm off that nobody steers: its own pulses still come with one frame each."""
+def test_unsteered_device_misses_no_pulse(phase: float) -> None:
+    """The clock has an error of 100 ppm, but one frame arrives in each interval of its pulses."""
     drive = Drive(Servo(crystal=Crystal(ppm=100)))
     drive.operational()
     for _ in range(300):
@@ -383,7 +388,7 @@ def test_a_device_that_nobody_steers_misses_no_pulse(phase: float) -> None:
 # -- quirks ------------------------------------------------------------------------------------
 
 
-def test_a_drive_by_sync1_shows_that_type_alone() -> None:
+def test_sync1_drive_shows_only_that_type() -> None:
     drive = Drive(Servo(quirks=ServoQuirks(sync_signal="sync1")))
     drive.start_mailbox(SERVO)
     assert value(drive, 0x1C32, 4) == 0x0009  # free run, DC SYNC1
@@ -394,7 +399,7 @@ def test_a_drive_by_sync1_shows_that_type_alone() -> None:
 
 
 @pytest.mark.parametrize(("later", "every"), [(0, 1), (300_000, 1), (3 * MS, 4)])
-def test_sync1_comes_with_the_first_sync0_after_its_time(later: int, every: int) -> None:
+def test_sync1_occurs_with_the_first_sync0_after_its_time(later: int, every: int) -> None:
     drive = Drive(Servo(quirks=ServoQuirks(sync_signal="sync1")))
     drive.start_mailbox(SERVO)
     drive.put_number(DEVICE, SYNC1_CYCLE, "<I", later)
@@ -411,7 +416,7 @@ def test_sync1_comes_with_the_first_sync0_after_its_time(later: int, every: int)
 
 
 @pytest.mark.parametrize("modes", [EL3702, SYNC1_ALONE, EASYCAT, EASYCAT_STORED])
-def test_the_sii_has_the_op_modes_given(modes: tuple[OpMode, ...]) -> None:
+def test_sii_contains_the_given_op_modes(modes: tuple[OpMode, ...]) -> None:
     drive = Drive(Servo(quirks=ServoQuirks(op_modes=modes)))
     sii = decode_sii(drive.segment.core.sii_image(DEVICE))
     assert [
@@ -429,7 +434,7 @@ def test_the_sii_has_the_op_modes_given(modes: tuple[OpMode, ...]) -> None:
     ]
 
 
-def test_an_op_mode_that_does_not_fit_is_refused() -> None:
+def test_op_mode_out_of_range_is_refused() -> None:
     with pytest.raises(ValueError, match="shift_ns must be a signed 32-bit number"):
         OpMode(name="DC", shift_ns=1 << 31)
     with pytest.raises(ValueError, match="assign_activate must be an unsigned 16-bit"):

@@ -1,4 +1,4 @@
-"""Watchdogs: outputs fall when process data stays away, and come back with it."""
+"""Watchdogs: outputs turn off without process data, and return with it."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def outputs(main: MainDevice) -> int:
     return device.outputs
 
 
-def test_outputs_fall_after_a_hundred_milliseconds_and_return(main: MainDevice) -> None:
+def test_outputs_turn_off_after_100_ms_and_return(main: MainDevice) -> None:
     main.write(STATION, 0x1000, b"\x0f")
     main.let_pass(99)
     assert outputs(main) == 0x0F
@@ -40,7 +40,7 @@ def test_outputs_fall_after_a_hundred_milliseconds_and_return(main: MainDevice) 
     assert main.read(STATION, 0x0442, 1) == b"\x01"
 
 
-def test_time_and_divider_set_when(main: MainDevice) -> None:
+def test_time_and_divider_set_the_timeout(main: MainDevice) -> None:
     main.write(STATION, 0x0400, struct.pack("<H", 2498))  # 100 us
     main.write(STATION, 0x0420, struct.pack("<H", 50))
     main.write(STATION, 0x1000, b"\x0f")
@@ -50,7 +50,7 @@ def test_time_and_divider_set_when(main: MainDevice) -> None:
     assert outputs(main) == 0
 
 
-def test_a_time_of_zero_switches_it_off(main: MainDevice) -> None:
+def test_time_of_zero_disables_the_watchdog(main: MainDevice) -> None:
     main.write(STATION, 0x0420, b"\x00\x00")
     main.write(STATION, 0x1000, b"\x0f")
     main.let_pass(5000)
@@ -64,7 +64,7 @@ def test_outputs_are_off_below_op(main: MainDevice) -> None:
     assert outputs(main) == 0
 
 
-def test_a_frozen_application_lets_the_pdi_watchdog_expire() -> None:
+def test_pdi_watchdog_expires_for_a_frozen_application() -> None:
     main = MainDevice(Segment([Servo()]))
     main.number_stations()
     main.let_pass(5)
@@ -75,7 +75,7 @@ def test_a_frozen_application_lets_the_pdi_watchdog_expire() -> None:
     assert main.read(STATION, 0x0443, 1) == b"\x01"
 
 
-def test_reading_does_not_feed_it(main: MainDevice) -> None:
+def test_reads_do_not_trigger_the_watchdog(main: MainDevice) -> None:
     main.write(STATION, 0x1000, b"\x0f")
     for _ in range(11):
         main.let_pass(10)

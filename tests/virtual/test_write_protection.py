@@ -22,7 +22,7 @@ def main() -> MainDevice:
 
 
 def together(main: MainDevice, *writes: tuple[int, bytes]) -> list[int]:
-    """The working counters of writes to the first device, all in one frame."""
+    """Write to the first device in one frame, and return the working counters."""
     datagrams = [Datagram(EcatCommand.APWR, address << 16, data) for address, data in writes]
     main.link.send(encode_frame(datagrams))
     assert main.link.wait_until(main.link.now() + MILLISECOND, True)
@@ -32,7 +32,7 @@ def together(main: MainDevice, *writes: tuple[int, bytes]) -> list[int]:
 
 
 @pytest.mark.parametrize(("protection", "counters"), [(REGISTERS, [0, 1, 1]), (ESC, [0, 0, 0])])
-def test_what_is_protected(main: MainDevice, protection: int, counters: list[int]) -> None:
+def test_protected_memory(main: MainDevice, protection: int, counters: list[int]) -> None:
     together(main, (protection, b"\x01"))
     addresses = (REGISTER, USER_RAM, RAM)
     assert [together(main, (address, b"\x05"))[0] for address in addresses] == counters
@@ -41,21 +41,21 @@ def test_what_is_protected(main: MainDevice, protection: int, counters: list[int
 @pytest.mark.parametrize(
     ("protection", "enable"), [(REGISTERS, REGISTERS_ENABLE), (ESC, ESC_ENABLE)]
 )
-def test_writing_is_enabled_for_one_frame(main: MainDevice, protection: int, enable: int) -> None:
+def test_writes_are_enabled_for_one_frame(main: MainDevice, protection: int, enable: int) -> None:
     together(main, (protection, b"\x01"))
     assert together(main, (enable, b"\x01"), (REGISTER, b"\x07")) == [1, 1]
     assert together(main, (REGISTER, b"\x08")) == [0]
     assert main.segment.core.peek(0, REGISTER, 1) == b"\x07"
 
 
-def test_protection_is_taken_off_the_same_way(main: MainDevice) -> None:
+def test_protection_is_removed_in_the_same_way(main: MainDevice) -> None:
     together(main, (REGISTERS, b"\x01"))
     assert together(main, (REGISTERS, b"\x00")) == [0]
     assert together(main, (REGISTERS_ENABLE, b"\x01"), (REGISTERS, b"\x00")) == [1, 1]
     assert together(main, (REGISTER, b"\x08")) == [1]
 
 
-def test_process_data_do_not_pass_a_protected_controller(main: MainDevice) -> None:
+def test_process_data_is_not_written_to_a_protected_controller(main: MainDevice) -> None:
     main.let_pass(30)
     main.start_servo(STATION + 1, 0)
     main.write(STATION + 1, ESC, b"\x01")
@@ -63,7 +63,7 @@ def test_process_data_do_not_pass_a_protected_controller(main: MainDevice) -> No
     assert main.exchange_logical(EcatCommand.LWR, 0, bytes(26)).working_counter == 0
 
 
-def test_three_letters_reset_a_device(main: MainDevice) -> None:
+def test_reset_sequence_resets_the_device(main: MainDevice) -> None:
     main.start_mailbox(STATION + 1)
     shown = []
     for letter in b"RES":
@@ -79,7 +79,7 @@ def test_three_letters_reset_a_device(main: MainDevice) -> None:
 
 
 @pytest.mark.parametrize("letters", [b"RRS", b"REX", b"ES", b"SER"])
-def test_other_letters_do_not(main: MainDevice, letters: bytes) -> None:
+def test_wrong_sequence_does_not_reset_the_device(main: MainDevice, letters: bytes) -> None:
     for letter in letters:
         main.write(STATION + 1, RESET, bytes([letter]))
     main.let_pass(5)

@@ -22,8 +22,8 @@ from catenary.wire.error_counters import ErrorCounters
 class Diagnosis:
     """Result of a diagnosis; `str()` describes it.
 
-    `counters`: by position, the counts in the judged time span; None for a silent device.
-    `totals`: by position, the counts since power-up.
+    `counters` holds the counts in the judged time span, by position; None for a silent device.
+    `totals` holds the counts since power-up.
     """
 
     findings: tuple[Finding, ...]
@@ -55,7 +55,7 @@ def diagnose(
 
     Args:
         subs: Devices to read.
-        since: Earlier diagnosis that starts the judged time span; None: power-up.
+        since: Earlier diagnosis that starts the judged time span; None for power-up.
         lost_frames: Number of frames lost or damaged in the same time span.
         ring: True if the segment is a ring.
     """

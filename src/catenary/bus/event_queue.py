@@ -27,7 +27,7 @@ class LoopClock:
     """Owns the zero of a loop's event times: the cycle start of its first iteration."""
 
     def __init__(self, zero_ns: Callable[[], int]) -> None:
-        self._zero_ns = zero_ns  # returns the link's clock time; 0: no iteration yet
+        self._zero_ns = zero_ns  # returns a time of the link's clock; 0 before the first iteration
 
     def stamped(self, event: Event) -> Event:
         """Return the event with its time on the clock of `cycle.time`, if the zero is known."""
@@ -146,7 +146,7 @@ class Callbacks:
         self.in_thread = True
         self.dropped = 0  # events that were dropped because callbacks were slow
         self._callbacks: list[Callback] = []
-        self._pending: queue.Queue[Event | None] = queue.Queue(capacity)  # None: end of the thread
+        self._pending: queue.Queue[Event | None] = queue.Queue(capacity)  # None ends the thread
         self._lock = threading.Lock()
         self._thread: threading.Thread | None = None
         self._delivering = False

@@ -10,16 +10,16 @@ from catenary.procedure.exchange import Procedure
 
 
 class CycleClock(Protocol):
-    """View of a cycle on the distributed clocks: `core.Clock`, or that of another master."""
+    """Interface to the distributed clocks of a cycle; `core.Clock` implements it."""
 
     def figures(self) -> dict[str, float]:
-        """Return the figures [ns]: see `core.Clock`."""
+        """Return the figures [ns], as `core.Clock` does."""
 
     def differences(self) -> list[tuple[float, int, int, int]]:
         """Return mean, last, largest magnitude [ns] and number of reads of each follower."""
 
     def keep_within(self, bound_ns: int) -> None:
-        """Set the bound of differences and phase."""
+        """Set the bound for the differences and the phase [ns]."""
 
     def reset_figures(self) -> None:
         """Reset the largest magnitudes."""
@@ -38,10 +38,10 @@ class Carrier(Protocol):
 
     @property
     def clock(self) -> CycleClock | None:
-        """View of the distributed clocks; None if the configuration has none."""
+        """Distributed clocks of the configuration; None if it has none."""
 
     def bring_to_op(self, positions: Sequence[int]) -> Procedure[None]:
-        """Wait while cycles flow until these devices are in OP.
+        """Wait until these devices are in OP. Cycles must run during the wait.
 
         Raises:
             StateError: A device does not reach OP.
@@ -52,4 +52,4 @@ class Carrier(Protocol):
         """Return the answers of all devices, with their states."""
 
     def listen(self) -> Procedure[None]:
-        """Fetch pending reports of devices and cables once, and put them as events."""
+        """Fetch the pending reports of devices and cables, and put them as events."""

@@ -27,7 +27,7 @@ from catenary.procedure.stations import (
 )
 from catenary.wire.al import STATE_MASK, AlState
 
-if TYPE_CHECKING:  # plan needs NumPy, a scan does not
+if TYPE_CHECKING:  # plan imports NumPy, which a scan does not need
     from catenary.bus.diagnosis import Diagnosis
     from catenary.bus.states import Outcome
     from catenary.plan.planner import Plan

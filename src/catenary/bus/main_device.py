@@ -32,7 +32,7 @@ from catenary.model.device import Identity
 from catenary.procedure.exchange import Procedure
 from catenary.wire.al import AlState
 
-if TYPE_CHECKING:  # plan needs NumPy, a scan does not
+if TYPE_CHECKING:  # plan imports NumPy, which a scan does not need
     from catenary.bus.diagnosis import Diagnosis
     from catenary.bus.states import Outcome
     from catenary.plan.cycle import ExecutionMode, ReceiveMode
@@ -133,7 +133,7 @@ class MainDevice:
         return self
 
     def forget(self) -> None:
-        """Release the parent's link and devices in a forked child. Sends nothing.
+        """Release the parent's link and devices in a forked child. Send nothing.
 
         No effect in the process that opened it.
         """
@@ -297,8 +297,8 @@ class MainDevice:
         loop runs, call it from another thread.
 
         Args:
-            since: Earlier diagnosis that starts the count; None: power-up of the devices.
-            subs: Devices of a `passive_scan`; None: those of the last `scan`.
+            since: Earlier diagnosis that starts the count; None for the power-up of the devices.
+            subs: Devices of a `passive_scan`; None for those of the last `scan`.
             lost_frames: Number of frames that were lost or damaged in that time.
         """
         chosen = self.subs if subs is None else subs
@@ -316,7 +316,7 @@ class MainDevice:
         """Return a printable plan for these requests, from the current mapping of the devices.
 
         The devices must be in PRE-OP. Nothing is written. For further options, call `read_mappings`
-        and then `catenary.plan.make_plan`.
+        and then `catenary.plan.make_plan` with `PlanOptions`.
 
         Args:
             requests: `Drives`, `Inputs`, `Outputs` and other process-data requests.
@@ -329,18 +329,18 @@ class MainDevice:
         Raises:
             MappingError: A device cannot map an object.
         """
+        from catenary.plan.options import PlanOptions
         from catenary.plan.planner import make_plan
 
         self.read_mappings(*requests, period=period)
-        return make_plan(
-            [sub.description for sub in self.subs],
-            requests,
+        options = PlanOptions(
             period=period,
             execution=execution,
             receive_mode=receive_mode,
             optional=optional,
             watchdog=watchdog,
         )
+        return make_plan([sub.description for sub in self.subs], requests, options)
 
     def read_mappings(self, *requests: ProcessDataRequest, period: float = 1e-3) -> None:
         """Update the mappings and the requested objects in the descriptions of the devices.
@@ -353,7 +353,7 @@ class MainDevice:
             CatenaryError: A device is not in PRE-OP; this is its error from the scan.
         """
         self._raise_errors()
-        from catenary.plan.planner import period_in_ns
+        from catenary.plan.options import period_in_ns
 
         self.master.read_mappings(requests, period_in_ns(period))
 

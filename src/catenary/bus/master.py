@@ -14,7 +14,7 @@ from catenary.link import Link
 from catenary.model.device import DeviceDescription
 from catenary.wire.al import AlState
 
-if TYPE_CHECKING:  # plan needs NumPy, a scan does not
+if TYPE_CHECKING:  # plan imports NumPy, which a scan does not need
     from catenary.bus.diagnosis import Diagnosis
     from catenary.bus.states import Outcome
     from catenary.plan.planner import Plan

@@ -15,7 +15,7 @@ from catenary.procedure.station import Station
 from catenary.wire.al import AlState
 from catenary.wire.coe import Emergency
 
-if TYPE_CHECKING:  # plan needs NumPy, a scan does not
+if TYPE_CHECKING:  # plan imports NumPy, which a scan does not need
     from catenary.bus.states import Outcome
 
 

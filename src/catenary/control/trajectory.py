@@ -163,6 +163,8 @@ def trajectory(
 
 @dataclass(frozen=True, slots=True)
 class _Bounds:
+    """Checked limits of a motion, one value per axis."""
+
     velocity: Row
     acceleration: Row
     jerk: Row
@@ -171,6 +173,7 @@ class _Bounds:
 
     @classmethod
     def of(cls, limits: MotionLimits, n: int) -> _Bounds:
+        """Return the limits of `n` axes. Raises ValueError if a limit is not valid."""
         rates = [
             checked(name, getattr(limits, name), n, above=True)
             for name in ("velocity", "acceleration", "jerk")
@@ -186,6 +189,7 @@ class _Bounds:
         return cls(velocity, acceleration, jerk, low, high)
 
     def check_start(self, q: Row, v: Row, a: Row) -> None:
+        """Raise ValueError if a motion within the limits cannot start from a state."""
         self._check_position("start", q)
         _raise_first("start velocity", v, abs(v) > self.velocity * (1 + SLACK), self.velocity)
         most = self.acceleration
@@ -196,6 +200,7 @@ class _Bounds:
         _raise_first(what, ahead, abs(ahead) > self.velocity * (1 + SLACK), self.velocity)
 
     def check_goal(self, q: Row) -> None:
+        """Raise ValueError if a goal is not finite or exceeds a position limit."""
         _raise_first("goal", q, ~np.isfinite(q), "must be finite")
         self._check_position("goal", q)
 

@@ -269,7 +269,7 @@ def column_bank(wanted: AxisObject) -> Bank:
     return Bank.REAL if is_float else Bank.INTEGER
 
 
-EXPONENTS = (-3, -6, -4, -5, -2, -1, 0, -7, -8, -9)  # some drives accept only ms and us
+EXPONENTS = (-3, -6, -4, -5, -2, -1, 0, -7, -8, -9)  # ms, us first: some drives need them
 
 
 def interpolation_time(period_ns: int) -> tuple[int, int] | None:

@@ -182,7 +182,7 @@ def _check_rest(axis: Axis, port: AxisPort, rates: Rates) -> None:
         raise ValueError(
             f"{axis.name}: with acceleration {rates.acceleration:.6g} {names.acceleration}, the "
             f"axis stops from {motion.velocity:.4g} {names.velocity} at {rest:.6g} "
-            f"{names.position}, {beyond}"
+            f"{names.position}, {beyond}; use a larger acceleration"
         )
 
 

@@ -24,10 +24,12 @@ class CycleNow(Protocol):
     """Number and time of a cycle."""
 
     @property
-    def number(self) -> int: ...
+    def number(self) -> int:
+        """Number of the cycle."""
 
     @property
-    def time(self) -> float: ...
+    def time(self) -> float:
+        """Time of the cycle [s]."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -31,8 +31,8 @@ class RequestedState(IntEnum):
 
 
 # Command for (state, requested state). The default is DISABLE_VOLTAGE. It does nothing in states
-# that the drive leaves itself (transitions 0, 14), leaves a quick stop (12), and clears bit 7 in a
-# fault.
+# that the drive leaves on its own (transitions 0, 14), leaves a quick stop (12), and clears bit 7
+# in a fault.
 TOWARDS: dict[tuple[AxisState, RequestedState], Controlword] = {
     (AxisState.READY_TO_SWITCH_ON, RequestedState.DISABLED): SHUTDOWN,  # stays
     (AxisState.SWITCHED_ON, RequestedState.DISABLED): SHUTDOWN,  # transition 6

@@ -84,7 +84,7 @@ class AxisUnits:
             raise ValueError(f"counts_per_turn must be positive, not {self.counts_per_turn}")
         if not (math.isfinite(self.gear_ratio) and self.gear_ratio > 0):
             raise ValueError(
-                f"gear_ratio must be positive, not {self.gear_ratio}; use direction=-1"
+                f"gear_ratio must be positive, not {self.gear_ratio}; direction=-1 reverses an axis"
             )
         if self.direction not in (1, -1):
             raise ValueError(f"direction must be 1 or -1, not {self.direction}")
@@ -164,13 +164,15 @@ def per_axis(name: str, value: V | Sequence[V], n: int) -> tuple[V, ...]:
 
     Args:
         name: name of the option, for messages.
-        value: one value for all axes, or a sequence with one per axis.
+        value: one value for all axes (a str is one value), or a sequence with one per axis.
         n: number of axes.
 
     Raises:
         ValueError: The number of values is wrong.
     """
-    return one_each(name, value, n) if isinstance(value, Sequence) else (value,) * n
+    if isinstance(value, str) or not isinstance(value, Sequence):
+        return (value,) * n
+    return one_each(name, value, n)
 
 
 def one_each(name: str, values: Sequence[V], n: int) -> tuple[V, ...]:

@@ -17,7 +17,7 @@ from catenary.plan.cycle import ClockPlan
 from catenary.plan.layout import UnitLayout
 from catenary.plan.planner import Plan
 from catenary.plan.start_up import WATCHDOG_DIVIDER, DevicePlan, Download
-from catenary.procedure.pdo import LEFT_ALONE
+from catenary.procedure.pdo import OPTIONAL_ABORTS
 
 EMERGENCIES = 16  # that the master stores for each device
 REQUEST_SIZE = 256  # bytes of an object read by request; a longer one takes a blocking call
@@ -47,9 +47,9 @@ class DeviceConfiguration:
     position: int
     address: Address
     config: int
-    sdo_request: int  # 0: no CoE
+    sdo_request: int  # 0 without CoE
     register_request: int
-    sync: SyncPlan | None  # None: no SYNC signals
+    sync: SyncPlan | None  # None without SYNC signals
 
 
 @dataclass(frozen=True, slots=True)
@@ -139,7 +139,7 @@ def _device(
     for download in (*plan.before_mapping, *plan.start_up):
         data = ctypes.create_string_buffer(download.data, len(download.data))
         if download.optional:
-            # Not in the master's list: after a refused SDO, the master gives up the device.
+            # Written here, because the master gives up a device that refuses an SDO of its list.
             _download_if_there(master, plan.position, download)
             continue
         place = (download.index, download.subindex, ctypes.addressof(data), len(data))
@@ -161,7 +161,7 @@ def _download_if_there(master: Reservation, position: int, download: Download) -
     try:
         master.download(position, download.index, download.subindex, download.data)
     except SdoAbort as abort:
-        if abort.code not in LEFT_ALONE:
+        if abort.code not in OPTIONAL_ABORTS:
             raise
 
 

@@ -17,7 +17,7 @@ class KernelAccess:
 
     def __init__(self, main: MasterOwner) -> None:
         self.main = main
-        self.active: Configuration | None = None  # None: the master is not activated
+        self.active: Configuration | None = None  # None if the master is not activated
 
     @property
     def subs(self) -> Sequence[bus.SubDevice]:

@@ -20,7 +20,7 @@ from catenary.igh.topology import check_delays
 from catenary.model.device import DeviceDescription, Direction, mapped_entries
 from catenary.wire.al import AlState
 
-if TYPE_CHECKING:  # plan needs NumPy, a scan does not
+if TYPE_CHECKING:  # plan imports NumPy, which a scan does not need
     from catenary.bus.diagnosis import Diagnosis
     from catenary.bus.master import MasterOwner
     from catenary.bus.states import Outcome
@@ -82,7 +82,7 @@ class KernelMaster:
             requests: The process-data requests of the loop.
             period_ns: The period of the loop.
         """
-        from catenary.plan.planner import gather_requests
+        from catenary.plan.combination import gather_requests
 
         asked = gather_requests(requests, period_ns)
         for sub in self.main.subs:

@@ -1,4 +1,4 @@
-"""One file per machine: devices by name with identity, drives, process data, loop and clocks."""
+"""Machine files, which describe devices, drives, process data, loop and clocks of a machine."""
 
 from catenary.machine.comparison import (
     HARMLESS,

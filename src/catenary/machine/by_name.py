@@ -12,7 +12,8 @@ V = TypeVar("V")
 class ByName(Mapping[str, V]):
     """Objects of a machine by their names in the file.
 
-    Those of absent devices are not among them; asking for one says which device is absent.
+    The mapping does not contain the objects of absent devices; the KeyError for such an object
+    names the absent device.
     """
 
     def __init__(self, kind: str, found: Mapping[str, V], absent: Mapping[str, str]) -> None:
@@ -21,10 +22,10 @@ class ByName(Mapping[str, V]):
         self._absent = dict(absent)
 
     def __getitem__(self, name: str) -> V:
-        """Return the object of this name.
+        """Return the object with this name.
 
         Raises:
-            KeyError: The file has no such name, or its device is absent.
+            KeyError: The file does not contain the name, or its device is absent.
         """
         if name in self._found:
             return self._found[name]
@@ -32,7 +33,7 @@ class ByName(Mapping[str, V]):
             raise MissingName(f'{self._kind} "{name}" is absent: {self._absent[name]}')
         near = get_close_matches(name, self._found, n=1)
         guess = f'; did you mean "{near[0]}"?' if near else ""
-        known = f"; known: {', '.join(self._found) or 'none'}"
+        known = f"; known names are {', '.join(self._found)}" if self._found else ""
         raise MissingName(f'the file has no {self._kind} "{name}"{guess or known}')
 
     def __iter__(self) -> Iterator[str]:
@@ -46,7 +47,7 @@ class ByName(Mapping[str, V]):
 
 
 class MissingName(KeyError):
-    """A name that a machine does not have. Unlike KeyError, its text is shown as it is."""
+    """KeyError for an unknown name. Unlike KeyError, its text has no additional quotes."""
 
     def __str__(self) -> str:
         return str(self.args[0])

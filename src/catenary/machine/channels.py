@@ -1,4 +1,4 @@
-"""Inputs and outputs of [process_data.NAME] as channels."""
+"""Channels from the tables [process_data.NAME], and columns from [drives.NAME]."""
 
 from __future__ import annotations
 
@@ -16,15 +16,20 @@ from catenary.machine.references import data_type, nearest, object_of
 from catenary.machine.schema import ChannelTable, ColumnTable
 from catenary.model.device import DeviceDescription, Direction, Entry
 
-UNTYPED = Entry(1, 0, 1)  # in place of an entry that is not needed
+UNTYPED = Entry(1, 0, 1)  # placeholder where the type of the entry is not used
 Given = Mapping[str, str | ChannelTable]
 
 
 def check_channels(file: MachineFile, path: KeyPath, given: Given) -> None:
-    """Check objects, types and scales.
+    """Check the objects, types and scales of a table of channels.
+
+    Args:
+        file: the machine file.
+        path: key path of the table.
+        given: channels by name.
 
     Raises:
-        MachineFileError: One is wrong.
+        MachineFileError: An object, a type or a scale is not valid.
     """
     for name, spec in given.items():
         _channel(file, (*path, name), spec, UNTYPED)
@@ -33,7 +38,15 @@ def check_channels(file: MachineFile, path: KeyPath, given: Given) -> None:
 def make_channels(
     file: MachineFile, path: KeyPath, given: Given, device: DeviceDescription
 ) -> dict[str, Channel]:
-    """Return the channels by name. The device's description has the types that the file lacks.
+    """Return the channels of a table by name.
+
+    The PDOs of the device supply the types that the file does not give.
+
+    Args:
+        file: the machine file.
+        path: key path of the table.
+        given: channels by name.
+        device: description of the device.
 
     Raises:
         MachineFileError: An object without a type is not in a PDO of the device.
@@ -50,10 +63,15 @@ def make_channels(
 def make_columns(
     file: MachineFile, path: KeyPath, given: Sequence[str | ColumnTable]
 ) -> list[str | tuple[str, Channel]]:
-    """Return `columns=` of `Drives`.
+    """Return the option `columns` of `Drives`.
+
+    Args:
+        file: the machine file.
+        path: key path of the list.
+        given: columns of the list.
 
     Raises:
-        MachineFileError: A name is unknown, or an object or a type is wrong.
+        MachineFileError: A name is unknown, or an object or a type is not valid.
     """
     columns: list[str | tuple[str, Channel]] = []
     for number, spec in enumerate(given):
@@ -89,18 +107,18 @@ def _entry(
     device: DeviceDescription,
     direction: Direction,
 ) -> Entry:
-    """Return the entry of the device that has the object; any one if the file has the type."""
+    """Return the entry of the device with the type of the object; UNTYPED if the file has it."""
     if isinstance(spec, ChannelTable) and spec.type is not UNSET:
         return UNTYPED
     text = spec if isinstance(spec, str) else spec.object
-    wanted = object_of(file, path, text)
+    place = object_of(file, path, text)
     entries = [entry for pdo in device.pdos(direction) for entry in pdo.entries if entry.index]
     for entry in entries:
-        if (entry.index, entry.subindex) == wanted:
+        if (entry.index, entry.subindex) == place:
             return entry
     known = [f"0x{entry.index:04X}:{entry.subindex:02X}" for entry in entries]
     raise file.error(
         path,
         f"{text} is not in a PDO of {device}{nearest(text, known)}",
-        hint=f'if the device has it, write its type: {{ object = "{text}", type = "UINT" }}',
+        hint=f'if the device has this object, add its type: {{ object = "{text}", type = "UINT" }}',
     )

@@ -1,4 +1,4 @@
-"""A machine file compared with the devices that a scan has found."""
+"""Comparison of a machine file with the devices that a scan has found."""
 
 from __future__ import annotations
 
@@ -16,32 +16,40 @@ HARMLESS: tuple[Verdict, ...] = ("same", "absent")
 
 
 class Comparison(NamedTuple):
-    """One device of the file, one of the segment, or both.
+    """Comparison of one device of the file with the device found.
 
-    Verdicts: "same"; "absent": optional, and not there; "different": another identity; "missing";
-    "unknown": not in the file.
+    The verdicts are:
+
+    - "same": the identities agree.
+    - "different": the device found has another identity.
+    - "missing": a required device was not found.
+    - "absent": an optional device was not found.
+    - "unknown": the file does not contain the device found.
     """
 
     verdict: Verdict
     expected: DeviceTable | None = None
     found: SubDevice | None = None
-    fault: str = ""
-    cause: str = ""  # the likely cause and the next step
+    fault: str = ""  # description of the difference
+    cause: str = ""  # likely cause and next step
 
     @property
     def name(self) -> str:
-        """Name in the file; of an unknown device its own."""
+        """Name in the file; for an unknown device, the name of the product."""
         if self.expected is not None:
             return self.expected.name
         return self.found.name if self.found is not None else ""
 
 
 def compare(expected: Sequence[DeviceTable], subs: Sequence[SubDevice]) -> tuple[Comparison, ...]:
-    """Return one comparison per device of the file, then the devices that it does not name.
+    """Compare the devices of a file with those of a segment.
 
     Args:
-        expected: The devices of the file.
-        subs: All devices of the segment, by position.
+        expected: devices of the file.
+        subs: all devices of the segment, by position.
+
+    Returns:
+        One comparison per device of the file, followed by the unknown devices.
     """
     found = [_candidates(device, subs) for device in expected]
     taken = {sub.position for subs_of_one in found for sub in subs_of_one}
@@ -58,26 +66,36 @@ def compare(expected: Sequence[DeviceTable], subs: Sequence[SubDevice]) -> tuple
 
 
 def address(device: DeviceTable) -> str:
-    """Return the address of a device in the file: "alias 11", "position 3"."""
+    """Return the address of a device in the file, such as "alias 11" or "position 3"."""
     return f"position {device.position}" if device.alias is UNSET else f"alias {device.alias}"
 
 
 def expected_identity(device: DeviceTable) -> str:
-    """Return the identity that the file gives, as errors show it."""
+    """Return the identity of a device in the file, as text for messages."""
     return _identity_text(device.identity)
 
 
 def agrees(expected: IdentityTable, found: Identity) -> bool:
-    """Return True if an identity has all numbers that the file gives."""
+    """Return True if all numbers of the identity in the file agree with a device.
+
+    Args:
+        expected: identity in the file.
+        found: identity of the device.
+    """
     return not differences(expected, found)
 
 
 def differences(expected: IdentityTable, found: Identity) -> list[str]:
-    """Return the numbers of the identity that differ, by name."""
-    wanted: Mapping[str, object] = {
+    """Return the names of the numbers that differ, such as "revision".
+
+    Args:
+        expected: identity in the file.
+        found: identity of the device.
+    """
+    numbers: Mapping[str, object] = {
         name: getattr(expected, name) for name in expected.__struct_fields__
     }
-    return [n for n, value in wanted.items() if value is not UNSET and value != getattr(found, n)]
+    return [n for n, value in numbers.items() if value is not UNSET and value != getattr(found, n)]
 
 
 def _candidates(device: DeviceTable, subs: Sequence[SubDevice]) -> list[SubDevice]:
@@ -120,10 +138,10 @@ def _cause_of_absence(device: DeviceTable, subs: Sequence[SubDevice], taken: set
         [first, *_] = free
         now = f"alias {first.alias}" if first.alias else "no alias"
         return (
-            f"{_place(first)} has this identity and {now}; if it is the device: "
-            f"catenary alias TARGET {first.position} {device.alias}, then switch it off and on"
+            f"{_place(first)} has this identity and {now}; if it is the right device, run "
+            f"`catenary alias TARGET {first.position} {device.alias}`, then switch it off and on"
         )
-    return "no free device has its identity; check cables and power"
+    return "no unassigned device has this identity; check cables and power"
 
 
 def _cause_of_another(
@@ -135,40 +153,45 @@ def _cause_of_another(
     """Return the likely cause of a wrong identity at an address, and the next step."""
     if not any(sub.identity):
         notes = "".join(f"; {note}" for note in sub.description.notes)
-        return f"its EEPROM has no identity{notes}; catenary sii read TARGET {sub.position}"
+        return f"its EEPROM has no identity{notes}; run `catenary sii read TARGET {sub.position}`"
     differing = differences(device.identity, sub.identity)
     if "vendor" not in differing and "product" not in differing:
         text = " and ".join(differing)
         return (
-            f"the same product with another {text}, perhaps exchanged or updated; if it is right, "
+            f"the device is the same product with another {text}; if it was replaced or updated, "
             f"change {text} in the file"
         )
     if device.alias is not UNSET:
         return (
-            f"alias {device.alias} was written to another device; catenary alias TARGET "
-            "POSITION VALUE writes it"
+            f"alias {device.alias} was written to another device; to correct it, run "
+            "`catenary alias TARGET POSITION VALUE`"
         )
     shift = _shift(expected, subs)
     if shift:
         more = "more" if shift > 0 else "fewer"
         return (
-            f"{abs(shift)} {more} before it on the cable than in the file; restore the cable, "
-            "change the positions, or use aliases"
+            f"the cable has {abs(shift)} {more} {_devices(shift)} before it than the file; correct "
+            "the cabling, change the positions in the file, or use aliases"
         )
     for other in expected:
         if other is not device and agrees(other.identity, sub.identity):
-            return f'it has the identity of "{other.name}": swapped devices or cables?'
+            return (
+                f'it has the identity of "{other.name}"; check whether devices or cables are '
+                "swapped"
+            )
     return "check the order of the devices on the cable, or correct the file"
 
 
 def _shift(expected: Sequence[DeviceTable], subs: Sequence[SubDevice]) -> int:
-    """Return how many devices more (fewer: negative) there are before the first wrong one; 0: the
-    order does not say."""
+    """Return the number of additional devices before the first wrong one.
+
+    The number is negative if devices are missing, and 0 if no shift explains the order.
+    """
     wrong = [
         device for device in expected if device.position is not UNSET and not _fits(device, subs, 0)
     ]
     for count in (1, 2):
-        moved = wrong[count:]  # without those that were taken out
+        moved = wrong[count:]  # without the devices that were removed
         if len(wrong) > 1 and all(_fits(device, subs, count) for device in wrong):
             return count
         if (
@@ -178,6 +201,10 @@ def _shift(expected: Sequence[DeviceTable], subs: Sequence[SubDevice]) -> int:
         ):
             return -count
     return 0
+
+
+def _devices(shift: int) -> str:
+    return "device" if abs(shift) == 1 else "devices"
 
 
 def _fits(device: DeviceTable, subs: Sequence[SubDevice], shift: int) -> bool:

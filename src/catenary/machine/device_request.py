@@ -1,4 +1,4 @@
-"""Start-up objects of devices: the `start_up` lists of a machine file as a request of the loop."""
+"""Requests for the `start_up` lists of a machine file."""
 
 from __future__ import annotations
 
@@ -18,10 +18,14 @@ from catenary.types import Octets
 
 
 def start_up_objects(file: MachineFile, number: int) -> list[StartUp]:
-    """Return the start-up objects of [[device]] `number`.
+    """Return the start-up objects of a device of the file.
+
+    Args:
+        file: the machine file.
+        number: number of the [[device]] table, from 0.
 
     Raises:
-        MachineFileError: An object, a type or a value is wrong.
+        MachineFileError: An object, a type or a value is not valid.
     """
     device = file.tables.device[number]
     path: KeyPath = ("device", number, "start_up")
@@ -46,7 +50,10 @@ def _start_up(file: MachineFile, table: StartUpTable, path: KeyPath) -> StartUp:
 
 
 class StartUpRequest:
-    """Request for a device without process data: start-up objects, whether it may be absent."""
+    """Request for a device that states its start-up objects and whether it may be absent.
+
+    It does not request process data.
+    """
 
     def __init__(
         self, sub: SubDevice, objects: Sequence[StartUp], *, required: bool, divider: int
@@ -55,12 +62,12 @@ class StartUpRequest:
         self._request = DeviceRequest(objects=tuple(objects), required=required, divider=divider)
 
     def pdos(self, period_ns: int) -> Mapping[int, DeviceRequest]:
-        """Return the request, by position."""
+        """Return the request of the device, by position."""
         return {self.subs[0].position: self._request}
 
     def tables(self, layout: ImageLayout) -> RequestTables:
-        """Return no axes and no columns."""
+        """Return empty tables."""
         return RequestTables()
 
     def bind(self, views: Views) -> None:
-        """Receive the views of the loop that opens. The request has none of its own."""
+        """Do nothing, since the request has no arrays."""

@@ -1,4 +1,4 @@
-"""Sentences for what msgspec rejects: the key path, what was expected, the nearest key."""
+"""Explanations of the validation errors of msgspec, with key path, expected value and hint."""
 
 from __future__ import annotations
 
@@ -26,13 +26,13 @@ ROLES = ("drives", "process_data")  # tables of tables
 _HINTS: Mapping[str, str] = {
     "identity": "identity = { vendor = 0x2, product = 0x44C2C52 }; `catenary init` writes it",
     "format": 'write format = "catenary-machine/1" at the top of the file',
-    "counts_per_turn": "counts of the motor's encoder per turn, from the drive's manual; after "
-    '`catenary init`, remove the "#" from the lines marked FILL IN',
+    "counts_per_turn": "write the encoder counts per motor turn, from the manual of the drive; in "
+    'a file of `catenary init`, remove the "#" from the lines marked FILL IN',
 }
 
 
 class Explanation(msgspec.Struct, frozen=True):
-    """Place of a mistake in a file, what is wrong, and what to do next."""
+    """Key path of an error in a file, message and hint."""
 
     path: KeyPath
     message: str
@@ -40,7 +40,12 @@ class Explanation(msgspec.Struct, frozen=True):
 
 
 def explain(error: msgspec.ValidationError, content: Mapping[str, object]) -> Explanation:
-    """Return the explanation of an error for `content`, which it was raised for."""
+    """Return the explanation of a validation error.
+
+    Args:
+        error: error of msgspec.
+        content: content of the file that caused the error.
+    """
     path = _path(str(error), content)
     message = _message(str(error))
     unknown, missing = _UNKNOWN.fullmatch(message), _MISSING.fullmatch(message)
@@ -57,7 +62,7 @@ def explain(error: msgspec.ValidationError, content: Mapping[str, object]) -> Ex
     )
     text = f"{expected[0].lower()}{expected[1:]}, found {_shown(found)}{_described(path)}"
     is_role = len(path) == 2 and path[0] in ROLES
-    hint = f"the header of the table has a name of yours: [{path[0]}.NAME]" if is_role else ""
+    hint = f"add a name of your choice to the header: [{path[0]}.NAME]" if is_role else ""
     return Explanation(path, text, hint)
 
 
@@ -67,7 +72,7 @@ def _message(text: str) -> str:
 
 
 def _path(text: str, content: Mapping[str, object]) -> KeyPath:
-    """Return the path in an error. msgspec writes `[...]` for any key of a table by names."""
+    """Return the path in an error text. msgspec writes `[...]` instead of a key that is a name."""
     found = _PLACE.fullmatch(text)
     path: KeyPath = ()
     for name, number, any_key in _STEP.findall(found[2] or "" if found is not None else ""):
@@ -77,7 +82,7 @@ def _path(text: str, content: Mapping[str, object]) -> KeyPath:
 
 
 def _failing_key(content: Mapping[str, object], path: KeyPath, text: str) -> str:
-    """Return the key of the table at `path` with the value that causes the error."""
+    """Return the key of the table at `path` whose value causes the error."""
     table = _at(content, path)
     assert isinstance(table, dict)
     for key, value in table.items():
@@ -112,7 +117,8 @@ def _explain_unknown(path: KeyPath, key: str) -> Explanation:
         return Explanation((*path, key), f'unknown key "{key}"; did you mean "{near[0]}"?')
     text = f'unknown key "{key}"'
     owner = _owner(key)
-    hint = f"{key} is a key of {owner}" if owner else f"keys: {', '.join(table.__struct_fields__)}"
+    keys = ", ".join(table.__struct_fields__)
+    hint = f"{key} is a key of {owner}" if owner else f"the keys of this table are {keys}"
     return Explanation((*path, key), text, hint)
 
 
@@ -141,7 +147,7 @@ def _in_words(kinds: str) -> str:
 
 
 def _shown(value: object) -> str:
-    """Return a value as TOML spells it, tables and lists by their kind."""
+    """Return a value in TOML notation, or "a table" or "a list"."""
     if isinstance(value, bool):
         return str(value).lower()
     if isinstance(value, dict | list):
@@ -150,7 +156,7 @@ def _shown(value: object) -> str:
 
 
 def _described(path: KeyPath) -> str:
-    """Return what the schema says of a key, in brackets."""
+    """Return the description of a key from the schema, in parentheses; empty without one."""
     texts = [
         note.description
         for kind in _flat(_type_at(path))
@@ -162,7 +168,7 @@ def _described(path: KeyPath) -> str:
 
 
 def _type_at(path: KeyPath) -> Any:
-    """Return the type that the schema has for a path."""
+    """Return the type of a key path in the schema."""
     kind: Any = MachineTables
     for step in path:
         kind = next(_inner(kind, step), object)
@@ -194,7 +200,7 @@ def _flat(kind: Any) -> Iterator[Any]:
 
 
 def quantities(table: type[Table]) -> dict[str, str | None]:
-    """Return the dimension of every key of a table; None if it is not a quantity."""
+    """Return the dimension of each key of a table; None for a key that is not a quantity."""
     hints = get_type_hints(table, include_extras=True)
     return {name: _dimension(hints[name]) for name in table.__struct_fields__}
 

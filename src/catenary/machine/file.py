@@ -1,4 +1,4 @@
-"""A machine file that has been read: its tables, and the lines that errors name."""
+"""Machine file after reading, with its tables and the line numbers for errors."""
 
 from __future__ import annotations
 
@@ -21,13 +21,13 @@ from catenary.target import TomlFile, parse, read_toml, target_of
 
 
 class MachineFile:
-    """The tables of a machine file, and the line of every key."""
+    """Tables of a machine file, and the line number of every key."""
 
     def __init__(self, file: TomlFile) -> None:
-        """Convert a TOML file.
+        """Convert a TOML file into tables.
 
         Raises:
-            MachineFileError: A key or a value is wrong; it names the line.
+            MachineFileError: A key or a value is not valid. The error names the line.
         """
         self.path = file.path
         self._toml = file
@@ -40,10 +40,10 @@ class MachineFile:
             raise self.error(found.path, found.message, hint=found.hint) from None
 
     def source(self) -> LinkSource:
-        """Return the link source of `target`.
+        """Return the link source of the key `target`.
 
         Raises:
-            MachineFileError: The file names none, or one that cannot be.
+            MachineFileError: The key is missing, or its value is not a valid target.
         """
         target = target_of(self._toml)
         try:
@@ -52,7 +52,13 @@ class MachineFile:
             raise self.error(("target",), error.message, hint=error.hint) from error
 
     def error(self, path: KeyPath, message: str, *, hint: str = "") -> MachineFileError:
-        """Return the error for a key."""
+        """Return the error for a key.
+
+        Args:
+            path: path of the key.
+            message: text of the error.
+            hint: what to do next.
+        """
         return MachineFileError(
             message,
             path=str(self.path),
@@ -63,11 +69,11 @@ class MachineFile:
 
     @contextmanager
     def located(self, path: KeyPath, keys: Iterable[str] = ()) -> Iterator[None]:
-        """Turn a ValueError into an error with a line.
+        """Convert a TypeError or ValueError in the block into a MachineFileError with a line.
 
         Args:
-            path: Place of the value, or of its table.
-            keys: Keys of the table; the first one in the text of the error is the place.
+            path: path of the value or of its table.
+            keys: keys of the table. The first key in the text of the error determines the line.
         """
         try:
             yield
@@ -77,7 +83,16 @@ class MachineFile:
             raise self.error(place, str(error)) from error
 
     def values(self, table: Table, path: KeyPath, *, linear: bool = False) -> dict[str, Any]:
-        """Return the keys that are given in a table, quantities in SI units."""
+        """Return the values in a table by key, with quantities in SI units.
+
+        Args:
+            table: the table.
+            path: path of the table.
+            linear: True if the quantities belong to a linear axis.
+
+        Raises:
+            MachineFileError: A quantity has a wrong unit.
+        """
         return {
             name: self._value(getattr(table, name), dimension, (*path, name), linear)
             for name, dimension in quantities(type(table)).items()
@@ -93,21 +108,25 @@ class MachineFile:
             return to_si(given, cast(Dimension, dimension), linear=linear)
 
     def _check_format(self, found: object) -> None:
-        """Check the format first: another version has other keys."""
+        """Raise MachineFileError for another format, before its keys cause other errors."""
         if isinstance(found, str) and found != FORMAT:
             raise self.error(
                 ("format",),
-                f'"{found}" is not a format that this version of Catenary reads',
-                hint=f'expected "{FORMAT}"; a newer format needs a newer Catenary',
+                f'this version of Catenary cannot read the format "{found}"',
+                hint=f'expected "{FORMAT}"; a newer format needs a newer version of Catenary',
             )
 
 
 def dotted(path: KeyPath) -> str:
-    """Return a path as text: `drives.arm.velocity_limit[2]`."""
+    """Return a path as text, such as `drives.arm.velocity_limit[2]`."""
     text = "".join(f"[{step}]" if isinstance(step, int) else f".{step}" for step in path)
     return text.removeprefix(".")
 
 
 def load(path: str | Path) -> MachineFile:
-    """Read the tables of a machine file; references between them are not checked."""
+    """Read the tables of a machine file, without a check of the references between them.
+
+    Raises:
+        MachineFileError: The file cannot be read, or a key or a value is not valid.
+    """
     return MachineFile(read_toml(path))

@@ -1,4 +1,4 @@
-"""The devices of a machine that were found, and what the program gets by name."""
+"""Devices of a machine that were found, and the drives and process data made from them."""
 
 from __future__ import annotations
 
@@ -32,10 +32,16 @@ class MachineParts:
 
 
 def raise_differences(file: MachineFile, found: Sequence[Comparison]) -> None:
-    """Raise the first difference between file and segment; the others are its notes.
+    """Raise an error for the first difference between file and segment.
+
+    The other differences are notes of the error.
+
+    Args:
+        file: the machine file.
+        found: comparisons of the devices.
 
     Raises:
-        IdentityError: A device is not the one in the file, or two devices have its alias.
+        IdentityError: A device has another identity, or two devices have the same alias.
         SegmentError: A required device is missing.
     """
     errors = [_error(file, each) for each in found if each.verdict in ("different", "missing")]
@@ -59,11 +65,15 @@ def _error(file: MachineFile, found: Comparison) -> CatenaryError:
 
 
 def make_found(file: MachineFile, found: Sequence[Comparison]) -> MachineParts:
-    """Return what the program gets by name.
+    """Make the drives, process data and requests of the devices that were found.
+
+    Args:
+        file: the machine file.
+        found: comparisons of the devices.
 
     Raises:
-        CatenaryError: A device of the file could not be brought to PRE-OP.
-        MachineFileError: A table asks for what its device does not have.
+        CatenaryError: A device of the file did not reach PRE-OP.
+        MachineFileError: A table requests an object or axis that its device does not have.
     """
     subs = {each.name: each.found for each in found if each.verdict == "same" and each.found}
     for sub in subs.values():
@@ -85,7 +95,7 @@ def make_found(file: MachineFile, found: Sequence[Comparison]) -> MachineParts:
 def _roles(
     file: MachineFile, kind: str, tables: Mapping[str, object], absent: Mapping[str, str]
 ) -> tuple[list[str], dict[str, str]]:
-    """Return the roles with all of their devices, and the reason for each of the others."""
+    """Return the roles whose devices are all present, and the reason for each other role."""
     reasons = {
         role: f'device "{name}": {absent[name]}'
         for role in tables

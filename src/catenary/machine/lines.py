@@ -1,6 +1,6 @@
 """Line numbers of keys in a TOML text, which `tomllib` does not report.
 
-The text has been accepted by `tomllib`: this scanner finds keys, and checks nothing.
+The scanner only finds keys. It needs a text that `tomllib` has accepted.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ _BLANK = re.compile(r"(?:[ \t\r\n]|#[^\n]*)*")
 _SPACE = re.compile(r"[ \t]*")
 _BARE_KEY = re.compile(r"[A-Za-z0-9_-]+")
 _SCALAR = re.compile(r"[^,\]}\n#]*")
-_STRINGS = (  # the long ones first
+_STRINGS = (  # multi-line strings first
     r'"{3}(?:[^\\]|\\.)*?"{3,5}',
     r"'{3}.*?'{3,5}",
     r'"(?:[^"\\]|\\.)*"',
@@ -25,19 +25,27 @@ _STRING = re.compile("|".join(_STRINGS), re.DOTALL)
 
 
 def key_lines(text: str) -> dict[KeyPath, int]:
-    """Return the line of every key, table and list element, by its path; lines count from 1."""
+    """Return the line number, from 1, of every key, table and list element, by its path."""
     return _Scanner(text).document()
 
 
 def line_of(lines: dict[KeyPath, int], path: KeyPath) -> int:
-    """Return the line of a path, or of the nearest table around it; 1 if there is none."""
+    """Return the line of a path, or of the innermost table that contains it.
+
+    Args:
+        lines: line numbers by path.
+        path: path of a key.
+
+    Returns:
+        Line number; 1 if the file contains neither.
+    """
     while path and path not in lines:
         path = path[:-1]
     return lines.get(path, 1)
 
 
 class _Scanner:
-    """Owns the place in a TOML text and the lines found so far."""
+    """Owner of the position in a TOML text and of the lines found so far."""
 
     def __init__(self, text: str) -> None:
         self._text = text
@@ -46,6 +54,7 @@ class _Scanner:
         self._elements: dict[KeyPath, int] = {}  # number of tables of each [[array]]
 
     def document(self) -> dict[KeyPath, int]:
+        """Scan the whole text. Return the line numbers by path."""
         table: KeyPath = ()
         self._skip(_BLANK)
         while self._at < len(self._text):
@@ -66,7 +75,7 @@ class _Scanner:
             path += (name,)
             if number == len(names) - 1 and is_array:
                 self._elements[path] = self._elements.get(path, 0) + 1
-            self._lines.setdefault(path, line)  # a table that exists by this header alone, too
+            self._lines.setdefault(path, line)  # also a table that only this header defines
             if path in self._elements:
                 path += (self._elements[path] - 1,)
         self._at += 2 if is_array else 1
@@ -108,7 +117,7 @@ class _Scanner:
             self._pair(path)
 
     def _inside(self, end: str) -> bool:
-        """Skip blanks and a comma. Return False after `end`."""
+        """Skip blanks and a comma. Return False at `end`, which is skipped too."""
         self._skip(_BLANK)
         if self._text[self._at] == ",":
             self._at += 1
@@ -119,7 +128,7 @@ class _Scanner:
         return False
 
     def _key(self) -> list[str]:
-        """Read a dotted key."""
+        """Read a dotted key. Return its parts."""
         parts: list[str] = []
         while True:
             self._skip(_SPACE)

@@ -1,10 +1,10 @@
-"""Machine: the devices, drives and process data that a machine file names, ready for a loop."""
+"""Machine, which opens the devices of a machine file and makes its drives and process data."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Self
+from typing import TYPE_CHECKING, Any, Self
 
 from msgspec import UNSET
 
@@ -37,18 +37,17 @@ class Machine:
             with machine.loop() as loop:
                 loop.wait(arm.move_to(0.0, velocity=0.5))
 
-    Entering opens the link, reads the identities without changing a device, compares them with the
-    file, and only then brings the devices to PRE-OP. Leaving brings them to INIT.
+    The `with` statement opens the link and compares the identities of the devices with the file,
+    without a change to any device. Only then does it bring the devices to PRE-OP. At the end, it
+    brings them to INIT.
 
     Args:
-        path: The machine file.
-        target: Instead of the `target` in the file: "eth0", "virtual:line.toml", or a `Segment`.
-        force: Open it even if another master is live on the interface.
+        path: the machine file.
+        target: overrides the `target` of the file: "eth0", "virtual:line.toml", or a `Segment`.
+        force: open the link even if another master is active on the interface.
 
     Raises:
-        MachineFileError: The file cannot be read, or is wrong; the error names line and key.
-        IdentityError: On entering: a device is not the one in the file, or two have its alias.
-        SegmentError: On entering: a required device is missing.
+        MachineFileError: The file cannot be read, or it is not valid. The error names line and key.
     """
 
     def __init__(
@@ -70,7 +69,12 @@ class Machine:
         self.close()
 
     def open(self) -> None:
-        """Open the link, check the identities, and bring the devices to PRE-OP."""
+        """Open the link, check the identities, and bring the devices to PRE-OP.
+
+        Raises:
+            IdentityError: A device has another identity, or two devices have the same alias.
+            SegmentError: A required device is missing.
+        """
         self._main.open()
         try:
             self._found = self._find()
@@ -89,7 +93,7 @@ class Machine:
 
     @property
     def segment(self) -> Segment:
-        """The virtual segment.
+        """Virtual segment of the target.
 
         Raises:
             RuntimeError: The target is not a virtual segment.
@@ -108,17 +112,17 @@ class Machine:
 
     @property
     def drives(self) -> ByName[Drives]:
-        """The [drives.NAME] tables."""
+        """Drives of the tables [drives.NAME], by name."""
         return self._opened.drives
 
     @property
     def process_data(self) -> ByName[ProcessData]:
-        """The [process_data.NAME] tables."""
+        """Process data of the tables [process_data.NAME], by name."""
         return self._opened.process_data
 
     @property
     def requests(self) -> tuple[LoopRequest, ...]:
-        """Requests for a loop: `print(machine.main.plan(*machine.requests))`."""
+        """Requests for a loop, for example for `machine.main.plan(*machine.requests)`."""
         return self._opened.requests
 
     def loop(
@@ -140,22 +144,14 @@ class Machine:
     ) -> Loop:
         """Return a loop with all drives and process data of the machine.
 
-        The options are those of `Loop`. None: as in the file; what the file does not give has the
+        The options are those of `Loop`. An option of None has the value in the file, or else the
         default of `Loop`.
 
         Raises:
-            MachineFileError: The file has no drives and no process data.
-            ValueError: An option is impossible.
+            MachineFileError: The file has neither drives nor process data.
+            ValueError: An option is not valid.
         """
-        found = self._opened
-        if not found.drives and not found.process_data:
-            raise self._file.error(
-                (),
-                "no drives and no process data",
-                hint="add a [drives.NAME] table: docs/reference/machine_file.md",
-            )
-        reference = self._file.tables.clocks.reference
-        options = loop_options(self._file, None if reference is UNSET else self.subs[reference])
+        options = self._file_options()
         given = {
             "period": period,
             "execution": execution,
@@ -170,18 +166,29 @@ class Machine:
             "clocks": clocks,
         }
         options |= {name: value for name, value in given.items() if value is not None}
-        return Loop(*found.requests, laws=laws, sink=sink, **options)
+        return Loop(*self.requests, laws=laws, sink=sink, **options)
+
+    def _file_options(self) -> dict[str, Any]:
+        """Return the options of the file for a loop. MachineFileError without any request."""
+        if not self.drives and not self.process_data:
+            raise self._file.error(
+                (),
+                "no drives and no process data",
+                hint="add a [drives.NAME] table: docs/reference/machine_file.md",
+            )
+        reference = self._file.tables.clocks.reference
+        return loop_options(self._file, None if reference is UNSET else self.subs[reference])
 
     @property
     def _opened(self) -> MachineParts:
         if not self._main.is_open:
-            raise RuntimeError("the machine is not open: use it in a with block")
+            raise RuntimeError("the machine is not open; use it in a `with` statement")
         return self._found
 
     def _find(self) -> MachineParts:
         """Check the identities without changing a device, then scan and make the requests."""
         file = self._file
-        if not self._has_own_master:  # that of IgH refuses a passive scan
+        if not self._has_own_master:  # the IgH master does not support a passive scan
             raise_differences(file, compare(file.tables.device, self._main.passive_scan()))
         found = compare(file.tables.device, self._main.scan(strict=False))
         raise_differences(file, found)

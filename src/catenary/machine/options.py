@@ -1,4 +1,4 @@
-"""Tables of a machine file as the options of `Loop`, `Drives` and `DistributedClock`."""
+"""Options of `Loop`, `Drives` and `ProcessData` from the tables of a machine file."""
 
 from __future__ import annotations
 
@@ -19,17 +19,17 @@ from catenary.machine.file import MachineFile
 from catenary.machine.lines import KeyPath
 from catenary.machine.references import WHOLE_LISTS, axis_addresses, pdo_index
 from catenary.machine.schema import ClockTable, DrivesTable, HomingTable, Optional
-from catenary.plan.planner import period_in_ns
+from catenary.plan.options import period_in_ns
 
 T = TypeVar("T")
 
 
 def loop_options(file: MachineFile, reference: SubDevice | None = None) -> dict[str, Any]:
-    """Return the options of `Loop` that [loop] and [clocks] give.
+    """Return the options of `Loop` from [loop] and [clocks].
 
     Args:
-        file: The machine file.
-        reference: Device of `clocks.reference`; None: not known yet.
+        file: the machine file.
+        reference: device of `clocks.reference`; None if it is not known yet.
 
     Raises:
         MachineFileError: A value is out of range.
@@ -49,7 +49,11 @@ def loop_options(file: MachineFile, reference: SubDevice | None = None) -> dict[
 
 
 def drives_options(file: MachineFile, role: str) -> dict[str, Any]:
-    """Return the options of `Drives` that [drives.ROLE] gives.
+    """Return the options of `Drives` from [drives.ROLE].
+
+    Args:
+        file: the machine file.
+        role: name of the drives.
 
     Raises:
         MachineFileError: A value is out of range, or a required option is missing.
@@ -75,7 +79,11 @@ def drives_options(file: MachineFile, role: str) -> dict[str, Any]:
 
 
 def process_data_options(file: MachineFile, role: str) -> dict[str, Any]:
-    """Return the options of `ProcessData` that [process_data.ROLE] gives, without its channels.
+    """Return the options of `ProcessData` from [process_data.ROLE], without its channels.
+
+    Args:
+        file: the machine file.
+        role: name of the process data.
 
     Raises:
         MachineFileError: A value is out of range.
@@ -98,7 +106,7 @@ def process_data_options(file: MachineFile, role: str) -> dict[str, Any]:
 def _clock(
     file: MachineFile, given: Optional[bool | ClockTable], device: str, path: KeyPath
 ) -> DistributedClock | bool:
-    """Return `dc=` of a request: `clock` of the role, else `op_mode` of the device."""
+    """Return the option `dc` of a request: `clock` of the role, or else `op_mode` of the device."""
     if isinstance(given, bool):
         return given
     if isinstance(given, ClockTable):
@@ -115,8 +123,8 @@ def _clock_of_axes(file: MachineFile, role: str) -> DistributedClock | bool:
     if any(clock != clocks[0] for clock in clocks):
         raise file.error(
             path,
-            "its devices have different values of op_mode",
-            hint='write clock = { op_mode = "..." } here, for all of them',
+            "the devices of these drives have different values of op_mode",
+            hint='write clock = { op_mode = "..." } here, for all of these devices',
         )
     return clocks[0]
 
@@ -133,7 +141,7 @@ def _homing(
 
 
 def _made(file: MachineFile, kind: type[T], values: dict[str, Any], path: KeyPath) -> T:
-    """Make an options class; its ValueError gets the line of the option."""
+    """Make an options object. Its ValueError becomes an error with the line of the option."""
     with file.located(path, values):
         return kind(**values)
 
@@ -141,7 +149,7 @@ def _made(file: MachineFile, kind: type[T], values: dict[str, Any], path: KeyPat
 def _check_ranges(
     file: MachineFile, table: DrivesTable, options: dict[str, Any], path: KeyPath
 ) -> None:
-    """Check each axis as `Drives` will, before the segment is opened."""
+    """Run the checks of `Drives` for each axis, before the segment is opened."""
     for number, name in enumerate(table.axes):
         own = {
             key: value[number] if isinstance(value, list) and key not in WHOLE_LISTS else value

@@ -1,4 +1,4 @@
-"""Reading a machine file, with every check that needs no devices."""
+"""Reader of a machine file, with all checks that need no devices."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ from catenary.machine.references import check_references
 
 
 def read_machine(path: str | Path) -> MachineFile:
-    """Read a machine file and check it; nothing is opened.
+    """Read a machine file and check it, without access to any device.
 
     Raises:
-        MachineFileError: The file cannot be read, or is wrong; it names line and key.
+        MachineFileError: The file cannot be read, or it is not valid. The error names line and key.
     """
     file = load(path)
     check_references(file)
@@ -36,11 +36,11 @@ def read_machine(path: str | Path) -> MachineFile:
 
 
 def refuse_unsupported(file: MachineFile) -> None:
-    """Raise MachineFileError for keys that this version reads and cannot obey."""
+    """Raise MachineFileError for keys that the format defines but this version does not support."""
     for number, device in enumerate(file.tables.device):
         if device.esi is not UNSET:
             raise file.error(
                 ("device", number, "esi"),
                 f'device "{device.name}": ESI files are not supported yet',
-                hint="remove the key: names and mapping then come from the device itself",
+                hint="remove the key; names and mapping are then read from the device",
             )

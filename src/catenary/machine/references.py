@@ -1,4 +1,4 @@
-"""Checks of a machine file that need no devices: names, addresses, lengths of lists."""
+"""Checks of the names, addresses and list lengths in a machine file, without any devices."""
 
 from __future__ import annotations
 
@@ -14,23 +14,23 @@ from catenary.machine.lines import KeyPath
 from catenary.machine.schema import DrivesTable, ProcessDataTable
 from catenary.types import ALL, DataType, Value, by_name
 
-SLOTS_END = 8  # ETG.6010 §5.1: 0x6000 + 0x800 · slot, up to 0x9FFF
+SLOTS_END = 8  # ETG.6010 §5.1: 0x6000 + 0x800 · slot, at most 0x9FFF
 _OBJECT = re.compile(r"0x([0-9A-Fa-f]{4}):([0-9A-Fa-f]{1,2})")
-WHOLE_LISTS = ("other_modes", "measured", "columns", "pdos", "axes")  # that are not one per axis
+WHOLE_LISTS = ("other_modes", "measured", "columns", "pdos", "axes")  # not one per axis
 
 
 class AxisAddress(NamedTuple):
-    """A device by its name in the file, and one of its axes; slot None: its only one."""
+    """Address of an axis in the file."""
 
-    device: str
-    slot: int | None
+    device: str  # name of the device
+    slot: int | None  # None for a device with a single axis
 
     def __str__(self) -> str:
         return self.device if self.slot is None else f"{self.device}/{self.slot}"
 
 
 def check_references(file: MachineFile) -> None:
-    """Check what the schema cannot.
+    """Check names, addresses and lists, which the schema cannot check.
 
     Raises:
         MachineFileError: A name, an address or a list contradicts the rest of the file.
@@ -48,18 +48,29 @@ def check_references(file: MachineFile) -> None:
 
 
 def check_device(file: MachineFile, path: KeyPath, name: str) -> None:
-    """Raise MachineFileError if no device of the file has this name."""
+    """Raise MachineFileError if no device of the file has a name.
+
+    Args:
+        file: the machine file.
+        path: path of the key with the name.
+        name: the name.
+    """
     names = [device.name for device in file.tables.device]
     if name not in names:
         raise file.error(path, f'no device is named "{name}"{nearest(name, names)}')
 
 
 def nearest(name: str, names: Sequence[str]) -> str:
-    """Return the continuation of an error about an unknown name."""
+    """Return the end of a message about an unknown name: the nearest name, or all names.
+
+    Args:
+        name: the unknown name.
+        names: known names.
+    """
     near = get_close_matches(name, names, n=1)
     if near:
         return f'; did you mean "{near[0]}"?'
-    return f"; known: {', '.join(names)}" if names else ""
+    return f"; known names are {', '.join(names)}" if names else ""
 
 
 def _check_devices(file: MachineFile) -> None:
@@ -67,18 +78,18 @@ def _check_devices(file: MachineFile) -> None:
     for number, device in enumerate(file.tables.device):
         path: KeyPath = ("device", number)
         if "/" in device.name:
-            raise file.error((*path, "name"), f'"{device.name}": a name has no "/"')
+            raise file.error((*path, "name"), f'the name "{device.name}" must not contain "/"')
         if device.alias is UNSET and device.position is UNSET:
             raise file.error(
                 path,
                 f'device "{device.name}" has neither alias nor position',
-                hint="write alias = 10, or position = 3; catenary scan shows positions",
+                hint="write, for example, alias = 10 or position = 3; see `catenary scan`",
             )
         if device.alias is not UNSET and device.position is not UNSET:
             raise file.error(
                 (*path, "position"),
-                f'device "{device.name}" has alias and position',
-                hint="keep the alias: it stays valid when the device is plugged in elsewhere",
+                f'device "{device.name}" has both alias and position',
+                hint="keep the alias; it stays valid when the device moves to another position",
             )
         for key in ("name", "alias", "position"):
             value = getattr(device, key)
@@ -88,14 +99,18 @@ def _check_devices(file: MachineFile) -> None:
             if first != number:
                 other = f'device[{first}], "{file.tables.device[first].name}"'
                 shown = f'"{value}"' if key == "name" else value
-                raise file.error((*path, key), f"{key} {shown} is that of {other} already")
+                raise file.error((*path, key), f"{key} {shown} is already used by {other}")
 
 
 def axis_addresses(file: MachineFile, role: str) -> list[AxisAddress]:
     """Return the axes of [drives.ROLE].
 
+    Args:
+        file: the machine file.
+        role: name of the drives.
+
     Raises:
-        MachineFileError: One is not a device, or device/slot.
+        MachineFileError: An axis is neither a device nor device/slot.
     """
     found = []
     for number, text in enumerate(file.tables.drives[role].axes):
@@ -133,7 +148,7 @@ def _check_lists(file: MachineFile, role: str, table: DrivesTable) -> None:
             raise file.error(
                 (*path, key),
                 f"{len(value)} values for {len(table.axes)} axes",
-                hint="write one value per axis, in the order of axes, or a single value for all",
+                hint="write one value per axis in the order of `axes`, or a single value for all",
             )
     names = [] if table.names is UNSET else table.names
     for number, name in enumerate(names):
@@ -147,8 +162,10 @@ def _check_process_data(file: MachineFile, path: KeyPath, table: ProcessDataTabl
     outputs = {} if table.outputs is UNSET else table.outputs
     for name in outputs:
         if name in inputs:
-            raise file.error((*path, "outputs", name), f'"{name}" is the name of an input too')
-    if table.outputs is not UNSET:  # else the names are those of the device
+            raise file.error(
+                (*path, "outputs", name), f'"{name}" is the name of both an input and an output'
+            )
+    if table.outputs is not UNSET:  # otherwise the device defines the names
         for name in table.safe:
             if name not in outputs:
                 text = f'"{name}" is not an output{nearest(name, list(outputs))}'
@@ -163,43 +180,70 @@ def _check_process_data(file: MachineFile, path: KeyPath, table: ProcessDataTabl
 
 
 def _check_op_modes(file: MachineFile) -> None:
-    """Check that every `op_mode` has a role that obeys it."""
+    """Check that a role uses the device of every `op_mode`."""
     used = {table.device for table in file.tables.process_data.values()}
     used |= {axis.device for role in file.tables.drives for axis in axis_addresses(file, role)}
     for number, device in enumerate(file.tables.device):
         if device.op_mode is not UNSET and device.name not in used:
             raise file.error(
                 ("device", number, "op_mode"),
-                f'op_mode has no effect: no role uses the device "{device.name}"',
+                f'op_mode has no effect, because no drives or process data use "{device.name}"',
                 hint=f'add [process_data.NAME] with device = "{device.name}", or remove op_mode',
             )
 
 
 def pdo_index(file: MachineFile, path: KeyPath, text: str) -> int:
-    """Return the index of a PDO that is a key of the file: "0x1A00"."""
+    """Return the index of a PDO from a key such as "0x1A00".
+
+    Args:
+        file: the machine file.
+        path: path of the key.
+        text: the key.
+
+    Raises:
+        MachineFileError: The text is not the index of a PDO.
+    """
     if re.fullmatch(r"0x1[6-9A-Ba-b][0-9A-Fa-f]{2}", text) is None:
         raise file.error(path, f'"{text}" is not a PDO; expected "0x1600" to "0x1BFF"')
     return int(text, 16)
 
 
 def object_of(file: MachineFile, path: KeyPath, text: str) -> tuple[int, int]:
-    """Return index and subindex of an object as text: "0x6000:11", both hexadecimal."""
+    """Return index and subindex of an object from text such as "0x6000:11", both hexadecimal.
+
+    Args:
+        file: the machine file.
+        path: path of the key with the object.
+        text: the object.
+
+    Raises:
+        MachineFileError: The text is not an object.
+    """
     found = _OBJECT.fullmatch(text)
     if found is None:
         raise file.error(
             path,
             f'"{text}" is not an object; expected "0xINDEX:SUBINDEX", both hexadecimal',
-            hint='four digits and one or two: "0x6000:11"',
+            hint='write four digits for the index and one or two for the subindex: "0x6000:11"',
         )
     return int(found[1], 16), int(found[2], 16)
 
 
 def data_type(file: MachineFile, path: KeyPath, text: str) -> DataType[Value]:
-    """Return the data type of a name: "UINT", "UNSIGNED16"."""
+    """Return the data type of a name such as "UINT" or "UNSIGNED16".
+
+    Args:
+        file: the machine file.
+        path: path of the key with the name.
+        text: the name.
+
+    Raises:
+        MachineFileError: The name is unknown.
+    """
     try:
         return by_name(text)
     except ValueError:
         names = [name for kind in ALL for name in (kind.name, *kind.aliases)]
         known = nearest(text.upper(), names) if get_close_matches(text.upper(), names) else ""
-        hint = "BOOL, SINT, INT, DINT, LINT, USINT, UINT, UDINT, ULINT, REAL, LREAL, ..."
+        hint = "use BOOL, SINT, INT, DINT, LINT, USINT, UINT, UDINT, ULINT, REAL, LREAL, ..."
         raise file.error(path, f'"{text}" is not a data type{known}', hint=hint) from None

@@ -1,4 +1,4 @@
-"""Requests for a loop from the tables of a machine file and the devices found."""
+"""Requests for a loop, made from the tables of a machine file and the devices found."""
 
 from __future__ import annotations
 
@@ -16,21 +16,32 @@ from catenary.machine.lines import KeyPath
 from catenary.machine.options import drives_options, process_data_options
 from catenary.machine.references import AxisAddress, axis_addresses
 
-Subs = Mapping[str, SubDevice]  # the devices that are there, by their names in the file
+Subs = Mapping[str, SubDevice]  # present devices, by their names in the file
 
 
 def devices_of(file: MachineFile, kind: str, role: str) -> list[str]:
-    """Return the names of the devices of a role, `kind` "drives" or "process_data"."""
+    """Return the names of the devices of a role.
+
+    Args:
+        file: the machine file.
+        kind: "drives" or "process_data".
+        role: name of the drives or process data.
+    """
     if kind == "process_data":
         return [file.tables.process_data[role].device]
     return list(dict.fromkeys(axis.device for axis in axis_addresses(file, role)))
 
 
 def make_drives(file: MachineFile, role: str, subs: Subs) -> Drives:
-    """Return the axes of [drives.ROLE].
+    """Return the drives of [drives.ROLE].
+
+    Args:
+        file: the machine file.
+        role: name of the drives.
+        subs: present devices by name.
 
     Raises:
-        MachineFileError: A slot is not there, a device is not a drive, or an option is impossible.
+        MachineFileError: A slot does not exist, a device is not a drive, or an option is not valid.
     """
     path: KeyPath = ("drives", role)
     options = drives_options(file, role)
@@ -55,17 +66,22 @@ def _axis(
         return sub, address.slot
     known = ", ".join(f'"{address.device}/{slot}"' for slot in slots)
     if address.slot is None:
-        raise file.error(path, f'"{address}" has {len(slots)} axes: write {known}')
+        raise file.error(path, f'"{address}" has {len(slots)} axes; write one of {known}')
     raise file.error(
-        path, f'"{address}": {sub.station} has no axis in slot {address.slot}; {known}'
+        path, f'"{address}": {sub.station} has no axis in slot {address.slot}; its axes are {known}'
     )
 
 
 def make_process_data(file: MachineFile, role: str, subs: Subs) -> ProcessData:
-    """Return the request of [process_data.ROLE].
+    """Return the process data of [process_data.ROLE].
+
+    Args:
+        file: the machine file.
+        role: name of the process data.
+        subs: present devices by name.
 
     Raises:
-        MachineFileError: An object is not in a PDO of the device, or an option is impossible.
+        MachineFileError: An object is not in a PDO of the device, or an option is not valid.
     """
     path: KeyPath = ("process_data", role)
     table = file.tables.process_data[role]
@@ -81,7 +97,12 @@ def make_process_data(file: MachineFile, role: str, subs: Subs) -> ProcessData:
 
 
 def make_device_requests(file: MachineFile, subs: Subs) -> list[StartUpRequest]:
-    """Return requests for devices with start-up objects, and for those that may be absent."""
+    """Return requests for the devices with start-up objects, and for those that may be absent.
+
+    Args:
+        file: the machine file.
+        subs: present devices by name.
+    """
     made = []
     for number, device in enumerate(file.tables.device):
         objects = start_up_objects(file, number)
@@ -92,7 +113,7 @@ def make_device_requests(file: MachineFile, subs: Subs) -> list[StartUpRequest]:
             StartUpRequest(
                 subs[device.name],
                 objects,
-                required=device.required and not dividers,  # else the roles decide
+                required=device.required and not dividers,  # a role has its own `required`
                 divider=dividers[0] if dividers else 1,
             )
         )

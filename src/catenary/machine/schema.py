@@ -1,7 +1,8 @@
-"""Tables of a machine file. Their keys are the options of `Drives`, `ProcessData`, `StartUp`,
-`DistributedClock`, `Loop` and its options classes; what is absent keeps the default there.
+"""Tables of a machine file.
 
-The descriptions appear in errors and in the JSON schema for editors.
+Their keys are the options of `Drives`, `ProcessData`, `StartUp`, `DistributedClock`, `Loop` and its
+options classes. A missing key keeps the default of its option. The descriptions appear in errors
+and in the JSON schema for editors.
 """
 
 from __future__ import annotations
@@ -22,7 +23,7 @@ Optional: TypeAlias = T | UnsetType
 
 def _quantity(dimension: Dimension, unit: str, example: str) -> Meta:
     return Meta(
-        description=f"[{unit}], or text with a unit",
+        description=f"number in {unit}, or text with a unit",
         examples=[example],
         extra={"dimension": dimension},
     )
@@ -38,9 +39,7 @@ Length = Annotated[float | str, _quantity("length", "m", "4 mm")]
 Force = Annotated[float | str, _quantity("force", "N", "60 N")]
 Word = Annotated[int, Meta(ge=0, le=0xFFFF)]
 DoubleWord = Annotated[int, Meta(ge=0, le=0xFFFFFFFF)]
-Object = Annotated[
-    str, Meta(description="object of the dictionary: 0xINDEX:SUBINDEX", examples=["0x6000:11"])
-]
+Object = Annotated[str, Meta(description="object, 0xINDEX:SUBINDEX", examples=["0x6000:11"])]
 Mode = Literal["csp", "csv", "cst", "pp", "pv", "hm"]
 TypeName = Annotated[str, Meta(description="data type", examples=["UINT", "REAL"])]
 Divider = Annotated[int, Meta(description="cycles of the loop between two exchanges", ge=1)]
@@ -51,7 +50,7 @@ class Table(msgspec.Struct, forbid_unknown_fields=True, frozen=True, kw_only=Tru
 
 
 class StopTable(Table, frozen=True, kw_only=True):
-    """[loop.stop]: what stops the axes, and what becomes of lost devices; as cat.StopPolicy."""
+    """[loop.stop]: conditions for stopping the axes, and lost devices (cat.StopPolicy)."""
 
     late_limit: Optional[Time] = UNSET
     handover: Optional[Time] = UNSET
@@ -65,7 +64,7 @@ class StopTable(Table, frozen=True, kw_only=True):
 
 
 class SchedulingTable(Table, frozen=True, kw_only=True):
-    """[loop.scheduling]: how the cycle waits and receives; as cat.Scheduling."""
+    """[loop.scheduling]: waiting and receiving of the cycle (cat.Scheduling)."""
 
     receive: Optional[Literal["poll", "wait", "busy"]] = UNSET
     busy_wait: Optional[Time] = UNSET
@@ -76,7 +75,7 @@ class SchedulingTable(Table, frozen=True, kw_only=True):
 
 
 class ClocksTable(Table, frozen=True, kw_only=True):
-    """[clocks]: distributed clocks of the loop; as cat.ClockOptions."""
+    """[clocks]: distributed clocks of the loop (cat.ClockOptions)."""
 
     lead: Optional[Literal["reference", "main"]] = UNSET
     reference: Optional[Annotated[str, Meta(description="name of a device")]] = UNSET
@@ -85,7 +84,7 @@ class ClocksTable(Table, frozen=True, kw_only=True):
 
 
 class LoopTable(Table, frozen=True, kw_only=True):
-    """[loop]: as cat.Loop."""
+    """[loop]: options of the loop (cat.Loop)."""
 
     period: Optional[Time] = UNSET
     execution: Optional[Literal["threaded", "inline"]] = UNSET
@@ -93,14 +92,14 @@ class LoopTable(Table, frozen=True, kw_only=True):
     watchdog: Optional[Time] = UNSET
     cpu: Optional[int] = UNSET
     priority: Optional[Annotated[int, Meta(description="SCHED_FIFO priority", ge=1, le=99)]] = UNSET
-    log: Optional[Annotated[int, Meta(description="cycles", ge=1)]] = UNSET
+    log: Optional[Annotated[int, Meta(description="number of cycles", ge=1)]] = UNSET
     log_axes: Optional[bool] = UNSET
     stop: StopTable = StopTable()
     scheduling: SchedulingTable = SchedulingTable()
 
 
 class IdentityTable(Table, frozen=True, kw_only=True):
-    """Identity of a device, checked when the machine is opened (object 0x1018)."""
+    """Identity of a device (object 0x1018), which is checked when the machine is opened."""
 
     vendor: DoubleWord
     product: DoubleWord
@@ -109,7 +108,7 @@ class IdentityTable(Table, frozen=True, kw_only=True):
 
 
 class StartUpTable(Table, frozen=True, kw_only=True):
-    """An object that is written when the device goes from PRE-OP to SAFE-OP; as cat.StartUp."""
+    """Object to write to the device between PRE-OP and SAFE-OP (cat.StartUp)."""
 
     object: Object
     value: bool | int | float | str
@@ -120,32 +119,32 @@ class StartUpTable(Table, frozen=True, kw_only=True):
 
 
 class DeviceTable(Table, frozen=True, kw_only=True):
-    """[[device]]: a device with its address (alias or position) and its identity."""
+    """[[device]]: device with its address (alias or position) and its identity."""
 
     name: Annotated[str, Meta(description="name in this file", min_length=1)]
     identity: IdentityTable
     alias: Optional[Annotated[int, Meta(description="station alias", ge=1, le=0xFFFF)]] = UNSET
-    position: Optional[Annotated[int, Meta(description="0 is the first", ge=0, le=0xFFFF)]] = UNSET
-    required: Annotated[bool, Meta(description="false: the device may be absent")] = True
+    position: Optional[Annotated[int, Meta(description="the first is 0", ge=0, le=0xFFFF)]] = UNSET
+    required: Annotated[bool, Meta(description="false if the device may be absent")] = True
     esi: Optional[Annotated[str, Meta(description="ESI file; not supported yet")]] = UNSET
-    op_mode: Optional[Annotated[str, Meta(description="OpMode of its SII")]] = UNSET
+    op_mode: Optional[Annotated[str, Meta(description="OpMode from the SII")]] = UNSET
     start_up: list[StartUpTable] = []
     comment: str = ""
 
 
 class ColumnTable(Table, frozen=True, kw_only=True):
-    """A further object of every axis of a role, of slot 0."""
+    """Additional object of each axis, with its index in slot 0."""
 
     name: str
     object: Object
     type: TypeName
-    scale: Optional[Annotated[float, Meta(description="value in SI units of one count")]] = UNSET
+    scale: Optional[Annotated[float, Meta(description="value of one count in SI units")]] = UNSET
     unit: str = ""
-    output: Annotated[bool, Meta(description="true: the column is written")] = False
+    output: Annotated[bool, Meta(description="true if the column is written")] = False
 
 
 class ClockTable(Table, frozen=True, kw_only=True):
-    """Distributed clock of the devices of a role; as cat.DistributedClock."""
+    """Distributed clock of the devices of a role (cat.DistributedClock)."""
 
     op_mode: Optional[str] = UNSET
     sync0: Optional[Time] = UNSET
@@ -155,7 +154,7 @@ class ClockTable(Table, frozen=True, kw_only=True):
 
 
 class HomingTable(Table, frozen=True, kw_only=True):
-    """Homing by the drive; as cat.drive.HomingMethod."""
+    """Homing by the drive (cat.drive.HomingMethod)."""
 
     method: Optional[int] = UNSET
     speed: Optional[Velocity] = UNSET
@@ -165,10 +164,10 @@ class HomingTable(Table, frozen=True, kw_only=True):
 
 
 class DrivesTable(Table, frozen=True, kw_only=True):
-    """[drives.NAME]: axes as one set; as cat.Drives. A list has one value per axis."""
+    """[drives.NAME]: drives of one or more axes (cat.Drives). A list has one value per axis."""
 
     axes: Annotated[
-        list[str], Meta(description='devices, or "device/slot" for one of several axes')
+        list[str], Meta(description='names of devices, or "device/slot" for one of several axes')
     ]
     counts_per_turn: PerAxis[float]
     names: Optional[Annotated[list[str], Meta(description="names of the axes")]] = UNSET
@@ -200,17 +199,19 @@ class DrivesTable(Table, frozen=True, kw_only=True):
 
 
 class ChannelTable(Table, frozen=True, kw_only=True):
-    """One object of a device's process data."""
+    """Object in the process data of a device."""
 
     object: Object
     type: Optional[TypeName] = UNSET
-    scale: Optional[Annotated[float, Meta(description="value in SI units of one count")]] = UNSET
-    unit: Annotated[str, Meta(description="for people; the value is raw · scale")] = ""
+    scale: Optional[Annotated[float, Meta(description="value of one count in SI units")]] = UNSET
+    unit: Annotated[str, Meta(description="unit of the value, for display")] = ""
 
 
 class ProcessDataTable(Table, frozen=True, kw_only=True):
-    """[process_data.NAME]: values of one device by name; as cat.ProcessData. Without inputs or
-    outputs: as the device maps them, with its own names."""
+    """[process_data.NAME]: values of one device by name (cat.ProcessData).
+
+    Without `inputs` or `outputs`, the mapped objects have the names from the device.
+    """
 
     device: Annotated[str, Meta(description="name of a device")]
     inputs: Optional[dict[str, Object | ChannelTable]] = UNSET
@@ -223,7 +224,7 @@ class ProcessDataTable(Table, frozen=True, kw_only=True):
 
 
 class MachineTables(Table, frozen=True, kw_only=True):
-    """A machine: devices by name, what the program gets by name, and the loop."""
+    """Machine with its devices, drives, process data and loop."""
 
     format: Literal["catenary-machine/1"]
     name: str = ""
@@ -238,6 +239,6 @@ class MachineTables(Table, frozen=True, kw_only=True):
 
 
 def json_schema() -> dict[str, object]:
-    """Return the JSON schema (draft 2020-12) of a machine file, for editors."""
+    """Return the JSON schema (draft 2020-12) of machine files, for editors."""
     schema = msgspec.json.schema(MachineTables)
     return {"$schema": "https://json-schema.org/draft/2020-12/schema", **schema}

@@ -1,4 +1,4 @@
-"""A machine file for the devices of a segment, as text with comments: `catenary init`."""
+"""Text of a machine file for the devices of a segment, with comments, for `catenary init`."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from catenary.model.device import DeviceDescription, Direction, Entry
 from catenary.types import BOOL, by_index
 
 FILL_IN = "FILL IN"
-UNSIGNED = {  # by length in bits
+UNSIGNED = {  # type by length [bits]
     **{8: "USINT", 16: "UINT", 24: "UINT24", 32: "UDINT"},
     **{40: "UINT40", 48: "UINT48", 56: "UINT56", 64: "ULINT"},
 }
-ENCODER = (0x608F, 1), (0x608F, 2)  # counts of the encoder, turns of the motor
+ENCODER = (0x608F, 1), (0x608F, 2)  # encoder counts, motor turns
 _HEAD = """\
-# Written by `catenary init`. Check it against the segment: catenary check FILE
-# A number is in SI units (rad, s, N·m). Text carries a unit: "170 deg", "500 us", "90 rpm".
+# Written by `catenary init`. To compare this file with the segment, run `catenary check FILE`.
+# A number is in SI units (rad, s, N·m). Text has a unit: "170 deg", "500 us", "90 rpm".
 # Complete the lines marked {mark} and remove the "#" before them.
 # All keys: docs/reference/machine_file.md
 format = "{format}"
@@ -28,21 +28,21 @@ target = {target}                      # cat.Machine(..., target="virtual:FILE.t
 [loop]
 period = "1 ms"
 
-# Devices, in the order of the cable. Rename them as you like. A device is found by its alias, or
-# by its position where it has none: `catenary alias TARGET POSITION VALUE` gives it one.
+# Devices, in the order on the cable. You can rename them. A device is identified by its alias, or
+# by its position if it has no alias. `catenary alias TARGET POSITION VALUE` writes an alias.
 """
 _DRIVES = """
-# Axes. Options are those of cat.Drives; a list has one value per axis, in the order of `axes`.
+# Axes. The options are those of cat.Drives. A list has one value per axis, in the order of `axes`.
 [drives.axes]
 axes = [{axes}]
 mode = "csp"
 {counts}
 # gear_ratio = 1.0                    # motor turns per joint turn
-# direction = 1                       # -1: the joint turns against the motor
+# direction = 1                       # -1 if the joint turns opposite to the motor
 # offset = "0 deg"                    # position of the joint where the drive reads 0
 # position_min = "-170 deg"
 # position_max = "170 deg"
-# velocity_limit = "90 deg/s"         # {mark}: without it 2π rad/s, and a warning
+# velocity_limit = "90 deg/s"         # {mark}: the default is 2π rad/s, with a warning
 # torque_limit = 20                   # [N·m]
 """
 
@@ -55,9 +55,9 @@ def machine_text(
     """Return the text of a machine file.
 
     Args:
-        devices: All devices of the segment, in PRE-OP.
-        target: Name of the segment: "eth0".
-        encoders: Counts per turn by (position, slot), where a drive reports them.
+        devices: all devices of the segment, read in PRE-OP.
+        target: target of the segment, such as "eth0".
+        encoders: encoder counts per turn by (position, slot), for drives that report them.
     """
     names = _names(devices)
     parts = [_HEAD.format(mark=FILL_IN, format=FORMAT, target=_quoted(target))]
@@ -79,7 +79,7 @@ name = "{name}"
 {address}
 identity = {{ vendor = 0x{identity.vendor:X}, product = 0x{identity.product:X}, \
 revision = 0x{identity.revision:X} }}
-# required = false                    # it may be absent
+# required = false                    # the device may be absent
 """
 
 
@@ -105,12 +105,12 @@ def _counts(counts: Sequence[float | None]) -> str:
     known = [count for count in counts if count is not None]
     if len(known) < len(counts):
         value = "0                  "
-        return f"# counts_per_turn = {value}# {FILL_IN}: counts of the motor's encoder per turn"
+        return f"# counts_per_turn = {value}# {FILL_IN}: encoder counts per motor turn"
     same = len(set(known)) == 1
     texts = [str(int(count)) if count == int(count) else str(count) for count in known]
     value = texts[0] if same else f"[{', '.join(texts)}]"
     return (
-        f"# counts_per_turn = {value}          # {FILL_IN}: 0x608F of the drives gives this value"
+        f"# counts_per_turn = {value}          # {FILL_IN}: this value is from 0x608F of the drives"
     )
 
 
@@ -122,7 +122,7 @@ def _process_data(name: str, device: DeviceDescription) -> str:
     text = f'\n[process_data.{name}]\ndevice = "{name}"\n'
     if outputs:
         first = next(iter(outputs))
-        text += f"# safe = {{ {first} = 0 }}{' ' * 15}# written when the loop ends; others: 0\n"
+        text += f"# safe = {{ {first} = 0 }}{' ' * 15}# sent when the loop ends; the default is 0\n"
     for heading, found in (("outputs", outputs), ("inputs", inputs)):
         if found:
             text += f"[process_data.{name}.{heading}]\n"
@@ -131,7 +131,7 @@ def _process_data(name: str, device: DeviceDescription) -> str:
 
 
 def _channels(device: DeviceDescription) -> dict[Direction, dict[str, str]]:
-    """Return name and object of each number that is mapped now. A name is given once."""
+    """Return the object of each mapped number, by a unique name."""
     found = [
         (direction, entry, pdo)
         for direction in (Direction.OUTPUT, Direction.INPUT)
@@ -151,8 +151,10 @@ def _channels(device: DeviceDescription) -> dict[Direction, dict[str, str]]:
 
 
 def _entries(device: DeviceDescription, direction: Direction) -> Iterator[tuple[Entry, str]]:
-    """Yield the numbers that are mapped, with the names of their PDOs; of a repeated object the
-    first."""
+    """Yield the mapped numbers with the names of their PDOs.
+
+    Only the first entry of an object that is mapped several times is used.
+    """
     seen = set()
     for assignment in device.assignments(direction):
         for pdo in assignment.pdos:
@@ -164,9 +166,9 @@ def _entries(device: DeviceDescription, direction: Direction) -> Iterator[tuple[
 
 
 def _type_name(entry: Entry) -> str:
-    """Return the type of an entry; without a usable one, an unsigned integer of its length.
+    """Return the type of an entry, or an unsigned integer if its type is not usable.
 
-    Empty for BOOL, and for lengths without a type: the device's PDO has them.
+    The result is empty for BOOL and for lengths without a type: the PDO of the device states them.
     """
     try:
         kind = by_index(entry.data_type)
@@ -183,7 +185,7 @@ def _names(devices: Sequence[DeviceDescription]) -> list[str]:
 
 
 def _unique(names: Sequence[str]) -> list[str]:
-    """Return the names, those that occur more than once numbered from 1."""
+    """Return the names, with numbers from 1 for those that occur more than once."""
     repeated = _repeated(names)
     used: dict[str, int] = {}
     made: list[str] = []
@@ -201,7 +203,7 @@ def _repeated(values: Sequence[object]) -> set[object]:
 
 
 def _slug(text: str, default: str) -> str:
-    """Return a text as a bare key of TOML: lower case, "_" for anything but letters and digits."""
+    """Return a text as a TOML bare key: lower case, with "_" for other characters."""
     return re.sub(r"[^a-z0-9]+", "_", text.lower()).strip("_") or default
 
 
@@ -210,5 +212,5 @@ def _quoted(text: str) -> str:
 
 
 def _comment(text: str) -> str:
-    """Return a device's text without characters that would end a comment."""
+    """Return a text of a device without characters that would end a comment."""
     return "".join(letter if letter.isprintable() else "?" for letter in text)

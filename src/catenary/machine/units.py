@@ -1,6 +1,6 @@
-"""Physical quantities as text, "170 deg" or "500 us", converted to SI units.
+"""Conversion of physical quantities from text, such as "170 deg" or "500 us", to SI units.
 
-A number without a unit is in SI units already.
+A number that is not text is already in SI units.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ Dimension = Literal[
 _TURN = 2.0 * math.pi
 _DEGREE = math.pi / 180.0
 
-# Units by physical quantity; the first one is SI.
+# Units by physical quantity; the first one is the SI unit.
 UNITS: Final[Mapping[str, Mapping[str, float]]] = {
     "time": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0},
     "angle": {"rad": 1.0, "mrad": 1e-3, "deg": _DEGREE, "turn": _TURN},
@@ -35,7 +35,7 @@ UNITS: Final[Mapping[str, Mapping[str, float]]] = {
     "force": {"N": 1.0, "mN": 1e-3, "kN": 1e3},
     "force slope": {"N/s": 1.0},
 }
-# The quantity of an option: at a rotary axis, at a linear axis.
+# Physical quantity of an option, for a rotary axis and for a linear axis.
 QUANTITIES: Final[Mapping[Dimension, tuple[str, str]]] = {
     "time": ("time", "time"),
     "position": ("angle", "length"),
@@ -58,31 +58,31 @@ def to_si(value: float | str, dimension: Dimension, *, linear: bool = False) -> 
     """Return a quantity in SI units.
 
     Args:
-        value: A number in SI units, or text with a unit: "90 deg/s".
-        dimension: What the option wants.
-        linear: True for an axis in metres: a position is a length, a torque is a force.
+        value: number in SI units, or text with a unit, such as "90 deg/s".
+        dimension: dimension of the option.
+        linear: True for a linear axis, whose positions are lengths and whose torques are forces.
 
     Raises:
-        ValueError: It is not a quantity of that dimension; the text names the units that are.
+        ValueError: The value is not a quantity of this dimension. The message lists its units.
     """
-    wanted = QUANTITIES[dimension][linear]
+    quantity = QUANTITIES[dimension][linear]
     if not isinstance(value, str):
         if math.isnan(value):
-            raise ValueError(f"nan is not a number; expected {described(wanted)}")
+            raise ValueError(f"nan is not a number; expected {described(quantity)}")
         return float(value)
     found = _TEXT.fullmatch(value)
     if found is None:
-        raise ValueError(f"{value!r} is not a number with a unit; expected {described(wanted)}")
+        raise ValueError(f"{value!r} is not a number with a unit; expected {described(quantity)}")
     number, unit = float(found[1]), found[2]
     if not unit:
         raise ValueError(
-            f"{value!r} has no unit; expected {described(wanted)}, or the number without quotes"
+            f"{value!r} has no unit; expected {described(quantity)}, or the number without quotes"
         )
-    return number * _factor(value, unit, wanted)
+    return number * _factor(value, unit, quantity)
 
 
 def described(quantity: str) -> str:
-    """Return a physical quantity with its units, for errors: "a time (s, ms, us, ns, min)"."""
+    """Return a physical quantity with its units, such as "a time (s, ms, us, ns, min)"."""
     return f"{_article(quantity)} ({', '.join(UNITS[quantity])})"
 
 
@@ -91,16 +91,16 @@ def _usual(unit: str) -> str:
     return SPELLINGS.get(plain, plain)
 
 
-def _factor(value: str, unit: str, wanted: str) -> float:
-    factor = UNITS[wanted].get(_usual(unit))
+def _factor(value: str, unit: str, expected: str) -> float:
+    factor = UNITS[expected].get(_usual(unit))
     if factor is not None:
         return factor
     for quantity, units in UNITS.items():
         if _usual(unit) in units:
-            raise ValueError(f"{value!r} is {_article(quantity)}; expected {described(wanted)}")
-    near = get_close_matches(_usual(unit), UNITS[wanted], n=1)
+            raise ValueError(f"{value!r} is {_article(quantity)}; expected {described(expected)}")
+    near = get_close_matches(_usual(unit), UNITS[expected], n=1)
     guess = f"did you mean {near[0]!r}? Expected" if near else "expected"
-    raise ValueError(f"{value!r}: unknown unit {unit!r}; {guess} {described(wanted)}")
+    raise ValueError(f"{value!r}: unknown unit {unit!r}; {guess} {described(expected)}")
 
 
 def _article(quantity: str) -> str:

@@ -137,6 +137,7 @@ class _Reader:
         self._complete = False  # True if the last record is the end of the data section
 
     def read(self) -> Recording:
+        """Read the file up to its end, or up to the first damaged record."""
         for place in places(self._stream):
             self._complete = place.opcode == DATA_END
             if place.opcode not in (METADATA, CHUNK):

@@ -43,9 +43,9 @@ cdef extern from "sink.h" nogil:
                     const void *target) noexcept nogil
 
 cdef class Ring:
-    """A ring at `offset` of a buffer, of `count` rows (a power of two) of `size` bytes.
+    """A ring of `count` rows (a power of two) of `size` bytes, at byte `offset` of a buffer.
 
-    Raises ValueError if it does not fit.
+    Raises ValueError if it does not fit in the buffer.
     """
     cdef Py_buffer buffer
     cdef ring_view view
@@ -59,6 +59,6 @@ cdef struct cycle_rows:
     uint64_t target_at
 
 cdef class CycleWriter(Ring):
-    """A ring whose rows are the cycles of an engine: `sizes` of its three blocks."""
+    """A ring whose rows are the cycles of an engine. `sizes`: bytes of the three blocks."""
     cdef cat_sink sink
     cdef cycle_rows rows

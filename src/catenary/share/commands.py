@@ -75,7 +75,7 @@ class CommandReader:
     def __init__(self, desk: Desk, layout: ShareLayout) -> None:
         self._desk = desk
         self._layout = layout
-        self._known: dict[int, _Known] = {}  # by place
+        self._known: dict[int, _Known] = {}  # by number of the place
         self._ended: list[LeaseEnd] = []
         self._next_check_ns = 0
 
@@ -87,7 +87,7 @@ class CommandReader:
         ]
 
     def ended(self) -> list[LeaseEnd]:
-        """Return the leases that `commands` has found ended since the last call."""
+        """Return the leases that have ended since the last call, as detected by `commands`."""
         ended, self._ended = self._ended, []
         return ended
 

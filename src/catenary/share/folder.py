@@ -57,7 +57,7 @@ def own_folder() -> Path:
 
 
 def user_folder(uid: int) -> Path:
-    """Return the folder of a user. Its name contains the id outside of this user namespace.
+    """Return the folder of a user. Its name contains the user id outside of this user namespace.
 
     In the user namespace of a private network, an ordinary user appears as root.
     """

@@ -155,7 +155,7 @@ def power_of_two(least: int) -> int:
 
 
 def encode_head(layout: ShareLayout) -> bytes:
-    """Return the header and the description, with which a segment begins."""
+    """Return the first bytes of a segment: the header and the description."""
     description = msgspec.json.encode(layout)
     return HEADER.pack(MAGIC, layout.version, len(description), layout.size) + description
 

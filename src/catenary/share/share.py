@@ -115,7 +115,7 @@ class Share:
         return self._reader().commands()
 
     def ended(self) -> list[LeaseEnd]:
-        """Return the leases that `commands` has found ended since the last call."""
+        """Return the leases that have ended since the last call, as detected by `commands`."""
         return self._reader().ended()
 
     def _reader(self) -> CommandReader:

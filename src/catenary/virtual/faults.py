@@ -182,14 +182,14 @@ class Swap(_LastingOfDevice, tag="swap", frozen=True):
 
 
 class Exchange(_LastingOfDevice, tag="exchange", frozen=True):
-    """Exchange of the positions of two devices. Both have no power for `for_`."""
+    """Exchange of the positions of two devices. Neither has power for `for_`."""
 
     device: int
     other: int
 
 
 class MailboxSilent(_LastingOfDevice, tag="mailbox_silent", frozen=True):
-    """Stop of a device's mailbox: SM0 stays full and SM1 stays empty."""
+    """Stopped mailbox of a device: SM0 stays full and SM1 stays empty."""
 
     device: int
 
@@ -240,7 +240,7 @@ class WrongWorkingCounter(_LastingOfDevice, tag="wrong_working_counter", frozen=
 
 
 class Freeze(_LastingOfDevice, tag="freeze", frozen=True):
-    """Stop of a device's model. Its controller continues to answer with old inputs."""
+    """Stopped model of a device. Its controller continues to answer with old inputs."""
 
     device: int
 

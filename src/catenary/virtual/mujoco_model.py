@@ -203,7 +203,7 @@ class Model:
         self._mujoco.mj_forward(self.model, self.data)
 
     def check_start(self) -> None:
-        """Raise ConfigurationError if bodies overlap at the start, as contact forces explode."""
+        """Raise ConfigurationError if bodies overlap at the start and would repel each other."""
         self._start()
         for contact in self.data.contact:
             if contact.dist > -DEEPEST:

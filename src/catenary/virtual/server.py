@@ -30,7 +30,7 @@ NEVER_NS = (1 << 63) - 1
 
 
 def _interface_flags(interface: str) -> int:
-    """Return the flags of an interface. Ask the kernel: /sys may show another network namespace."""
+    """Return the flags of an interface from the kernel (/sys may show another namespace)."""
     request = struct.pack("16sH14x", interface.encode(), 0)
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as anything:
         try:

@@ -1,4 +1,4 @@
-"""Junction, where the line branches. It has no process data and no mailbox."""
+"""Junction, at which the line branches. It has no process data and no mailbox."""
 
 from __future__ import annotations
 

@@ -1,5 +1,6 @@
-"""A loop, a law, drives and tasks (threads, or processes) live by one virtual clock: the same to
-the last bit in every run, and in a fraction of the time it tells."""
+"""A loop, a law, drives and tasks (threads or processes) use one virtual clock.
+All runs are bit-identical, and take a fraction of the simulated time.
+"""
 
 from __future__ import annotations
 
@@ -29,7 +30,7 @@ def swing(actual, target, memory, time):
 
 
 def live(path: Path, run: Run) -> tuple[str, list[float], int, object]:
-    """(digest of the frames, longest responses [s], cycles, where the arm ended)"""
+    """Return a digest of the frames, the longest responses [s], the cycles and the end position."""
     with VirtualClock() as clock:
         tasks = Tasks(
             *(
@@ -65,7 +66,7 @@ def live(path: Path, run: Run) -> tuple[str, list[float], int, object]:
 
 
 @pytest.mark.parametrize("run", ["threads", "processes"])
-def test_two_runs_are_the_same_to_the_last_bit(tmp_path: Path, run: Run) -> None:
+def test_two_runs_are_bit_identical(tmp_path: Path, run: Run) -> None:
     pytest.importorskip("numba", reason="the law of this scenario is compiled")
     first = live(tmp_path / "first.pcapng", run)
     assert first == live(tmp_path / "second.pcapng", run)
@@ -76,7 +77,7 @@ def test_two_runs_are_the_same_to_the_last_bit(tmp_path: Path, run: Run) -> None
 
 
 def looping(clock: VirtualClock, place: Participant, took: list[float]) -> None:
-    """A loop in a thread of its own, whose body computes 9 ms in each of three cycles."""
+    """Run a loop in a separate thread, with 9 ms of computation in each of three cycles."""
     try:
         with cat.MainDevice(cat.Segment([cat.virtual.Servo()], clock=place)) as main:
             arm = cat.Drives(
@@ -94,7 +95,7 @@ def looping(clock: VirtualClock, place: Participant, took: list[float]) -> None:
 
 
 def test_the_body_of_a_loop_is_preempted_like_a_task() -> None:
-    """The loop has priority 10 on processor 0: a task of priority 30 takes 3 ms of every 10."""
+    """The loop has priority 10 on processor 0. A task of priority 30 uses 3 ms of every 10 ms."""
     took: list[float] = []
     with VirtualClock() as clock:
         name, period, execution, priority = TASKS[0]
@@ -109,7 +110,7 @@ def test_the_body_of_a_loop_is_preempted_like_a_task() -> None:
     assert all(one == pytest.approx(12e-3) or one == pytest.approx(15e-3) for one in took)
 
 
-def test_a_clock_that_is_none_is_refused() -> None:
+def test_an_invalid_clock_is_refused() -> None:
     with pytest.raises(ValueError, match="VirtualClock"):
         cat.Segment([cat.virtual.Servo()], clock=3)
     with pytest.raises(ValueError, match="VirtualClock"):

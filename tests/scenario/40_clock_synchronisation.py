@@ -1,7 +1,7 @@
-"""Ten drives, then thirty-three, whose crystals differ by up to 200 ppm from each other, drift with
-the temperature, and whose differences are read within a microsecond. Two seconds after the loop was
-entered, its burst included, no clock is further than a microsecond from the reference; and none is
-for long after. (`python -m benchmarks clocks` runs ten minutes of it.)"""
+"""Crystals of 10 and of 33 drives differ by up to 200 ppm and drift with the temperature.
+Two seconds after entering the loop, including the burst, all clocks are within 1 us of the
+reference, and they stay there. (`python -m benchmarks clocks` runs ten minutes of it.)
+"""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ BOUND = 1e-6
 
 
 @pytest.mark.parametrize("servos", [10, 33])
-def test_within_two_seconds_and_for_long_after(servos: int) -> None:
+def test_clocks_are_synchronised_within_two_seconds_and_stay_so(servos: int) -> None:
     with clocked_cell(servos) as cell:
         entered = cell.segment.now_ns
         with cat.Loop(cell.drives(dc=True), period=1e-3) as loop:
@@ -35,8 +35,8 @@ def test_within_two_seconds_and_for_long_after(servos: int) -> None:
             assert loop.clocks.reference is cell.subs[0]
 
 
-def test_with_stamps_that_scatter_twice_as_much() -> None:
-    """The clocks follow what they read, so they scatter too; what is watched is a mean."""
+def test_time_stamps_with_twice_the_jitter() -> None:
+    """The clocks follow their readings, so they have jitter, too. The checked value is a mean."""
     with clocked_cell(10, jitter=1e-6) as cell, cat.Loop(cell.drives(dc=True), period=1e-3) as loop:
         loop.wait_locked(within=BOUND, timeout=2.0)
         for _ in range(50):
@@ -49,7 +49,7 @@ def test_with_stamps_that_scatter_twice_as_much() -> None:
 
 @pytest.mark.parametrize("run", ["threaded", "inline"])
 @pytest.mark.parametrize("clock", ["reference", "main"])
-def test_whoever_follows_in_whatever_order(run: str, clock: str) -> None:
+def test_every_execution_mode_and_every_reference(run: str, clock: str) -> None:
     with clocked_cell(3) as cell:
         arm = cell.drives(dc=True)
         with cat.Loop(arm, period=1e-3, execution=run, clocks=cat.ClockOptions(lead=clock)) as loop:  # type: ignore[arg-type]
@@ -60,8 +60,8 @@ def test_whoever_follows_in_whatever_order(run: str, clock: str) -> None:
             assert loop.clocks.jumps == 0
 
 
-def test_over_branches_the_delays_are_right() -> None:
-    """A tree, clocks without scatter: what is left is what the delays are wrong by."""
+def test_delays_across_branches_are_correct() -> None:
+    """In a tree with clocks without jitter, the differences are the errors of the delays."""
     random = Random(4)
     servos = [Servo(serial=k, crystal=crystal(random, 0.0)) for k in range(6)]
     behind = {1: (0, 3), 2: (1, 1), 3: (0, 1), 4: (3, 1), 5: (0, 2), 6: (5, 1)}
@@ -70,22 +70,22 @@ def test_over_branches_the_delays_are_right() -> None:
         cat.Loop(cell.drives(dc=True), period=1e-3) as loop,
     ):
         loop.wait_locked()
-        run_for(loop, 16.0)  # four times what the controllers' own filters take
+        run_for(loop, 16.0)  # four times the settling time of the controllers' filters
         found = true_differences(cell.segment)
     assert len(found) == 6
     assert max(map(abs, found.values())) < 50e-9
 
 
-def test_the_wake_up_takes_on_the_reference_clocks_rate() -> None:
+def test_the_cycle_follows_the_rate_of_the_reference_clock() -> None:
     with cell_of(Servo(crystal=Crystal(ppm=150.0))) as cell:
         with cat.Loop(cell.drives(dc=True), period=1e-3) as loop:
             run_for(loop, 1.0)
             assert loop.clocks.rate == pytest.approx(150e-6, abs=1e-6)
             period = loop.timing["period"]["mean"]
-        assert period == pytest.approx(1e-3 / (1 + 150e-6), rel=5e-6)  # of the machine
+        assert period == pytest.approx(1e-3 / (1 + 150e-6), rel=5e-6)  # on the clock of the machine
 
 
-def test_the_reference_takes_on_the_machines_rate() -> None:
+def test_the_reference_clock_follows_the_rate_of_the_machine() -> None:
     with (
         cell_of(Servo(crystal=Crystal(ppm=150.0)), Servo(crystal=Crystal(ppm=-80.0))) as cell,
         cat.Loop(cell.drives(dc=True), period=1e-3, clocks=cat.ClockOptions(lead="main")) as loop,
@@ -96,7 +96,7 @@ def test_the_reference_takes_on_the_machines_rate() -> None:
         assert abs(cell.segment.core.system_time(0) - cell.segment.now_ns - offset) < 500
 
 
-def test_a_law_runs_by_the_reference_clock_too() -> None:
+def test_a_law_follows_the_reference_clock() -> None:
     def hold(actual, target, memory, time):  # type: ignore[no-untyped-def]
         return time > 0.3
 

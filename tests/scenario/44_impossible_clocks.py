@@ -1,5 +1,7 @@
-"""Clocks asked of devices that have none, or of one before its reference: refused before anything
-moves, naming the device. Frames that cannot sit before the beat are refused too."""
+"""Clocks are requested of devices without clocks, or of devices before the reference.
+The request is refused before anything moves, and the error names the device.
+Frames that do not fit before SYNC0 are refused, too.
+"""
 
 from __future__ import annotations
 
@@ -13,32 +15,32 @@ from tests.scenario.cell import PRE_OP, Cell
 
 def enter(cell: Cell, *requests: object, **options: object) -> None:
     with cat.Loop(*requests, period=1e-3, **grouped(options)):  # type: ignore[arg-type]
-        raise AssertionError("this loop cannot be")
+        raise AssertionError("the loop was opened")
 
 
-def test_a_device_without_a_clock(cell: Cell) -> None:
+def test_a_device_without_a_clock_is_refused(cell: Cell) -> None:
     lamps = cat.Outputs(cell.subs[1], dc=True)
     with pytest.raises(ConfigurationError, match=r"device 1 .*dc= was requested, but it has no"):
         enter(cell, cell.drives(dc=True), lamps)
     assert all(state == PRE_OP for state in cell.states)
 
 
-def test_a_reference_without_a_clock(cell: Cell) -> None:
+def test_a_reference_without_a_clock_is_refused(cell: Cell) -> None:
     with pytest.raises(ConfigurationError, match=r"device 1 .*given as the reference clock"):
         enter(cell, cell.drives(dc=True), reference=cell.subs[1])
 
 
-def test_a_reference_behind_its_followers(cell: Cell) -> None:
-    with pytest.raises(ConfigurationError, match=r"device 2 .* lies before device 3"):
+def test_a_reference_after_its_followers_is_refused(cell: Cell) -> None:
+    with pytest.raises(ConfigurationError, match=r"device 2 .* precedes device 3"):
         enter(cell, cell.drives(dc=True), reference=cell.subs[3])
 
 
-def test_frames_that_do_not_fit_before_the_beat(cell: Cell) -> None:
+def test_frames_that_do_not_fit_before_sync0_are_refused(cell: Cell) -> None:
     with pytest.raises(ConfigurationError, match="do not fit into a period of 1000 us"):
         enter(cell, cell.drives(dc=True), margin=0.99e-3)
 
 
-def test_two_requests_that_disagree(cell: Cell) -> None:
+def test_contradicting_requests_are_refused(cell: Cell) -> None:
     one = cat.Drives(
         cell.subs.drives,
         counts_per_turn=2**20,
@@ -50,7 +52,7 @@ def test_two_requests_that_disagree(cell: Cell) -> None:
         enter(cell, one, other)
 
 
-def test_a_reference_of_the_users_choice(cell: Cell) -> None:
+def test_the_user_can_choose_the_reference(cell: Cell) -> None:
     with cat.Loop(
         cell.drives(dc=True), period=1e-3, clocks=cat.ClockOptions(reference=cell.subs[2])
     ) as loop:
@@ -59,6 +61,6 @@ def test_a_reference_of_the_users_choice(cell: Cell) -> None:
         assert set(loop.clocks.differences) == {3}
 
 
-def test_nobody_but_us_is_followed(cell: Cell) -> None:
+def test_unknown_clocks_to_follow_are_refused(cell: Cell) -> None:
     with pytest.raises(ValueError, match='lead=\'gps\': must be one of "reference", "main"'):
         cat.Loop(cell.drives(dc=True), clocks=cat.ClockOptions(lead="gps"))  # type: ignore[arg-type]

@@ -1,5 +1,5 @@
-"""The slower task that writes set-points ahead falls behind. The axes continue, then hold, and
-follow the next rows. An empty stream is an underrun: after the late limit the axes are stopped.
+"""The task that streams set-points falls behind. The axes continue, hold and follow the next rows.
+An empty stream is an underrun: after the late limit, the axes are stopped.
 """
 
 import numpy as np
@@ -41,7 +41,7 @@ def test_a_moving_axis_comes_to_rest_and_is_stopped(cell: Cell) -> None:
     arm = cell.drives(mode="csv")
     with cat.Loop(arm, stop=cat.StopPolicy(on_axis_stopped="event")) as loop:
         for cycle in loop:
-            arm.target.velocity[:] = 0.0  # somebody holds the load
+            arm.target.velocity[:] = 0.0  # the load is held
             if cycle.number == 100:
                 break
         stream = loop.stream()

@@ -1,6 +1,6 @@
-"""A program forks while its loop is open and a lease is held, and the child leaves the blocks that
-it was copied in, by an exception or sys.exit. The loop, its share and the lease are the parent's:
-they go on, and nothing of theirs is removed.
+"""A program forks while its loop is open and a lease is held. The child leaves the copied blocks by
+an exception or sys.exit. The loop, its share and the lease belong to the parent.
+They continue, and nothing of them is removed.
 """
 
 import subprocess
@@ -40,7 +40,7 @@ with cat.MainDevice(cat.Segment([cat.virtual.Servo()])) as main:
 """
 
 
-def test_its_leaving_ends_nothing() -> None:
+def test_the_exit_of_a_child_does_not_affect_the_parent() -> None:
     with own_name("fork") as name:
         done = subprocess.run(
             [sys.executable, "-W", "ignore", "-c", PROGRAM, name],

@@ -1,6 +1,7 @@
-"""A crystal warms up faster than its controller follows: an event says whose clock left the bound,
-and another when it is back. Asking for more than the clocks can give ends with an error that names
-the worst. The axes follow all the while: a clock that is off is no fault of the bus."""
+"""A crystal warms up faster than its controller can follow. Events report that its clock left the
+bound, and that it returned. A bound that the clocks cannot keep ends with an error that names the
+worst clock. The axes keep moving, because a clock error is not a bus fault.
+"""
 
 from __future__ import annotations
 
@@ -14,7 +15,7 @@ from tests.scenario.cell import cell_of
 from tests.scenario.clocked import clocked_cell, run_for
 
 
-def test_leaving_the_bound_and_coming_back_are_events() -> None:
+def test_leaving_the_bound_and_returning_are_events() -> None:
     with cell_of(Coupler(), Servo(serial=1), Servo(serial=2)) as cell:
         with cat.Loop(cell.drives(dc=True), period=1e-3) as loop:
             loop.wait_locked(within=0.5e-6)
@@ -33,11 +34,11 @@ def test_leaving_the_bound_and_coming_back_are_events() -> None:
         assert "device 2" in left.message
 
 
-def test_more_than_clocks_can_give() -> None:
+def test_a_bound_that_the_clocks_cannot_keep() -> None:
     with clocked_cell(2) as cell, cat.Loop(cell.drives(dc=True), period=1e-3) as loop:
         with pytest.raises(ClockError, match=r"clocks not within 0.01 us after 0.5 s: .* us off"):
             loop.wait_locked(within=1e-8, timeout=0.5)
-        loop.wait_locked(within=1e-6)  # the loop goes on
+        loop.wait_locked(within=1e-6)  # the loop continues
 
 
 @pytest.mark.parametrize("within", [0.0, -1e-6, float("nan")])
@@ -50,7 +51,7 @@ def test_a_bound_is_positive(within: float) -> None:
         loop.wait_locked(within=within)
 
 
-def test_the_figures_print() -> None:
+def test_the_figures_are_printed() -> None:
     with clocked_cell(2) as cell, cat.Loop(cell.drives(dc=True), period=1e-3) as loop:
         loop.wait_locked()
         text = str(loop.clocks)
@@ -64,8 +65,8 @@ def test_the_figures_print() -> None:
         assert loop.clocks.time - before == pytest.approx(0.1, abs=2e-3)
 
 
-def test_late_frames_are_late_and_not_corrupt() -> None:
-    """Each cycle asks another device's difference: a frame of the cycle before looks different."""
+def test_late_frames_count_as_late_and_not_as_corrupt() -> None:
+    """Each cycle reads the difference of another device, so a frame of the last cycle differs."""
     with (
         clocked_cell(2) as cell,
         cat.Loop(cell.drives(dc=True), stop=cat.StopPolicy(lost_limit=5)) as loop,

@@ -1,6 +1,6 @@
-"""What befalls the cobot's program in mid-motion: its tasks are killed one by one (`kill -9`), a
-drive reports a fault, the bus is lost, a joint does not follow. The arm holds or stops within a
-cycle, says so, and comes home when what was lost is back.
+"""Faults during a motion of the cobot's program: its tasks are killed one by one (kill -9), a drive
+reports a fault, the bus is lost, or a joint does not follow. The arm holds or stops within one
+cycle, reports the reason, and returns home after recovery.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ def run(
     befalls: Callable[[int, Any], None],
     goals: Sequence[float] = (np.pi / 2, 0.0),
 ) -> Any:
-    """One run, up and home; `befalls(number, tasks)` in every cycle."""
+    """Run one motion up and home, and call `befalls(number, tasks)` in every cycle."""
     running: list[Any] = []
     tasks_class = cobot.realtime.Tasks
 
@@ -71,7 +71,7 @@ def run(
 
 
 def with_fault(cobot: Any, monkeypatch: pytest.MonkeyPatch, fault: Fault) -> None:
-    """The segment of the run has it coming."""
+    """Inject a fault into the segment of the run."""
     read_segment = cobot.read_segment
 
     def faulty(path: str, **options: Any) -> Any:
@@ -83,7 +83,7 @@ def with_fault(cobot: Any, monkeypatch: pytest.MonkeyPatch, fault: Fault) -> Non
 
 
 def nothing(number: int, tasks: Any) -> None:
-    """A run in which no task suffers."""
+    """Do nothing to the tasks."""
 
 
 def kill(name: str, at: Collection[int] = (AT,)) -> Callable[[int, Any], None]:
@@ -100,14 +100,14 @@ def came_home(outcome: Any) -> bool:
 
 
 def reasons(outcome: Any) -> list[str]:
-    """Of its stops; each was told to the drives within a cycle."""
+    """Return the reasons of the stops, after checking that each was sent within a cycle."""
     answers = reactions(record.read(outcome.path))
     assert [answer.reason for answer in answers] == [stop.reason for stop in outcome.stopped]
     assert all(answer.cycles <= 1 for answer in answers)
     return [stop.reason for stop in outcome.stopped]
 
 
-def test_dynamics_that_are_killed_are_back_before_they_are_missed(
+def test_the_killed_dynamics_task_restarts_in_time(
     cobot: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     outcome = run(cobot, tmp_path, monkeypatch, kill("dynamics"))
@@ -116,10 +116,10 @@ def test_dynamics_that_are_killed_are_back_before_they_are_missed(
     assert came_home(outcome)
 
 
-def test_without_dynamics_it_stops_and_gives_up(
+def test_without_the_dynamics_task_the_arm_stops_and_the_program_ends(
     cobot: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Killed more often than a task is restarted. That ends all tasks, the log among them."""
+    """The task is killed more often than it is restarted, which ends all tasks."""
     read_segment, segments = cobot.read_segment, []
     reasons: list[str | None] = []
 
@@ -140,10 +140,10 @@ def test_without_dynamics_it_stops_and_gives_up(
     assert "OPERATION ENABLED" not in {servo.drive_state() for servo in segments[0]}
 
 
-def test_a_trajectory_that_is_killed_goes_on_where_it_was(
+def test_a_killed_trajectory_task_continues_its_motion(
     cobot: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Its successor begins with the speed that the reference has when the last row is taken."""
+    """The restarted task begins with the velocity of the reference at the last row."""
     outcome = run(cobot, tmp_path, monkeypatch, kill("trajectory"))
     assert "trajectory" in str(outcome.tasks.failures[0])
     assert reasons(outcome) == []
@@ -152,10 +152,10 @@ def test_a_trajectory_that_is_killed_goes_on_where_it_was(
     assert came_home(outcome)
 
 
-def test_set_points_that_run_dry_stop_it_and_it_goes_on_with_the_next(
+def test_missing_set_points_stop_the_arm_until_new_ones_arrive(
     cobot: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The trajectory's rows are lost for a while in full motion."""
+    """The rows of the trajectory are lost for a while at full speed."""
     take = cobot.realtime.Queue.take
     number = 0
 
@@ -174,30 +174,32 @@ def test_set_points_that_run_dry_stop_it_and_it_goes_on_with_the_next(
     assert came_home(outcome)
 
 
-def test_a_goal_out_of_reach_is_said_and_the_arm_holds(
+def test_an_unreachable_target_is_reported_and_the_arm_holds(
     cobot: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The motion to the first goal ends, the next one never begins. The trajectory task is
-    restarted in vain, then its error comes out."""
+    """The motion to the first goal ends, and the next one does not begin.
+
+    Restarts of the trajectory task do not help, and the program ends with its error.
+    """
     with pytest.raises(TaskError, match=r"trajectory(.|\n)*position_max"):
         run(cobot, tmp_path, monkeypatch, nothing, goals=[0.1, 4.0])
     recording = record.read(tmp_path / "cobot.mcap")
     assert 0.09 < abs(recording["position"]).max() < 0.11
 
 
-def test_without_the_log_the_arm_knows_nothing_of_it(
+def test_a_killed_log_task_does_not_affect_the_arm(
     cobot: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     outcome = run(cobot, tmp_path, monkeypatch, kill("log"))
     assert outcome.stopped == []
     assert "log" in str(outcome.tasks.failures[0])
-    recording = record.read(outcome.path)  # as far as it got
+    recording = record.read(outcome.path)  # up to the kill
     assert recording.ended == "cut off"
     assert len(recording["number"]) <= AT
 
 
 @pytest.mark.parametrize("lasting", [0.3, 2.5])
-def test_a_drive_in_fault_stops_all_and_the_motion_goes_on_after_it(
+def test_a_drive_fault_stops_the_arm_and_the_motion_continues_later(
     cobot: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, lasting: float
 ) -> None:
     with_fault(cobot, monkeypatch, drive_fault(2, at=1.5, for_=lasting))
@@ -208,21 +210,21 @@ def test_a_drive_in_fault_stops_all_and_the_motion_goes_on_after_it(
 
 @pytest.mark.parametrize("between", [("main", 0), (2, 3)], ids=["all", "the wrist"])
 @pytest.mark.parametrize("lasting", [0.01, 0.7])
-def test_a_bus_that_is_lost_is_waited_for(
+def test_the_program_waits_for_a_lost_bus(
     cobot: Any,
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
     between: tuple[int, int],
     lasting: float,
 ) -> None:
-    """Shorter than the drives' watchdogs, and so long that they have left OP and are in fault."""
+    """The loss is shorter than the drives' watchdogs, or so long that the drives are in fault."""
     with_fault(cobot, monkeypatch, cut(between=between, at=1.5, for_=lasting))
     outcome = run(cobot, tmp_path, monkeypatch, nothing)
     assert reasons(outcome) == ["lost bus"]
     assert came_home(outcome)
 
 
-def test_a_bus_that_stays_lost_ends_it(
+def test_a_permanently_lost_bus_ends_the_program(
     cobot: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     with_fault(cobot, monkeypatch, cut(between=("main", 0), at=1.5))
@@ -230,20 +232,20 @@ def test_a_bus_that_stays_lost_ends_it(
         run(cobot, tmp_path, monkeypatch, nothing)
 
 
-def test_a_joint_that_does_not_follow_stops_all(
+def test_a_joint_that_does_not_follow_stops_the_arm(
     cobot: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Its torque is off for a moment, and its brake closed."""
+    """Its torque is off for a short time, and its brake is closed."""
     with_fault(cobot, monkeypatch, safe_torque_off(1, at=1.5, for_=0.8))
     outcome = run(cobot, tmp_path, monkeypatch, nothing)
     assert reasons(outcome) == ["following error"]
     assert came_home(outcome)
 
 
-def test_a_joint_beyond_its_reach_comes_back(
+def test_a_joint_out_of_its_range_returns(
     cobot: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Everything beyond 1 rad is out of reach, from mid-motion on until the arm stands."""
+    """Angles above 1 rad are out of range, from the middle of the motion until the arm stands."""
     reach = cobot.REACH
 
     def befalls(number: int, tasks: Any) -> None:
@@ -252,5 +254,5 @@ def test_a_joint_beyond_its_reach_comes_back(
     outcome = run(cobot, tmp_path, monkeypatch, befalls)
     assert reasons(outcome) == ["limit"]
     recording = record.read(outcome.path)
-    assert recording["position"].max() > 1.5  # and it went where it was to go
+    assert recording["position"].max() > 1.5  # it reached the goal
     assert came_home(outcome)
