@@ -19,7 +19,7 @@ from catenary.bench.loop import OURS, ROUND_CYCLES, make_jobs, show_progress, wr
 from catenary.bench.report import machine
 from catenary.bench.rounds import interleave
 from catenary.bench.segment import ANALOG_CHANNELS, served
-from catenary.bench.statistics import WITH_TAIL, combine
+from catenary.bench.statistics import WITH_POST_PROCESSING, combine
 
 DRIVE_BYTES = 26  # in both directions
 INPUT_BYTES = 4 * ANALOG_CHANNELS  # of one terminal
@@ -63,11 +63,11 @@ def measure(*, seconds: float, file: Path | None) -> None:
     costs: dict[str, list[Point]] = {name: [] for name in OURS}
     for (name, axes, terminals), ones in found.items():
         run = combine(name, ones)
-        cost = run.timing_us[WITH_TAIL]["p50"]
+        cost = run.timing_us[WITH_POST_PROCESSING]["p50"]
         size = axes * DRIVE_BYTES + terminals * INPUT_BYTES
         costs[name].append(Point(axes, size, round(cost, 3)))
     fits = {name: fit(points) for name, points in costs.items()}
-    print(f"{machine()}\nmedian of in_controller + tail:")
+    print(f"{machine()}\nmedian of in_controller + post_processing:")
     for name, cost_line in fits.items():
         print(f"  {name:18} {cost_line}")
     write(

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from statistics import median
 
-from catenary.bench.statistics import IN_CONTROLLER, WAKE_TO_SENT, WITH_TAIL, Rounds, Run
+from catenary.bench.statistics import IN_CONTROLLER, WAKE_TO_SENT, WITH_POST_PROCESSING, Rounds, Run
 
 OURS = ("catenary-inline", "catenary-threaded", "catenary-law")
 PEERS = ("c", "c-ring", "c-busy", "pysoem")
@@ -19,7 +19,7 @@ COMPARED = (
     "receive",
     "process",
     IN_CONTROLLER,
-    WITH_TAIL,
+    WITH_POST_PROCESSING,
 )
 
 

@@ -112,7 +112,7 @@ def share_ratios(runs: Sequence[Run]) -> dict[str, float]:
         )
         for order in ORDERS
         for one, other in ((READ, BESIDE), (READ, SHARED), (SHARED, ""))
-        for phase in ("in_controller", "tail")
+        for phase in ("in_controller", "post_processing")
     }
 
 

@@ -56,7 +56,7 @@ def storm_ratios(runs: Sequence[Run]) -> dict[str, float]:
             timing[f"{name}-sdo"][phase]["p50"] / max(timing[name][phase]["p50"], 1e-3), 3
         )
         for name in NAMES[::2]
-        for phase in ("in_controller", "tail")
+        for phase in ("in_controller", "post_processing")
     }
 
 

@@ -23,7 +23,6 @@ from catenary.virtual.coe.dictionary import (
     number,
     stored,
 )
-from catenary.virtual.coe.quirks import NO_MAILBOX_QUIRKS
 from catenary.virtual.crystal import EXACT
 from catenary.virtual.description import Description, MappedEntry, Pdo
 from catenary.virtual.devices.application import Application, mailbox_of, sync_managers_of
@@ -70,11 +69,8 @@ class ForceSensor(AppliedDevice):
             alias=0,
             serial=0,
             lrw=True,
-            mailbox_bytes=128,
-            mailbox_delay=300e-6,
             crystal=EXACT,
             clock_bits=64,
-            mailbox_quirks=NO_MAILBOX_QUIRKS,
             sii_quirks=NO_SII_QUIRKS,
         )
         self.mapping_quirks = mapping_quirks

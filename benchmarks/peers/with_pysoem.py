@@ -110,7 +110,7 @@ def _measure(master: Any, drives: list[Any], homes: list[int], job: Job) -> Roun
 
 
 def _phases(stamps: np.ndarray) -> np.ndarray:
-    """Convert times to durations. The last cycle only ends the tail of the previous one."""
+    """Convert times to durations. The last cycle only ends the previous one."""
     waiting, deadline, woke, sent_before, received, processed, sent = stamps.T
     durations = [
         np.diff(woke, prepend=woke[0])[:-1],

@@ -13,7 +13,7 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
 from catenary.bench.report import machine
-from catenary.realtime.system.scheduling import what_scheduling
+from catenary.realtime.system.scheduling import current_scheduling
 
 RATIOS = "other machines: compare ratios, not microseconds"
 PACKAGES = ("catenary", "numpy", "numba", "pysoem")
@@ -64,7 +64,7 @@ def as_json(name: str, sheet: Sheet) -> str:
             "command": shlex.join(["python", "-m", "benchmarks", *sys.argv[1:]]),
             "versions": versions(),
             "cpus": sorted(os.sched_getaffinity(0)),
-            "scheduling": str(what_scheduling()),
+            "scheduling": str(current_scheduling()),
             "conditions": sheet.conditions,
             "note": RATIOS,
             "left_out": list(sheet.left_out),

@@ -1,4 +1,4 @@
-"""A line of virtual devices behind a network interface, and programs that use it."""
+"""A line of virtual devices on a network interface, and programs that use it."""
 
 from __future__ import annotations
 

@@ -69,7 +69,7 @@ def test_the_loop_reads_whatever_is_there(
             assert str(end)
 
 
-def test_a_ring_whose_number_is_the_last_there_is_has_an_end(
+def test_a_ring_with_the_largest_number_ends(
     shared: tuple[Desk, mmap.mmap],
 ) -> None:
     """`for (number = first; number <= last; ...)` never ended for 2^64 - 1."""

@@ -1,4 +1,4 @@
-"""Attack: a program ends in ways that it did not plan. Its axes are stopped if possible."""
+"""Attack: a program ends unexpectedly. Its axes are stopped if possible."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Attack: two masters on one network interface. The second one is refused, the first goes on."""
+"""Attack: two masters on one network interface. The second is refused; the first continues."""
 
 from __future__ import annotations
 
@@ -200,11 +200,11 @@ def test_a_master_in_another_container(veth: tuple[str, str]) -> None:
     )
 
 
-def test_the_process_of_another_container_is_said_to_be_invisible() -> None:
+def test_a_process_of_another_container_is_reported_as_invisible() -> None:
     assert "invisible here" in ownership.described(0)
 
 
-def test_whoever_keeps_the_lock_without_a_right_to_the_interface(veth: tuple[str, str]) -> None:
+def test_a_lock_held_without_permission_for_the_interface(veth: tuple[str, str]) -> None:
     """Any user may bind a name of an abstract socket."""
     with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as stranger:
         stranger.bind(ownership.NAME + veth[0])
@@ -218,7 +218,7 @@ def test_a_lock_that_the_system_refuses_is_a_link_error(
     veth: tuple[str, str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(ownership, "NAME", "\0" + 200 * "x")  # longer than an address may be
-    with pytest.raises(LinkError, match=f"{veth[0]}: its lock cannot be taken"):
+    with pytest.raises(LinkError, match=f"{veth[0]}: cannot take the lock of the interface"):
         cat.MainDevice(veth[0]).open()
 
 

@@ -1,4 +1,4 @@
-"""Other users against shares and mutexes: what they read, command, lock, take and break.
+"""Attacks of other users on shares and mutexes: read, command, lock, take, damage.
 
 Alice runs a loop; Bob is an operator, of her group; Mallory is neither.
 """
@@ -106,7 +106,7 @@ said(lambda: os.rename(folder + "/share-arm", folder + "/y"))
             assert [line.split()[0] for line in lines] == ["PermissionError"] * 4
 
 
-def test_who_takes_a_users_folder_is_named(machine: Machine) -> None:
+def test_the_owner_of_a_taken_folder_is_named(machine: Machine) -> None:
     """Denial, not deception: /dev/shm is open to all users. /run/catenary cannot be taken."""
     assert machine.run(MALLORY, f"import os; os.mkdir('/dev/shm/catenary-{ALICE}', 0o777)") == []
     take = f'{SAY}\nsaid(lambda: cat.share.Mutex("tool"))'
@@ -132,7 +132,7 @@ subprocess.run([*private, sys.executable, "-c", program], check=True)
     assert machine.run(0, take) == ["done"]
 
 
-def test_a_share_of_another_user_is_refused_unless_asked_for(machine: Machine) -> None:
+def test_a_share_of_another_user_is_refused_unless_requested(machine: Machine) -> None:
     """The owner of a share can crash its readers by truncating the file (SIGBUS)."""
     make_group_folder(machine)
     with machine.started(MALLORY, LOOP, "644", group=True) as loop:
@@ -152,7 +152,7 @@ def test_roots_share_needs_no_word(machine: Machine) -> None:
         assert machine.run(ALICE, f'{SAY}\nsaid(lambda: cat.attach("arm"))') == ["done"]
 
 
-def test_a_mutex_of_another_user_is_refused_unless_asked_for(machine: Machine) -> None:
+def test_a_mutex_of_another_user_is_refused_unless_requested(machine: Machine) -> None:
     """Its robust list holds pointers: a forged file crashed the C library (SIGSEGV)."""
     make_group_folder(machine)
     evil = """

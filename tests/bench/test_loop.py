@@ -36,6 +36,6 @@ def test_the_file_has_the_setting_and_all_runs(tmp_path, capsys) -> None:
 
 def test_a_missing_ratio_is_a_dash() -> None:
     runs = [combine("c", [make_round(500, 4000, 5500)])]
-    text = as_text(runs, {"tail: a / b": 1.5, "process: c / d": 2.0})
+    text = as_text(runs, {"post_processing: a / b": 1.5, "process: c / d": 2.0})
     assert text.splitlines()[-2].split() == ["a", "/", "b", "1.50", "-"]
     assert text.splitlines()[-1].split() == ["c", "/", "d", "-", "2.00"]

@@ -34,7 +34,15 @@ def test_combine_the_rounds_of_a_peer() -> None:
     assert run.timing_us["in_controller"]["min"] == 10.3
     assert run.timing_us["in_controller"]["max"] == 12.3
     assert set(run.timing_us) == {*PHASES, *DERIVED}
-    assert set(run.timing_us["tail"]) == {"mean", "min", "max", "sd", "p50", "p99", "p999"}
+    assert set(run.timing_us["post_processing"]) == {
+        "mean",
+        "min",
+        "max",
+        "sd",
+        "p50",
+        "p99",
+        "p999",
+    }
 
 
 def test_figures_of_each_round_are_kept() -> None:

@@ -20,13 +20,15 @@ def test_readers_stand_beside_a_share_without_and_that_beside_none() -> None:
     runs = [run(name, cost.get(name[name.rindex("-") :], 1000)) for name in NAMES]
     ratios = share_ratios(runs)
     assert ratios["in_controller: catenary-inline-readers / catenary-inline-shared"] == 1.1
-    assert ratios["tail: catenary-threaded-readers / catenary-threaded-bystanders"] == 1.008
-    assert ratios["tail: catenary-threaded-shared / catenary-threaded"] == 1.1
+    assert (
+        ratios["post_processing: catenary-threaded-readers / catenary-threaded-bystanders"] == 1.008
+    )
+    assert ratios["post_processing: catenary-threaded-shared / catenary-threaded"] == 1.1
     assert set(NAMES) <= set(MODULES)
 
 
 def test_limits_are_printed_with_the_measured_values() -> None:
-    name = "tail: catenary-inline-readers / catenary-inline-bystanders"
+    name = "post_processing: catenary-inline-readers / catenary-inline-bystanders"
     told = as_aims([Reading(3, 472, read=1.5, copy=0.25)], {name: 1.02, "x / y": 3.0})
     assert told.splitlines() == [
         "  read 472 bytes (3 axes): 1.50 us, the copy alone 0.25 us: difference 1.25 us, "

@@ -21,7 +21,7 @@ from benchmarks.soak.minute import Minute
 from benchmarks.soak.run import as_text, soak, soaked_minute
 from benchmarks.soak.setting import Mode, Setting, setting_of, settings
 from benchmarks.soak.witness import Witness
-from catenary.loop.session import Session
+from catenary.loop.fault_report import FaultReport
 from catenary.loop.watches.device import Watch
 from catenary.virtual import DigitalOutputs, Fault, Segment, Servo
 from catenary.virtual import faults as f
@@ -224,7 +224,7 @@ def test_a_cycle_that_a_cut_ring_loses_later_is_found(monkeypatch: pytest.Monkey
 
 
 def test_a_stop_without_an_event_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(Session, "_announce_axes", lambda self, **_: [])
+    monkeypatch.setattr(FaultReport, "report_axes", lambda self, **_: [])
     minute = soaked(monkeypatch, f.SafeTorqueOff(device=TOOL, at=0.3, for_=0.1))
     assert "no silent stop" in invariants(minute)
 

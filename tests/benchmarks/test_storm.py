@@ -20,7 +20,7 @@ def test_each_storm_stands_beside_its_calm() -> None:
     runs = [run(name, 3000 + 300 * name.endswith("-sdo"), 7) for name in NAMES]
     ratios = storm_ratios(runs)
     assert ratios["in_controller: catenary-inline-sdo / catenary-inline"] == 1.1
-    assert ratios["tail: catenary-threaded-sdo / catenary-threaded"] == 1.1
+    assert ratios["post_processing: catenary-threaded-sdo / catenary-threaded"] == 1.1
     assert runs[1].answers == 14
     assert set(NAMES) <= set(MODULES)
 

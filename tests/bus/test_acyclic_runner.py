@@ -56,22 +56,22 @@ class AcyclicQueue:
             self._back.append(frame)
 
 
-def settle(lane: AcyclicQueue, runner: AcyclicRunner, cycles: int = 5000) -> int:
+def settle(queue: AcyclicQueue, runner: AcyclicRunner, cycles: int = 5000) -> int:
     for number in range(cycles):
         if not runner.busy:
             return number
         runner.step()
-        lane.cycle()
+        queue.cycle()
     raise AssertionError(f"still busy after {cycles} cycles")
 
 
 def test_an_upload_takes_one_step_per_cycle() -> None:
     with MainDevice(demo_segment()) as main:
         [drive, *_] = main.scan().drives
-        lane = AcyclicQueue(main.link)
-        runner = AcyclicRunner(lane)
+        queue = AcyclicQueue(main.link)
+        runner = AcyclicRunner(queue)
         task = runner.submit(upload(drive.channel, 0x1000, 0))
-        cycles = settle(lane, runner)
+        cycles = settle(queue, runner)
         assert UDINT.decode(task.result()) & 0xFFFF == 402
         assert 3 <= cycles <= 12
         assert runner.counts.sent <= cycles
@@ -80,12 +80,12 @@ def test_an_upload_takes_one_step_per_cycle() -> None:
 def test_many_procedures_share_the_frame_of_a_cycle() -> None:
     with MainDevice(demo_segment()) as main:
         subs = main.scan()
-        lane = AcyclicQueue(main.link)
-        runner = AcyclicRunner(lane)
+        queue = AcyclicQueue(main.link)
+        runner = AcyclicRunner(queue)
         tasks = [runner.submit(_state(sub.station.address)) for sub in subs]
-        settle(lane, runner)
+        settle(queue, runner)
         assert [task.result() for task in tasks] == [2] * 6
-        [frame] = lane.pushed
+        [frame] = queue.pushed
         assert len(decode_frame(frame).datagrams) == 6
         assert all(datagram.index >= 0x80 for datagram in decode_frame(frame).datagrams)
 
@@ -93,11 +93,11 @@ def test_many_procedures_share_the_frame_of_a_cycle() -> None:
 def test_procedures_on_one_mailbox_take_turns() -> None:
     with MainDevice(demo_segment()) as main:
         drive = main.scan()[2]
-        lane = AcyclicQueue(main.link)
-        runner = AcyclicRunner(lane)
+        queue = AcyclicQueue(main.link)
+        runner = AcyclicRunner(queue)
         places = [(0x1000, 0), (0x1018, 1), (0x1018, 2), (0x5FFF, 0), (0x1008, 0)]
         tasks = [runner.submit(upload(drive.channel, *place)) for place in places]
-        settle(lane, runner)
+        settle(queue, runner)
         assert tasks[1].result() == UDINT.encode(drive.identity.vendor)
         assert tasks[2].result() == UDINT.encode(drive.identity.product)
         assert tasks[4].result() == b"Catenary virtual servo 1"
@@ -109,26 +109,26 @@ def test_procedures_on_one_mailbox_take_turns() -> None:
 def test_a_full_queue_delays_but_loses_nothing() -> None:
     with MainDevice(demo_segment()) as main:
         subs = main.scan()
-        lane = AcyclicQueue(main.link, slots=0)
-        runner = AcyclicRunner(lane)
+        queue = AcyclicQueue(main.link, slots=0)
+        runner = AcyclicRunner(queue)
         task = runner.submit(_state(subs[0].station.address))
         for _ in range(5):
             runner.step()
-            lane.cycle()
+            queue.cycle()
         assert not task.done
-        lane.slots = 1
-        settle(lane, runner)
+        queue.slots = 1
+        settle(queue, runner)
         assert task.result() == 2
 
 
 def test_lost_frames_are_repeated_or_recovered() -> None:
     with MainDevice(demo_segment()) as main:
         drive = main.scan()[2]
-        lane = AcyclicQueue(main.link)
-        lane.lose = {0, 2, 4, 7}
-        runner = AcyclicRunner(lane)
+        queue = AcyclicQueue(main.link)
+        queue.lose = {0, 2, 4, 7}
+        runner = AcyclicRunner(queue)
         task = runner.submit(upload(drive.channel, 0x1018, 1))
-        settle(lane, runner)
+        settle(queue, runner)
         assert task.result() == UDINT.encode(drive.identity.vendor)
         assert runner.counts.lost >= 3
 
@@ -138,10 +138,10 @@ def test_procedures_on_a_lost_segment_end_in_time() -> None:
     with MainDevice(segment) as main:
         drive = main.scan()[2]
         segment.unplug()
-        lane = AcyclicQueue(main.link)
-        runner = AcyclicRunner(lane)
+        queue = AcyclicQueue(main.link)
+        runner = AcyclicRunner(queue)
         task = runner.submit(upload(drive.channel, 0x1018, 1))
-        assert settle(lane, runner) < 2000
+        assert settle(queue, runner) < 2000
         with pytest.raises(ResponseTimeout, match="device 2"):
             task.result()
 
@@ -149,13 +149,13 @@ def test_procedures_on_a_lost_segment_end_in_time() -> None:
 def test_a_blocking_call_in_the_loops_thread_raises_at_once() -> None:
     with MainDevice(demo_segment()) as main:
         drive = main.scan()[2]
-        lane = AcyclicQueue(main.link)
+        queue = AcyclicQueue(main.link)
         with (
-            main.attached(AcyclicRunner(lane)),
+            main.attached(AcyclicRunner(queue)),
             pytest.raises(RuntimeError, match="in the loop's thread"),
         ):
             drive.sdo.read(0x1000)
-        assert lane.pushed == []
+        assert queue.pushed == []
         assert drive.sdo.read(0x1000)  # the loop has ended
 
 
@@ -172,8 +172,8 @@ def test_a_scan_is_refused_while_a_loop_runs() -> None:
 def test_another_thread_reads_while_the_loop_runs() -> None:
     with MainDevice(demo_segment()) as main:
         drive = main.scan()[2]
-        lane = AcyclicQueue(main.link)
-        runner = AcyclicRunner(lane)
+        queue = AcyclicQueue(main.link)
+        runner = AcyclicRunner(queue)
         found: list[int] = []
         with main.attached(runner):
             thread = threading.Thread(
@@ -182,7 +182,7 @@ def test_another_thread_reads_while_the_loop_runs() -> None:
             thread.start()
             while thread.is_alive():  # each step is a cycle of virtual time
                 runner.step()
-                lane.cycle()
+                queue.cycle()
                 thread.join(0.001)
         assert found == [drive.identity.vendor]
 
@@ -212,15 +212,15 @@ def test_closing_ends_waiting_calls() -> None:
 
 def test_pauses_use_the_clock_of_the_queue() -> None:
     with demo_segment().open_link() as link:
-        lane = AcyclicQueue(link)
-        runner = AcyclicRunner(lane)
+        queue = AcyclicQueue(link)
+        runner = AcyclicRunner(queue)
 
         def waits() -> Procedure[str]:
             yield after(0.020)
             return "done"
 
         task = runner.submit(waits())
-        assert 19 <= settle(lane, runner) <= 22
+        assert 19 <= settle(queue, runner) <= 22
         assert task.result() == "done"
 
 
@@ -233,8 +233,8 @@ def test_a_starting_loop_waits_for_running_procedures() -> None:
     """Only one thread uses the link. A running procedure finishes first; a later one is queued."""
     with MainDevice(demo_segment()) as main:
         drive = main.scan()[2]
-        lane = AcyclicQueue(main.link)
-        runner = AcyclicRunner(lane)
+        queue = AcyclicQueue(main.link)
+        runner = AcyclicRunner(queue)
         talking, go_on = threading.Event(), threading.Event()
         order: list[str] = []
 
@@ -256,7 +256,7 @@ def test_a_starting_loop_waits_for_running_procedures() -> None:
             order.append("attached")
             while second.is_alive():
                 runner.step()
-                lane.cycle()
+                queue.cycle()
                 second.join(0.001)
         first.join()
         assert order == ["talked", "attached"]

@@ -86,7 +86,7 @@ def test_a_pdo_flagged_as_fixed_is_refused_in_the_plan() -> None:
 def test_access_rights_are_read_from_the_dictionary() -> None:
     """The SII need not flag fixed PDOs, because the access rights are read."""
     wanted = asking(FOLLOWING_ERROR, POSITION, DEMAND, ObjectReference(0x5FFF, 0, 8))
-    refused = pytest.raises(MappingError, match="its dictionary says that 0x1C13 is read-only")
+    refused = pytest.raises(MappingError, match="0x1C13 is read-only in its dictionary")
     with scanned(fixed_lists="declared") as main, refused:
         main.plan(wanted)
 
@@ -128,9 +128,9 @@ def test_the_old_mapping_is_restored_if_an_object_cannot_be_mapped() -> None:
 
 def test_an_sii_without_the_permissions_is_honoured() -> None:
     with scanned(coe_details=0x23) as main:
-        with pytest.raises(MappingError, match="0x1C13 cannot be changed"):
+        with pytest.raises(MappingError, match="does not allow changes of 0x1C13"):
             main.plan(asking(FOLLOWING_ERROR))
-        with pytest.raises(MappingError, match="the entries of PDOs cannot be changed"):
+        with pytest.raises(MappingError, match="does not allow changes of PDO entries"):
             main.plan(asking(DEMAND))
         main.configure(main.plan(asking(POSITION)))
 

@@ -1,4 +1,4 @@
-"""The acyclic lane: opaque frames beside the cycle, bounded both ways."""
+"""The acyclic queue: opaque frames outside the cycle, bounded in both directions."""
 
 import pytest
 
@@ -16,7 +16,7 @@ def lane_frames(b: Bench) -> list[bytes]:
 
 
 @pytest.mark.parametrize("execution", ["threaded", "inline"])
-def test_a_frame_goes_out_after_the_cyclic_one_and_comes_back(execution: str) -> None:
+def test_an_acyclic_frame_is_sent_after_the_cyclic_one_and_returns(execution: str) -> None:
     b = bench(axis(0), execution=execution)
     b.engine.run(1)
     sent = len(b.link.sent)
@@ -82,7 +82,7 @@ def test_a_full_queue_refuses() -> None:
     assert b.engine.acyclic_push(request(64))
 
 
-def test_answers_nobody_takes_are_dropped_and_counted() -> None:
+def test_answers_that_are_not_read_are_dropped_and_counted() -> None:
     b = bench(axis(0))
     for k in range(70):
         b.link.arrive(request(k), 1000)
@@ -116,7 +116,7 @@ def test_what_is_no_acyclic_frame_is_refused(frame: bytes, message: str) -> None
         bench(axis(0)).engine.acyclic_push(frame)
 
 
-def test_waiting_says_whether_a_frame_is_there() -> None:
+def test_wait_returns_true_if_a_frame_has_returned() -> None:
     b = bench(axis(0))
     assert not b.engine.acyclic_wait(0)
     b.engine.acyclic_push(request())

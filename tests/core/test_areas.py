@@ -1,4 +1,4 @@
-"""Areas: bytes of an image that the application has as they are."""
+"""Areas: bytes of an image that the application uses without conversion."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def test_inputs_are_read_only_and_constant_between_two_cycles() -> None:
     assert b.input_bytes[0] == 5
 
 
-def test_a_number_beside_an_area_stays() -> None:
+def test_a_number_next_to_an_area_is_unchanged() -> None:
     number = Column("n", Number(8, 16, NumberKind.UNSIGNED), Bank.INTEGER, 0, 0)
     areas = (area(0, 1), area(3, 1))
     b = Echo(replace(make_plan([], units=1), output_areas=areas, output_columns=(number,)))

@@ -1,4 +1,4 @@
-"""Axis records: scales, counters that go round, modes, what is written where."""
+"""Axis records: scales, counters that wrap, modes, and the outputs written."""
 
 import pytest
 
@@ -18,7 +18,7 @@ def test_a_position_counter_is_followed_round_both_ways() -> None:
         assert b.actual_position[0] - start == pytest.approx(travelled / COUNTS)
 
 
-def test_a_target_beyond_the_counter_goes_round() -> None:
+def test_a_target_beyond_the_counter_wraps() -> None:
     b = bench(axis(0), drives=[ScriptedDrive(position=2**31 - 100)])
     b.enable()
     home = b.actual_position[0]

@@ -1,4 +1,4 @@
-"""Values of the axes in the log: as many rows as records, each with its cycle."""
+"""Values of the axes in the log: one row per record, with its cycle number."""
 
 from __future__ import annotations
 

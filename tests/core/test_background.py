@@ -1,4 +1,4 @@
-"""Set-points of a program in the background: how long they count in each mode, in the core."""
+"""Set-points of a background program: how long they are valid in each mode."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""The phase controller: beside its twin, and against clocks that drift."""
+"""The phase controller, compared with its twin and tested against clocks that drift."""
 
 from __future__ import annotations
 
@@ -74,7 +74,7 @@ def test_it_finds_phase_and_rate(ppm: float, delay: int) -> None:
     assert controller.jumps == 0
 
 
-def test_it_smooths_what_the_reference_says() -> None:
+def test_it_smooths_the_time_of_the_reference() -> None:
     errors = phases(PhaseController(PLAN, PERIOD), ppm=100.0, jitter=1000)
     assert max(map(abs, errors[1000:])) < 400
 

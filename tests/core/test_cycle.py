@@ -1,4 +1,4 @@
-"""The three orders, the instants, the figures. Virtual time throughout."""
+"""Execution modes, cycle starts and figures, in virtual time."""
 
 from dataclasses import replace
 
@@ -90,7 +90,7 @@ def test_inline_sends_when_the_body_ends_and_sees_the_frame_of_the_cycle_before(
 
 
 @pytest.mark.parametrize("execution", EXECUTION_MODES)
-def test_number_time_and_instants(execution: str) -> None:
+def test_number_time_and_cycle_starts(execution: str) -> None:
     b = bench(axis(0), execution=execution)
     seen = []
     for _ in range(5):
@@ -101,7 +101,7 @@ def test_number_time_and_instants(execution: str) -> None:
 
 
 @pytest.mark.parametrize(("spent", "skipped"), [(2.5, 2), (3.0, 3)])
-def test_inline_skips_missed_instants_and_never_bursts(spent: float, skipped: int) -> None:
+def test_inline_skips_missed_cycle_starts_without_bursts(spent: float, skipped: int) -> None:
     b = bench(axis(0), execution="inline")
     b.steps(2)
     sent = len(b.link.sent)
@@ -239,7 +239,7 @@ def test_an_unknown_phase_is_refused() -> None:
 
 
 @pytest.mark.parametrize("execution", EXECUTION_MODES)
-def test_an_interrupted_wait_goes_on_and_sends_once(execution: str) -> None:
+def test_an_interrupted_wait_continues_and_sends_once(execution: str) -> None:
     b = bench(axis(0), execution=execution)
     b.steps(1)
     sent = len(b.link.sent)
@@ -279,7 +279,7 @@ def test_nothing_runs_after_stop() -> None:
     b.engine.stop()
 
 
-def test_after_a_pause_the_grid_goes_on() -> None:
+def test_the_grid_continues_after_a_pause() -> None:
     b = bench(axis(0))
     b.engine.run(3)
     b.engine.stop()

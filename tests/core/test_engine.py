@@ -67,7 +67,7 @@ def test_a_native_thread_does_not_need_python(link) -> None:
     assert engine.counters["cycles"] - engine.counters["lost"] >= 20
 
 
-def test_a_signal_handler_runs_at_once_and_its_exception_comes_out(engine: Engine) -> None:
+def test_a_signal_handler_runs_at_once_and_its_exception_is_raised(engine: Engine) -> None:
     def handler(number: int, frame: object) -> None:
         raise InterruptedError("a handler's")
 
@@ -83,7 +83,7 @@ def test_a_signal_handler_runs_at_once_and_its_exception_comes_out(engine: Engin
     assert engine.run(2) & CYCLE_OK
 
 
-def test_the_lane_and_its_waiting_thread(engine: Engine) -> None:
+def test_the_acyclic_queue_and_its_waiting_thread(engine: Engine) -> None:
     frame = encode_frame([Datagram(EcatCommand.BRD, 0x0130 << 16, bytes(2), index=0x91)])
     answers = []
 
@@ -124,7 +124,7 @@ def test_stop_and_start_again(engine: Engine) -> None:
 
 
 @pytest.mark.parametrize("execution", EXECUTION_MODES)
-def test_scheduling_that_was_not_to_be_had_is_said(execution: str, link) -> None:
+def test_refused_scheduling_is_reported(execution: str, link) -> None:
     policy, cpus = os.sched_getscheduler(0), os.sched_getaffinity(0)
     engine = Engine(plan(execution, cpu=1023, priority=1), link.capsule)
     engine.start()
@@ -137,7 +137,7 @@ def test_scheduling_that_was_not_to_be_had_is_said(execution: str, link) -> None
     assert (os.sched_getscheduler(0), os.sched_getaffinity(0)) == (policy, cpus)
 
 
-def test_the_thread_of_a_failed_link_ends_and_says_why() -> None:
+def test_the_thread_of_a_failed_link_ends_and_reports_the_error() -> None:
     b = Bench(plan("threaded", sync_units=()))
     b.engine.stop()
     b.link.table.flags = 0  # no virtual time: a native thread, waiting by a Python callback
@@ -150,7 +150,7 @@ def test_the_thread_of_a_failed_link_ends_and_says_why() -> None:
     engine.stop()
 
 
-def test_no_new_cycle_in_time_is_said() -> None:
+def test_a_missing_cycle_is_reported_after_the_timeout() -> None:
     b = Bench(plan("threaded", sync_units=()))
     b.engine.stop()
     b.link.table.flags = 0

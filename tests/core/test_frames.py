@@ -1,4 +1,4 @@
-"""The frame engine: what is sent, what is believed, and what is counted and forgotten."""
+"""The frame engine: frames that are sent, accepted, or counted and dropped."""
 
 from dataclasses import replace
 
@@ -178,7 +178,7 @@ def test_cycle_numbers_count_the_cycles() -> None:
         (64, 2, False, "33 in one cycle, at most 32"),
         (128, 1, True, None),
         (129, 1, True, "129 in one cycle, at most 128"),
-        (1025, 100, False, "1025, at least 1 and at most 1024"),
+        (1025, 100, False, "1025, must be 1 to 1024"),
     ],
 )
 def test_how_many_frames_a_cycle_may_have(
@@ -334,14 +334,14 @@ def test_a_lost_second_frame(optional: bool) -> None:
 
 
 def slow_second(divider: int, phase: int = 0, **options: object) -> Bench:
-    """The second of two drives rides in a frame of its own, every so many cycles."""
+    """The second of two drives is in a separate frame with a divider."""
     plan = make_plan([axis(0), axis(1)], **options)
     units = (plan.sync_units[0], SyncUnit("second", (1,), divider=divider))
     slow = replace(frame_plan([lrw(1)]), divider=divider, phase=phase)
     return Bench(replace(plan, frames=(frame_plan([al_status(2), lrw(0)]), slow), sync_units=units))
 
 
-def test_a_slow_unit_goes_out_in_its_own_cycles_only() -> None:
+def test_a_unit_with_a_divider_is_sent_only_in_its_cycles() -> None:
     b = slow_second(divider=4, phase=1)
     b.engine.run(12)
     assert [len(decode_frame(f).datagrams) for f in b.link.sent] == [2, 1, 2, 2, 2] * 3
@@ -432,7 +432,7 @@ def test_a_link_that_does_not_send_is_counted_and_the_cycle_is_lost() -> None:
 # ---- receive modes
 
 
-def test_look_waits_for_the_deadline_and_looks_once() -> None:
+def test_poll_mode_waits_for_the_deadline_and_reads_once() -> None:
     b = bench(axis(0), receive_mode="poll")
     b.engine.run(2)
     assert b.ok
@@ -476,7 +476,7 @@ def with_datagram(frame, **changes) -> dict[str, object]:
         (lambda p, f, d: {"frames": (replace(f, template=f.template[:40]),)}, "40 bytes"),
         (lambda p, f, d: {"frames": (replace(f, datagrams=()),)}, "no datagrams"),
         (lambda p, f, d: with_datagram(f, offset=31), "expected at 30"),
-        (lambda p, f, d: with_datagram(f, length=14), "its datagrams end at"),
+        (lambda p, f, d: with_datagram(f, length=14), "the end of its datagrams at"),
         (lambda p, f, d: with_datagram(f, command=3), "command or length"),
         (lambda p, f, d: with_datagram(f, sync_unit=1), "sync unit 1 of 1"),
         (lambda p, f, d: with_datagram(f, expected_counter=70000), "counter 70000"),

@@ -125,7 +125,7 @@ def test_no_velocity_before_it_is_followed() -> None:
     assert b.drives[0].target_velocity == 0
 
 
-def test_the_torque_goes_on_while_an_open_brake_waits_for_bit_12() -> None:
+def test_the_torque_stays_while_an_open_brake_waits_for_bit_12() -> None:
     b = bench(axis(0, mode=CST), drives=[ScriptedDrive(follows=False)])
     b.ask(REQUEST_ENABLED)
     sent = []
@@ -180,7 +180,7 @@ def test_a_drive_that_is_known_to_lack_bit_12_need_not_be_waited_for_again() -> 
     assert followed(b)
 
 
-def test_bit_12_that_comes_after_all_drops_the_goal_once() -> None:
+def test_a_late_bit_12_drops_the_requested_state_once() -> None:
     b = mute_drive()
     b.drives[0].follows = True
     b.steps(2)
@@ -332,7 +332,7 @@ def test_an_axis_that_dropped_while_the_drive_stays_enabled_is_stopped_quickly()
     assert b.drives[0].state == 1
 
 
-def test_a_request_made_while_nobody_could_hear_it_is_forgotten() -> None:
+def test_a_request_to_a_lost_device_is_discarded() -> None:
     b = bench(axis(0), sync_units=(SyncUnit("u", (0,), optional=True),))
     b.engine.run(1)
     b.segment.silent = {0}
@@ -348,7 +348,7 @@ def test_a_request_made_while_nobody_could_hear_it_is_forgotten() -> None:
 # ---- stopping
 
 
-def test_quick_stop_waits_for_standstill_before_the_voltage_goes() -> None:
+def test_quick_stop_removes_the_voltage_only_at_standstill() -> None:
     b = driving(CSP)
     b.drives[0].stays_in_quick_stop = True
     b.drives[0].velocity = 900
@@ -378,7 +378,7 @@ def test_a_request_during_a_quick_stop_waits_for_standstill(requested_state: int
     assert b.drives[0].state == (OE if requested_state == REQUEST_ENABLED else 1)
 
 
-def test_disabling_goes_by_disable_operation() -> None:
+def test_disabling_uses_disable_operation() -> None:
     b = driving(CSP)
     b.ask(REQUEST_DISABLED)
     b.engine.next()
@@ -407,7 +407,7 @@ def test_quick_stop_all_and_the_native_end(execution: str) -> None:
     assert [d.state for d in b.drives] == [1, 1]
 
 
-def test_a_request_in_the_same_commit_does_not_beat_quick_stop_all() -> None:
+def test_quick_stop_all_overrides_a_request_of_the_same_commit() -> None:
     b = driving(CSP)
     b.ask(REQUEST_ENABLED)
     b.engine.quick_stop_all()
@@ -506,7 +506,7 @@ def test_a_late_limit_of_zero_is_off() -> None:
     assert followed(b)
 
 
-def test_nobody_is_late_before_and_between_applications() -> None:
+def test_no_axis_is_late_before_and_between_applications() -> None:
     b = bench(axis(0))
     b.enable()
     b.engine.spend(500 * MS)
@@ -605,7 +605,7 @@ def test_velocity_and_torque_are_clamped() -> None:
         assert b.drives[0].target_torque == sent
 
 
-def test_a_velocity_comes_to_rest_at_the_position_limit() -> None:
+def test_a_velocity_stops_at_the_position_limit() -> None:
     b = driving(CSV, limits=AxisLimits(position_max=1.0, velocity=5.0), deceleration=50.0)
     drive = b.drives[0]
     for _ in range(2000):
@@ -655,7 +655,7 @@ def test_no_torque_that_would_exceed_the_velocity_limit() -> None:
         assert drive.target_torque == sent
 
 
-def test_a_torque_beyond_its_number_is_cut_and_said() -> None:
+def test_a_torque_beyond_its_type_is_saturated_and_reported() -> None:
     b = driving(CST)
     b.target_torque[0] = 100.0  # 100 000 counts in 16 bits
     assert b.engine.next() & CYCLE_LIMITED

@@ -1,4 +1,4 @@
-"""The hand-over: no vector half old and half new, the latest value, private buffers."""
+"""The hand-over: consistent vectors, the latest value, private buffers."""
 
 import ctypes
 import gc

@@ -1,4 +1,4 @@
-"""Histograms, judged by NumPy on the raw values."""
+"""Histograms, compared with NumPy on the raw values."""
 
 import numpy as np
 import pytest
@@ -52,6 +52,6 @@ def test_what_is_out_of_range_is_counted_at_the_ends() -> None:
     assert sum(count for *_, count in histogram.counts()) == 2
 
 
-def test_an_empty_one_says_so() -> None:
+def test_an_empty_histogram_has_only_a_count() -> None:
     assert Histogram().summary() == {"count": 0}
     assert Histogram().counts() == []

@@ -1,4 +1,4 @@
-"""Laws in the cycle, in every execution mode: handed over, ended, left. Virtual time throughout."""
+"""Laws in the cycle: hand-over and end, in every execution mode and in virtual time."""
 
 import ctypes
 import gc
@@ -199,7 +199,7 @@ def test_a_finished_law_leaves_the_axes_holding_and_python_where_it_ended(execut
 
 
 @pytest.mark.parametrize("execution", EXECUTION_MODES)
-def test_run_law_goes_on_until_its_end(execution: str) -> None:
+def test_run_law_continues_until_the_end_of_the_law(execution: str) -> None:
     b = bench(axis(0), execution=execution)
     b.enable()
     law = make_law(b, lambda frame: frame.time > 0.02)
@@ -294,11 +294,11 @@ def test_memory_and_parameters_change_all_at_once_and_can_be_read_back() -> None
     law.set_memory([0.5, 0.0])
     b.steps(1)
     assert law.memory == [2.5, -2.0]
-    with pytest.raises(ValueError, match="2 numbers, not 3"):
+    with pytest.raises(ValueError, match="expected 2 numbers, received 3"):
         law.set_parameters([1.0, 2.0, 3.0])
 
 
-def test_numbers_given_while_others_are_converted_come_whole() -> None:
+def test_numbers_set_during_a_conversion_are_not_mixed() -> None:
     b = bench(axis(0), execution="threaded")
     b.enable()
     law = make_law(b, lambda frame: 0, memory=[1.0])
@@ -366,7 +366,7 @@ def endless(tmp_path_factory: pytest.TempPathFactory) -> ctypes.CDLL:
 
 
 @pytest.mark.parametrize("execution", EXECUTION_MODES)
-def test_a_law_that_never_returns_is_given_up_and_the_bus_goes_on(
+def test_a_law_that_never_returns_is_aborted_and_the_bus_continues(
     execution: str, endless: ctypes.CDLL
 ) -> None:
     b = bench(axis(0), execution=execution)

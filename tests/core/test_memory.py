@@ -1,5 +1,7 @@
-"""Memory of the cycle: no page fault in the native thread, and what could be locked. Nothing timed
-is asserted."""
+"""Memory of the cycle: no page faults in the native thread, and the amount of locked memory.
+
+Nothing timed is asserted.
+"""
 
 from __future__ import annotations
 

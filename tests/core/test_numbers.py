@@ -1,4 +1,4 @@
-"""Numbers at any bit offset, read and written through columns; judged by Python's integers."""
+"""Numbers at any bit offset, read and written through columns, compared with Python's integers."""
 
 import struct
 from dataclasses import replace
@@ -142,8 +142,8 @@ def test_bits(bits: int) -> None:
 @pytest.mark.parametrize(
     ("number", "bank", "message"),
     [
-        (Number(-1, 8, NumberKind.SIGNED), Bank.REAL, "leave the image"),
-        (Number(SIZE * 8 - 7, 8, NumberKind.SIGNED), Bank.REAL, "leave the image"),
+        (Number(-1, 8, NumberKind.SIGNED), Bank.REAL, "exceed the image"),
+        (Number(SIZE * 8 - 7, 8, NumberKind.SIGNED), Bank.REAL, "exceed the image"),
         (Number(0, 0, NumberKind.SIGNED), Bank.REAL, "0 bits"),
         (Number(0, 65, NumberKind.SIGNED), Bank.REAL, "65 bits"),
         (Number(0, 16, NumberKind.REAL), Bank.REAL, "16 bits"),

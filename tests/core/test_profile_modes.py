@@ -1,4 +1,4 @@
-"""Profile position and profile velocity in the core: the drive makes the trajectory."""
+"""Profile position and profile velocity in the core: the drive generates the trajectory."""
 
 import math
 

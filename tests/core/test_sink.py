@@ -1,4 +1,4 @@
-"""Sinks: every cycle once, in the tail, with what was known and sent."""
+"""Sinks: called once per cycle in the post-processing, with inputs and outputs."""
 
 from __future__ import annotations
 
@@ -93,7 +93,7 @@ def test_every_cycle_once_with_what_was_known_and_sent(execution: str) -> None:
 
 
 @pytest.mark.parametrize("execution", ["threaded", "inline"])
-def test_it_comes_behind_the_frames_of_its_cycle(execution: str) -> None:
+def test_the_sink_is_called_after_the_frames_of_its_cycle(execution: str) -> None:
     sent: list[int] = []
     b, sink = opened(execution, look=lambda: len(sent))
     b.link.sent = sent
@@ -150,10 +150,10 @@ def test_refuses_a_table_of_another_version_or_of_other_blocks() -> None:
         b.engine.set_sink(None)
     b.engine.stop()
     sink.table.actual_size += 8
-    with pytest.raises(ValueError, match=r"a sink for blocks of .* bytes, there are"):
+    with pytest.raises(ValueError, match=r"sink: blocks of .* bytes, the engine has"):
         b.engine.set_sink(sink.capsule)
     sink.table.version = 2
-    with pytest.raises(ValueError, match="version 2, not 1"):
+    with pytest.raises(ValueError, match="version 2, expected 1"):
         b.engine.set_sink(sink.capsule)
     other = b"catenary.link"
     with pytest.raises(ValueError, match="incorrect name"):

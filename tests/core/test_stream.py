@@ -1,4 +1,4 @@
-"""Set-points written ahead: one row a cycle, dry, with a law, and back to the application."""
+"""Streams of set-points: one row per cycle, underruns, with a law, and after their end."""
 
 import threading
 
@@ -61,7 +61,7 @@ def test_an_empty_stream_is_an_underrun_that_is_reported_and_ends(execution: str
     assert b.drives[0].state == 1
 
 
-def test_the_velocity_of_an_empty_stream_goes_to_zero() -> None:
+def test_the_velocity_decreases_to_zero_on_an_empty_stream() -> None:
     b = bench(axis(0, mode=CSV, deceleration=10.0))
     b.ask(1)
     for _ in range(12):
@@ -91,7 +91,7 @@ def test_a_law_finds_the_row_in_its_targets(execution: str) -> None:
     assert b.drives[0].target_position == -6
 
 
-def test_after_it_the_application_goes_on_from_where_it_ended() -> None:
+def test_the_application_continues_from_the_end_of_the_stream() -> None:
     b, stream = streaming("threaded")
     stream.write(rows(*np.linspace(0.001, 0.008, 8)), b.engine.number)
     b.engine.run(4)  # no application meanwhile: the stream goes on

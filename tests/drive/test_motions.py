@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from catenary.drive.motions import AT_ONCE, HALT, NEW_SET_POINT, move_profile, stop_profile
-from catenary.drive.port import AxisPort, Steps
+from catenary.drive.port import AxisFacts, AxisPort, Steps
 from catenary.drive.profile import Rates
 from catenary.drive.units import AxisUnits
 from catenary.errors import MoveError, SdoAbort
@@ -42,11 +42,7 @@ class Rig:
         self.port = AxisPort(
             self.views,
             0,
-            name="left",
-            units=AxisUnits(1000),
-            exchange=PERIOD,
-            period=PERIOD,
-            measures_velocity=True,
+            AxisFacts("left", AxisUnits(1000), PERIOD, PERIOD, measures_velocity=True),
             write=self.write,  # type: ignore[arg-type]
             put_rate=lambda name, value: False,
         )
@@ -212,11 +208,7 @@ def test_noise_of_an_estimated_velocity_is_not_a_motion() -> None:
     coarse = AxisPort(
         rig.views,
         0,
-        name="left",
-        units=AxisUnits(1000),
-        exchange=PERIOD,
-        period=PERIOD,
-        measures_velocity=False,
+        AxisFacts("left", AxisUnits(1000), PERIOD, PERIOD, measures_velocity=False),
         write=rig.write,  # type: ignore[arg-type]
         put_rate=lambda name, value: False,
     )

@@ -285,7 +285,7 @@ def test_no_move_while_a_stream_sets_the_targets() -> None:
         stream.close()
         next(loop)
         move = arm.move_to(0.1)
-        with pytest.raises(RuntimeError, match="a stream cannot begin during a move"):
+        with pytest.raises(RuntimeError, match="a stream cannot start during a move"):
             loop.stream(100)
         loop.wait(move)
         loop.stream(100)

@@ -9,6 +9,7 @@ import pytest
 
 import catenary as cat
 from catenary.igh import Master
+from catenary.plan.options import PlanOptions
 from catenary.plan.planner import make_plan
 from tests.igh.double import Double
 from tests.igh.loops import clocked_loop, kernel_of
@@ -126,7 +127,7 @@ def test_the_phase_is_corrected_before_op(
     arm = cat.Drives(main.subs.drives, counts_per_turn=1000, velocity_limit=100.0, dc=True)
     main.read_mappings(arm)
     devices = [sub.description for sub in main.subs]
-    main.configure(make_plan(devices, [arm], clock="reference"))
+    main.configure(make_plan(devices, [arm], PlanOptions(clock="reference")))
     exchange, start = kernel_of(main).configuration.exchange, main.link.now()
     for cycle in range(100):  # SAFE-OP
         main.link.wait_until(start + cycle * PERIOD_NS, False)

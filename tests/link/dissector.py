@@ -1,4 +1,4 @@
-"""What tshark, a foreign dissector, sees in a file."""
+"""Dissection of a recording by tshark."""
 
 from __future__ import annotations
 

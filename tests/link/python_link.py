@@ -1,4 +1,4 @@
-"""A link written in Python, in virtual time: what is sent comes back after a latency.
+"""A link written in Python, in virtual time: sent frames return after a latency.
 
 Its table is filled with ctypes callbacks, so that the compiled wrappers are tested over a link they
 do not know.

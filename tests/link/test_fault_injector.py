@@ -1,4 +1,4 @@
-"""Faults: which frames they hit, what they do to them, and that a seed repeats them."""
+"""Faults: the frames they affect, their effect, and repetition by a seed."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def exchange(link: FaultInjector, frames: list[bytes], period: int = 10_000) -> 
     return rounds
 
 
-def test_without_faults_all_comes_back():
+def test_without_faults_all_frames_return():
     frames = numbered(5)
     assert exchange(FaultInjector(PythonLink()), frames) == [[sent] for sent in frames]
 
@@ -78,14 +78,14 @@ def test_duplicates():
     assert exchange(link, frames) == [[frames[0]], [frames[1]] * 2, [frames[2]]]
 
 
-def test_a_frame_duplicated_when_sent_goes_twice():
+def test_a_sent_frame_that_is_duplicated_is_sent_twice():
     inner = PythonLink()
     link = FaultInjector(inner, Fault(kind="duplicate", direction="sent"))
     link.send(frame(bytes(4)))
     assert inner.sent == [frame(bytes(4))] * 2
 
 
-def test_a_delayed_frame_comes_after_the_next():
+def test_a_delayed_frame_arrives_after_the_next():
     frames = numbered(3)
     late = Fault(kind="delay", frames=range(0, 1), delay=15e-6)
     rounds = exchange(FaultInjector(PythonLink(), late), frames)

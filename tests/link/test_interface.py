@@ -1,4 +1,4 @@
-"""The raw link: round trips over a veth pair, and what refuses to be a link."""
+"""The raw link: round trips over a veth pair, and interfaces that are refused."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ def echo(link: Link, count: int) -> None:
         link.send(received[:6] + bytes([received[6] | 2]) + received[7:])
 
 
-def test_says_how_frames_are_received(pair):
+def test_receive_path_describes_how_frames_are_received(pair):
     assert pair[0].receive_path in ("mapped ring", "recv (as asked)")
 
 
@@ -118,7 +118,7 @@ def test_waits_for_a_frame_no_longer_than_the_deadline(pair):
     assert near.now() >= deadline
 
 
-def test_looking_for_time_alone_leaves_frames_there(pair):
+def test_a_wait_without_wake_on_frame_keeps_frames(pair):
     near, far = pair
     near.send(frame(bytes(46)))
     assert far.wait_until(far.now(), False) is False
@@ -144,7 +144,7 @@ def test_a_network_gone_down_is_an_error_and_coming_back_is_not(pair, veth):
 
 
 @pytest.mark.parametrize("wrapped", ["raw", "recorded", "ring"])
-def test_an_interface_without_a_carrier_says_so(veth, wrapped, tmp_path):
+def test_an_interface_without_a_carrier_is_reported(veth, wrapped, tmp_path):
     """The kernel's word for it is ENOBUFS, "No buffer space available"."""
     name, other = veth
     link = Interface(name).open_link()
@@ -163,14 +163,14 @@ def test_an_interface_without_a_carrier_says_so(veth, wrapped, tmp_path):
         link.send(frame(bytes(46)))
 
 
-def test_a_scan_without_a_carrier_says_so(veth):
+def test_a_scan_without_a_carrier_is_reported(veth):
     name, other = veth
     subprocess.run(["ip", "link", "set", other, "down"], check=True)
     with MainDevice(Interface(name)) as main, pytest.raises(LinkError, match=f"{name} has no link"):
         main.scan()
 
 
-def test_a_closed_link_says_so(pair):
+def test_a_closed_link_is_reported(pair):
     near = pair[0]
     capsule = near.capsule
     near.close()
@@ -243,7 +243,7 @@ def test_no_permission_names_the_command(monkeypatch):
         Interface("eth0").open_link()
 
 
-def test_a_ring_refused_falls_back_to_recv_and_says_so(veth, monkeypatch):
+def test_a_refused_ring_falls_back_to_recv_and_is_reported(veth, monkeypatch):
     monkeypatch.setattr("catenary.link.interface.BLOCK_SIZE", 3)
     with Interface(veth[0]).open_link() as near, Interface(veth[1]).open_link() as far:
         assert far.receive_path.startswith("recv (no mapped ring: ")

@@ -1,4 +1,4 @@
-"""Recordings: judged by tshark, a foreign reader."""
+"""Recordings, checked by tshark."""
 
 from __future__ import annotations
 
@@ -83,7 +83,7 @@ def files_of_4096_bytes():
 
 
 @pytest.mark.parametrize("flags", [0, 1], ids=["writer thread", "virtual time"])
-def test_a_disk_that_fills_up_is_said_at_the_end(tmp_path, flags):
+def test_a_full_disk_is_reported_at_close(tmp_path, flags):
     inner = PythonLink(latency_ns=0, flags=flags)
     with files_of_4096_bytes():
         link = Recorder(inner, tmp_path / "run.pcapng")

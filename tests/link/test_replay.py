@@ -1,4 +1,4 @@
-"""Replays: recorded segments that answer again."""
+"""Replays of recorded segments."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def test_answers_of_one_question_come_in_order_and_the_last_again():
     assert [answered(link, QUESTION) for _ in range(5)] == [*says, says[2], says[2]]
 
 
-def test_what_was_never_asked_stays_unanswered_and_is_shown():
+def test_an_unknown_question_is_unanswered_and_reported():
     link = Replay([(QUESTION, QUESTION)])
     assert answered(link, frame(b"else")) is None
     assert answered(link, frame(b"more")) is None
@@ -139,13 +139,13 @@ def test_pairs_by_content_where_only_the_address_was_counted_up():
     ]
 
 
-def test_what_nobody_answered_stays_unpaired_without_direction():
+def test_an_unanswered_frame_stays_unpaired_without_direction():
     lost = local(frame(bytes(40)), True)
     assert pair([Packet(2 * MS * n, lost) for n in range(5)]) == []
 
 
 @pytest.mark.parametrize(("size", "later"), [(40, 10_000), (4, 30 * MS)])
-def test_what_comes_back_as_it_was_sent_does_so_at_once_or_padded(size, later):
+def test_a_frame_that_returns_unchanged_returns_at_once_or_padded(size, later):
     """A read of a station that is not there: nothing in it changes on the way."""
     asked = local(frame(bytes(size)), True)
     packets = [Packet(0, asked), Packet(later, asked.ljust(60, b"\0"))]

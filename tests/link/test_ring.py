@@ -1,4 +1,4 @@
-"""Two links as one ring, over a row of devices written in Python that counts what passes."""
+"""Two links as one ring, over a line of devices written in Python that counts frames."""
 
 from __future__ import annotations
 
@@ -171,7 +171,7 @@ def test_a_closed_ring_answers_once(ring: RingOfDevices, link: RingLink) -> None
 
 
 @pytest.mark.parametrize("cut", [-1, 0, 1, 2, 3])
-def test_a_cut_ring_answers_as_if_it_were_whole(
+def test_a_cut_ring_answers_like_a_closed_ring(
     ring: RingOfDevices, link: RingLink, cut: int
 ) -> None:
     ring.cut = cut
@@ -228,7 +228,7 @@ def test_a_port_that_cannot_send_leaves_the_other(ring: RingOfDevices, link: Rin
 
 
 @pytest.mark.parametrize("side", [0, 1])
-def test_a_port_without_a_link_is_told_as_a_cut(
+def test_a_port_without_a_link_is_reported_as_a_cut(
     ring: RingOfDevices, link: RingLink, side: int
 ) -> None:
     """Linux refuses frames for a port without a carrier (ENETDOWN, ENOBUFS): a closed ring whose
@@ -378,7 +378,7 @@ def test_what_must_not_be_there_twice_is_not_in_the_second_copy(command: EcatCom
     assert commands == [EcatCommand.NOP, EcatCommand.BRD]
 
 
-def test_the_time_that_is_expected_leads_the_clocks_behind_a_cut(
+def test_the_expected_time_controls_the_clocks_beyond_a_cut(
     ring: RingOfDevices, link: RingLink
 ) -> None:
     """The second copy asks nobody for it; what comes back is what the reference clock has said."""
@@ -393,9 +393,7 @@ def test_the_time_that_is_expected_leads_the_clocks_behind_a_cut(
     assert merge(first, other) == first
 
 
-def test_a_time_that_only_the_second_copy_brought_is_nobodys(
-    ring: RingOfDevices, link: RingLink
-) -> None:
+def test_a_time_only_in_the_second_copy_is_ignored(ring: RingOfDevices, link: RingLink) -> None:
     ring.cut = -1
     [back] = exchange(link, Datagram(EcatCommand.FRMW, 0x1001 | 0x910 << 16, b"\x01\x02", 5))
     assert (back.data, back.working_counter) == (b"\x01\x02", 0)

@@ -1,4 +1,4 @@
-"""Axes that the core stopped: what is new, what raises, what the error says."""
+"""Axes that the core stopped: new stops, errors and their messages."""
 
 import numpy as np
 import pytest
@@ -149,7 +149,7 @@ def test_only_a_required_axis_raises() -> None:
             assert tool.enabled.all()
 
 
-def test_what_the_application_asks_for_is_no_event() -> None:
+def test_a_requested_stop_puts_no_event() -> None:
     with cat.MainDevice(cat.Segment([cat.virtual.Servo(), cat.virtual.Servo()])) as main:
         arm = cat.Drives(main.scan().drives, counts_per_turn=2**20, velocity_limit=10.0)
         with cat.Loop(arm) as loop:
@@ -174,7 +174,7 @@ def test_what_the_application_asks_for_is_no_event() -> None:
         ({"late_limit": float("nan")}, "late_limit=nan"),
     ],
 )
-def test_options_that_cannot_be(options: dict[str, object], match: str) -> None:
+def test_impossible_options(options: dict[str, object], match: str) -> None:
     with cat.MainDevice(cat.Segment([cat.virtual.Servo()])) as main:
         arm = cat.Drives(main.scan().drives, counts_per_turn=1, velocity_limit=10.0)
         with pytest.raises(ValueError, match=match):

@@ -128,7 +128,7 @@ def test_an_update_that_raises_sends_nothing(cell: Cell) -> None:
     assert cell.arm.enabled.all()
 
 
-def test_requests_count_without_an_update_too(cell: Cell) -> None:
+def test_requests_take_effect_without_an_update(cell: Cell) -> None:
     cell.arm.quick_stop()
     until(lambda: not cell.arm.enabled.any())
 
@@ -152,7 +152,7 @@ def test_updates_of_several_threads_follow_each_other(cell: Cell) -> None:
 
 
 @csv
-def test_velocities_end_by_themselves_when_the_program_is_stuck(cell: Cell) -> None:
+def test_velocities_expire_if_the_program_is_stuck(cell: Cell) -> None:
     with cell.loop.update():
         cell.arm.target.velocity[:] = 1.0
     until(lambda: cell.moved(0))
@@ -185,7 +185,7 @@ def test_a_longer_command_timeout() -> None:
 
 
 @pytest.mark.parametrize("timeout", [0.0, -1.0, float("inf"), float("nan")])
-def test_a_command_timeout_that_is_none(timeout: float) -> None:
+def test_no_command_timeout(timeout: float) -> None:
     with pytest.raises(ValueError, match="command_timeout"):
         cat.StopPolicy(command_timeout=timeout)
 
@@ -193,7 +193,7 @@ def test_a_command_timeout_that_is_none(timeout: float) -> None:
 # ---- waiting
 
 
-def test_wait_raises_the_error_of_what_it_waits_for(cell: Cell) -> None:
+def test_wait_raises_the_error_of_the_move(cell: Cell) -> None:
     with pytest.raises(DriveError, match="is lost"):
         cell.loop.wait(Condition(lambda: True, DriveError("is lost")))
 
@@ -373,7 +373,7 @@ def test_a_stream_is_written_ahead(cell: Cell) -> None:
 # ---- what is refused
 
 
-def test_a_thread_iterates_so_the_program_must_not(cell: Cell) -> None:
+def test_the_program_cannot_iterate_a_loop_in_the_background(cell: Cell) -> None:
     for iterate in (lambda: next(cell.loop), lambda: iter(cell.loop), cell.loop.wait_locked):
         with pytest.raises(RuntimeError, match="runs in the background"):
             iterate()
@@ -383,9 +383,9 @@ def test_a_thread_iterates_so_the_program_must_not(cell: Cell) -> None:
 
 def test_calls_inside_an_update(cell: Cell) -> None:
     with cell.loop.update():
-        with pytest.raises(RuntimeError, match=r"update\(\) inside"), cell.loop.update():
+        with pytest.raises(RuntimeError, match=r"update\(\) was called inside"), cell.loop.update():
             raise AssertionError
-        with pytest.raises(RuntimeError, match=r"wait\(\) inside"):
+        with pytest.raises(RuntimeError, match=r"wait\(\) was called inside"):
             cell.loop.wait(Condition(lambda: True))
 
 
@@ -427,7 +427,7 @@ def test_an_inline_loop_cannot_run_in_the_background() -> None:
 
 def test_open_and_close() -> None:
     cell = Cell("csp")
-    with pytest.raises(RuntimeError, match="the loop is open"):
+    with pytest.raises(RuntimeError, match="the loop is already open"):
         cell.loop.open()
     next(cell.loop)
     cell.run_in_background()
@@ -443,7 +443,7 @@ def test_open_and_close() -> None:
     cell.main.close()
 
 
-def test_a_second_loop_is_refused_and_the_first_goes_on(cell: Cell) -> None:
+def test_a_second_loop_is_refused_and_the_first_continues(cell: Cell) -> None:
     with pytest.raises(RuntimeError, match=r"a loop runs.*close"):
         cat.Loop(cell.arm).open()
     cell.pass_cycles(5)
@@ -478,7 +478,7 @@ def test_ctrl_c_while_closing_only_hurries(cell: Cell) -> None:
     signal.signal(signal.SIGINT, mine)
 
 
-def test_a_loop_that_is_forgotten_is_stopped_with_a_warning() -> None:
+def test_an_unreferenced_loop_is_stopped_with_a_warning() -> None:
     cell = Cell("csp", 1)
     cell.run_in_background()
     with pytest.warns(RuntimeWarning, match="was not left"):
@@ -508,7 +508,9 @@ with loop.update():
 
 
 @pytest.mark.parametrize("end", ["", "raise SystemExit(0)"])
-def test_the_end_of_the_program_closes_the_loop_in_silence(end: Literal["", "raise"]) -> None:
+def test_the_end_of_the_program_closes_the_loop_silently(
+    end: Literal["", "raise"],
+) -> None:
     program = [sys.executable, "-W", "error", "-c", EXIT.format(end=end)]
     done = subprocess.run(program, capture_output=True, text=True, timeout=120, check=False)
     assert done.stderr == ""
@@ -671,7 +673,7 @@ def test_a_loop_that_cannot_run_in_the_background_keeps_its_late_limits(
 def test_an_exit_in_the_thread_stops_the_axes(monkeypatch: pytest.MonkeyPatch) -> None:
     cell = Cell("csp", servos=1)
 
-    def leave(self: Session, flags: int, *, faults: bool) -> None:
+    def leave(self: Session, flags: int) -> None:
         raise SystemExit(1)
 
     monkeypatch.setattr(Session, "judge", leave)

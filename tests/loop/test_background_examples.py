@@ -1,4 +1,4 @@
-"""The examples of loops in the background run without arguments, and end by themselves."""
+"""Examples of loops in the background run without arguments, and end without help."""
 
 from __future__ import annotations
 

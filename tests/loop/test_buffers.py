@@ -1,4 +1,4 @@
-"""The engine's buffers, cut for each request."""
+"""Buffers of the engine, divided into views for each request."""
 
 import numpy as np
 

@@ -1,4 +1,4 @@
-"""examples/compiled_law.py runs, is short, and arrives."""
+"""examples/compiled_law.py: it is short, runs, and reaches its target."""
 
 import subprocess
 import sys
@@ -9,7 +9,7 @@ import pytest
 EXAMPLE = Path(__file__).resolve().parents[2] / "examples" / "compiled_law.py"
 
 
-def test_it_arrives() -> None:
+def test_the_arm_reaches_its_target() -> None:
     pytest.importorskip("numba", reason="laws are compiled by Numba: pip install 'catenary[law]'")
     done = subprocess.run(
         [sys.executable, str(EXAMPLE)], capture_output=True, text=True, check=True

@@ -1,4 +1,4 @@
-"""`cycle.time`, the times of events and of the log are on one clock."""
+"""`cycle.time`, the events and the log have the same clock."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Every example runs without arguments; two of them are seen to do what they say."""
+"""Every example runs without arguments. The output of two of them is checked."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def test_it_runs_without_arguments(name: str) -> None:
     assert run(name)
 
 
-def test_a_tool_that_comes_and_goes() -> None:
+def test_a_tool_that_is_connected_and_disconnected() -> None:
     out = run("tool.py")
     assert "device 2" in out
     assert "does not answer any more" in out

@@ -44,7 +44,7 @@ def test_the_shortest_interval_counts_until_the_last_loop_is_closed() -> None:
         ("virtual", "inline", 20e-6, 0.005),
     ],
 )
-def test_an_inline_loop_sets_it_where_time_is_real(
+def test_an_inline_loop_sets_it_in_real_time(
     clock: str, run: str, option: float | None, during: float
 ) -> None:
     with cat.MainDevice(Segment([Servo()], clock=clock)) as main:
@@ -64,7 +64,7 @@ def test_an_inline_loop_sets_it_where_time_is_real(
 
 
 @pytest.mark.parametrize("option", [0.0, -1.0, 2.0, float("nan")])
-def test_an_interval_that_cannot_be_is_refused(option: float) -> None:
+def test_an_impossible_interval_is_refused(option: float) -> None:
     with cat.MainDevice(Segment([Servo()])) as main:
         arm = cat.Drives(main.scan().drives, counts_per_turn=1 << 20, velocity_limit=6.0)
         with pytest.raises(ValueError, match="switch_interval"):

@@ -1,4 +1,4 @@
-"""Compiled laws are kept only where no other user can write; otherwise there is a warning."""
+"""Compiled laws are cached only where no other user can write; otherwise there is a warning."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def test_a_folder_above_that_others_can_write_is_refused(tmp_path: Path) -> None
     above = tmp_path / "above"
     above.mkdir()
     above.chmod(0o775)
-    with pytest.raises(PermissionError, match=f"others can write in {above}"):
+    with pytest.raises(PermissionError, match=f"other users can write in {above}"):
         private_folder(above / "laws")
     above.chmod(0o1777)  # sticky, as /tmp: others cannot exchange what is ours
     private_folder(above / "laws")
@@ -133,7 +133,7 @@ def test_without_a_folder_there_is_a_warning_and_no_cache(
         warnings.simplefilter("error")
         assert make_cache(law) is not None
     tmp_path.chmod(0o777)
-    with pytest.warns(RuntimeWarning, match="others can write in"):
+    with pytest.warns(RuntimeWarning, match="other users can write in"):
         assert make_cache(law) is None
     (tmp_path / "file").touch()
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "file"))

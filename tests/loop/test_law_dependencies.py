@@ -1,4 +1,4 @@
-"""A law's machine code is made anew when something it uses has changed, and only then."""
+"""A law is compiled again if a dependency has changed, and only then."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ def ran(folder: Path) -> list[float]:
     return [float(word) for word in done.stdout.split()]
 
 
-def test_a_function_in_another_file_that_changes_is_compiled_anew(tmp_path: Path) -> None:
+def test_a_changed_function_in_another_file_is_compiled_again(tmp_path: Path) -> None:
     pytest.importorskip("numba", reason="laws are compiled by Numba: pip install 'catenary[law]'")
     write(tmp_path / "gains.py", GAINS.format(factor=2.0), 1000)
     write(tmp_path / "follow.py", LAW.format(offset=0.5), 1000)
@@ -83,7 +83,7 @@ def named(folder: Path, monkeypatch: pytest.MonkeyPatch, offset: object) -> tupl
     return dependencies(importlib.import_module("lawful").law)
 
 
-def test_values_of_globals_and_files_are_told(
+def test_dependencies_have_values_of_globals_and_stamps_of_files(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(sys, "dont_write_bytecode", True)
@@ -97,7 +97,7 @@ def test_values_of_globals_and_files_are_told(
     assert first != named(tmp_path, monkeypatch, 1.0)
 
 
-def test_blocks_of_a_package_are_told_file_by_file() -> None:
+def test_a_package_has_one_stamp_per_file() -> None:
     def direct(memory, parameters):
         control.pid(memory, parameters, 0, 0.0, 0.0, 0.0, 1e-3)
 

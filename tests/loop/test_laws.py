@@ -1,4 +1,4 @@
-"""Laws in a loop: compiled and as Python, what they see, what is refused, and how they fail."""
+"""Laws in a loop: compiled and as Python, arguments, refusals and failures."""
 
 import math
 from collections.abc import Callable, Iterator
@@ -72,7 +72,7 @@ def test_compiled_and_as_python_it_does_the_same() -> None:
     assert np.array_equal(tracks[0][1], tracks[1][1])
 
 
-def test_everything_a_law_may_ask_for_by_name() -> None:
+def test_all_arguments_of_a_law() -> None:
     for compiled in (True, False):
         with opened() as (_, loop):
             memory = loop.run(count, np.zeros(5), [2.0], compiled=compiled)
@@ -93,7 +93,7 @@ def test_watched_while_it_runs_parameters_changed_all_at_once() -> None:
         assert run.steps > 110
         assert run.longest >= 0.0
         assert run.overruns == 0
-        with pytest.raises(ValueError, match="1 numbers, not 2"):
+        with pytest.raises(ValueError, match="expected 1 numbers, received 2"):
             run.parameters = [1.0, 2.0]
         with pytest.raises(ValueError, match="one-dimensional"):
             run.memory = np.zeros((5, 1))
@@ -255,7 +255,7 @@ def endless(actual, target, memory, time):
         (endless, "did not return"),
     ],
 )
-def test_a_failing_law_stops_the_drives_and_says_why(law: Callable, said: str, run: str) -> None:
+def test_a_failing_law_stops_the_drives(law: Callable, said: str, run: str) -> None:
     with opened(execution=run) as (arm, loop):
         with pytest.raises(LawError, match=said) as caught:
             loop.run(law, memory=[7.0])

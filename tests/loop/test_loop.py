@@ -1,4 +1,4 @@
-"""What Loop refuses before it touches the segment."""
+"""Arguments that Loop refuses before it sends a frame."""
 
 import contextlib
 import math
@@ -24,7 +24,7 @@ from tests.loop_options import grouped
         ({"period": math.nan}, "period=nan s"),
     ],
 )
-def test_refuses_what_cannot_be(asked: dict, named: str) -> None:
+def test_impossible_arguments_are_refused(asked: dict, named: str) -> None:
     with cat.MainDevice(Segment([Servo()])) as main:
         arm = cat.Drives(
             main.scan().drives, mode="csp", counts_per_turn=2**20, velocity_limit=100.0
@@ -51,7 +51,7 @@ def test_a_period_too_short_for_the_frames_names_their_time(
             cat.Loop(arm, period=period, execution=run).__enter__()
 
 
-def test_the_log_reaches_back_as_far_as_asked() -> None:
+def test_the_log_has_the_requested_length() -> None:
     with cat.MainDevice(Segment([Servo()])) as main:
         arm = cat.Drives(
             main.scan().drives, mode="csp", counts_per_turn=2**20, velocity_limit=100.0
@@ -65,7 +65,7 @@ def test_the_log_reaches_back_as_far_as_asked() -> None:
             cat.Loop(arm, period=1e-3, log=0)
 
 
-def test_a_main_device_that_is_closed_round_an_open_loop_leaves_it_first() -> None:
+def test_closing_the_main_device_leaves_an_open_loop_first() -> None:
     segment = Segment([Servo()])
     main = cat.MainDevice(segment)
     main.open()
@@ -78,7 +78,7 @@ def test_a_main_device_that_is_closed_round_an_open_loop_leaves_it_first() -> No
     loop.__exit__(None, None, None)
 
 
-def test_what_was_asked_and_not_committed_does_not_come_after_the_stop() -> None:
+def test_uncommitted_requests_have_no_effect_after_the_stop() -> None:
     """An exception right after `enable`: the axis stays off while the loop is being left."""
     segment = Segment([Servo()])
     with cat.MainDevice(segment) as main:
@@ -91,7 +91,7 @@ def test_what_was_asked_and_not_committed_does_not_come_after_the_stop() -> None
         assert segment[0].drive_state() == "SWITCH ON DISABLED"
 
 
-def test_a_fault_in_a_cycle_that_python_has_missed_is_raised_all_the_same() -> None:
+def test_a_fault_in_a_missed_cycle_is_raised() -> None:
     segment = Segment([Servo()])
 
     def run() -> None:

@@ -52,7 +52,7 @@ def test_an_update_does_not_write_the_targets_of_a_move() -> None:
 def test_wait_takes_a_move(wrong: object) -> None:
     with cat.MainDevice(Segment([Servo()])) as main:
         arm = Drives(main.scan().drives, counts_per_turn=2**20, velocity_limit=2.0)
-        with Loop(arm) as loop, pytest.raises(TypeError, match="takes a move, such as"):
+        with Loop(arm) as loop, pytest.raises(TypeError, match="needs a move"):
             loop.wait(wrong)  # type: ignore[arg-type]
 
 

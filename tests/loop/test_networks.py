@@ -1,4 +1,4 @@
-"""Two networks in real time: a native thread each; targets are committed before the waiting."""
+"""Two networks in real time, each with a native thread."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from catenary.virtual import Coupler, Segment, Servo
 CYCLES = 200
 
 
-def test_both_run_on_threads_of_their_own() -> None:
+def test_each_network_has_its_own_thread() -> None:
     """Nothing is said of how timely: only that both exchange, follow, and come down."""
     segments = [Segment([Coupler(), Servo(), Servo()], clock="monotonic") for _ in range(2)]
     with cat.MainDevice(segments[0]) as first, cat.MainDevice(segments[1]) as second:

@@ -1,4 +1,4 @@
-"""A loop on a network interface that loses its link: what a pulled cable is on a real machine."""
+"""A loop on a network interface that loses its link, as with a pulled cable."""
 
 from __future__ import annotations
 
@@ -74,7 +74,7 @@ def run_without_link(request: cat.Outputs, veth: tuple[str, str], server: Server
         iterate_until(loop, lambda: False)
 
 
-def test_a_required_device_ends_the_loop_and_the_way_down_names_the_link(
+def test_a_required_device_ends_the_loop_and_the_note_names_the_link(
     veth: tuple[str, str], server: Server
 ) -> None:
     with cat.MainDevice(Interface(veth[0])) as main:

@@ -1,4 +1,4 @@
-"""Options of a loop: impossible ones are refused when they are written, before anything is sent."""
+"""Impossible options of a loop are refused before a frame is sent."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def arm(main: cat.MainDevice) -> cat.Drives:
         (lambda: cat.StopPolicy(lost_limit=0), "lost_limit=0: must be a whole number, at least 1"),
         (lambda: cat.StopPolicy(lost_limit=2.5), "lost_limit=2.5"),  # type: ignore[arg-type]
         (lambda: cat.StopPolicy(lost_limit=math.inf), "lost_limit=inf"),  # type: ignore[arg-type]
-        (lambda: cat.StopPolicy(handover=-1.0), "handover must be positive and finite"),
+        (lambda: cat.StopPolicy(handover=-1.0), "handover=-1.0 s: must be positive and finite"),
         (lambda: cat.StopPolicy(stop_deadline=math.inf), "stop_deadline=inf s"),
         (lambda: cat.StopPolicy(stop_deadline=-2.0), "stop_deadline=-2.0 s"),
         (lambda: cat.Scheduling(quorum=0), "quorum=0"),
@@ -55,7 +55,7 @@ def test_a_group_of_options_has_its_class(arm: cat.Drives) -> None:
 
 def test_a_loop_takes_requests(main: cat.MainDevice) -> None:
     for wrong in (main, main.subs, main.subs[1], cat.Drives):
-        with pytest.raises(TypeError, match="a Loop takes process-data requests"):
+        with pytest.raises(TypeError, match="a Loop accepts process-data requests"):
             cat.Loop(wrong)  # type: ignore[arg-type]
     with pytest.raises(ValueError, match="a Loop needs a process-data request"):
         cat.Loop()
@@ -76,5 +76,5 @@ def test_a_request_takes_devices(main: cat.MainDevice) -> None:
 def test_a_phase_that_did_not_occur_is_named(arm: cat.Drives) -> None:
     with cat.Loop(arm) as loop:
         next(loop)
-        with pytest.raises(KeyError, match="no phase 'latency' in these cycles; there are: period"):
+        with pytest.raises(KeyError, match="no phase 'latency' in these cycles; they have: period"):
             loop.timing["latency"]

@@ -1,4 +1,4 @@
-"""Units of what a loop gives to its sink."""
+"""Units of the values that a loop publishes."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Safe values of outputs are sent when the loop ends, for whatever reason, before the states go."""
+"""Safe values of outputs are sent whenever the loop ends, before the devices leave OP."""
 
 from __future__ import annotations
 
@@ -76,7 +76,7 @@ def test_after_an_error_of_the_program(cell: Cell) -> None:
     assert cell.sensor.lamp == 7
 
 
-def test_what_was_written_and_not_sent_does_not_come_after_it(cell: Cell) -> None:
+def test_unsent_values_do_not_follow_the_safe_ones(cell: Cell) -> None:
     with cell.main as main:
         main.scan()
         data = ProcessData(main.subs[SENSOR], safe={"Lamp": 7})
@@ -125,7 +125,7 @@ def test_while_the_axes_still_brake(cell: Cell, monkeypatch: pytest.MonkeyPatch)
     assert lamps == [50, 7]
 
 
-def test_a_device_that_is_gone_is_named(cell: Cell) -> None:
+def test_a_lost_device_is_named(cell: Cell) -> None:
     def pull(loop: cat.Loop) -> None:
         cell.segment.inject(power_cycle(SENSOR, at=0.0, for_=60.0))
         for _ in loop:
@@ -134,7 +134,7 @@ def test_a_device_that_is_gone_is_named(cell: Cell) -> None:
     with pytest.raises(cat.WorkingCounterError) as caught:
         run(cell, pull, safe={"Lamp": 7})
     notes = "\n".join(caught.value.__notes__)
-    assert "device 2 Force sensor: did not confirm the safe values" in notes
+    assert "device 2 Force sensor did not confirm the safe values" in notes
 
 
 def test_a_device_gets_them_while_another_one_of_its_unit_is_silent() -> None:

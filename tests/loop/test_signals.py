@@ -1,4 +1,4 @@
-"""Ctrl-C and SIGTERM: raised while the loop runs, remembered while it is being left."""
+"""Ctrl-C and SIGTERM: raised while the loop runs, deferred while it is being left."""
 
 import os
 import signal
@@ -41,7 +41,7 @@ def test_sigterm_becomes_system_exit(guard: SignalGuard) -> None:
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_leaving_is_not_cut_short_but_hurried(guard: SignalGuard, number: int) -> None:
+def test_a_signal_while_leaving_shortens_the_waits(guard: SignalGuard, number: int) -> None:
     guard.install()
     try:
         assert leave(guard, number) == "left"
@@ -50,7 +50,7 @@ def test_leaving_is_not_cut_short_but_hurried(guard: SignalGuard, number: int) -
     assert guard.hurry
 
 
-def test_an_applications_own_handler_stays_in_charge(guard: SignalGuard) -> None:
+def test_a_handler_of_the_application_is_called(guard: SignalGuard) -> None:
     seen: list[int] = []
     before = signal.signal(signal.SIGTERM, lambda number, frame: seen.append(number))
     try:
@@ -63,7 +63,7 @@ def test_an_applications_own_handler_stays_in_charge(guard: SignalGuard) -> None
         signal.signal(signal.SIGTERM, before)
 
 
-def test_the_handlers_are_given_back(guard: SignalGuard) -> None:
+def test_the_former_handlers_are_restored(guard: SignalGuard) -> None:
     before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
     guard.install()
     assert signal.getsignal(signal.SIGINT) is not before[signal.SIGINT]
@@ -82,7 +82,7 @@ def test_ignored_signals_stay_ignored(guard: SignalGuard) -> None:
         signal.signal(signal.SIGINT, before)
 
 
-def test_outside_of_the_main_thread_signals_are_left_alone(guard: SignalGuard) -> None:
+def test_no_handlers_outside_the_main_thread(guard: SignalGuard) -> None:
     before = signal.getsignal(signal.SIGINT)
     thread = threading.Thread(target=guard.install)
     thread.start()

@@ -1,4 +1,4 @@
-"""Streams in a loop: a trajectory written ahead, by the loop's thread or another."""
+"""Streams in a loop: a trajectory written ahead, by the iterating thread or another one."""
 
 import threading
 
@@ -63,7 +63,7 @@ def test_another_thread_may_write(opened) -> None:
     assert arm.target.position == pytest.approx([0.05, -0.05])
 
 
-def test_what_is_no_row_is_refused(opened) -> None:
+def test_invalid_rows_are_refused(opened) -> None:
     _, loop = opened
     stream = loop.stream()
     with pytest.raises(ValueError, match="rows of 2 axes"):

@@ -1,4 +1,4 @@
-"""The figures of a loop as numbers, as a table and in words."""
+"""Figures of a loop as numbers, as a table and as advice."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ def test_each_kind_has_a_line_of_its_own() -> None:
 @pytest.mark.parametrize(
     ("found", "cause"),
     [
-        (with_phase("lateness", 340e-6, late=12), "the worst by 340 us: another process"),
+        (with_phase("lateness", 340e-6, late=12), "by up to 340 us: another process"),
         (timing("SCHED_OTHER: not permitted (EPERM)", late=1), "no real-time priority"),
         (timing("virtual time", late=1), "used the virtual time"),
         (with_phase("process", 2.5e-3, late=1), "the body took up to 2500 us of a period of 1000"),

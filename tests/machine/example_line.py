@@ -17,12 +17,11 @@ from catenary.virtual.coe.dictionary import (
     number,
     stored,
 )
-from catenary.virtual.coe.quirks import NO_MAILBOX_QUIRKS
 from catenary.virtual.crystal import EXACT
 from catenary.virtual.description import Description, MappedEntry, Pdo
 from catenary.virtual.devices import Device
 from catenary.virtual.devices.application import Application, mailbox_of, sync_managers_of
-from catenary.virtual.devices.applied import AppliedDevice
+from catenary.virtual.devices.applied import AppliedDevice, MailboxOptions
 from catenary.virtual.op_modes import FREE_RUN, OpMode
 from catenary.virtual.sii_image import make_sii_image
 from catenary.virtual.sii_quirks import NO_SII_QUIRKS
@@ -59,12 +58,10 @@ class Imu(AppliedDevice):
             alias=0,
             serial=0,
             lrw=True,
-            mailbox_bytes=MAILBOX_BYTES,
-            mailbox_delay=300e-6,
             crystal=EXACT,
             clock_bits=64,
-            mailbox_quirks=NO_MAILBOX_QUIRKS,
             sii_quirks=NO_SII_QUIRKS,
+            mailbox=MailboxOptions(MAILBOX_BYTES),
         )
 
     def description(self) -> Description:

@@ -412,7 +412,7 @@ MISTAKES: dict[str, tuple[str, ...]] = {
         '"250 us"',
         "inf",
         "drives.arm.clock.shift",
-        "shift=inf: must be a finite time",
+        "shift=inf s: must be finite",
     ),
 }
 

@@ -1,4 +1,4 @@
-"""Descriptions made by hand, and the demo's segment as its SII describes it."""
+"""Descriptions of devices, and of the demo's segment as in its SIIs."""
 
 from __future__ import annotations
 

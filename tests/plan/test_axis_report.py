@@ -5,6 +5,7 @@ import math
 import pytest
 
 from catenary.plan.axis_report import AxisReport
+from catenary.plan.options import PlanOptions
 from catenary.plan.planner import make_plan
 from catenary.plan.request import ImageLayout, RequestTables
 from tests.plan.devices import Asking, demo
@@ -24,11 +25,11 @@ class Reports(Asking):
 
 
 def test_the_report_has_a_section_of_axes() -> None:
-    text = str(make_plan(demo(), [Reports({})], late_limit_position=0, handover=0.005))
+    text = str(make_plan(demo(), [Reports({})], PlanOptions(late_limit_position=0, handover=0.005)))
     assert (
         "axes: late limit CSP off, CSV 50 ms, CST 10 ms; "
         "CST keeps its torque for 5 ms after a law or stream ended\n"
-        "    in the background, an update counts for 200 ms in CSV and PV, 20 ms in CST\n"
+        "    in the background, an update is valid for 200 ms in CSV and PV, 20 ms in CST\n"
         "    axis 0  2 Servo  CSP, CST\n"
         "        on_loss: disable\n"
         "    axis 1  3 Servo  CSV\n"
@@ -38,11 +39,12 @@ def test_the_report_has_a_section_of_axes() -> None:
 
 def test_a_late_limit_of_zero_is_refused_in_cst() -> None:
     with pytest.raises(ValueError, match="2 Servo: late_limit=0 is refused with CST"):
-        make_plan(demo(), [Reports({})], late_limit_torque=0)
-    assert make_plan(demo(), late_limit_torque=0).cycle.late_limit_torque_ns == 0
+        make_plan(demo(), [Reports({})], PlanOptions(late_limit_torque=0))
+    plan = make_plan(demo(), options=PlanOptions(late_limit_torque=0))
+    assert plan.cycle.late_limit_torque_ns == 0
 
 
 @pytest.mark.parametrize("handover", [0.0, -1.0, math.inf, math.nan])
 def test_the_handover_must_be_a_time(handover: float) -> None:
-    with pytest.raises(ValueError, match="handover must be positive"):
-        make_plan(demo(), handover=handover)
+    with pytest.raises(ValueError, match="must be positive and finite"):
+        make_plan(demo(), options=PlanOptions(handover=handover))

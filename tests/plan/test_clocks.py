@@ -1,4 +1,4 @@
-"""Who runs by whose clock, and when."""
+"""Choice of clocks, SYNC times, and the time of the frames."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from catenary.errors import ConfigurationError
 from catenary.model.device import DeviceDescription, OpMode
 from catenary.plan.clocks import SyncPlan, make_sync, start_time_ns
 from catenary.plan.cycle import DatagramKind
+from catenary.plan.options import PlanOptions
 from catenary.plan.planner import Plan, make_plan
 from catenary.plan.request import DeviceRequest, DistributedClock
 from catenary.wire.datagram import EcatCommand, decode_datagram
@@ -38,7 +39,7 @@ def asking(*positions: int, clock: DistributedClock | None = None) -> Asking:
 
 
 def planned(devices: list[DeviceDescription], *positions: int, **options: object) -> Plan:
-    return make_plan(devices, [asking(*positions)], **options)  # type: ignore[arg-type]
+    return make_plan(devices, [asking(*positions)], PlanOptions(**options))  # type: ignore[arg-type]
 
 
 def clock_datagrams(plan: Plan) -> list[tuple[EcatCommand, int, int, int]]:
@@ -52,7 +53,7 @@ def clock_datagrams(plan: Plan) -> list[tuple[EcatCommand, int, int, int]]:
     return found
 
 
-def test_nobody_requests_for_clocks() -> None:
+def test_no_clock_request() -> None:
     plan = make_plan(cell())
     assert plan.cycle.clock is None
     assert clock_datagrams(plan) == []
@@ -70,13 +71,13 @@ def test_the_first_clock_is_the_reference() -> None:
     ]
 
 
-def test_a_reference_that_is_given() -> None:
+def test_a_chosen_reference() -> None:
     plan = planned(cell(), 2, 3, reference=2)
     assert plan.cycle.clock is not None
     assert (plan.cycle.clock.reference, plan.cycle.clock.followers) == (2, (3,))
 
 
-def test_the_reference_follows_us() -> None:
+def test_the_reference_follows_the_main_device() -> None:
     plan = planned(cell(), 2, clock="main")
     assert clock_datagrams(plan)[:2] == [
         (EcatCommand.FPWR, 0x1001, 0x0910, 1),
@@ -84,12 +85,12 @@ def test_the_reference_follows_us() -> None:
     ]
 
 
-def test_a_reference_alone_has_nobody_to_watch() -> None:
+def test_a_reference_alone_has_no_followers() -> None:
     plan = planned([clocked(servo(0))], 0)
     assert clock_datagrams(plan) == [(EcatCommand.FRMW, 0x1001, 0x0910, 1)]
 
 
-def test_frames_are_through_before_the_beat() -> None:
+def test_frames_pass_all_devices_before_sync0() -> None:
     plan = planned(cell(), 2, 3)
     clock = plan.cycle.clock
     assert clock is not None
@@ -123,21 +124,21 @@ def test_the_controller_slows_down_to_the_same_time_at_any_period() -> None:
     [
         ((1,), {}, r"device 1 \(Lamps\): dc= was requested, but it has no"),
         ((2,), {"reference": 1}, "given as the reference clock, but it has no"),
-        ((2,), {"reference": 3}, r"device 2 \(Servo\) lies before device 3 \(Servo\)"),
-        ((2,), {"reference": 4}, "there is no device 4, the segment has 4"),
+        ((2,), {"reference": 3}, r"device 2 \(Servo\) precedes device 3 \(Servo\)"),
+        ((2,), {"reference": 4}, "there is no device 4; the segment has 4 devices"),
     ],
 )
-def test_what_cannot_be(
+def test_impossible_clock_requests(
     positions: tuple[int, ...], options: dict[str, object], message: str
 ) -> None:
     with pytest.raises(ConfigurationError, match=message):
         planned(cell(), *positions, **options)
 
 
-def test_a_clock_that_only_stamps() -> None:
+def test_a_clock_that_only_latches() -> None:
     devices = cell()
     devices[2] = replace(devices[2], system_time=False)
-    with pytest.raises(ConfigurationError, match="only stamps receive times"):
+    with pytest.raises(ConfigurationError, match="only latches receive times"):
         planned(devices, 2)
 
 
@@ -152,7 +153,7 @@ def sync(asked: DistributedClock, *modes: OpMode) -> SyncPlan:
     return make_sync(clocked(servo(0), *modes), asked, PERIOD_NS)
 
 
-def test_sync_without_any_knowledge_is_sync0_at_the_beat() -> None:
+def test_sync_without_an_op_mode_is_sync0() -> None:
     assert sync(DistributedClock()) == SyncPlan(0x0300, PERIOD_NS, 0, 0)
 
 
@@ -213,7 +214,7 @@ def test_without_a_name_the_first_op_mode_with_sync0() -> None:
     assert sync(DistributedClock(), FREE, SYNC1_ALONE).op_mode == "DcSync250us"
 
 
-def test_an_unknown_op_mode_lists_those_there_are() -> None:
+def test_an_unknown_op_mode_lists_the_known_ones() -> None:
     with pytest.raises(ConfigurationError, match=r"no OpMode 'x'; it has 'SM_Sync or Async', 'DC'"):
         sync(DistributedClock(op_mode="x"), FREE, SYNC0)
     with pytest.raises(ConfigurationError, match=r"no OpMode 'x'; it has none") as refused:
@@ -246,7 +247,7 @@ def test_sync_as_requested() -> None:
         (
             DistributedClock(assign_activate=0x0100),
             OpMode(),
-            r"device 0 \(Servo\): AssignActivate 0x0100 starts no SYNC signal",
+            r"device 0 \(Servo\): AssignActivate 0x0100 does not start a SYNC signal",
         ),
         (DistributedClock(shift=1e-3), OpMode(), r"device 0 \(Servo\): a shift of 1000 us"),
         (
@@ -262,7 +263,7 @@ def test_sync_as_requested() -> None:
         ),
     ],
 )
-def test_sync_that_cannot_be(asked: DistributedClock, mode: OpMode, message: str) -> None:
+def test_impossible_sync_settings(asked: DistributedClock, mode: OpMode, message: str) -> None:
     with pytest.raises(ConfigurationError, match=message):
         sync(asked, mode)
 
@@ -280,11 +281,11 @@ def test_an_implausible_shift_is_the_eeproms_and_can_be_overridden() -> None:
     assert sync(DistributedClock(shift=0.0), FREE, easycat).shift_ns == 0
 
 
-def test_the_image_of_an_easycat_tells_each_step() -> None:
+def test_the_image_of_an_easycat_names_each_correction() -> None:
     """As EasyConfigurator leaves it: its OpMode lacks AssignActivate, and the shift is one too."""
     mode = OpMode("DC_Sync", "DC_Sync", shift_ns=1_882_234_944)  # pollen_Orbita2d.bin
     asked = DistributedClock(op_mode="DC_Sync")
-    with pytest.raises(ConfigurationError, match="starts no SYNC signal") as refused:
+    with pytest.raises(ConfigurationError, match="does not start a SYNC signal") as refused:
         sync(asked, FREE, mode)
     assert "DistributedClock(op_mode='DC_Sync', assign_activate=0x0300)" in refused.value.hint
     asked = DistributedClock(op_mode="DC_Sync", assign_activate=0x0300)
@@ -325,7 +326,7 @@ def test_any_factors_make_a_plan_or_name_the_device(
         assert 0 <= plan.sync1_ns < 1 << 32
 
 
-def test_what_the_application_is_told_may_be_refused() -> None:
+def test_sync_objects_may_be_refused() -> None:
     """0x1C32 and 0x1C33: type and cycle time; who has no mailbox is told nothing."""
     plan = planned([clocked(coupler(0)), clocked(servo(1))], 0, 1)
     told = [(d.index, d.subindex, d.data) for d in plan.devices[1].downloads if d.optional]
@@ -338,7 +339,7 @@ def test_what_the_application_is_told_may_be_refused() -> None:
     assert plan.devices[0].downloads == ()
 
 
-def test_all_start_at_a_common_beat_far_enough_ahead() -> None:
+def test_all_start_at_a_common_sync0_time() -> None:
     every_third = SyncPlan(0x0700, PERIOD_NS, 2 * PERIOD_NS, 0)
     every = SyncPlan(0x0300, PERIOD_NS, 0, 0)
     for now in (0, 1, 123_456_789, 10**18 + 1):

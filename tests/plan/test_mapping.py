@@ -1,4 +1,4 @@
-"""Mappings: kept, chosen among the offered ones, rewritten, written down, refused with reasons."""
+"""Mappings: unchanged, chosen from the offered PDOs, rewritten, specified, or refused."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ FOLLOWING_ERROR = ObjectReference(0x60F4, 0, 32)
 POSITION = ObjectReference(0x6064, 0, 32)
 
 
-def test_what_is_mapped_stays() -> None:
+def test_a_sufficient_mapping_stays() -> None:
     mapping = make_mapping(servo(0), Direction.INPUT, [POSITION])
     assert not mapping.changed
     assert mapping_downloads(mapping) == ()
@@ -80,13 +80,13 @@ def may(device: DeviceDescription, **permissions: bool) -> DeviceDescription:
 
 def test_a_device_that_denies_pdo_configuration_is_not_rewritten() -> None:
     device = may(servo(0), pdo_configuration=False)
-    with pytest.raises(MappingError, match="its SII says that the entries of PDOs cannot"):
+    with pytest.raises(MappingError, match="its SII does not allow changes of PDO entries"):
         make_mapping(device, Direction.INPUT, [FOLLOWING_ERROR])
 
 
 def test_a_device_that_denies_pdo_assignment_keeps_its_pdos() -> None:
     device = may(offering(servo(0, fixed=True)), pdo_assign=False)
-    with pytest.raises(MappingError, match="its SII says that 0x1C13 cannot be changed"):
+    with pytest.raises(MappingError, match="its SII does not allow changes of 0x1C13"):
         make_mapping(device, Direction.INPUT, [FOLLOWING_ERROR])
 
 
@@ -138,7 +138,7 @@ def test_a_rewrite_for_a_required_object_leaves_optional_ones_out() -> None:
     ]
 
 
-def test_a_written_mapping_is_tried_whatever_the_sii_says() -> None:
+def test_a_specified_mapping_ignores_the_permissions_of_the_sii() -> None:
     device = may(servo(0, fixed=True), pdo_configuration=False, pdo_assign=False)
     written = [WrittenPdo(0x1A00, (POSITION, FOLLOWING_ERROR))]
     mapping = make_mapping(device, Direction.INPUT, [POSITION], written)
@@ -156,11 +156,11 @@ def test_a_written_mapping_that_the_device_has_changes_nothing() -> None:
 
 def test_a_written_mapping_without_a_required_object_is_refused() -> None:
     written = [WrittenPdo(0x1A00, (FOLLOWING_ERROR,))]
-    with pytest.raises(MappingError, match=r"written down \(0x1A00\): 0x6064:00 \(32 bits\)"):
+    with pytest.raises(MappingError, match=r"as specified \(0x1A00\): 0x6064:00 \(32 bits\)"):
         make_mapping(servo(0), Direction.INPUT, [POSITION], written)
 
 
-def test_a_written_pdo_that_nobody_knows_needs_its_entries() -> None:
+def test_an_unknown_pdo_needs_its_entries() -> None:
     with pytest.raises(MappingError, match="neither its dictionary nor its SII has PDO 0x1A07"):
         make_mapping(servo(0), Direction.INPUT, [POSITION], [WrittenPdo(0x1A07)])
 
@@ -176,7 +176,7 @@ def test_an_object_mapped_twice_with_different_sizes_is_accepted() -> None:
         assert not make_mapping(device, Direction.INPUT, wanted).changed
 
 
-def test_fixed_pdos_keep_what_they_have_where_the_rest_is_not_required() -> None:
+def test_fixed_pdos_stay_if_the_missing_objects_are_optional() -> None:
     requested = [POSITION, replace(FOLLOWING_ERROR, required=False)]
     assert not make_mapping(servo(0, fixed=True), Direction.INPUT, requested).changed
 
@@ -188,15 +188,15 @@ def test_without_coe_nothing_changes() -> None:
         make_mapping(lamps(0), Direction.OUTPUT, [ObjectReference(0x7050, 1, 1)])
 
 
-def test_a_device_without_process_data_says_so() -> None:
+def test_a_device_without_process_data_is_reported() -> None:
     with pytest.raises(MappingError, match="no CoE mailbox"):
         make_mapping(coupler(0), Direction.INPUT, [FOLLOWING_ERROR])
 
 
-def test_a_wrong_length_is_told() -> None:
+def test_a_wrong_length_is_reported() -> None:
     with pytest.raises(MappingError, match="is mapped with 32 bits, 16 were requested") as caught:
         make_mapping(servo(0), Direction.INPUT, [ObjectReference(0x6064, 0, 16)])
-    assert "0x6064:00 is mapped with 32 bits already" in caught.value.message
+    assert "0x6064:00 is already mapped with 32 bits" in caught.value.message
 
 
 @pytest.mark.parametrize(
@@ -207,7 +207,7 @@ def test_a_wrong_length_is_told() -> None:
         (ObjectInformation(0x60F4, 0, 16), "has 16 bits, 32 were requested"),
     ],
 )
-def test_what_the_dictionary_says_is_believed(known: ObjectInformation, match: str) -> None:
+def test_the_dictionary_decides_on_a_mapping(known: ObjectInformation, match: str) -> None:
     device = replace(servo(0), objects=(known,))
     with pytest.raises(MappingError, match=match):
         make_mapping(device, Direction.INPUT, [FOLLOWING_ERROR])
@@ -231,13 +231,13 @@ def test_a_mandatory_pdo_is_rewritten_rather_than_exchanged() -> None:
     assert [pdo.index for pdo in mapping.rewritten] == [0x1A00]
 
 
-def test_too_much_for_a_datagram() -> None:
+def test_a_mapping_that_exceeds_a_datagram_is_refused() -> None:
     requested = [ObjectReference(0x2000 + k, 0, 64) for k in range(190)]
     with pytest.raises(MappingError, match="do not fit"):
         make_mapping(servo(0), Direction.INPUT, requested)
 
 
-def test_a_changed_mapping_moves_what_follows() -> None:
+def test_a_changed_mapping_moves_the_following_objects() -> None:
     plan = make_plan(demo(), [asks(3, inputs=((0x60F4, 0, 32),))])
     assert plan.devices[3].mapping_changed
     assert plan.devices[3].layout.input_size == 17

@@ -1,4 +1,4 @@
-"""The search for PDOs that together carry wanted objects: real alternatives, small and odd ones."""
+"""Search for PDOs that carry the requested objects, with alternatives of real devices."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ EL3002 = sorted([*STANDARD, *COMPACT], key=lambda each: each.index)
 CONTROL, POSITION, VELOCITY = (0x6040, 0, 16), (0x607A, 0, 32), (0x60FF, 0, 32)
 
 
-def test_what_is_assigned_stays() -> None:
+def test_assigned_pdos_stay() -> None:
     found = find_combination(STANDARD, EL3002, wants((0x6010, 0x11, 16)))
     assert found == Combination(tuple(STANDARD))
 

@@ -1,4 +1,4 @@
-"""The whole plan: the demo's segment byte by byte, and what its counters must be."""
+"""The whole plan: the demo's segment byte by byte, and its expected counters."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import pytest
 
 from catenary.errors import ConfigurationError, MappingError
 from catenary.model.device import Direction
-from catenary.plan import Number, NumberKind, make_plan
+from catenary.plan import Number, NumberKind, PlanOptions, make_plan
 from catenary.plan.cycle import Copy, DatagramKind, DatagramPlan
 from catenary.plan.layout import MailboxFmmu
 from catenary.plan.request import DeviceRequest, RequestTables
@@ -63,8 +63,8 @@ def test_the_template_is_a_frame_of_its_datagrams() -> None:
     assert not any(decoded.datagrams[1].data)
 
 
-def test_mailboxes_ride_in_the_cycle_without_a_part_in_its_verdict() -> None:
-    plan = make_plan(demo(), optional=[3])
+def test_mailbox_bits_do_not_make_a_cycle_bad() -> None:
+    plan = make_plan(demo(), options=PlanOptions(optional=[3]))
     assert plan.mailboxes.devices == (2, 3, 4)
     [column] = plan.cycle.input_columns
     assert column.number == Number(8 * 39, 3, NumberKind.UNSIGNED)
@@ -78,7 +78,7 @@ def test_mailboxes_ride_in_the_cycle_without_a_part_in_its_verdict() -> None:
     assert "FMMU 2 in   mailbox full, 1 bit" in str(plan)
 
 
-def test_who_has_no_fmmu_to_spare_shows_no_mailbox() -> None:
+def test_a_device_without_a_spare_fmmu_has_no_mailbox_bit() -> None:
     small = replace(servo(1), controller=replace(servo(1).controller, fmmu_count=2))
     assert make_plan([coupler(0), small, servo(2)]).mailboxes.devices == (2,)
     bytes_only = servo(1)
@@ -95,7 +95,7 @@ def test_mailboxes_of_many_devices_take_several_columns() -> None:
     assert (bits, starts) == ([32, 32, 6], [0, 32, 64])
 
 
-def test_where_objects_are() -> None:
+def test_places_of_objects() -> None:
     layout = make_plan(demo()).layout
     assert layout.output(1, 0x7010, 1) == Number(1, 1, NumberKind.UNSIGNED)
     assert layout.output(2, 0x6040, 0) == Number(8, 16, NumberKind.UNSIGNED)
@@ -106,7 +106,7 @@ def test_where_objects_are() -> None:
     assert layout.sync_unit(5) == 0
 
 
-def test_what_each_device_is_told() -> None:
+def test_the_plan_of_one_device() -> None:
     plan = make_plan(demo())
     drive = plan.devices[3]
     assert drive.station_address == 0x1004
@@ -127,10 +127,10 @@ def test_what_each_device_is_told() -> None:
 
 def test_equal_plans_are_equal() -> None:
     assert make_plan(demo()) == make_plan(demo())
-    assert make_plan(demo()) != make_plan(demo(), period=2e-3)
+    assert make_plan(demo()) != make_plan(demo(), options=PlanOptions(period=2e-3))
 
 
-def test_a_plan_prints_what_it_holds() -> None:
+def test_a_plan_prints_its_contents() -> None:
     text = str(make_plan(demo()))
     for part in (
         "6 devices, period 1 ms",
@@ -185,7 +185,7 @@ def test_devices_in_no_request_are_required_if_any_other_is(required: bool) -> N
 
 
 def test_an_optional_device_is_a_unit_of_its_own() -> None:
-    cycle = make_plan(demo(), optional=[3]).cycle
+    cycle = make_plan(demo(), options=PlanOptions(optional=[3])).cycle
     assert [(unit.devices, unit.optional) for unit in cycle.sync_units] == [
         ((1, 2, 4, 5), False),
         ((3,), True),
@@ -211,20 +211,20 @@ class Slow:
         raise NotImplementedError
 
 
-def test_devices_of_a_divisor_ride_in_frames_of_their_own() -> None:
+def test_devices_with_a_divider_have_their_own_frames() -> None:
     cycle = make_plan(demo(), [Slow(4, 2, 3)]).cycle
     assert [(u.devices, u.divider) for u in cycle.sync_units] == [((1, 4, 5), 1), ((2, 3), 4)]
     assert [(f.divider, f.phase) for f in cycle.frames] == [(1, 0), (4, 0)]
     assert "every 4 cycles" in str(make_plan(demo(), [Slow(4, 2, 3)]))
 
 
-def test_units_of_a_divisor_take_turns() -> None:
+def test_units_of_a_divider_take_turns() -> None:
     """Three that are optional, so units of their own: never two of them in one cycle."""
     cycle = make_plan(demo(), [Slow(4, 2, 3, 4, required=False)]).cycle
     assert [(f.divider, f.phase) for f in cycle.frames] == [(1, 0), (4, 0), (4, 1), (4, 2)]
 
 
-def test_requests_for_one_device_meet_in_the_greatest_common_divisor() -> None:
+def test_requests_for_one_device_use_the_greatest_common_divisor() -> None:
     units = make_plan(demo(), [Slow(4, 2), Slow(6, 2, 3)]).cycle.sync_units
     assert [(u.devices, u.divider) for u in units] == [((1, 4, 5), 1), ((2,), 2), ((3,), 6)]
 
@@ -235,13 +235,13 @@ def test_one_request_that_requires_a_device_is_enough() -> None:
     assert [(u.devices, u.optional) for u in units] == [((1, 3, 4, 5), False), ((2,), True)]
 
 
-def test_a_divisor_that_starves_the_watchdog_is_refused() -> None:
+def test_a_divider_too_long_for_the_watchdog_is_refused() -> None:
     with pytest.raises(ValueError, match="every 50 cycles"):
         make_plan(demo(), [Slow(50, 2)])
 
 
 @pytest.mark.parametrize("count", [40, 56, 57, 120, 200])
-def test_many_devices_take_several_frames_and_never_straddle(count: int) -> None:
+def test_many_devices_use_several_frames_and_are_never_split(count: int) -> None:
     plan = make_plan([servo(position) for position in range(count)])
     cycle = plan.cycle
     assert all(len(frame.template) <= 1514 for frame in cycle.frames)
@@ -265,10 +265,12 @@ def test_a_device_that_exceeds_a_datagram_is_refused_with_both_numbers(
     exact: bool, limit: int
 ) -> None:
     fits = block(0, outputs=700, inputs=limit - 700)
-    plan = make_plan([fits], exact_matching=exact)
+    plan = make_plan([fits], options=PlanOptions(exact_matching=exact))
     assert len(plan.cycle.frames) == 1
     with pytest.raises(MappingError) as caught:
-        make_plan([block(0, outputs=701, inputs=limit - 700)], exact_matching=exact)
+        make_plan(
+            [block(0, outputs=701, inputs=limit - 700)], options=PlanOptions(exact_matching=exact)
+        )
     text = str(caught.value)
     assert f"701 bytes of outputs and {limit - 700} bytes of inputs" in text
     assert f"{limit + 1} bytes of process data" in text
@@ -278,50 +280,54 @@ def test_a_device_that_exceeds_a_datagram_is_refused_with_both_numbers(
 
 def test_more_frames_in_a_cycle_than_indices_are_refused_by_the_plan() -> None:
     devices = [block(k, outputs=1000, inputs=0) for k in range(33)]
-    assert len(make_plan(devices[:32], period=5e-3).cycle.frames) == 32
+    assert len(make_plan(devices[:32], options=PlanOptions(period=5e-3)).cycle.frames) == 32
     with pytest.raises(ConfigurationError) as caught:
-        make_plan(devices, period=5e-3)
-    assert "33 frames in one cycle, at most 32" in str(caught.value)
+        make_plan(devices, options=PlanOptions(period=5e-3))
+    assert "33 frames in one cycle; the limit is 32" in str(caught.value)
     assert "exact_matching=True" in str(caught.value)
-    assert len(make_plan(devices, period=5e-3, exact_matching=True).cycle.frames) == 33
+    exact = make_plan(devices, options=PlanOptions(period=5e-3, exact_matching=True))
+    assert len(exact.cycle.frames) == 33
 
 
 def test_cyclic_frames_that_exceed_the_period_are_refused() -> None:
     devices = [block(k, outputs=1000, inputs=0) for k in range(12)]
     with pytest.raises(ConfigurationError) as caught:
-        make_plan(devices, period=1e-3)
+        make_plan(devices, options=PlanOptions(period=1e-3))
     assert str(caught.value).startswith(
-        "the cyclic frames take 1011.04 us at 100 Mbit/s, the period is 1000 us"
+        "the cyclic frames take 1011.04 us at 100 Mbit/s; the period is 1000 us"
     )
     assert "divider=" in str(caught.value)
-    turns = make_plan(devices, [Slow(2, *range(12))], period=1e-3).cycle
+    turns = make_plan(devices, [Slow(2, *range(12))], PlanOptions(period=1e-3)).cycle
     assert turns.wire_ns < 600_000  # of the busiest cycle, not of all frames
 
 
-def test_frames_that_cannot_be_back_in_time_are_refused() -> None:
+def test_frames_that_return_too_late_are_refused() -> None:
     devices = [block(k, outputs=1000, inputs=0) for k in range(10)]
     with pytest.raises(ConfigurationError) as caught:
-        make_plan(devices, period=1e-3)
+        make_plan(devices, options=PlanOptions(period=1e-3))
     assert str(caught.value).startswith(
         "period=0.001 s is too short: the cyclic frames take 842.72 us at 100 Mbit/s, and must be "
         "back 800 us after the cycle start"
     )
-    make_plan(devices, period=1e-3, execution="inline")
+    make_plan(devices, options=PlanOptions(period=1e-3, execution="inline"))
 
 
-def test_acyclic_frames_get_what_the_cyclic_ones_and_the_guard_leave() -> None:
-    plan = make_plan([block(k, outputs=1000, inputs=0) for k in range(2)], period=1e-3)
+def test_acyclic_frames_get_the_remaining_wire_time() -> None:
+    plan = make_plan(
+        [block(k, outputs=1000, inputs=0) for k in range(2)], options=PlanOptions(period=1e-3)
+    )
     assert plan.cycle.acyclic_ns == 1_000_000 - plan.cycle.wire_ns - 100_000
     left = f"{plan.cycle.acyclic_ns / 1e3:g}"
     assert f"of 1000 us for cyclic frames, up to {left} us for acyclic frames, 10%" in str(plan)
     full = make_plan(
-        [block(k, outputs=1000, inputs=0) for k in range(11)], period=1e-3, collect_share=1.0
+        [block(k, outputs=1000, inputs=0) for k in range(11)],
+        options=PlanOptions(period=1e-3, collect_share=1.0),
     )
     assert full.cycle.acyclic_ns == 0
     assert "one frame for acyclic frames" in str(full)
 
 
-def test_a_request_for_a_device_that_is_not_there() -> None:
+def test_a_request_for_a_missing_device() -> None:
     with pytest.raises(ConfigurationError, match="device 9; the segment has 6"):
         make_plan(demo(), [asks(9)])
 
@@ -339,13 +345,13 @@ def test_a_request_for_a_device_that_is_not_there() -> None:
         (1e-3, -0.1, "watchdog"),
     ],
 )
-def test_times_that_cannot_be(period: float, watchdog: float, match: str) -> None:
+def test_impossible_times(period: float, watchdog: float, match: str) -> None:
     with pytest.raises(ValueError, match=match):
-        make_plan(demo(), period=period, watchdog=watchdog)
+        make_plan(demo(), options=PlanOptions(period=period, watchdog=watchdog))
 
 
 def test_the_watchdog_can_be_off() -> None:
-    plan = make_plan(demo(), watchdog=0)
+    plan = make_plan(demo(), options=PlanOptions(watchdog=0))
     assert plan.devices[2].watchdog_count == 0
     assert plan.devices[2].layout.sync_managers[0].control == 0x24
     assert "13 out, 13 in, watchdog off" in str(plan)

@@ -51,9 +51,9 @@ def test_the_order_of_writing() -> None:
     assert section[5].endswith("0x6065:00  88 13 00 00 → 5 (UDINT)")
 
 
-def test_a_value_that_is_there_already_is_shown_as_such() -> None:
+def test_an_unchanged_value_is_marked() -> None:
     plan = plan_of(DeviceRequest(objects=(StartUp(0x6065, 0, 5000, type=types.UDINT),)))
-    assert "0x6065:00  5000 (UDINT) (as it is)" in str(plan)
+    assert "0x6065:00  5000 (UDINT) (unchanged)" in str(plan)
 
 
 def test_without_downloads_there_is_no_section() -> None:
@@ -73,11 +73,11 @@ def test_the_type_comes_from_the_dictionary() -> None:
     [
         ((), "the object dictionary does not describe it"),
         ((ObjectInformation(0x6065, 0, 0),), "the object dictionary does not describe it"),
-        ((ObjectInformation(0x6065, 0, 32),), r"does not tell its data type \(32 bits\)"),
+        ((ObjectInformation(0x6065, 0, 32),), r"does not report its data type \(32 bits\)"),
         ((ObjectInformation(0x6065, 0, 16, 0x0800),), "0x0800 is not a base data type"),
     ],
 )
-def test_a_type_that_is_not_known(objects: tuple[ObjectInformation, ...], why: str) -> None:
+def test_an_unknown_type(objects: tuple[ObjectInformation, ...], why: str) -> None:
     with pytest.raises(
         ConfigurationError,
         match=rf"device 3 .*type of start-up object 0x6065:00 is unknown: .*{why}",
@@ -106,7 +106,7 @@ def test_a_value_of_another_kind_names_the_object() -> None:
         StartUp(0x2000, 0, 5, type=types.VISIBLE_STRING)
     with pytest.raises(ValueError, match="an index has 16 bits"):
         StartUp(0x16065, 0, b"")
-    with pytest.raises(TypeError, match="index and subindex are numbers, not '0x6065' and 0"):
+    with pytest.raises(TypeError, match="index and subindex must be numbers, not '0x6065' and 0"):
         StartUp("0x6065", 0, 5)  # type: ignore[arg-type]
     with pytest.raises(TypeError, match=r"0x6065:00: 'UDINT' is not a type of catenary\.types"):
         StartUp(0x6065, 0, 5, type="UDINT")  # type: ignore[arg-type]
@@ -114,12 +114,12 @@ def test_a_value_of_another_kind_names_the_object() -> None:
 
 @pytest.mark.parametrize("index", [0x1600, 0x17FF, 0x1A00, 0x1BFF, 0x1C12, 0x1C13])
 @pytest.mark.parametrize("before_mapping", [True, False])
-def test_the_mapping_cannot_be_changed_behind_the_plan(index: int, before_mapping: bool) -> None:
+def test_start_up_objects_cannot_change_the_mapping(index: int, before_mapping: bool) -> None:
     with pytest.raises(ValueError, match=rf"0x{index:04X}:00 is part of the PDO mapping.*pdos="):
         StartUp(index, 0, b"\x00", before_mapping=before_mapping)
 
 
-def test_objects_next_to_the_mapping_are_free() -> None:
+def test_objects_next_to_the_mapping_are_allowed() -> None:
     assert StartUp(0x1800, 6, b"\x00").index == 0x1800
     assert StartUp(0x1C32, 1, b"\x02").index == 0x1C32
 

@@ -1,4 +1,4 @@
-"""The process-data watchdog of each device: its time, and the trigger bit that goes with it."""
+"""Process-data watchdog of each device: its time and its trigger bit."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from dataclasses import replace
 import pytest
 
 from catenary.model.device import DeviceDescription
+from catenary.plan.options import PlanOptions
 from catenary.plan.planner import make_plan
 from catenary.plan.request import DeviceRequest, ObjectReference
 from tests.plan.devices import Asking, lamps, servo
@@ -29,7 +30,8 @@ def watchdog_ns(
     *outputs: ObjectReference, divider: int = 1, period: float = 1e-3, watchdog: float | None = None
 ) -> int:
     request = Asking({0: DeviceRequest(outputs=outputs, divider=divider)})
-    return make_plan([servo(0)], [request], period=period, watchdog=watchdog).devices[0].watchdog_ns
+    options = PlanOptions(period=period, watchdog=watchdog)
+    return make_plan([servo(0)], [request], options).devices[0].watchdog_ns
 
 
 def test_100_ms_unless_torques_are_commanded() -> None:
@@ -65,7 +67,7 @@ def test_only_the_device_in_cst_has_the_short_watchdog() -> None:
     assert "device   1  Servo  station 0x1002  13 out, 13 in, watchdog 10 ms" in str(plan)
 
 
-def test_what_the_application_says_counts() -> None:
+def test_the_requested_time_is_used() -> None:
     assert watchdog_ns(TORQUE, watchdog=0.05) == 50 * MILLISECOND
     assert watchdog_ns(TORQUE, watchdog=0) == 0
 
@@ -78,7 +80,7 @@ def test_a_period_too_long_for_the_register() -> None:
 @pytest.mark.parametrize("control", [0x24, 0x64, 0x04, 0x44])
 def test_the_trigger_bit_agrees_with_the_time(control: int) -> None:
     for watchdog, expected in ((None, control | 0x40), (0, control & ~0x40)):
-        plan = make_plan([with_control(servo(0), control)], watchdog=watchdog)
+        plan = make_plan([with_control(servo(0), control)], options=PlanOptions(watchdog=watchdog))
         outputs, inputs = plan.devices[0].layout.sync_managers
         assert outputs.control == expected
         assert outputs.triggers_watchdog is (watchdog is None)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import pytest
 
 from catenary.errors import ConfigurationError
+from catenary.plan.options import PlanOptions
 from catenary.plan.planner import make_plan
 from catenary.procedure.configure import configure_process_data
 from catenary.procedure.exchange import Reply, Request
@@ -51,7 +52,7 @@ class LockedMemory(Memory):
 
 def configure(memory: Memory, watchdog: float | None = None) -> Memory:
     device = servo(0)
-    plan = make_plan([device], watchdog=watchdog).devices[0]
+    plan = make_plan([device], options=PlanOptions(watchdog=watchdog)).devices[0]
     play(configure_process_data(STATION, device, plan), memory)
     return memory
 

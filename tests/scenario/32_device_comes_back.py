@@ -404,7 +404,7 @@ def test_an_internal_error_of_the_watch_is_raised_on_leaving(
         yield []
         raise ZeroDivisionError(f"of {at_most}")
 
-    monkeypatch.setattr(restore, "look_around", broken)
+    monkeypatch.setattr(restore, "find_devices", broken)
     with pytest.raises(ZeroDivisionError):
         run(cell, unplug(TOOL, at=0.1), seconds=0.3)
     assert cell.states[:TOOL] == [PRE_OP] * TOOL

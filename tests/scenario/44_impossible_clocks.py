@@ -31,7 +31,7 @@ def test_a_reference_without_a_clock_is_refused(cell: Cell) -> None:
 
 
 def test_a_reference_after_its_followers_is_refused(cell: Cell) -> None:
-    with pytest.raises(ConfigurationError, match=r"device 2 .* lies before device 3"):
+    with pytest.raises(ConfigurationError, match=r"device 2 .* precedes device 3"):
         enter(cell, cell.drives(dc=True), reference=cell.subs[3])
 
 

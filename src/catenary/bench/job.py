@@ -22,7 +22,7 @@ PHASES = (
     "receive",
     "process",
     "send",
-    "tail",
+    "post_processing",
     "output_delay",
     "input_age",
 )
@@ -30,8 +30,8 @@ PHASES = (
 
 For a cycle start d, a wake-up w and the time s at which the last cyclic send has returned:
 period = w - w of the previous cycle; lateness = w - d; receive = w → inputs usable;
-process = the body; send = its end → s; tail = s → start of the next wait; output_delay = s - d;
-input_age = s of the frame that returned the inputs → start of the body.
+process = the body; send = its end → s; post_processing = s → start of the next wait;
+output_delay = s - d; input_age = s of the frame that returned the inputs → start of the body.
 In Catenary's native thread: send = w → s, receive = last frame received → inputs usable.
 """
 

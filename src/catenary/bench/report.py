@@ -17,7 +17,7 @@ HEADLINES = {
     "wake_to_sent": "wake to sent",
     "input_age": "input age",
 }
-COLUMNS = ("period", "lateness", "receive", "process", "send", "in_controller", "tail")
+COLUMNS = ("period", "lateness", "receive", "process", "send", "in_controller", "post_processing")
 FIGURES = ("max", "p50", "p99")  # in the order of catenary.figures
 NAME, FIGURE, GAP = 20, 9, "   "  # width of a name, width of a figure, and separator of groups
 

@@ -13,11 +13,15 @@ from catenary.bench.job import PHASES, Round
 Values = npt.NDArray[np.float64]
 Timing = dict[str, dict[str, float]]
 
-IN_CONTROLLER, WITH_TAIL, WAKE_TO_SENT = "in_controller", "in_controller+tail", "wake_to_sent"
-DERIVED = (IN_CONTROLLER, WITH_TAIL, WAKE_TO_SENT)
+IN_CONTROLLER, WITH_POST_PROCESSING, WAKE_TO_SENT = (
+    "in_controller",
+    "in_controller+post_processing",
+    "wake_to_sent",
+)
+DERIVED = (IN_CONTROLLER, WITH_POST_PROCESSING, WAKE_TO_SENT)
 """Columns computed from the phases of every cycle.
 
-in_controller = receive + process + send; in_controller+tail = in_controller + tail;
+in_controller = receive + process + send; in_controller+post_processing = the sum of these two;
 wake_to_sent = output_delay - lateness (wake-up → last cyclic frame passed to the kernel).
 """
 PER_ROUND = ("p50", "p99", "max")  # figures stored for each round
@@ -79,7 +83,7 @@ def columns_of(one: Round) -> dict[str, Values]:
     samples = np.where(one.samples < 0, np.nan, one.samples * 1e-3)
     columns = dict(zip(PHASES, samples.T, strict=True))
     columns[IN_CONTROLLER] = columns["receive"] + columns["process"] + columns["send"]
-    columns[WITH_TAIL] = columns[IN_CONTROLLER] + columns["tail"]
+    columns[WITH_POST_PROCESSING] = columns[IN_CONTROLLER] + columns["post_processing"]
     columns[WAKE_TO_SENT] = columns["output_delay"] - columns["lateness"]
     columns["period"] = columns["period"][1:]  # the first period started before the round
     return {name: values[~np.isnan(values)] for name, values in columns.items()}

@@ -17,7 +17,7 @@ from importlib import import_module
 from pathlib import Path
 
 from catenary.bench.job import Job, Round, read_job, write_round
-from catenary.realtime.system.scheduling import Scheduling, request_scheduling, what_scheduling
+from catenary.realtime.system.scheduling import Scheduling, current_scheduling, request_scheduling
 
 
 def main(arguments: Sequence[str]) -> None:
@@ -33,7 +33,7 @@ def main(arguments: Sequence[str]) -> None:
 
 def schedule(job: Job) -> Scheduling:
     if job.priority is None:
-        return what_scheduling()
+        return current_scheduling()
     # Lock the memory of the Python peers. The C programs lock their own memory.
     return request_scheduling(priority=job.priority, lock_memory=True, cpu=job.cpu)
 

@@ -19,8 +19,9 @@ from catenary.errors import (
 from catenary.link import RingLink
 from catenary.model.device import DeviceDescription, Direction, mapped_pdos
 from catenary.plan.clocks import SYNC_OBJECTS
+from catenary.plan.combination import gather_requests
 from catenary.plan.pdo_search import any_carries
-from catenary.plan.planner import Plan, gather_requests
+from catenary.plan.planner import Plan
 from catenary.plan.request import DeviceRequest, ObjectReference, ProcessDataRequest
 from catenary.plan.start_up import DevicePlan
 from catenary.plan.start_up_object import StartUp

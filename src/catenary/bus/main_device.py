@@ -316,7 +316,7 @@ class MainDevice:
         """Return a printable plan for these requests, from the current mapping of the devices.
 
         The devices must be in PRE-OP. Nothing is written. For further options, call `read_mappings`
-        and then `catenary.plan.make_plan`.
+        and then `catenary.plan.make_plan` with `PlanOptions`.
 
         Args:
             requests: `Drives`, `Inputs`, `Outputs` and other process-data requests.
@@ -329,18 +329,18 @@ class MainDevice:
         Raises:
             MappingError: A device cannot map an object.
         """
+        from catenary.plan.options import PlanOptions
         from catenary.plan.planner import make_plan
 
         self.read_mappings(*requests, period=period)
-        return make_plan(
-            [sub.description for sub in self.subs],
-            requests,
+        options = PlanOptions(
             period=period,
             execution=execution,
             receive_mode=receive_mode,
             optional=optional,
             watchdog=watchdog,
         )
+        return make_plan([sub.description for sub in self.subs], requests, options)
 
     def read_mappings(self, *requests: ProcessDataRequest, period: float = 1e-3) -> None:
         """Update the mappings and the requested objects in the descriptions of the devices.
@@ -353,7 +353,7 @@ class MainDevice:
             CatenaryError: A device is not in PRE-OP; this is its error from the scan.
         """
         self._raise_errors()
-        from catenary.plan.planner import period_in_ns
+        from catenary.plan.options import period_in_ns
 
         self.master.read_mappings(requests, period_in_ns(period))
 

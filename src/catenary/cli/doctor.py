@@ -40,6 +40,23 @@ def add_parser(commands: Commands) -> None:
     parser.add_argument(
         "nic", metavar="NIC", nargs="?", help="network card of the segment, such as eth0"
     )
+    _add_measurement(parser)
+    add_json(parser)
+    action = parser.add_mutually_exclusive_group()
+    action.add_argument(
+        "--apply",
+        action="store_true",
+        help="list reversible changes, ask for confirmation, and apply them",
+    )
+    action.add_argument("--undo", action="store_true", help="undo the changes by --apply")
+    parser.add_argument(
+        "--yes", action="store_true", help="with --apply, do not ask for confirmation"
+    )
+    parser.set_defaults(run=run)
+
+
+def _add_measurement(parser: argparse.ArgumentParser) -> None:
+    """Add the options of the thread that measures the wake-up latency."""
     parser.add_argument(
         "--seconds",
         type=seconds,
@@ -64,18 +81,6 @@ def add_parser(commands: Commands) -> None:
         type=number,
         help="CPU of the loop's thread (default: the last isolated CPU, else the last CPU)",
     )
-    add_json(parser)
-    doing = parser.add_mutually_exclusive_group()
-    doing.add_argument(
-        "--apply",
-        action="store_true",
-        help="list reversible changes, ask for confirmation, and apply them",
-    )
-    doing.add_argument("--undo", action="store_true", help="undo the changes by --apply")
-    parser.add_argument(
-        "--yes", action="store_true", help="with --apply, do not ask for confirmation"
-    )
-    parser.set_defaults(run=run)
 
 
 def run(arguments: argparse.Namespace) -> int:

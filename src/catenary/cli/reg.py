@@ -37,6 +37,11 @@ def add_parser(commands: Commands) -> None:
         "change.",
         example="catenary reg read eth0 2 AL_STATUS\ncatenary reg write eth0 2 0x0310 0 --size 4",
     ).add_subparsers(title="commands", metavar="COMMAND", required=True)
+    _add_read(group)
+    _add_write(group)
+
+
+def _add_read(group: Commands) -> None:
     reading = add_command(
         group,
         "read",
@@ -54,6 +59,9 @@ def add_parser(commands: Commands) -> None:
     )
     add_json(reading)
     reading.set_defaults(run=run_read)
+
+
+def _add_write(group: Commands) -> None:
     writing = add_command(
         group,
         "write",

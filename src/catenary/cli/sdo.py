@@ -29,6 +29,12 @@ def add_parser(commands: Commands) -> None:
         "catenary sdo write eth0 2 0x6065 5000 --type UDINT\n"
         "catenary sdo list eth0 2 --values",
     ).add_subparsers(title="commands", metavar="COMMAND", required=True)
+    _add_read(group)
+    _add_write(group)
+    _add_list(group)
+
+
+def _add_read(group: Commands) -> None:
     reading = add_command(
         group,
         "read",
@@ -41,6 +47,9 @@ def add_parser(commands: Commands) -> None:
     _add_type(reading)
     add_json(reading)
     reading.set_defaults(run=run_read)
+
+
+def _add_write(group: Commands) -> None:
     writing = add_command(
         group,
         "write",
@@ -56,6 +65,9 @@ def add_parser(commands: Commands) -> None:
     _add_type(writing)
     add_json(writing)
     writing.set_defaults(run=run_write)
+
+
+def _add_list(group: Commands) -> None:
     listing = add_command(
         group,
         "list",

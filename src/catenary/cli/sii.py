@@ -33,6 +33,12 @@ def add_parser(commands: Commands) -> None:
         example="catenary sii read eth0 2 --text\ncatenary sii show drive.bin\n"
         "catenary sii write eth0 2 drive.bin --dry-run",
     ).add_subparsers(title="commands", metavar="COMMAND", required=True)
+    _add_read(group)
+    _add_show(group)
+    _add_write(group)
+
+
+def _add_read(group: Commands) -> None:
     reading = add_command(
         group,
         "read",
@@ -54,6 +60,9 @@ def add_parser(commands: Commands) -> None:
         help="read N bytes instead of the size in the EEPROM",
     )
     reading.set_defaults(run=run_read)
+
+
+def _add_show(group: Commands) -> None:
     showing = add_command(
         group,
         "show",
@@ -64,6 +73,9 @@ def add_parser(commands: Commands) -> None:
     )
     showing.add_argument("file", metavar="FILE", type=Path, help="file with the binary image")
     showing.set_defaults(run=run_show)
+
+
+def _add_write(group: Commands) -> None:
     writing = add_command(
         group,
         "write",

@@ -16,6 +16,10 @@ def add_parser(commands: Commands) -> None:
         description="Serves a virtual segment that any MainDevice can use.",
         example="catenary virtual serve veth1 --config machine.toml",
     ).add_subparsers(title="commands", metavar="COMMAND", required=True)
+    _add_serve(group)
+
+
+def _add_serve(group: Commands) -> None:
     parser = add_command(
         group,
         "serve",

@@ -5,11 +5,11 @@ from catenary.core._native cimport cat_link, cat_packet_ring
 
 cdef struct acyclic_queue_t:
     cat_packet_ring *out       # frames of the service thread, to be sent
-    cat_packet_ring *back      # frames that came back
+    cat_packet_ring *back      # frames that have returned
     int64_t wire_time          # maximum wire time of acyclic frames per cycle [ns]
     uint32_t arrived           # futex word: number of arrivals
-    uint32_t waiting           # 1: the service thread sleeps on `arrived`, or is about to
-    uint32_t under_way         # cycle only: frames sent in the last cycle that are not back yet
+    uint32_t waiting           # 1: the service thread sleeps on `arrived` or is about to sleep
+    uint32_t under_way         # cycle only: frames of the last cycle that have not returned yet
     uint64_t sent              # cycle only, like the next two
     uint64_t received
     uint64_t dropped           # frames that returned to a full ring or could not be sent
@@ -21,4 +21,4 @@ cdef class AcyclicQueue:
 
 cdef void acyclic_send(acyclic_queue_t *queue, const cat_link *link, int64_t passed) noexcept nogil
 cdef void acyclic_received(acyclic_queue_t *queue, const uint8_t *bytes, uint32_t length,
-                        int64_t stamp) noexcept nogil
+                           int64_t stamp) noexcept nogil

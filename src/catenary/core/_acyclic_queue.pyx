@@ -3,18 +3,18 @@
 
 Theory of operation
     One service thread pushes whole frames into `out` and pops returned ones from `back`. Both are
-    rings for one producer and one consumer (native/packet_ring.h). After each cycle `acyclic_send` sends
-    at most four frames. Their wire time must fit into the part of the period that the plan leaves
-    (plan/frames.py) and that has not passed. The first frame is always sent, so that a
-    conversation never starves. Frames with an index from 0x80 on return through `acyclic_received`.
-    The cycle never waits for the service thread.
+    rings for one producer and one consumer (native/packet_ring.h). After each cycle `acyclic_send`
+    sends at most four frames. Their wire time must fit into the part of the period that the plan
+    reserves for them (plan/frames.py), less the time that has passed. The first frame is always
+    sent, so that a conversation never starves. Frames with an index of 0x80 or above return through
+    `acyclic_received`. The cycle never waits for the service thread.
 
 Waking
     The service thread sets `waiting`, then sleeps while `arrived` is unchanged. The cycle increments
     `arrived`, then wakes the thread if `waiting` is set. A full fence separates the two steps of the
     cycle. The futex compares `arrived` again in the kernel, so that no wake-up is lost.
 
-Budget: 0.05 us if nothing is queued, else what the link's send takes, at most four times.
+Budget: 0.05 us if the queue is empty, otherwise at most four sends of the link.
 """
 
 from libc.stdint cimport int64_t, uint8_t, uint32_t, uint64_t
@@ -45,13 +45,14 @@ cdef enum:
 
 
 cdef inline int64_t wire_time(uint32_t length) noexcept nogil:
-    """Return how long a frame holds a cable of 100 Mbit/s, as wire/frame.py does."""
+    """Return how long a frame occupies a cable of 100 Mbit/s, as wire/frame.py does [ns]."""
     return <int64_t>(max(length, CAT_FRAME_MIN) + FRAME_OVERHEAD) * NS_PER_BYTE
 
 
 cdef void acyclic_send(acyclic_queue_t *queue, const cat_link *link, int64_t passed) noexcept nogil:
     """Send at most four frames that fit into the remaining wire time; always send the first one.
-    `passed` [ns]: time since the cycle start.
+
+    `passed`: time since the cycle start [ns].
     """
     cdef const cat_packet *packet
     cdef int64_t left = queue.wire_time - passed
@@ -73,7 +74,7 @@ cdef void acyclic_send(acyclic_queue_t *queue, const cat_link *link, int64_t pas
 
 
 cdef void acyclic_received(acyclic_queue_t *queue, const uint8_t *bytes, uint32_t length,
-                        int64_t stamp) noexcept nogil:
+                           int64_t stamp) noexcept nogil:
     if queue.under_way > 0:
         queue.under_way -= 1
     if cat_ring_push(queue.back, bytes, length, stamp) != 0:
@@ -90,7 +91,7 @@ cdef class AcyclicQueue:
     def __cinit__(self, int64_t wire_time_ns):
         """`wire_time_ns`: maximum wire time of acyclic frames per cycle."""
         if wire_time_ns < 0:
-            raise ValueError(f"acyclic_ns: {wire_time_ns}")
+            raise ValueError(f"acyclic_ns: {wire_time_ns}, must not be negative")
         cdef size_t size = sizeof(cat_packet_ring)
         self.c.out = <cat_packet_ring *>memory_take(&self.memory, 1, size)
         self.c.back = <cat_packet_ring *>memory_take(&self.memory, 1, size)
@@ -116,7 +117,7 @@ cdef class AcyclicQueue:
         return frame
 
     def wait(self, int64_t timeout_ns):
-        """Wait once. A signal or a spurious wake-up ends the wait early."""
+        """Wait once for a returned frame. A signal or a spurious wake-up ends the wait early."""
         cdef uint32_t seen = cat_load_acquire32(&self.c.arrived)
         if cat_ring_peek(self.c.back) != NULL:
             return True

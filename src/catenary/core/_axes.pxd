@@ -69,7 +69,7 @@ cdef struct axis_t:
     double demand_torque
     # requested
     uint32_t request           # number of the last request taken over
-    uint8_t requested_state               # requested state in force
+    uint8_t requested_state    # requested state in force
     uint16_t command           # command bits of the last controlword sent
     int8_t mode                # in force: the drive follows set-points of this mode
     int8_t mode_wanted         # requested mode, sent in 0x6060
@@ -80,14 +80,14 @@ cdef struct axis_t:
     uint8_t clear_reset        # keep bit 7 clear for one cycle, to create an edge
     uint8_t followed
     uint8_t worked             # was followed since OPERATION_ENABLED or since a mode change
-    uint8_t shows_following              # bit 12 was seen: the drive implements it
+    uint8_t shows_following    # bit 12 was seen: the drive implements it
     uint8_t followed_at_stop   # bit 12 was set when the stop began
     uint8_t flags
     uint8_t stop_reason
     uint64_t stop_cycle
     uint64_t followed_since    # number of the cycle
-    uint32_t climbing_cycles   # cycles since the request, while not followed
-    uint32_t waiting_cycles    # cycles while powered, to be enabled, and not followed
+    uint32_t climbing_cycles   # cycles since the request during which the axis was not followed
+    uint32_t waiting_cycles    # cycles while powered and requested enabled, but not followed
     uint32_t mute_cycles       # cycles in which only bit 12 is missing; stays at the limit
     uint32_t gap_cycles        # cycles since bit 12 was lost
     uint32_t stop_cycles       # cycles under power since the stop
@@ -98,7 +98,7 @@ cdef struct axis_t:
     double setpoint            # [rad]
     double setpoint_velocity   # [rad/s] between the last two
     double previous_velocity   # [rad/s] between the two before these
-    double ghost               # [rad] set-point of this cycle; in a fallback continued by the core
+    double ghost               # [rad] set-point of this cycle; extrapolated by the core in a fallback
     double ghost_velocity      # [rad/s]
     uint64_t setpoint_stamp    # number of the cycle it was meant for
     uint32_t fallback_cycles   # cycles in a row without a set-point
@@ -145,8 +145,8 @@ cdef struct axes_t:
     uint32_t late_limit_position
     uint32_t late_limit_velocity
     uint32_t late_limit_torque
-    uint32_t handover_limit    # CST keeps its torque in a hand-over at most this long
-    uint32_t keep_limit        # CSP keeps its velocity in an underrun at most this long
+    uint32_t handover_limit    # maximum time for which CST keeps its torque in a hand-over
+    uint32_t keep_limit        # maximum time for which CSP keeps its velocity in an underrun
     uint32_t mode_limit        # time until 0x6061 must show the requested mode
     uint32_t gap_limit         # time without bit 12 until the axis is stopped
     uint32_t stop_patience     # time until a quick stop must show an effect
@@ -162,11 +162,11 @@ cdef struct axes_t:
     uint32_t handed_over       # number of cycles of a hand-over so far
     uint64_t handed_over_at    # cycle in which the last hand-over began
     uint8_t background         # the targets come from a program in the background
-    uint8_t velocity_counts    # its last update is within the command timeout
+    uint8_t velocity_counts    # the last velocity update is within the command timeout
     uint8_t torque_counts
     uint32_t stop_asked        # number of stop requests, from any thread
     uint32_t stop_seen
-    uint32_t cycle_flags              # flags of the cycle that its axes set
+    uint32_t cycle_flags       # flags of the cycle that its axes set
     uint32_t moving
 
 cdef class Axes:

@@ -8,7 +8,7 @@ AXIS_FOLLOWED: Final[int]  # set-points are followed: enabled, requested mode in
 AXIS_LIMITED: Final[int]  # the last set-point sent was limited
 AXIS_DROPPED: Final[int]  # the core stopped the axis since the last request
 AXIS_REFUSED: Final[int]  # the target was NaN, infinite or beyond the step limit
-AXIS_FALLBACK: Final[int]  # without a valid set-point, or returning to the set-points
+AXIS_FALLBACK: Final[int]  # no valid set-point, or the command is returning to the set-points
 AXIS_MODE_REFUSED: Final[int]  # the drive did not show the last requested mode
 
 class Axes:

@@ -1,15 +1,16 @@
 # cython: boundscheck=False, wraparound=False, cdivision=True
 """Axes, columns and areas: conversion of process images (bytes) from and to arrays in SI units.
 
-Theory of operation. An axis is a slot of a CiA 402 drive. The plan states the place of each
-quantity, or that it is absent. `axes_read` runs after the inputs of a cycle. It decodes the actual
-values and unwraps position counters of any width to 64 bits (`counts`, `last_raw`); then _guard.pyx
-judges the axis. `axes_write` runs before the outputs: requests (_guard.pyx), set-points
-(_setpoints.pyx), controlword, bytes. A number is written only if it differs from the image (`put_t`).
-`axes_apply_late` applies late stop requests to outputs that a law has computed. `axes_report` reports
-the axes after the frames. `cycle_flags` collects the flags of the cycle, `handed_over` counts the cycles of a
-hand-over, and `stop_asked` counts stop requests of any thread. Areas are bytes of an image that the
-application uses unchanged: copied, never interpreted. _axes.pxd defines every word of an axis.
+Theory of operation. An axis is a slot of a CiA 402 drive. The plan contains the position of each
+quantity in the image; a quantity may be absent. `axes_read` runs after the inputs of a cycle. It
+decodes the actual values and unwraps position counters of any width to 64 bits (`counts`,
+`last_raw`); then _guard.pyx judges the axis. `axes_write` runs before the outputs: requests
+(_guard.pyx), set-points (_setpoints.pyx), controlword, bytes. A number is written only if it
+differs from the image (`put_t`). `axes_apply_late` applies late stop requests to outputs that a law
+has computed. `axes_report` reports the axes after the frames. `cycle_flags` collects the flags of
+the cycle, `handed_over` counts the cycles of a hand-over, and `stop_asked` counts stop requests of
+any thread. Areas are bytes of an image that are copied without interpretation. _axes.pxd defines
+every field of an axis.
 
 Budget: 60 ns per axis and direction.
 """
@@ -64,7 +65,7 @@ AXIS_FALLBACK = FALLBACK
 AXIS_MODE_REFUSED = MODE_REFUSED
 
 STILL_NS = 5_000_000                   # at rest for this long: the axis has stopped
-BEYOND_NS = 20_000_000                 # CSV: stop an axis that is outside a limit and leaving for this long
+BEYOND_NS = 20_000_000                 # CSV: time outside a limit, moving away, until the axis is stopped
 CLIMBING_NS = 10_000_000_000           # a request to enable expires
 MUTE_NS = 1_000_000_000                # missing bit 12; longer than a brake takes to open
 KEEP_NS = 10_000_000                   # in an underrun, CSP keeps its velocity for this long
@@ -103,7 +104,7 @@ cdef inline void read_position(axis_t *a, const uint8_t *inputs, double elapsed)
 
 
 cdef inline double demand_error(axis_t *a, const uint8_t *inputs) noexcept nogil:
-    """Return demanded minus actual position; both count modulo the width of their types."""
+    """Return demanded minus actual position; both wrap at the width of their types."""
     cdef uint64_t raw
     if a.position_demand.kind == REAL_KIND or a.actual_position.kind == REAL_KIND:
         return number_value(&a.position_demand, inputs) - a.position
@@ -162,7 +163,7 @@ cdef inline void read_areas(const axes_t *x, actual_t *out) noexcept nogil:
 cdef void axes_read(axes_t *x, actual_t *out, uint64_t number, int64_t instant) noexcept nogil:
     """Decode the input image into the actual values of cycle `number`, after its collect.
 
-    `instant`: its cycle start [ns]. `axes_report` follows later, in the post-processing.
+    `instant`: cycle start of this cycle [ns]. The post-processing calls `axes_report` later.
     """
     cdef const uint8_t *inputs = x.image.inputs
     cdef axis_t *a
@@ -185,7 +186,7 @@ cdef void axes_read(axes_t *x, actual_t *out, uint64_t number, int64_t instant) 
 
 
 cdef void axes_report(axes_t *x, actual_t *out) noexcept nogil:
-    """Report the state of the axes and what was sent last, next to the values of `axes_read`."""
+    """Add the state of the axes and the last outputs to the values of `axes_read`."""
     cdef const axis_t *a
     cdef uint32_t i
     x.moving = 0
@@ -211,7 +212,7 @@ cdef void axes_report(axes_t *x, actual_t *out) noexcept nogil:
 # ---- outputs
 
 cdef inline bint takes(put_t *put, double value) noexcept nogil:
-    """Store a value; return True if it changed. Most set-points do not: those of other modes."""
+    """Store a value; return True if it changed. Set-points of inactive modes rarely change."""
     if value == put.value:
         return False
     put.value = value
@@ -243,7 +244,7 @@ cdef inline void lead_axis(axes_t *x, axis_t *a, uint16_t bits) noexcept nogil:
 
 
 cdef inline bint apply_stop(axes_t *x) noexcept nogil:
-    """Stop all axes if a stop was requested since the last call. Return True if so."""
+    """Stop all axes if requested since the last call; return True if they were stopped."""
     cdef uint32_t asked = cat_load_acquire32(&x.stop_asked)
     if asked == x.stop_seen:
         return False
@@ -279,8 +280,9 @@ cdef inline void write_areas(axes_t *x, const target_t *t) noexcept nogil:
 
 
 cdef void write_velocity_offsets(axes_t *x) noexcept nogil:
-    """Write 0x60B1 after the columns. While an axis does not follow its set-points, 0x60B1 is the
-    velocity of its command.
+    """Write 0x60B1 after the columns.
+
+    While an axis does not follow its set-points, 0x60B1 is the velocity of its command.
     """
     cdef axis_t *a
     cdef uint32_t i
@@ -336,7 +338,7 @@ cdef void axes_write(axes_t *x, const target_t *target, bint fresh, uint64_t num
 
 
 cdef void axes_hand_over(axes_t *x) noexcept nogil:
-    """Change the source of the set-points: commands return to the new ones without a jump."""
+    """Prepare the axes for a new source of set-points, so that commands do not jump."""
     cdef uint32_t i
     for i in range(x.axis_count):
         x.axes[i].returning = x.axes[i].accepted > 0
@@ -349,9 +351,9 @@ cdef inline bint removes_power(const target_t *target, uint32_t i) noexcept nogi
 cdef bint axes_apply_late(axes_t *x, const target_t *target, bint fresh) noexcept nogil:
     """Apply late stop requests to outputs that a law has computed.
 
-    These are stops and, if the orders are fresh, requested states that remove power and control
-    bits of axes that work. Requests that give power or reset wait for the next write, with their
-    set-points. Return True if outputs may differ.
+    These are stops and, if the targets are fresh, requested states that remove power and the control
+    bits of axes that work. Requests that enable or reset an axis take effect at the next write,
+    together with their set-points. Return True if outputs may differ.
     """
     cdef axis_t *a
     cdef uint32_t i
@@ -377,7 +379,7 @@ cdef inline void follow(target_t *target, uint32_t i, bint followed, uint64_t si
     """Set the target of an axis that is not followed to the value that is sent to it.
 
     An axis that has become followed since the last commit starts from the commanded value, because
-    earlier targets cannot be meant for it. Its torque stays: the axis was enabled with it.
+    earlier targets were not meant for it. Its torque stays, because the axis was enabled with it.
     """
     if not followed:
         target.position[i] = commanded_position
@@ -411,7 +413,7 @@ cdef inline void follow_update(const axes_t *x, const actual_t *actual, target_t
 
 
 cdef void axes_follow(const axes_t *x, const actual_t *actual, target_t *target) noexcept nogil:
-    """Adapt the application's targets to the cycle that it sees."""
+    """Adapt the application's targets to the newest actual values that it has."""
     cdef uint32_t i
     cdef double position, velocity, torque
     for i in range(x.axis_count):
@@ -438,18 +440,18 @@ cdef void axes_follow_now(const axes_t *x, target_t *target) noexcept nogil:
 # ---- Python interface
 
 def finite_or(value, double absent, where, *, positive=True):
-    """Return a limit as a float; None: `absent`."""
+    """Return a limit, or `absent` if it is None. Raise ValueError if it is invalid."""
     if value is None:
         return absent
     if not isfinite(value) or (positive and value <= 0):
-        raise ValueError(f"{where}: {value}")
+        raise ValueError(f"{where}: {value}, must be finite{' and positive' * positive}")
     return value
 
 
 def cycles_of(duration_ns, period_ns, where):
     """Return the number of cycles that last at least `duration_ns`; 0 stays 0 (off)."""
     if not 0 <= duration_ns < 1 << 62:
-        raise ValueError(f"{where}: {duration_ns}")
+        raise ValueError(f"{where}: {duration_ns} ns, must be 0 to 2^62")
     return min(-(-duration_ns // period_ns), 0x7FFFFFFF)
 
 
@@ -463,7 +465,7 @@ cdef class Axes:
         self.c.input_areas = <area_t *>memory_take(memory, len(plan.input_areas) + 1, sizeof(area_t))
         self.c.output_areas = <area_t *>memory_take(memory, len(plan.output_areas) + 1, sizeof(area_t))
         if plan.lost_limit < 1:
-            raise ValueError(f"lost_limit: {plan.lost_limit}")
+            raise ValueError(f"lost_limit: {plan.lost_limit}, must be at least 1")
         self.c.period = plan.period_ns / 1e9
         self.c.lost_limit = min(plan.lost_limit, 0x7FFFFFFF)
         self.make_limits_in_time(plan)
@@ -518,7 +520,7 @@ cdef class Axes:
         if not 0 <= plan.sync_unit < len(cycle.sync_units):
             raise ValueError(f"{name}: sync unit {plan.sync_unit} of {len(cycle.sync_units)}")
         if not -128 <= plan.mode <= 127:
-            raise ValueError(f"{name}: mode {plan.mode}")
+            raise ValueError(f"{name}: mode {plan.mode}, must be -128 to 127")
         outputs, inputs = cycle.output_size, cycle.input_size
         make_number(&a.controlword, plan.controlword, outputs, f"{name} controlword")
         make_number(&a.statusword, plan.statusword, inputs, f"{name} statusword")

@@ -1,4 +1,4 @@
-"""Values of every axis in every logged cycle; used by the compiled modules."""
+"""Log of the values of every axis in every cycle; used by the compiled modules."""
 
 from typing import Final
 

@@ -1,10 +1,10 @@
 # cython: boundscheck=False, wraparound=False, cdivision=True
-"""Values of every axis in every logged cycle: a ring of rows in the locked memory of the log.
+"""Log of the values of every axis in every cycle: a ring of rows in the locked memory of the log.
 
-A row is the number of its cycle, then one axis_record_t for each axis. The writer clears the number,
+A row contains the cycle number and one axis_record_t for each axis. The writer clears the number,
 writes the records and stores the number again (release). A reader copies a row and checks that the
-number is the same before and after the copy; otherwise the row belongs to another cycle. `rows` NULL:
-no axis is logged. Budget: 10 ns for each axis.
+number is the same before and after the copy; otherwise the row belongs to another cycle. `rows`
+NULL: no axis is logged. Budget: 10 ns for each axis.
 """
 
 from libc.stdint cimport uint8_t, uint32_t, uint64_t
@@ -47,7 +47,7 @@ cdef void axis_log_put(axis_log_t *log, uint64_t number, const actual_t *actual,
     cdef axis_record_t *r = <axis_record_t *>(row + sizeof(uint64_t))
     cdef uint32_t i
     cat_store_release64(stamp, 0)
-    cat_fence()  # before the records
+    cat_fence()  # the number is cleared before the records change
     for i in range(log.axes):
         r[i].actual_position = actual.position[i]
         r[i].actual_velocity = actual.velocity[i]
@@ -66,8 +66,10 @@ cdef void axis_log_put(axis_log_t *log, uint64_t number, const actual_t *actual,
 
 
 cdef bytes axis_log_row(const axis_log_t *log, uint64_t number):
-    """Return the records of a cycle: empty if axes are not logged, None if the row was
-    overwritten."""
+    """Return the records of a cycle; None if the row was overwritten.
+
+    If axes are not logged, return empty bytes.
+    """
     cdef uint8_t *row
     cdef uint64_t *stamp
     if log.rows == NULL:

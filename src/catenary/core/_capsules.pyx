@@ -32,9 +32,9 @@ cdef cat_image *image_in(object capsule, plan) except NULL:
     mine = (image.output_size, image.input_size, image.unit_count)
     wanted = (plan.output_size, plan.input_size, len(plan.sync_units))
     if mine != wanted:
-        raise ValueError(f"image: (output, input bytes, sync units) {mine}, the plan has {wanted}")
+        raise ValueError(f"image: (output bytes, input bytes, sync units) {mine}, the plan has {wanted}")
     if plan.clock is not None:
-        raise ValueError("clock: the owner of the image table keeps the clocks")
+        raise ValueError("clock: the owner of the image table controls the clocks; remove the plan's clock")
     return image
 
 
@@ -42,8 +42,8 @@ cdef const cat_sink *sink_in(object capsule, tuple sizes) except NULL:
     """Return the sink table of a capsule; check its block sizes [bytes]."""
     cdef const cat_sink *sink = <const cat_sink *>PyCapsule_GetPointer(capsule, CAT_SINK_CAPSULE)
     if sink.version != CAT_SINK_VERSION:
-        raise ValueError(f"sink table of version {sink.version}, not {CAT_SINK_VERSION}")
+        raise ValueError(f"sink: table version {sink.version}, expected {CAT_SINK_VERSION}")
     asked = (sink.record_size, sink.actual_size, sink.target_size)
     if asked != sizes:
-        raise ValueError(f"a sink for blocks of {asked} bytes, there are {sizes}")
+        raise ValueError(f"sink: blocks of {asked} bytes, the engine has {sizes}")
     return sink

@@ -33,7 +33,7 @@ COMMANDS = (
     (0x07, 0x0F, 0x02, 0x07),  # operation enabled: 5 (ramp of 0x605C), stays, 11 (0x605A), 5
     (0x00, 0x00, 0x02, 0x00),  # quick stop active: 12, 12 (16 would move at once), stays, 12
     (0x00, 0x00, 0x00, 0x00),  # fault reaction active: the drive leaves it by itself
-    (0x00, 0x80, 0x00, 0x80),  # fault: stays (and prepares the edge of bit 7), 15, stays, 15
+    (0x00, 0x80, 0x00, 0x80),  # fault: stays (and prepares the rising edge of bit 7), 15, stays, 15
 )
 
 cdef uint8_t[128] STATE_OF  # only the low seven bits of the statusword are used
@@ -50,7 +50,7 @@ cdef uint16_t cia402_command(uint8_t state, uint8_t requested_state, uint16_t pr
         return 0
     command = COMMAND_OF[state][requested_state]
     if command == FAULT_RESET and previous & 0x0F:
-        return 0  # fault of an enabled drive: clear its commands first
+        return 0  # clear the commands of an enabled drive before the reset
     return command
 
 

@@ -46,10 +46,10 @@ class Clock:
         """
 
     def reset_figures(self) -> None:
-        """Forget the largest magnitudes."""
+        """Reset the largest magnitudes."""
 
     def keep_within(self, bound_ns: int) -> None:
-        """Set the bound of differences and phase."""
+        """Set the bound for clock differences and phase error [ns]."""
 
     def set_epoch(self, epoch_ns: int) -> None:
         """Set system time minus link time. Call it before `start`."""

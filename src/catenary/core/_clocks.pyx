@@ -1,15 +1,16 @@
 # cython: boundscheck=False, wraparound=False, cdivision=True
 """Distributed clocks in the cycle: time in the frames, phase of the cycle starts, supervision.
 
-Every frame is stamped when it leaves. The time that the reference clock put into it gives the phase of
-its cycle start. A PI controller of rising inertia turns phase errors into longer or shorter periods
-(docs/how_to/clocks.md explains its gains); plan/clocks.py has the numbers. If the clocks follow the
-MainDevice, the cycle starts are set into phase once and stay on their grid.
-Its twin in Python: tests/core/phase_twin.py. Budget: 60 ns per cycle.
+Every frame is stamped when it leaves. The time that the reference clock put into it gives the phase
+of its cycle start. A PI controller with decreasing bandwidth corrects phase errors by longer or
+shorter periods (docs/how_to/clocks.md explains its gains); plan/clocks.py has the numbers. If the
+clocks follow the MainDevice, the cycle starts are set into phase once and stay on their grid. Its
+twin in Python: tests/core/phase_twin.py. Budget: 60 ns per cycle.
 
-A reference that does not answer is no longer read in each frame: a device that was switched off
-returns with another time, which must not spread. All other clocks then follow the time in the frame,
-which the core continues. The reference is probed now and then, and leads again once its time agrees.
+A reference that does not answer is no longer read in each frame. A device that was switched off
+returns with a different time, which must not reach the other clocks. All other clocks then follow
+the time in the frame, which the core continues. The reference is probed periodically, and leads
+again once its time agrees.
 """
 
 from libc.math cimport fabs
@@ -21,13 +22,13 @@ from catenary.core._native cimport CAT_FPRD, CAT_FRMW
 cdef enum:
     HOLD = 2                   # an answer belongs to a cycle start that was fixed two cycles before
     REJECTED_MAX = 8           # errors beyond `step` in a row that mean a jump of the clock
-    SILENT_MAX = 16            # cycles without the reference until the core continues its time
+    SILENT_MAX = 16            # cycles without an answer until the core continues the reference's time
     PROBED = 0xFFFFFFFF
     PROBE_EVERY = 8            # cycles between two probes of a lost reference
     ADP = 2                    # offset in a datagram's header
     ADO = 4
     DATA = 10
-    NO_STATION = 0xFFFF        # as in IgH; 0 is the address of a device just switched on
+    NO_STATION = 0xFFFF        # as in IgH; a device has address 0 after power-on
     SYSTEM_TIME = 0x0910
     DIFFERENCE = 0x092C
     SETTLE = 16                # cycles within the bound, in addition to one round of all followers
@@ -69,7 +70,7 @@ cdef int64_t phase_coast(phase_t *p) noexcept nogil:
 
 
 cdef int64_t phase_seek(phase_t *p, int64_t error) noexcept nogil:
-    """Set the cycle starts into phase at once, only forward: none is early."""
+    """Set the cycle starts in phase at once, only by delays, so that none is early."""
     p.state = FOLLOWING
     p.hold = HOLD
     p.rejected = 0
@@ -83,8 +84,8 @@ cdef int64_t phase_step(phase_t *p, int64_t error) noexcept nogil:
     late).
 
     Single errors beyond `step` are outliers. Several in a row mean that the clock has jumped. The
-    jump is corrected within the rate limit, about as fast as the other clocks follow. Cycle starts
-    that jumped too would put the frames after the SYNC signals of clocks that still follow.
+    jump is corrected within the rate limit, about as fast as the other clocks follow. If the
+    cycle starts jumped as well, frames would arrive after the SYNC signals of the other clocks.
     """
     cdef double wanted, applied, gain
     if p.state == SEEKING:
@@ -140,7 +141,7 @@ cdef inline int64_t expected_time(const clock_t *k, int64_t now) noexcept nogil:
 
 
 cdef void ask(clock_t *k) noexcept nogil:
-    """Select the follower that the frame reads; sometimes a lost reference instead."""
+    """Select the follower that the frame reads; periodically probe a lost reference instead."""
     if k.holding and k.silent % PROBE_EVERY == 0:
         k.asked = PROBED
         put16(k.watch_header + ADP, k.reference)
@@ -172,7 +173,7 @@ cdef void take_time(clock_t *k, const uint8_t *data, uint16_t counter) noexcept 
     cdef uint32_t low = word32(data)
     cdef int64_t expected = expected_time(k, k.sent)
     if k.holding or counter == 0 or (low == k.payload and counter != k.listeners):
-        return  # untouched: the other devices received our own time
+        return  # not read by the reference: the other devices received our own time
     k.time = expected + <int32_t>(low - <uint32_t>expected)
     k.time_sent = k.sent
     k.samples += 1
@@ -229,7 +230,7 @@ cdef void clock_take(clock_t *k, uint8_t command, const uint8_t *data,
 # ---- the end of a cycle's input
 
 cdef int64_t follow_reference(clock_t *k) noexcept nogil:
-    """Return the error of the cycle start, not of the frame: its delay after the start is known."""
+    """Return the shift for the phase error of the cycle start, corrected for the send delay."""
     cdef int64_t at_instant
     if not k.sampled:
         return phase_coast(&k.phase)
@@ -239,7 +240,7 @@ cdef int64_t follow_reference(clock_t *k) noexcept nogil:
 
 
 cdef int64_t lead_reference(clock_t *k) noexcept nogil:
-    """Set the cycle starts into phase with our own time; the error is that of the reference."""
+    """Set the cycle starts in phase with our own time; measure the error of the reference."""
     if k.sampled:
         if k.phase.hold:
             k.phase.hold -= 1
@@ -266,7 +267,7 @@ cdef void take_bound(clock_t *k) noexcept nogil:
 
 
 cdef void watch(clock_t *k) noexcept nogil:
-    """Update `locked`: set after some time within the bound, cleared at once outside it."""
+    """Update `locked`: set it after some time within the bound, clear it at once outside."""
     cdef bint good = (k.phase.state == FOLLOWING and k.phase.hold == 0 and k.samples > 0
                       and k.silent < SILENT_MAX and k.outside == 0
                       and fabs(k.phase.mean) <= k.bound)
@@ -311,7 +312,7 @@ cdef int64_t clock_close(clock_t *k) noexcept nogil:
 cdef set_phase(phase_t *p, plan, int64_t period_ns):
     if not (0 < plan.bandwidth <= 0.25 and 0 <= plan.rate_limit_ns <= 0.1 * period_ns
             and 0 <= plan.drift_limit_ns <= plan.rate_limit_ns and 0 < plan.step_ns < period_ns):
-        raise ValueError(f"clock: impossible phase controller in {plan}")
+        raise ValueError(f"clock: parameters of the phase controller are out of range: {plan}")
     p.period = period_ns
     p.bandwidth_end = plan.bandwidth
     p.rate_limit = plan.rate_limit_ns
@@ -352,7 +353,7 @@ cdef class Clock:
     def __cinit__(self, plan, int64_t period_ns):
         set_phase(&self.c.phase, plan, period_ns)
         if plan.follow not in ("reference", "main"):
-            raise ValueError(f"clock: follow {plan.follow!r}")
+            raise ValueError(f"clock: follow {plan.follow!r}, must be 'reference' or 'main'")
         if len(plan.stations) > 0xFFFF or not 0 <= plan.phase_ns < period_ns:
             raise ValueError(f"clock: {len(plan.stations)} followers, phase {plan.phase_ns}")
         self.c.follows_main = plan.follow == "main"
@@ -418,7 +419,7 @@ cdef class Clock:
 
     def keep_within(self, int64_t bound_ns):
         if bound_ns <= 0:
-            raise ValueError(f"clock: a bound of {bound_ns} ns")
+            raise ValueError(f"clock: bound {bound_ns} ns, must be positive")
         self.c.bound_asked = bound_ns
 
     def set_epoch(self, int64_t epoch_ns):

@@ -20,7 +20,7 @@ cdef enum:  # phases
     RECEIVE = 2
     PROCESS = 3
     SEND = 4
-    TAIL = 5
+    POST_PROCESSING = 5
     ROUND_TRIP = 6
     IN_CONTROLLER = 7
     OUTPUT_DELAY = 8
@@ -65,7 +65,7 @@ cdef struct cycle_t:
     cat_pointer stream         # stream_t; none: the application or the law sets the set-points
     const cat_sink *sink       # NULL: none
     int execution
-    bint patient               # a cycle may begin at any time within its period: several engines in one thread
+    bint patient               # several engines in one thread: a cycle may begin at any time in its period
     int64_t period
     int64_t busy_wait          # busy-wait time before each cycle start
     int64_t collect_deadline   # time after the wake-up

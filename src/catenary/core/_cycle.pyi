@@ -4,7 +4,7 @@ from typing import Final
 
 # Flags that `next` and `run` return, and that `flags` keeps.
 CYCLE_OK: Final[int]  # every required sync unit answered in this cycle
-CYCLE_LATE: Final[int]  # cycles were skipped before this one (or Python missed cycles)
+CYCLE_LATE: Final[int]  # cycles were skipped before this one, or Python missed cycles
 CYCLE_LIMITED: Final[int]  # the last set-points sent were limited on some axis
 CYCLE_WORKING_COUNTER: Final[int]  # lost_limit cycles in a row were not ok
 CYCLE_DROPPED: Final[int]  # the core stopped an axis, or a drive refused a mode

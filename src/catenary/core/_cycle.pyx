@@ -1,5 +1,5 @@
 # cython: boundscheck=False, wraparound=False, cdivision=True
-"""One cycle in its two execution modes, and its cycle starts.
+"""One cycle in both execution modes, and the cycle starts.
 
 Theory of operation.
 
@@ -10,21 +10,22 @@ Theory of operation.
 `cycle_native` is one threaded cycle, with or without a law. An inline loop runs it in its caller's
 thread while a law runs. A law computes after the frames of its cycle are back, for the next cycle
 (`computed`). Like Python, it has one period from input to output, and its frames leave at the cycle
-start. Its first step follows the collect of the cycle in which it was requested. Its last targets are
-sent in the cycle after its last step. Requests of the application during a law apply one cycle later,
-except for stops, requested states that remove power, and control bits (`axes_apply_late`).
+start. Its first step follows the collect of the cycle in which it was requested. Its last targets
+are sent in the cycle after its last step. Requests of the application during a law apply one cycle
+later, except for stops, requested states that remove power, and control bits (`axes_apply_late`).
 
-In virtual time all modes run in the caller's thread. Cycle starts are origin + k·period. A cycle that
-begins late is sent if its frames can return before the next cycle start (`turnaround`), with a law
-before its reserve. Otherwise it is skipped and counted; no burst makes up for it. Inline, a body
-that ends after the next cycle start skips that one: its frames cannot return in time. With clocks,
-frames that leave later than the margin before SYNC0 are sent and counted (`missed_sync`).
+In virtual time all modes run in the caller's thread. Cycle starts are origin + k·period. A cycle
+that begins late is sent if its frames can return before the next cycle start (`turnaround`), with a
+law before its reserve. Otherwise it is skipped and counted; cycles are never sent in bursts to
+catch up. Inline, a body that ends after the next cycle start skips that one: its frames cannot
+return in time. With clocks, frames that leave later than the margin before SYNC0 are sent and
+counted (`missed_sync`).
 
-Phases. receive: inputs usable, from the wake-up (inline) or from the last frame (threaded). process:
-the body of the application, or the law. send: wake-up → last cyclic frame handed to the kernel
-(inline: end of the body →). in_controller: their sum. tail: post-processing until the next wait.
-round_trip: sent → last frame seen (threaded). output_delay: cycle start → last cyclic frame handed to
-the kernel. input_age: frames handed to the kernel → law or body begins with their inputs.
+Phases. receive: inputs usable, from the wake-up (inline) or from the last frame (threaded).
+process: the body of the application, or the law. send: wake-up → last cyclic frame handed to the
+kernel (inline: end of the body →). in_controller: their sum. post_processing: work until the next
+wait. round_trip: sent → last frame seen (threaded). output_delay: cycle start → last cyclic frame
+handed to the kernel. input_age: frames handed to the kernel → law or body begins with their inputs.
 interpreter: Python's thread awake → it has the interpreter (added by the engine).
 Budget: 1 us for three drives, without the link.
 """
@@ -112,7 +113,7 @@ PHASE_NAMES = {
     "receive": RECEIVE,
     "process": PROCESS,
     "send": SEND,
-    "tail": TAIL,
+    "post_processing": POST_PROCESSING,
     "round_trip": ROUND_TRIP,
     "in_controller": IN_CONTROLLER,
     "output_delay": OUTPUT_DELAY,
@@ -229,7 +230,7 @@ cdef void cycle_await_acyclic(cycle_t *c, int64_t until) noexcept nogil:
 
 
 cdef void begin(cycle_t *c, int64_t wake) noexcept nogil:
-    """Begin a cycle with what the frames need; figures follow in the post-processing."""
+    """Begin a cycle. Only work that the frames need is done here; figures are computed later."""
     cdef record_t *record
     c.number += 1
     c.scheduled = c.next
@@ -273,7 +274,7 @@ cdef inline void follow_clock(cycle_t *c) noexcept nogil:
 
 
 cdef inline void judge(cycle_t *c) noexcept nogil:
-    """Judge the frames that were collected."""
+    """Update the flags and the loss counters from the collected frames."""
     if c.image.ok[0]:
         c.flags |= OK
         if c.image.whole[0]:
@@ -286,7 +287,7 @@ cdef inline void judge(cycle_t *c) noexcept nogil:
 
 
 cdef void report(cycle_t *c, actual_t *actual, const target_t *target) noexcept nogil:
-    """Report the cycle in addition to its values: axes, header, log, sticky flags."""
+    """Write the results of the cycle: axes, header, log, sticky flags."""
     cdef actual_header_t *header = actual.header
     cdef record_t *record = record_of(c)
     cdef uint32_t unit
@@ -362,8 +363,9 @@ cdef bint take_streamed(cycle_t *c, target_t *target, bint fresh, uint64_t numbe
 
 cdef int64_t give(cycle_t *c, record_t *record, int64_t since, const actual_t *actual,
                   const target_t *target) noexcept nogil:
-    """Pass the cycle to the sink; return the duration of the post-processing without the sink,
-    whose own time cannot be part of the data it receives.
+    """Pass the cycle to the sink; return the duration of the post-processing with the sink.
+
+    The sink receives the duration without itself.
     """
     record.tail_ns = short_ns(now(c) - since)
     c.sink.put(c.sink.self, c.number, record, actual.header, target.header)
@@ -401,7 +403,7 @@ cdef void post_process(cycle_t *c, int64_t since, const actual_t *actual,
             histogram_add(&h[IN_CONTROLLER], c.process + record.receive_ns + record.send_ns)
     took = give(c, record, since, actual, target) if c.sink != NULL else now(c) - since
     record.tail_ns = short_ns(took)
-    histogram_add(&h[TAIL], took)
+    histogram_add(&h[POST_PROCESSING], took)
     clear_next_record(c)
 
 
@@ -415,8 +417,8 @@ cdef int64_t cycle_law_reserve(const cycle_t *c, int64_t budget) noexcept nogil:
 
 
 cdef void end_law(cycle_t *c, uint32_t status) noexcept nogil:
-    """Hand over: targets committed before the law are no longer valid. `status` RUNNING: the law
-    has ended by itself and its last targets are still to be sent.
+    """Hand over: targets committed before the law are no longer valid. With
+    `status` RUNNING, the law has ended by itself and its last targets are still to be sent.
     """
     if c.law == NULL:
         return
@@ -429,7 +431,7 @@ cdef void end_law(cycle_t *c, uint32_t status) noexcept nogil:
 
 
 cdef void forget_law(cycle_t *c) noexcept nogil:
-    """Access the law for the last time: afterwards the engine may free it."""
+    """Release the law; afterwards the engine may free it."""
     c.law = NULL
     law_monitor_park(&c.monitor)
     cat_pointer_release(&c.law_request)
@@ -458,8 +460,9 @@ cdef void take_law(cycle_t *c, const target_t *orders) noexcept nogil:
 
 
 cdef void take_orders(cycle_t *c, const target_t *committed) noexcept nogil:
-    """Copy what the application may request while a law computes: states, modes, control bits, and
-    bytes of areas, which a law cannot access.
+    """Copy the application's states, modes and control bits, and the bytes of areas.
+
+    A law cannot access these.
     """
     cdef target_t *target = &c.handover.target[OF_LAW]
     cdef uint32_t axes = c.handover.counts.axes
@@ -471,7 +474,7 @@ cdef void take_orders(cycle_t *c, const target_t *committed) noexcept nogil:
 
 
 cdef bint step_law(cycle_t *c, actual_t *actual, target_t *target) noexcept nogil:
-    """Run one step of the law. Return False if the targets it left must not be sent."""
+    """Run one step of the law; return True if its targets may be sent."""
     cdef law_t *law = c.law
     cdef int64_t since = now(c)
     cdef bint goes_on
@@ -550,7 +553,7 @@ cdef void write_committed(cycle_t *c, target_t *committed, bint fresh) noexcept 
 
 
 cdef void note_return(cycle_t *c) noexcept nogil:
-    """Note after a collect with a deadline how long the frames took."""
+    """Record how long the frames took, after a collect with a deadline."""
     cdef int64_t seen = c.image.frame_stamp[0]
     if c.missing == 0:
         record_of(c).round_trip_ns = short_ns(seen - c.sent)

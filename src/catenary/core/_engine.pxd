@@ -15,7 +15,7 @@ from catenary.core._thread cimport cat_scheduling, thread_t
 cdef struct engine_t:
     cycle_t cycle
     thread_t thread
-    int error                  # reason why the native thread ended by itself
+    int error                  # -errno that ended the native thread; 0: none
     uint32_t done              # the native thread has ended
 
 cdef class Engine:
@@ -34,7 +34,7 @@ cdef class Engine:
     cdef uint16_t device_count
     cdef bint alone            # no other program shares the virtual time: waits keep the GIL
     cdef Figures figures
-    cdef Law law               # running, or its end has not been seen yet; None: Python sets the targets
+    cdef Law law               # running, or Python has not processed its end yet; None: no law
     cdef list laws             # laws that the cycle may still use
     cdef Stream stream         # sets the set-points; None: Python or the law does
     cdef list streams          # streams that the cycle may still use

@@ -1,4 +1,4 @@
-"""Engine: owns all parts of a cyclic exchange and is its only entry from Python."""
+"""Engine: owner of all parts of a cyclic exchange and their only interface to Python."""
 
 from catenary.core._clocks import Clock
 from catenary.core._law import Law
@@ -12,13 +12,13 @@ class Engine:
     thread. On a link in virtual time both modes run in the caller's thread.
 
     Args:
-        plan: a catenary.plan.CyclePlan, read by attribute.
-        link: a capsule "catenary.link"; the caller keeps the link object alive until `stop`.
-        image: a capsule "catenary.image" of another master that exchanges the process images. The
-            link is then used for the time only; the plan's frames and the queue are not used.
+        plan: A catenary.plan.CyclePlan, read by attribute.
+        link: A capsule "catenary.link"; the caller keeps the link object alive until `stop`.
+        image: A capsule "catenary.image" of another master that exchanges the process images. The
+            link is then used only for the time; the plan's frames and the queue are not used.
 
     Raises:
-        ValueError: a number of the plan is out of range.
+        ValueError: A number of the plan is out of range.
     """
 
     def __init__(self, plan: object, link: object, image: object = None) -> None: ...
@@ -30,21 +30,20 @@ class Engine:
         actual_position, actual_velocity, actual_torque, statusword, mode_actual, axis_state,
         axis_flags, input_reals, input_integers, input_bits, input_bytes, and unit_valid ("B"),
         unit_counter ("H") per sync unit. Writable: target_position, target_velocity, target_torque,
-        mode_target, requested_state, request, controlword_bits, output_reals, output_integers, output_bits,
-        output_bytes.
+        mode_target, requested_state, request, controlword_bits, output_reals, output_integers,
+        output_bits, output_bytes.
 
-        A quantity that is not mapped reads NaN (velocity: estimated from the position).
-        A requested state is taken over when `request` of its axis has changed: requested_state[i] = 1;
-        request[i] += 1.
-        Until an axis is followed, each `next` and `run` overwrites its targets with what is sent to
-        it: the actual position (powered: the held one), velocity and torque.
+        A quantity that is not mapped reads NaN; a velocity is then estimated from the position. A
+        requested state takes effect when `request` of its axis changes: requested_state[i] = 1;
+        request[i] += 1. Until an axis is followed, each `next` and `run` overwrites its targets with
+        the values sent to it: position (held if powered, otherwise actual), velocity and torque.
         """
 
     def start(self, origin_ns: int = 0) -> None:
         """Start the cycles: flush the link, set the first cycle start, start the native thread.
 
-        Until the first commit, drives stay disabled and outputs are zero. After `stop` it
-        continues.
+        Until the first commit, drives stay disabled and outputs are zero. After `stop`, the grid of
+        cycle starts continues.
 
         Raises:
             OSError: The native thread cannot be started.
@@ -65,7 +64,7 @@ class Engine:
         """
 
     def commit_targets(self) -> None:
-        """Commit the target buffers before the next `next`, if that waits for a native thread.
+        """Commit the target buffers before `next`, if a native thread runs the cycles.
 
         With several engines, commit all of them before waiting for the first one.
         """
@@ -75,24 +74,24 @@ class Engine:
         """True if a law that has begun, or a stream, sets the targets."""
 
     def keep_targets(self) -> None:
-        """Make the next `next` commit nothing."""
+        """Skip the commit of the following `next`."""
 
     background: bool
     """True if a thread repeats the targets of a program.
 
-    CSP then has no late limit. Set-points of CSV and CST are valid until the command timeout after
-    an update; then their targets are the commanded values. Inline cycles raise ValueError.
+    CSP then has no late limit. After an update, set-points of CSV and CST are valid until the
+    command timeout; then their targets are the commanded values. Raises ValueError if inline.
     """
 
     def begin_update(self) -> None:
-        """Allow another thread than the one that iterates to write the target buffers.
+        """Allow a thread other than the iterating one to write the target buffers.
 
-        Until `end_update`, `next` does not change them. Use it in one thread at a time, which keeps
-        the other from committing.
+        Until `end_update`, `next` does not change them. Only one thread may use it at a time, and it
+        must prevent the iterating thread from committing.
         """
 
     def end_update(self, commit: bool) -> None:
-        """End an update; commit the target buffers as new ones of the program in the background."""
+        """End an update; if `commit`, commit the target buffers as an update in the background."""
 
     @property
     def origin(self) -> int:
@@ -102,10 +101,10 @@ class Engine:
         """
 
     def take_turns(self) -> None:
-        """Allow cycles to begin at any time within the period: several engines in one thread."""
+        """Allow late cycle starts within the period, for several engines in one thread."""
 
     def run(self, cycles: int) -> int:
-        """Run cycles without an application, for start-up and shutdown: a hand-over.
+        """Run cycles without an application (a hand-over), for start-up and shutdown.
 
         Requests, modes, control bits and columns are committed; set-points are not. CSV and CST
         axes are not enabled. The GIL is released; signal handlers run at least every 10 ms.
@@ -123,13 +122,13 @@ class Engine:
         """
 
     def quick_stop_all(self) -> None:
-        """Stop every axis with the next frames; each needs a new request afterwards.
+        """Stop every axis with the next frames. Afterwards, each axis needs a new request.
 
-        It can be called from any thread.
+        Any thread may call it.
         """
 
     def run_until_stopped(self, timeout_ns: int) -> bool:
-        """Run until no axis is powered (each is disabled, in fault, or its unit is lost).
+        """Run until every axis is disabled, in fault or lost.
 
         Returns:
             False if `timeout_ns` passed first.
@@ -158,7 +157,7 @@ class Engine:
     @zero_ns.setter
     def zero_ns(self, zero: int) -> None: ...
 
-    # The cycle that `actual` belongs to.
+    # Properties of the cycle of the current actual values.
     @property
     def number(self) -> int:
         """Number of cycles so far: 1 for the first."""
@@ -189,7 +188,7 @@ class Engine:
     def disturbed(self) -> bool:
         """True if a device did not answer at the last collect, or was not in OP without an error.
 
-        It can be read from any thread.
+        Any thread may read it.
         """
 
     # Figures. Exact after `stop`; while the native thread runs, they may differ by one cycle.
@@ -214,14 +213,14 @@ class Engine:
         """Return (lower, upper, count) of every bucket of a phase that is not empty [s]."""
 
     def reset_histograms(self) -> None:
-        """Clear the figures so far, for example those of the start-up."""
+        """Clear the histograms, for example after the start-up."""
 
     def log(self) -> bytes:
         """Return the records (RECORD_FIELDS) of the last cycles, oldest first.
 
         With the plan's `log_axes`, each is followed by one record (AXIS_FIELDS) for each axis:
-        measured values, the targets of the frames that read them (law: those computed from them),
-        and what was sent.
+        measured values, the targets of the frames that read them (for a law, the targets computed
+        from them) and the values sent.
         """
 
     @property
@@ -262,14 +261,14 @@ class Engine:
 
     @property
     def clock(self) -> Clock | None:
-        """Distributed clocks; None if the plan has none."""
+        """Distributed clocks; None if the plan does not use them."""
 
     # Sinks.
     def set_sink(self, capsule: object) -> None:
         """Pass every cycle, after its frames, to a sink: a capsule "catenary.sink" (native/sink.h).
 
         Args:
-            capsule: The sink; None: no sink.
+            capsule: The sink; None to remove it.
 
         Raises:
             RuntimeError: The engine is running.
@@ -304,19 +303,19 @@ class Engine:
         """Return the private buffers as the blocks of `law_fields`; the second is writable."""
 
     def start_law(self, law: Law) -> None:
-        """Start a compiled law. From the next cycle on, it computes the set-points in the cycle
-        thread.
+        """Start a compiled law, which computes the set-points in the cycle thread.
 
-        It also computes the output columns. It begins with the commanded values and replaces a
-        running law. Requested states, modes and control bits stay with the application. While the
-        law runs, `next` overwrites the target buffers with the commanded values.
+        From the next cycle on, it also computes the output columns. It begins with the commanded
+        values and replaces a running law. Requested states, modes and control bits stay with the
+        application. While the law runs, `next` overwrites the target buffers with the commanded
+        values.
 
         Raises:
             ValueError: The budget leaves too little of the period for the frames.
         """
 
     def stop_law(self) -> None:
-        """Stop the law: a hand-over until the application commits targets."""
+        """Stop the law; a hand-over follows until the application commits targets."""
 
     def run_law(self, duration_ns: int, trouble: int) -> int:
         """Wait without the GIL until the law has ended.
@@ -330,13 +329,12 @@ class Engine:
         """
 
     def set_stream(self, stream: Stream | None) -> None:
-        """Take one row of the stream per cycle as set-points. A running law finds it in its
-        targets.
+        """Use one row of a stream per cycle as set-points.
 
-        An empty stream is an underrun.
+        A running law receives the row in its targets. An empty stream is an underrun.
 
         Args:
-            stream: The stream; None: a hand-over until the application commits targets.
+            stream: The stream; None starts a hand-over until the application commits targets.
 
         Raises:
             ValueError: The number of axes differs.

@@ -1,14 +1,14 @@
 # cython: boundscheck=False, wraparound=False, cdivision=True
-"""Engine: owns all parts of one cyclic exchange and is the only entry from Python.
+"""Engine: owner of all parts of a cyclic exchange and their only interface to Python.
 
-Theory of operation. In the threaded mode, `native` is set and a native thread runs the cycles. `step`
-commits the targets and waits for the newest cycle. Inline, and in virtual time, `step` runs the cycle
-in the caller's thread: `inline_outputs` and `inline_inputs`, or `lockstep` for a threaded cycle.
-`hold` runs cycles without an application: a hand-over. The GIL is released around waits only if
-another thread could need it (`alone`: not in virtual time). `law` and `stream` are the ones that
-compute the set-points; `laws` and `streams` keep every one that the cycle may still use. `committed`
-marks targets that were committed before `next`, `emitted` inline frames that were sent. `left` is the
-time at which the body began, and `input_age` the age of its inputs at that time.
+Theory of operation. In the threaded mode, `native` is set and a native thread runs the cycles.
+`step` commits the targets and waits for the newest cycle. Inline, and in virtual time, `step` runs
+the cycle in the caller's thread: `inline_outputs` and `inline_inputs`, or `lockstep` for a threaded
+cycle. `hold` runs cycles without an application: a hand-over. The GIL is released around waits only
+if another thread could need it (`alone`: not in virtual time). `law` and `stream` are the ones that
+compute the set-points; `laws` and `streams` keep every one that the cycle may still use.
+`committed` marks targets that were committed before `next`, `emitted` inline frames that were sent.
+`left` is the time at which the body began, and `input_age` the age of its inputs at that time.
 
 Budget of `next`, besides the link: 1 us for three drives.
 """
@@ -98,7 +98,7 @@ from catenary.core._thread cimport (
 
 cdef enum:
     SIGNALS_NS = 10_000_000    # longest run of native cycles between two calls of signal handlers
-    SILENCE_NS = 1_000_000_000 # plus some periods: longest wait for a cycle of a live thread
+    SILENCE_NS = 1_000_000_000 # plus four periods: longest wait for a cycle of a live thread
 
 
 cdef void thread_loop(void *argument) noexcept nogil:
@@ -128,16 +128,16 @@ def check_plan(plan):
     if plan.execution not in EXECUTION_MODES:
         raise ValueError(f"execution: {plan.execution!r}, must be one of {', '.join(EXECUTION_MODES)}")
     if not 1000 <= plan.period_ns <= 1 << 40:
-        raise ValueError(f"period_ns: {plan.period_ns}")
+        raise ValueError(f"period_ns: {plan.period_ns}, must be 1000 to 2^40")
     if not 0 <= plan.collect_deadline_ns <= plan.period_ns:
         raise ValueError(
-            f"collect_deadline_ns: {plan.collect_deadline_ns}, must lie in the period"
-            f" of {plan.period_ns}"
+            f"collect_deadline_ns: {plan.collect_deadline_ns}, must not exceed the"
+            f" period of {plan.period_ns}"
         )
     if plan.priority is not None and not 1 <= plan.priority <= 99:
         raise ValueError(f"priority: {plan.priority}, must be 1 to 99 or None")
     if plan.cpu is not None and not 0 <= plan.cpu < 1024:
-        raise ValueError(f"cpu: {plan.cpu}")
+        raise ValueError(f"cpu: {plan.cpu}, must be 0 to 1023 or None")
     if not 0 <= plan.busy_wait_ns < plan.period_ns:
         raise ValueError(f"busy_wait_ns: {plan.busy_wait_ns}, must be less than the period")
     if not 1 <= plan.log_cycles <= 1 << 24:
@@ -220,7 +220,7 @@ cdef class Engine:
         return self.h.actual[PRIVATE].header
 
     cdef void begin_iteration(self) noexcept:
-        """Make the present cycle start the zero of times, unless there is one."""
+        """Make the current cycle start the zero of times, unless it is already set."""
         if self.zero == 0:
             self.zero = self.e.cycle.origin + self.h.actual[PRIVATE].header.time_ns
 
@@ -296,7 +296,7 @@ cdef class Engine:
                 return True
         return image.al_counter[0] != self.device_count or image.al_status[0] != CAT_AL_OP
 
-    # ---- life
+    # ---- start and stop
 
     def start(self, int64_t origin_ns=0):
         cdef int rc
@@ -309,7 +309,7 @@ cdef class Engine:
         self.e.error = 0
         self.e.done = 0
         self.left = -1
-        handover_swap(self.h)  # left by an earlier run
+        handover_swap(self.h)  # discard the values of an earlier run
         if not self.virtual:
             self.settle_memory()
         self.e.thread.body = thread_loop
@@ -351,7 +351,7 @@ cdef class Engine:
         if self.forgotten:
             return RuntimeError("the loop runs in the parent process: a forked child cannot use it")
         if self.e.cycle.origin != 0:
-            return RuntimeError("the loop is closed, its cycle has ended: open it again")
+            return RuntimeError("the loop is closed and its cycle has ended: open it again")
         return RuntimeError("the engine is not running: start it first")
 
     # ---- steps
@@ -393,7 +393,7 @@ cdef class Engine:
                 header.updated = max(self.e.cycle.number, <uint64_t>1)
             self.commit_targets()
         self.writing = False
-        if self.law is None and self.stream is None:  # as `follow` did not meanwhile
+        if self.law is None and self.stream is None:  # `follow` skipped this during the update
             axes_follow(&self.axes.c, &self.h.actual[PRIVATE], &self.h.target[PRIVATE])
 
     @property
@@ -404,7 +404,7 @@ cdef class Engine:
         self.e.cycle.patient = not self.native
 
     cdef uint32_t step(self, int64_t timeout_ns=0) except? 0xFFFFFFFF:
-        """Run one step. `timeout_ns` 0: one second and some periods."""
+        """Run one step. A `timeout_ns` of 0 means one second and four periods."""
         if not self.running:
             raise self.not_running()
         if timeout_ns == 0:
@@ -447,8 +447,10 @@ cdef class Engine:
         return True
 
     cdef void follow(self) noexcept:
-        """Update the targets of Python that follow by themselves, after new actual values. While a
-        law runs, and until the cycle of its end has been seen, these are all targets.
+        """Update Python's targets after new actual values.
+
+        These are the targets of axes that are not followed. While a law runs, and until Python has
+        received the cycle of its end, these are all targets.
         """
         cdef actual_t *actual = &self.h.actual[PRIVATE]
         if self.law is None and self.stream is None:
@@ -463,13 +465,13 @@ cdef class Engine:
             self.law = None
 
     cdef void inline_outputs(self, bint application) noexcept nogil:
-        """Send once per cycle: a wait interrupted by a signal must not send a second time."""
+        """Send once per cycle, even if a signal interrupts the wait and it is repeated."""
         if not self.emitted:
             cycle_outputs(&self.e.cycle, &self.h.target[PRIVATE], application)
             self.emitted = True
 
     cdef int inline_inputs(self) except -1:
-        """Wait, and run the half of the cycle after it, in Python's thread."""
+        """Wait for the cycle start and read the inputs, in Python's thread."""
         cdef cycle_t *c = &self.e.cycle
         cdef int rc
         while True:
@@ -541,7 +543,7 @@ cdef class Engine:
         return self.flags_since() | flags
 
     cdef void enter_body(self) noexcept:
-        """Note when the application begins to compute, and how old its inputs are."""
+        """Record when the application begins to compute, and the age of its inputs."""
         self.left = self.now_ns()
         self.input_age = self.left - self.h.actual[PRIVATE].header.sent_ns
 
@@ -550,7 +552,7 @@ cdef class Engine:
         target.header.hold = hold
         target.header.seen = self.h.actual[PRIVATE].header.number
         target.header.stamp = target.header.seen + 1
-        if self.writing:  # an axis that became followed meanwhile keeps the written target
+        if self.writing:  # an axis followed since the update began keeps its written target
             target.header.seen = self.writing_since
         target.header.process_ns = -1
         target.header.input_age_ns = -1
@@ -670,7 +672,7 @@ cdef class Engine:
         cdef cycle_t *c = &self.e.cycle
         cdef int64_t since, slice, left = duration_ns
         if duration_ns < 0:
-            raise ValueError(f"duration_ns: {duration_ns}")
+            raise ValueError(f"duration_ns: {duration_ns}, must not be negative")
         if not self.running:
             raise self.not_running()
         if not self.virtual:
@@ -687,14 +689,14 @@ cdef class Engine:
             left -= slice + self.now_ns() - since  # the cycles do not use the application's time
 
     cdef void compute(self, int64_t duration_ns) noexcept:
-        """Compute for this long, where time passes by itself."""
+        """Compute for this long in real time."""
         cdef int64_t end = self.now_ns() + duration_ns
         with nogil:
             while self.e.cycle.link.now(self.e.cycle.link.self) < end:
                 pass
 
     cdef int spend_cycle(self) except -1:
-        """Run a cycle while the application computes; it does not see this cycle yet."""
+        """Run a cycle while the application computes; its values are not swapped in yet."""
         cdef int rc
         with nogil:
             rc = cycle_wait(&self.e.cycle)
@@ -734,7 +736,7 @@ cdef class Engine:
         return f"{scheduling_text(&self.e.thread)}, {self.memory_text()}"
 
     cdef void settle_memory(self) noexcept:
-        """Touch and lock the memory of the cycle. The log is last, so that it is refused first."""
+        """Touch and lock the memory of the cycle. The log is last, so that it is the first to be refused."""
         if self.frames is not None:
             cat_memory_settle(&self.frames.memory)
         if self.clock is not None:
@@ -776,7 +778,7 @@ cdef class Engine:
             self.law.supersede()
         if not self.virtual:
             cat_memory_settle(&law.memory_block)
-        self.laws = [*self.laws, law]  # before the offer: it must outlive its use by the cycle
+        self.laws = [*self.laws, law]  # before the offer, to keep the law alive while the cycle uses it
         self.law = law
         law.c.threaded = self.native
         self.h.target[PRIVATE].header.updated = 0  # not valid after the law
@@ -830,7 +832,7 @@ cdef class Engine:
     def set_sink(self, capsule):
         cdef const cat_sink *sink = NULL
         if self.running:
-            raise RuntimeError("the engine is running: a sink is set before, and taken away after")
+            raise RuntimeError("the engine is running: stop it before you set or remove a sink")
         if capsule is not None:
             sink = sink_in(capsule, self.sink_sizes)
         self.e.cycle.sink = sink
@@ -840,7 +842,7 @@ cdef class Engine:
 
     def set_stream(self, Stream stream):
         if stream is not None and stream.c.axes != self.axes.c.axis_count:
-            raise ValueError(f"a stream for {stream.c.axes} axes, there are {self.axes.c.axis_count}")
+            raise ValueError(f"the stream has {stream.c.axes} axes, the engine {self.axes.c.axis_count}")
         if stream is not None:
             if not self.virtual:
                 cat_memory_settle(&stream.memory)

@@ -2,7 +2,7 @@
 """Figures of a cycle: the log, a ring of records, and one histogram per phase.
 
 The native thread writes without waiting. A reader copies a record and drops it if the thread has
-overwritten it meanwhile; histograms are reset by exchanging them for cleared ones.
+overwritten it during the copy. Histograms are reset by exchanging them for cleared ones.
 """
 
 from libc.stdint cimport uint8_t, uint32_t, uint64_t
@@ -41,10 +41,9 @@ cdef class Figures:
         return 0
 
     cdef bytes log(self):
-        """Return the last records, oldest first, each followed by those of its axes if they are
-        logged.
+        """Return the last records, oldest first; records of logged axes follow each of them.
 
-        Cycles that are incomplete or were overwritten meanwhile are left out.
+        Cycles that are incomplete or were overwritten during the copy are omitted.
         """
         cdef cycle_t *c = self.cycle
         cdef uint64_t last = c.number

@@ -46,7 +46,7 @@ cdef struct frame_t:
     uint8_t needed             # its loss makes the cycle not ok
     uint8_t index              # index in the last emit in which it was due
     uint8_t due                # sent in the last emit
-    uint8_t back               # accepted since the last emit
+    uint8_t back               # returned and accepted since the last emit
     uint8_t judged             # counters, AL status and clocks were evaluated since the last emit
     uint8_t template[1536]     # frame to send
     uint8_t returned[1536]     # last frame returned

@@ -4,15 +4,15 @@
 Theory of operation
     The plan makes a template for each frame. `emit` advances `serial`, gives each due frame the
     next index, copies the outputs into the templates and sends them. `collect`
-    takes received frames until all are back or the deadline has passed. Then it judges once:
-    returned frames (`judge_frame`), then sync units (`judge_units`), and copies the inputs of
-    valid units to the image. The inputs of other units keep their last valid values.
+    takes received frames until all are back or the deadline has passed. Then it
+    evaluates returned frames (`judge_frame`) and sync units (`judge_units`) once, and copies the
+    inputs of valid units to the image. The inputs of other units keep their last valid values.
 
 Matching
     A received frame is accepted if source, EtherType, commands, addresses and lengths match the
     template and its index was assigned in this cycle. An index is reused after 128 frames, so a
-    frame that is repeated that much later is accepted too. Frames with a cycle number (a NOP
-    datagram, `exact_matching` in the plan) are accepted only with the number of this cycle.
+    frame that is repeated exactly that much later is accepted as well. Frames with a cycle number
+    (a NOP datagram, `exact_matching` in the plan) are accepted only with the number of this cycle.
     Every other frame is counted by kind and dropped (`frame_counters_t`).
 
 Validity
@@ -67,7 +67,7 @@ cdef enum:
     DRAIN_MAX = 256            # frames taken in one collect: a flood cannot delay the cycle
     DIVIDER_MAX = 10000
     MISSED_MAX = 1000000000
-    NUMBER_SIZE = 4            # of the data of a cycle number
+    NUMBER_SIZE = 4            # size of the data of a cycle number [bytes]
 
 cdef enum:                     # kinds of datagrams, as in plan/cycle.py
     PROCESS_DATA = 0
@@ -179,7 +179,7 @@ cdef int frames_emit(void *self) noexcept nogil:
 
 
 cdef void forget_returns(frames_t *f) noexcept nogil:
-    """Reset what `judge` adds up, after the frames were sent."""
+    """Reset the sums of `judge`, after the frames were sent."""
     cdef uint32_t unit
     for unit in range(f.image.unit_count):
         f.units[unit].right = 0
@@ -337,7 +337,7 @@ cdef int await_frames(frames_t *f, int64_t deadline, int budget) noexcept nogil:
 # ---- judge
 
 cdef void judge_frame(frames_t *f, frame_t *frame) noexcept nogil:
-    """Judge the datagrams of a returned frame, once: working counters, AL status, clocks."""
+    """Evaluate the datagrams of a returned frame once: working counters, AL status, clocks."""
     cdef datagram_t *d = &f.datagrams[frame.first_datagram]
     cdef const datagram_t *end = d + frame.datagram_count
     cdef uint16_t counter
@@ -358,7 +358,7 @@ cdef void judge_frame(frames_t *f, frame_t *frame) noexcept nogil:
 
 
 cdef inline void judge_unit(frames_t *f, uint32_t unit) noexcept nogil:
-    """Judge a unit that is due in this cycle."""
+    """Determine whether a unit that is due in this cycle is valid."""
     cdef bint valid = f.units[unit].right == f.units[unit].datagrams
     f.unit_valid[unit] = valid
     f.unit_fresh[unit] = valid
@@ -385,7 +385,7 @@ cdef void judge_units(frames_t *f) noexcept nogil:
 
 
 cdef void copy_inputs(frames_t *f) noexcept nogil:
-    """Copy the inputs of returned datagrams, of each unit all or none."""
+    """Copy the inputs of returned datagrams; for each unit, copy either all or none."""
     cdef const datagram_t *d = f.datagrams
     cdef const datagram_t *end = d + f.datagram_count
     cdef const frame_t *frame
@@ -403,8 +403,9 @@ cdef void copy_inputs(frames_t *f) noexcept nogil:
 
 
 cdef void judge(frames_t *f) noexcept nogil:
-    """Judge a collect: frames, then units, then the inputs. If the units are settled and every
-    datagram is right again, they are unchanged.
+    """Evaluate a collect: frames, units, inputs.
+
+    If the units are settled and every datagram is right again, the units are unchanged.
     """
     cdef frame_t *frame = f.frames
     cdef const frame_t *last = frame + f.frame_count
@@ -453,7 +454,7 @@ cdef void frames_flush(frames_t *f) noexcept nogil:
             return
 
 
-# ---- construction: the plan is checked here once, so that the functions above need not
+# ---- construction: checks the plan once, so that the functions above need no checks
 
 def check(condition, message):
     """Raise ValueError(message) unless the condition holds."""
@@ -473,7 +474,7 @@ def frames_per_cycle(frames):
 
 
 def has_number(frame):
-    """True if the frame carries a cycle number."""
+    """Return True if the frame contains a cycle number."""
     return any(d.kind == CYCLE_NUMBER for d in frame.datagrams)
 
 
@@ -515,7 +516,7 @@ cdef class Frames:
         datagrams = [d for frame in plan.frames for d in frame.datagrams]
         copies = sum(len(d.outputs) + len(d.inputs) for d in datagrams)
         check(1 <= len(plan.frames) <= FRAMES_MAX,
-              f"frames: {len(plan.frames)}, at least 1 and at most {FRAMES_MAX}")
+              f"frames: {len(plan.frames)}, must be 1 to {FRAMES_MAX}")
         limit = INDEX_COUNT if all(map(has_number, plan.frames)) else FRAMES_PER_CYCLE_MAX
         busiest = frames_per_cycle(plan.frames)
         check(busiest <= limit, f"frames: {busiest} in one cycle, at most {limit}")
@@ -540,11 +541,11 @@ cdef class Frames:
         check(len(frame.datagrams) > 0, f"frame {number}: no datagrams")
         check(1 <= frame.divider <= DIVIDER_MAX and 0 <= frame.phase < frame.divider,
               f"frame {number}: divider {frame.divider}, phase {frame.phase}")
-        check(number > 0 or frame.divider == 1, "frame 0 goes out in every cycle")
+        check(number > 0 or frame.divider == 1, "frame 0: divider must be 1")
         payload = int.from_bytes(template[14:16], "little")
         end = DATAGRAMS + sum(HEADER + d.length + CAT_DATAGRAM_COUNTER for d in frame.datagrams)
         check(payload >> 12 == 1 and DATAGRAMS + (payload & 0x7FF) == end and end <= len(template),
-              f"frame {number}: its EtherCAT header says {payload:#06x}, its datagrams end at {end}")
+              f"frame {number}: EtherCAT header {payload:#06x} does not match the end of its datagrams at {end}")
         cdef frame_t *c = &self.c.frames[number]
         c.length = len(template)
         c.used = end
@@ -554,7 +555,7 @@ cdef class Frames:
         c.phase = frame.phase
         memcpy(c.template, <const uint8_t *>template, len(template))
         check(is_ours(self.c.frames[0].template, c.template),
-              f"frame {number}: another source than frame 0")
+              f"frame {number}: source address differs from frame 0")
 
     def make_datagram(self, uint32_t number, frame, plan, uint32_t copies):
         where = f"frame {number}, datagram at {plan.offset}"
@@ -570,7 +571,7 @@ cdef class Frames:
         header = frame.template[plan.offset : plan.offset + HEADER]
         check(header[0] == plan.command
               and int.from_bytes(header[6:8], "little") & 0x7FF == plan.length,
-              f"{where}: command or length differ from the template's")
+              f"{where}: command or length differs from the template")
         check(0 <= plan.expected_counter <= 0xFFFF, f"{where}: counter {plan.expected_counter}")
         check(-1 <= plan.sync_unit < <int>self.c.image.unit_count,
               f"{where}: sync unit {plan.sync_unit} of {self.c.image.unit_count}")
@@ -629,7 +630,7 @@ cdef class Frames:
             self.c.units[unit].frame = number
         first = &self.c.frames[self.c.units[unit].frame]
         check((first.divider, first.phase) == (self.c.frames[number].divider, self.c.frames[number].phase),
-              f"{where}: its sync unit rides in frames of other cycles too")
+              f"{where}: its sync unit is also in frames of other cycles")
 
     def make_copy(self, where, plan, copy, uint32_t image_size, uint32_t place):
         start = plan.offset + HEADER
@@ -645,7 +646,7 @@ cdef class Frames:
         return place + 1
 
     cdef carry_time(self, clock_t *clock):
-        """Tell the clock where its data is in the templates."""
+        """Connect the clock to its datagrams in the templates."""
         cdef uint32_t k
         cdef datagram_t *d
         cdef uint8_t *header
@@ -662,7 +663,7 @@ cdef class Frames:
                 clock.main_header = header
             elif d.command == CAT_FPRD:
                 clock.watch_header = header
-        check(clock.time_header != NULL, "clock: no frame carries the reference's time")
+        check(clock.time_header != NULL, "clock: no datagram reads the time of the reference")
         check((clock.main_header != NULL) == (clock.follows_main != 0),
               "clock: our time is sent when the reference follows us, and only then")
         check((clock.watch_header != NULL) == (clock.follower_count > 0),

@@ -87,14 +87,15 @@ cdef inline bint shows_mode(const axis_t *a) noexcept nogil:
     return not a.mode_actual.present or a.mode_shown == a.mode
 
 cdef inline void guard_orders(axes_t *x, axis_t *a, const target_t *t, uint32_t i) noexcept nogil:
-    """Take over new orders; a no-op for an axis that works and has none."""
+    """Process new requests; a no-op for an axis that works and has none."""
     if (t.request[i] != a.request or t.mode[i] != a.mode_wanted or a.mode_refused != NO_MODE
             or (a.requested_state == ENABLED and not a.followed)):
         guard_take_orders(x, a, t, i)
 
 cdef inline bint guard_works(const axis_t *a) noexcept nogil:
-    """Return True if the axis follows its set-points and shall continue."""
-    return a.followed and a.requested_state == ENABLED and a.state == OPERATION_ENABLED and not a.clear_reset
+    """Return True if the axis follows its set-points and continues to."""
+    return (a.followed and a.requested_state == ENABLED and a.state == OPERATION_ENABLED
+            and not a.clear_reset)
 
 cdef inline uint16_t guard_controlword(axes_t *x, axis_t *a, uint16_t bits) noexcept nogil:
     """Return the controlword for this cycle. Call it once per cycle while the axis does not work,

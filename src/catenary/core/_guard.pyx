@@ -1,19 +1,20 @@
 # cython: boundscheck=False, wraparound=False, cdivision=True
-"""Safety of one axis in one cycle: requests, whether it is followed, and how it stops.
+"""Safety of one axis in one cycle: requests, the followed state, and stops.
 docs/explanation/safety.md has the table of reactions and their scenarios; _setpoints.pyx computes
 the outputs.
 
-Theory of operation. `guard_observe` runs after the inputs of a cycle, the other functions before its
-outputs. `requested_state` is the requested state in force, `mode` the mode of operation in force, `mode_wanted`
-the one requested in 0x6060. The set-points of the application are valid only while the axis is
-*followed*: requested state enabled, OPERATION_ENABLED, the mode shown is the one in force, statusword
-bit 12 if the mode defines it, and its unit answers. `worked` is set once the axis was followed since
-OPERATION_ENABLED or since a mode change; `shows_following` once its drive has shown bit 12. `gap_cycles` counts
-since bit 12 was lost, `mute_cycles` while it was never shown, `climbing_cycles` since the request.
+Theory of operation. `guard_observe` runs after the inputs of a cycle, the other functions before
+its outputs. `requested_state` is the requested state in force. `mode` is the mode of operation in
+force, `mode_wanted` the mode requested in 0x6060. The set-points of the application are valid only
+while the axis is *followed*: requested state enabled, OPERATION_ENABLED, the mode shown is the one
+in force, statusword bit 12 if the mode defines it, and its unit answers. `worked` is set once the
+axis was followed since OPERATION_ENABLED or since a mode change; `shows_following` once its drive
+has shown bit 12. `gap_cycles` counts since bit 12 was lost, `mute_cycles` while it was never shown,
+`climbing_cycles` since the request.
 
-A stop (`stop_axis`) needs a new request afterwards; `stop_reason` and `stop_cycle` keep its cause. It
-sends quick stop, then disable operation, then disable voltage (`stop_command`, `stop_cycles`). With
-`on_loss` csp_hold, an axis in CST without set-points is held in CSP instead (`holding`).
+A stop (`stop_axis`) needs a new request afterwards; `stop_reason` and `stop_cycle` keep its cause.
+It sends quick stop, then disable operation, then disable voltage (`stop_command`, `stop_cycles`).
+With `on_loss` csp_hold, an axis in CST without set-points is held in CSP instead (`holding`).
 
 Budget: 10 ns per axis that works.
 """
@@ -90,7 +91,7 @@ cdef inline bint enters_without_torque(const axis_t *a, int8_t mode) noexcept no
 
 
 cdef void take_mode(axes_t *x, axis_t *a, int8_t mode) noexcept nogil:
-    """Take a requested mode over. A powered axis keeps its mode until 0x6061 shows the new one."""
+    """Process a requested mode. A powered axis keeps its mode until 0x6061 shows the new one."""
     if mode == a.mode_refused:
         return
     a.mode_refused = NO_MODE
@@ -108,7 +109,7 @@ cdef void take_mode(axes_t *x, axis_t *a, int8_t mode) noexcept nogil:
 
 
 cdef void take_request(axes_t *x, axis_t *a, const target_t *t, uint32_t i) noexcept nogil:
-    """Take a new request over; count how long it has been waiting."""
+    """Process a new request, and count how long a request to enable has been pending."""
     cdef uint8_t requested_state
     if t.request[i] != a.request:
         a.request = t.request[i]
@@ -141,14 +142,14 @@ cdef void take_request(axes_t *x, axis_t *a, const target_t *t, uint32_t i) noex
 
 
 cdef void guard_take_orders(axes_t *x, axis_t *a, const target_t *t, uint32_t i) noexcept nogil:
-    """Take over what the application requests: mode of operation and state."""
+    """Process the application's requests: mode of operation and state."""
     if t.mode[i] != a.mode_wanted or a.mode_refused != NO_MODE:
         take_mode(x, a, t.mode[i])
     take_request(x, a, t, i)
 
 
 cdef void guard_stop(axes_t *x) noexcept nogil:
-    """Stop every axis on request; nothing moves without a new one."""
+    """Stop every axis; each needs a new request afterwards."""
     cdef uint32_t i
     for i in range(x.axis_count):
         stop_axis(x, &x.axes[i], STOP_REQUEST)
@@ -174,7 +175,10 @@ cdef uint16_t stop_command(axes_t *x, axis_t *a) noexcept nogil:
 
 
 cdef inline bint may_lose_voltage(const axes_t *x, const axis_t *a) noexcept nogil:
-    """QUICK_STOP_ACTIVE: return True at rest, or after the deadline, as a velocity may be noise."""
+    """Return True if a quick stop may end: at rest, or after the deadline.
+
+    The deadline covers drives whose velocity is never below the standstill limit.
+    """
     return a.still_cycles >= x.still_limit or a.stop_cycles > x.stop_limit
 
 
@@ -223,15 +227,14 @@ cdef void prepare_mode(axis_t *a, int8_t mode) noexcept nogil:
 
 
 cdef void prepare_other_mode(axis_t *a) noexcept nogil:
-    """Set the target of the mode that a powered drive shows, or shall show, if it is not in
-    force."""
+    """Set the target of the requested or shown mode of a powered drive that is not in force."""
     cdef int8_t other = a.mode_wanted if a.mode_wanted != a.mode else a.mode_shown
     if other != a.mode:
         prepare_mode(a, other)
 
 
 cdef void begin_setpoints(axis_t *a) noexcept nogil:
-    """Forget the previous set-points: the axis holds its command."""
+    """Discard the previous set-points; the axis holds its command."""
     a.setpoint = a.commanded_position
     a.ghost = a.commanded_position
     a.setpoint_velocity = 0.0
@@ -257,8 +260,7 @@ cdef void enter_mode(axis_t *a) noexcept nogil:
 
 
 cdef void refuse_mode(axes_t *x, axis_t *a, int8_t mode) noexcept nogil:
-    """Restore the mode in force: the drive does not show the requested mode or must not enter
-    it."""
+    """Restore the mode in force, because the requested mode is not shown or not allowed."""
     a.mode_refused = mode
     a.mode_wanted = a.mode
     a.waiting_cycles = 0
@@ -269,7 +271,7 @@ cdef void refuse_mode(axes_t *x, axis_t *a, int8_t mode) noexcept nogil:
 # ---- after the inputs
 
 cdef bint is_mapped(const axis_t *a) noexcept nogil:
-    """Return True if the target of the mode has a place in the process data."""
+    """Return True if the target of the mode is mapped in the process data."""
     cdef uint8_t quantity = quantity_of(a.mode)
     if quantity == POSITION:
         return a.target_position.present
@@ -279,7 +281,7 @@ cdef bint is_mapped(const axis_t *a) noexcept nogil:
 
 
 cdef bint is_trusted(axes_t *x, axis_t *a) noexcept nogil:
-    """Return True if the drive follows its targets: mode in force, bit 12 or no need of it."""
+    """Return True if the drive follows its targets, according to mode and bit 12."""
     if (a.requested_state != ENABLED or a.state != OPERATION_ENABLED or a.lost or a.holding
             or a.mode_wanted != a.mode or not is_mapped(a) or not shows_mode(a)):
         if a.mute_cycles < x.mute_limit:
@@ -289,7 +291,7 @@ cdef bint is_trusted(axes_t *x, axis_t *a) noexcept nogil:
         return True
     if a.status & FOLLOWS_COMMAND:
         if a.followed and not a.shows_following:
-            stop_axis(x, a, STOP_NOT_FOLLOWING)  # it has the bit: it followed nothing until now
+            stop_axis(x, a, STOP_NOT_FOLLOWING)  # it implements the bit, so it has not followed until now
         a.shows_following = 1
         a.gap_cycles = 0
         return a.requested_state == ENABLED
@@ -302,7 +304,7 @@ cdef bint is_trusted(axes_t *x, axis_t *a) noexcept nogil:
 
 
 cdef void observe_requested_state(axes_t *x, axis_t *a, uint8_t state_before) noexcept nogil:
-    """Adapt the requested state to what the drive did by itself."""
+    """Adapt the requested state to state changes that the drive made by itself."""
     if a.requested_state == ENABLED:
         if a.state >= FAULT_REACTION_ACTIVE and state_before < FAULT_REACTION_ACTIVE:
             stop_axis(x, a, STOP_FAULT)
@@ -319,7 +321,7 @@ cdef void observe_requested_state(axes_t *x, axis_t *a, uint8_t state_before) no
 
 cdef void guard_observe(axes_t *x, axis_t *a, uint8_t state_before,
                         uint64_t number) noexcept nogil:
-    """Judge the inputs of a cycle: requested state, mode in force, followed or not."""
+    """Update requested state, mode in force and `followed` from the inputs of a cycle."""
     if a.invalid_in_row > 0:
         if a.invalid_in_row >= x.lost_limit and not a.lost:
             a.lost = 1

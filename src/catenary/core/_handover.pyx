@@ -1,13 +1,14 @@
 # cython: boundscheck=False, wraparound=False, cdivision=True
 """Hand-over between the cycle and Python: private buffers for Python, and triple buffers
-(native/triple_buffer.h) in both directions, so that a vector is never half old and half new.
+(native/triple_buffer.h) in both directions, so that values of different cycles are never mixed.
 
-Theory of operation. One block of memory per direction and slot: a header and the arrays of one table,
-items of 8 bytes first. Slots 0 to 2 are exchanged. PRIVATE is Python's own, OF_LAW holds the targets
-of a law, BEFORE_LAW those before its step. `published` counts publications and is the futex word on
-which Python sleeps while `waiting`. `sticky` keeps flags of cycles that Python has not read yet.
+Theory of operation. One block of memory per direction and slot: a header and the arrays of one
+table, items of 8 bytes first. Slots 0 to 2 are exchanged. PRIVATE is Python's own, OF_LAW holds the
+targets of a law, BEFORE_LAW those before its step. `published` counts publications and is the futex
+word on which Python sleeps while `waiting`. `sticky` keeps flags of cycles that Python has not read
+yet.
 
-Budget: 0.1 us per direction for three drives, to copy some 200 bytes.
+Budget: 0.1 us per direction for three drives, to copy about 200 bytes.
 """
 
 from cpython.buffer cimport PyBUF_FORMAT, PyBUF_WRITABLE
@@ -97,7 +98,7 @@ cdef void handover_commit(handover_t *h) noexcept nogil:
 
 
 cdef target_t *handover_latch(handover_t *h, bint *fresh) noexcept nogil:
-    """Cycle: return the newest committed targets; `fresh` if not seen before."""
+    """Cycle: return the newest committed targets; set `fresh` if they are new."""
     fresh[0] = cat_triple_take(&h.target_triple) != 0
     return &h.target[h.target_triple.front]
 
@@ -109,14 +110,14 @@ cdef void handover_publish(handover_t *h) noexcept nogil:
 
 
 cdef void handover_wake(handover_t *h) noexcept nogil:
-    """Wake Python if it sleeps; only then this is a system call."""
+    """Wake Python; a system call only if Python sleeps."""
     cat_fence()  # publish before reading `waiting`; otherwise a sleeper may be missed
     if cat_load_acquire32(&h.waiting):
         cat_futex_wake(&h.published)
 
 
 cdef bint handover_swap(handover_t *h) noexcept nogil:
-    """Python: copy the newest actual values to its own; return True if there were any."""
+    """Python: copy the newest actual values to its own; return True if they are new."""
     if not cat_triple_take(&h.actual_triple):
         return False
     memcpy(h.actual[PRIVATE].header, h.actual[h.actual_triple.front].header, h.actual_size)
@@ -190,7 +191,7 @@ cdef class Handover:
         for k in range(TARGETS):
             lay(<void **>&self.c.target[k], block + 4 * actual + k * target,
                 sizeof(target_header_t), TARGET, self.counts)
-            self.c.target[k].header.hold = 1  # nothing was committed yet
+            self.c.target[k].header.hold = 1  # nothing has been committed yet
 
     def fields(self):
         """Return Python's own arrays by the names of plan.request.Views, as memoryviews."""

@@ -1,5 +1,5 @@
 # cython: boundscheck=False, wraparound=False, cdivision=True
-"""Histograms of times as Python reads them, in seconds; native/histogram.h counts them in ns."""
+"""Histograms of times in seconds for Python; native/histogram.h counts in ns."""
 
 from libc.stdint cimport int64_t, uint32_t
 from libc.stdlib cimport calloc, free

@@ -15,22 +15,22 @@ class Cycle:
     def __init__(self, engine: Engine) -> None: ...
     @property
     def number(self) -> int:
-        """Number of the cycle, 0 for the first of the iteration.
+        """Number of the cycle; 0 for the first cycle of the iteration.
 
         Skipped cycle starts leave gaps in `time` only.
         """
 
     @property
     def time(self) -> float:
-        """Cycle start [s] since that of the first cycle of the iteration, on the link's clock.
+        """Cycle start relative to the first cycle of the iteration, on the link's clock [s].
 
-        A multiple of the period, unless the cycle starts follow the reference clock. Then it is the
-        elapsed time.
+        It is a multiple of the period, unless the cycle starts follow the reference clock. Then it
+        is the elapsed time.
         """
 
     @property
     def ok(self) -> bool:
-        """True if every required sync unit answered: the inputs are of this cycle."""
+        """True if every required sync unit answered, so that the inputs are of this cycle."""
 
     @property
     def lost(self) -> int:
@@ -38,26 +38,26 @@ class Cycle:
 
     @property
     def late(self) -> bool:
-        """True if cycles were skipped, or ran without new targets, since the iteration before."""
+        """True if cycles were skipped, or ran without new targets, since the previous iteration."""
 
     @property
     def limited(self) -> bool:
-        """True if a set-point was limited on some axis: see `Drives.limited`."""
+        """True if the set-point of any axis was limited; see `Drives.limited`."""
 
     @property
     def refused(self) -> bool:
-        """True if a target was refused: NaN, infinite, or further than the step limit."""
+        """True if a target was refused: NaN, infinite, or beyond the step limit."""
 
     @property
     def dry(self) -> bool:
-        """True if the stream of set-points was empty: an underrun."""
+        """True if the stream of set-points was empty (an underrun)."""
 
     @property
     def networks(self) -> tuple[Cycle, ...]:
-        """The cycle of each network of the loop; with one network, this one."""
+        """Cycle of each network of the loop; with one network, only this cycle."""
 
     def spend(self, seconds: float) -> None:
-        """Let virtual time pass as if the body took this long [s]. On a NIC, compute that long."""
+        """Let virtual time pass as if the body took this long [s]. On a NIC, busy-wait."""
 
 class Mover(Protocol):
     """Source of targets that the loop steps before each commit."""
@@ -88,4 +88,4 @@ class Iteration:
     def __iter__(self) -> Self: ...
     def __next__(self) -> Cycle: ...
     def step_movers(self) -> None:
-        """Let the movers write their targets, as every step does."""
+        """Call `step` of all movers, as every committing step does."""

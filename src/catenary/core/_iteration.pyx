@@ -1,6 +1,6 @@
 # cython: boundscheck=False, wraparound=False, cdivision=True
-"""Iteration of a loop. It is compiled to avoid cache misses: they dominate the first microseconds
-after a wait, and a Python generator with its properties causes many of them.
+"""Iteration of a loop. It is compiled to avoid cache misses, which dominate the first microseconds
+after a wait. A Python generator with properties would cause many of them.
 """
 
 from libc.stdint cimport int64_t, uint32_t, uint64_t
@@ -24,7 +24,7 @@ cdef class Cycle:
 
     @property
     def number(self):
-        """Number of the cycle, 0 for the first of the iteration.
+        """Number of the cycle; 0 for the first cycle of the iteration.
 
         Skipped cycle starts leave gaps in `time` only.
         """
@@ -32,16 +32,16 @@ cdef class Cycle:
 
     @property
     def time(self):
-        """Cycle start [s] since that of the first cycle of the iteration, on the link's clock.
+        """Cycle start relative to the first cycle of the iteration, on the link's clock [s].
 
-        A multiple of the period, unless the cycle starts follow the reference clock. Then it is the
-        elapsed time.
+        It is a multiple of the period, unless the cycle starts follow the reference clock. Then it
+        is the elapsed time.
         """
         return <double>(self.header.time_ns - self.first_ns) * 1e-9
 
     @property
     def ok(self):
-        """True if every required sync unit answered: the inputs are of this cycle."""
+        """True if every required sync unit answered, so that the inputs are of this cycle."""
         return (self.header.flags & OK) != 0
 
     @property
@@ -51,31 +51,31 @@ cdef class Cycle:
 
     @property
     def late(self):
-        """True if cycles were skipped, or ran without new targets, since the iteration before."""
+        """True if cycles were skipped, or ran without new targets, since the previous iteration."""
         return (self.header.flags & (LATE | UNCOMMITTED)) != 0
 
     @property
     def limited(self):
-        """True if a set-point was limited on some axis: see `Drives.limited`."""
+        """True if the set-point of any axis was limited; see `Drives.limited`."""
         return (self.header.flags & LIMITED_SOME) != 0
 
     @property
     def refused(self):
-        """True if a target was refused: NaN, infinite, or further than the step limit."""
+        """True if a target was refused: NaN, infinite, or beyond the step limit."""
         return (self.header.flags & REFUSED_SOME) != 0
 
     @property
     def dry(self):
-        """True if the stream of set-points was empty: an underrun."""
+        """True if the stream of set-points was empty (an underrun)."""
         return (self.header.flags & DRY) != 0
 
     @property
     def networks(self):
-        """The cycle of each network of the loop; with one network, this one."""
+        """Cycle of each network of the loop; with one network, only this cycle."""
         return (self,)
 
     def spend(self, double seconds):
-        """Let virtual time pass as if the body took this long [s]. On a NIC, compute that long."""
+        """Let virtual time pass as if the body took this long [s]. On a NIC, busy-wait."""
         self.engine.spend(round(seconds * 1e9))
 
     def __repr__(self):

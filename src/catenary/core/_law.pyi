@@ -1,10 +1,10 @@
-"""A law in the cycle: its numbers, its budget, and how it ended."""
+"""A law in the cycle: its numbers, its budget, and its end."""
 
 from collections.abc import Sequence
 from typing import Final
 
-# `Law.status`; 0: not taken over by the cycle yet. LAW_FINISHED and LAW_STOPPED hold the axes, all
-# later ones stop the drives.
+# Values of `Law.status`; 0: the cycle has not started the law yet. After LAW_FINISHED and LAW_STOPPED
+# the axes hold; all other ends stop the drives.
 LAW_RUNNING: Final[int]
 LAW_FINISHED: Final[int]  # the law returned "finished": the axes hold
 LAW_STOPPED: Final[int]  # stopped by `stop_law` or by another law: the axes hold
@@ -50,7 +50,7 @@ class Law:
     def set_parameters(self, values: Sequence[float]) -> None: ...
     @property
     def memory(self) -> list[float]:
-        """Return the memory as the last step left it."""
+        """Memory after the last step."""
 
     @property
     def status(self) -> int: ...
@@ -62,7 +62,7 @@ class Law:
 
     @property
     def figures(self) -> dict[str, int]:
-        """Return steps, overruns and longest_ns."""
+        """Counts of steps and overruns, and the longest step: steps, overruns, longest_ns."""
 
     def wait(self, timeout_ns: int) -> bool:
         """Wait for the end of the law, without the GIL; return True if it has ended."""

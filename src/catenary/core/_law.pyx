@@ -1,11 +1,12 @@
 # cython: boundscheck=False, wraparound=False, cdivision=True
-"""A law in the cycle: its numbers, its budget, and how it ends.
+"""A law in the cycle: its numbers, its budget, and its end.
 
-Theory of operation. The law is a function of native/law.h. Parameters and a new memory reach it
-through triple buffers before a step, all at once. Its memory is copied for the application after a
-step: on request if the cycle has its own thread (`wanted`, `given`), otherwise each time. `status` is
-a futex word and gives the reason of the end. A step over the budget is counted; `overrun_limit` of
-them in a row end the law. The engine's monitor aborts a step that never returns.
+Theory of operation. The law is a function of native/law.h. Parameters and a new memory are passed
+through triple buffers and take effect together before a step. Its memory is copied for the
+application after a step: on request if the cycle has its own thread (`wanted`, `given`), otherwise
+each time. `status` is a futex word and contains the reason for the end. A step over the budget is
+counted; `overrun_limit` of them in a row end the law. The engine's monitor aborts a step that never
+returns.
 
 Budget: 30 ns in addition to the law, without memory.
 """
@@ -54,7 +55,7 @@ LAW_OVERRUN = OVERRUN
 LAW_ABORTED = CAT_LAW_ABORTED
 
 cdef enum:
-    NUMBERS_MAX = 4096         # they are copied in every cycle
+    NUMBERS_MAX = 4096         # limits the time to copy them in every cycle
     STUCK_NS = 20_000_000      # processor time in one call, after which it counts as stuck
     REHEARSALS = 3
     ANSWER_NS = 200_000_000    # longest wait for a copy of the memory
@@ -80,7 +81,7 @@ cdef inline bint take(exchange_t *numbers, double *values) noexcept nogil:
 # ---- in the cycle
 
 cdef bint law_begin(law_t *law, cat_law_monitor *monitor, int64_t instant) noexcept nogil:
-    """Begin with a law. Return False if the application has withdrawn it."""
+    """Begin a law. Return False if the application has withdrawn it."""
     law.begun = instant
     if not cat_change32(&law.status, WAITING, RUNNING):
         return False
@@ -114,9 +115,7 @@ cdef int first_not_finite(const axes_t *axes, const target_t *target) noexcept n
 cdef bint law_run(law_t *law, cat_law_monitor *monitor, const axes_t *axes,
                   const actual_t *actual, target_t *target, int64_t instant,
                   uint64_t number) noexcept nogil:
-    """Run one step. Return True if the law goes on. What a failed step left in `target` must not be
-    sent.
-    """
+    """Run one step; return True if the law continues. Targets of a failed step must not be sent."""
     cdef int rc, axis
     take(&law.parameters_in, law.numbers.parameters)
     take(&law.memory_in, law.numbers.memory)
@@ -138,7 +137,7 @@ cdef bint law_run(law_t *law, cat_law_monitor *monitor, const axes_t *axes,
 
 
 cdef void law_report(law_t *law) noexcept nogil:
-    """Copy the memory of a law that goes on, if the application has requested it."""
+    """Copy the memory of a law that continues, if the application has requested it."""
     cdef uint32_t wanted
     if not law.threaded:
         give(&law.memory_out, law.numbers.memory)
@@ -151,7 +150,7 @@ cdef void law_report(law_t *law) noexcept nogil:
 
 
 cdef bint law_took(law_t *law, int64_t duration, uint64_t number) noexcept nogil:
-    """Record the duration of a step; return True if the law may go on."""
+    """Record the duration of a step; return True if the law may continue."""
     law.longest = max(law.longest, duration)
     if law.budget == 0 or duration <= law.budget:
         law.overruns_in_row = 0
@@ -190,7 +189,7 @@ cdef class Law:
                   uint32_t overrun_limit, int priority):
         cdef double *place
         if address == 0:
-            raise ValueError("address: no function")
+            raise ValueError("address: 0 is not the address of a function")
         if budget_ns < 0 or overrun_limit == 0:
             raise ValueError(f"budget_ns: {budget_ns}, overrun_limit: {overrun_limit}")
         if max(len(memory), len(parameters)) > NUMBERS_MAX:
@@ -229,9 +228,9 @@ cdef class Law:
     cdef fill(self, exchange_t *numbers, values):
         cdef double *slot
         if len(values) != numbers.count:
-            raise ValueError(f"{numbers.count} numbers, not {len(values)}")
+            raise ValueError(f"expected {numbers.count} numbers, received {len(values)}")
         checked = [float(value) for value in values]
-        slot = numbers.slots[numbers.triple.back]  # not earlier: float() may run any code
+        slot = numbers.slots[numbers.triple.back]  # only now, because float() may run arbitrary code
         for i, value in enumerate(checked):
             slot[i] = value
         if numbers.count:
@@ -255,7 +254,8 @@ cdef class Law:
 
     cdef int request_memory(self) except -1:
         """Wait until the cycle has copied the memory after its next step, or the law has ended.
-        After ANSWER_NS return anyway: the last copy is used.
+
+        Return after ANSWER_NS in any case; then the last copy is used.
         """
         cdef uint32_t wanted = self.c.wanted + 1
         cdef uint32_t given
@@ -280,7 +280,7 @@ cdef class Law:
         return cat_load_acquire32(&self.c.status) > RUNNING
 
     cdef void supersede(self) noexcept:
-        """End the law before its start, if the cycle has not begun with it."""
+        """Withdraw the law if the cycle has not started it yet."""
         if cat_change32(&self.c.status, WAITING, STOPPED_BY_APPLICATION):
             give(&self.c.memory_out, self.c.numbers.memory)
             cat_futex_wake(&self.c.status)

@@ -10,7 +10,7 @@ cdef void *memory_take(cat_memory *memory, size_t count, size_t size) except NUL
     """Return `count` zeroed elements of `size` bytes. Raise MemoryError if memory is exhausted."""
     cdef void *part = cat_memory_take(memory, count, size)
     if part == NULL:
-        raise MemoryError(f"{count * size} bytes for the cycle")
+        raise MemoryError(f"cannot allocate {count * size} bytes for the cycle")
     return part
 
 
@@ -29,7 +29,7 @@ def reason(error):
 
 
 cdef object memory_text(const cat_memory_state *state):
-    """Return "1.2 MB locked" and, if some of it could not be locked, how much and why."""
+    """Return the state as text: "1.2 MB locked", and the amount not locked with its reason."""
     text = f"{amount(state.locked)} locked"
     if state.touched:
         text += f", {amount(state.touched)} touched only ({reason(state.error)})"

@@ -2,7 +2,7 @@
 """Numbers in a process image: any bit offset, 1 to 64 bits, inlined where they are used.
 
 Little endian hosts (x86-64, ARM64). Images are padded, so that whole words may be accessed. A number
-is in one 64-bit word: it is shifted to the upper end and down again. Numbers that span nine bytes or
+within one 64-bit word is shifted to the upper end and down again. Numbers that span nine bytes or
 exceed an int64 use the slow functions (_numbers.pyx).
 """
 

@@ -1,5 +1,5 @@
 # cython: cdivision=True
-"""Numbers in a process image: checked here once, read and written by the inline code of the .pxd."""
+"""Numbers in a process image: checks and slow functions. The .pxd has the inline functions."""
 
 from libc.math cimport isfinite, rint
 from libc.stdint cimport int64_t, uint8_t, uint32_t, uint64_t
@@ -67,18 +67,17 @@ cdef bint number_put_other(const number_t *n, uint8_t *image, double raw) noexce
 # ---- Python interface
 
 cdef int make_number(number_t *n, object plan, object image_size, object where) except -1:
-    """Set `n` from a plan's Number; None: absent. ValueError names `where` and the invalid
-    field."""
+    """Set `n` from a plan's Number; None means absent. Raise ValueError if a field is invalid."""
     n.present = 0
     if plan is None:
         return 0
     if plan.kind not in (UNSIGNED, SIGNED, REAL):
-        raise ValueError(f"{where}: kind {plan.kind}")
+        raise ValueError(f"{where}: unknown kind {plan.kind}")
     if not 1 <= plan.bit_length <= 64 or (plan.kind == REAL and plan.bit_length not in (32, 64)):
         raise ValueError(f"{where}: {plan.bit_length} bits")
     if not 0 <= plan.bit_offset <= image_size * 8 - plan.bit_length:
         raise ValueError(
-            f"{where}: bits {plan.bit_offset} to {plan.bit_offset + plan.bit_length - 1} leave the"
+            f"{where}: bits {plan.bit_offset} to {plan.bit_offset + plan.bit_length - 1} exceed the"
             f" image of {image_size} bytes"
         )
     if not (isfinite(plan.scale) and plan.scale != 0 and isfinite(plan.offset)):

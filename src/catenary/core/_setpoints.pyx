@@ -1,8 +1,8 @@
 # cython: boundscheck=False, wraparound=False, cdivision=True
 """Set-points of one axis in one cycle: commanded_position, commanded_velocity, commanded_torque.
 
-Theory of operation. A followed axis gets the committed set-point, within its limits. In six situations
-something else is sent:
+Theory of operation. A followed axis gets the committed set-point, within its limits. In six
+situations other values are sent:
 
 - not powered: target := actual; in SWITCHED_ON a committed torque is sent, so that it is present when
   the brake opens;
@@ -16,14 +16,14 @@ something else is sent:
 - stopping: another state was requested, or the core stopped the axis.
 
 In the profile modes the drive makes the trajectory. In PP the command stays until another one is
-committed, and no underrun counts: the drive ends its motion by itself. In PV the velocity stays in
-an underrun, and the late limit of CSV counts; in all other situations the target is 0.
-In all six situations CSP and CSV decelerate and hold, and CST keeps its torque; each is bounded in
-time (`judge_lateness`, _guard.pyx). In an underrun CSP first keeps the velocity of the last two
-set-points. `ghost` is the set-point of this cycle, which the core continues in a fallback
+committed. Underruns do not count, because the drive completes its motion by itself. In PV the
+velocity stays in an underrun, and the late limit of CSV counts; in all other situations the target
+is 0. In all six situations CSP and CSV decelerate and hold, and CST keeps its torque; each is
+bounded in time (`judge_lateness`, _guard.pyx). In an underrun CSP first keeps the velocity of the
+last two set-points. `ghost` is the set-point of this cycle, which the core continues in a fallback
 (`fallback_cycles`). `setpoint` is the last one that the application has written; `accepted` counts
-them up to two. When set-points return, the command returns to them within acceleration, deceleration
-and torque slope (`returning`).
+them up to two. When set-points return, the command returns to them within acceleration,
+deceleration and torque slope (`returning`).
 
 Budget: 10 ns per axis that follows.
 """
@@ -120,7 +120,7 @@ cdef double towards_limits(const axis_t *a, double velocity) noexcept nogil:
 
 
 cdef inline double fallback_velocity(const axis_t *a) noexcept nogil:
-    """Return the velocity at which set-points stopped. A single step does not define a velocity."""
+    """Return the velocity of the last set-points; 0 if they do not define one."""
     cdef double last = a.setpoint_velocity
     cdef double before = a.previous_velocity
     if last * before <= 0.0:
@@ -170,7 +170,7 @@ cdef bint is_number(axis_t *a, double value) noexcept nogil:
 
 
 cdef bint is_accepted(axes_t *x, axis_t *a, double target, uint64_t between) noexcept nogil:
-    """Refuse a CSP set-point too far from the last accepted one."""
+    """Return True if a CSP set-point is within the step limit; otherwise refuse it."""
     cdef double limit = a.step_limit
     if limit == 0.0:
         limit = fmax(a.step_floor, 2 * a.velocity_limit * x.period
@@ -256,8 +256,9 @@ cdef void follow_velocity(axes_t *x, axis_t *a, double target) noexcept nogil:
 
 
 cdef double limited_torque(axis_t *a, double target) noexcept nogil:
-    """Return the torque within its limit: none towards a reached position limit and none that
-    accelerates beyond the velocity limit.
+    """Return the limited torque.
+
+    It never acts towards a reached position limit or accelerates beyond the velocity limit.
     """
     target = clamp(a, target, -a.torque_limit, a.torque_limit)
     if a.position >= a.position_max or a.velocity > a.velocity_limit:
@@ -283,7 +284,7 @@ cdef void follow_torque(axes_t *x, axis_t *a, double target) noexcept nogil:
 cdef void limit_torque(axes_t *x, axis_t *a) noexcept nogil:
     a.commanded_torque = limited_torque(a, a.commanded_torque)
     if is_leaving(a):
-        stop_axis(x, a, STOP_POSITION_LIMIT)  # without torque only the drive can brake the axis
+        stop_axis(x, a, STOP_POSITION_LIMIT)  # zero torque does not brake; only the drive can stop the axis
 
 
 cdef void follow(axes_t *x, axis_t *a, const target_t *t, uint32_t i, bint fresh) noexcept nogil:
@@ -348,8 +349,10 @@ cdef void judge_lateness(axes_t *x, axis_t *a) noexcept nogil:
 # ---- outputs
 
 cdef void rest(axes_t *x, axis_t *a, const target_t *t, uint32_t i) noexcept nogil:
-    """Not powered: set target := actual. The torque committed last is sent before the brake
-    opens."""
+    """Set the targets of an unpowered axis to the actual values.
+
+    In SWITCHED_ON, send the committed torque, so that it is present when the brake opens.
+    """
     a.commanded_position = a.position
     a.commanded_velocity = 0.0
     a.commanded_torque = 0.0
@@ -362,7 +365,7 @@ cdef void rest(axes_t *x, axis_t *a, const target_t *t, uint32_t i) noexcept nog
 
 
 cdef void stopping(axes_t *x, axis_t *a) noexcept nogil:
-    """Powered, but stopping: decelerate; the last torque stays until the voltage is removed."""
+    """Decelerate a powered axis that stops; keep its torque until the voltage is removed."""
     a.stop_cycles += 1
     fall_back(x, a, False)
     prepare_other_mode(a)

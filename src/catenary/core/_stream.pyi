@@ -1,4 +1,4 @@
-"""Set-points written ahead of their cycle starts."""
+"""Set-points written in advance of their cycle starts."""
 
 class Stream:
     """Ring of set-points: one row per cycle start. One thread writes.

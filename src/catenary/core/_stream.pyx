@@ -1,8 +1,8 @@
 # cython: boundscheck=False, wraparound=False, cdivision=True
-"""Set-points written ahead: a bounded ring, one row per cycle.
+"""Set-points written in advance: a bounded ring with one row per cycle.
 
-One thread writes (`written`), the cycle takes (`taken`); neither waits for the other. `dry` counts the
-cycles that found no row. Budget: 10 ns for three axes.
+One thread writes rows (`written`), the cycle takes them (`taken`). Neither waits for the other.
+`dry` counts the cycles without a row. Budget: 10 ns for three axes.
 """
 
 from libc.stdint cimport uint32_t, uint64_t
@@ -41,7 +41,7 @@ cdef bint stream_take(stream_t *s, target_t *target) noexcept nogil:
 cdef class Stream:
     def __cinit__(self, uint32_t axes, uint32_t capacity):
         if axes == 0 or not 1 <= capacity <= ROWS_MAX:
-            raise ValueError(f"a stream of {capacity} rows for {axes} axes")
+            raise ValueError(f"a stream of {capacity} rows for {axes} axes: it needs 1 to {ROWS_MAX} rows and an axis")
         self.c.axes = axes
         self.c.capacity = capacity
         cdef size_t count = <size_t>axes * capacity * QUANTITIES
@@ -66,7 +66,7 @@ cdef class Stream:
         cdef uint64_t room = s.capacity - (s.written - cat_load_acquire64(&s.taken))
         cdef uint64_t number
         if count * size != <size_t>len(rows):
-            raise ValueError(f"rows of {s.axes * QUANTITIES} numbers, not {len(rows)} bytes")
+            raise ValueError(f"{len(rows)} bytes are not whole rows of {s.axes * QUANTITIES} numbers ({size} bytes)")
         count = min(count, room)
         for number in range(count):
             memcpy(row_of(s, s.written + number), source + number * size, size)

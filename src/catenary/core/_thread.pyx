@@ -1,11 +1,11 @@
-"""The native thread: SCHED_FIFO, a CPU of its own, a touched stack, no signals, never the GIL.
+"""The native thread: SCHED_FIFO, its own CPU, a touched stack, no signals, no GIL.
 
-Without the permission for one of these, the thread runs without it, and `loop.scheduling` reports it.
+If the system refuses priority or CPU, the thread runs without it, and `loop.scheduling` reports it.
 
-A forked child has no copy of the thread. `thread_join` returns there at once, and the pages of the stack
-that cycles use are wiped instead of copied (native/locked_memory.h). The pages above them hold glibc's
-description of the thread, which the child needs. The thread keeps its pages before it ends: glibc reuses
-stacks, and the next thread may fork.
+A forked child has no copy of the thread. `thread_join` returns at once there. The stack pages that
+cycles use are wiped instead of copied (native/locked_memory.h). The pages above them hold glibc's
+description of the thread, which the child needs. Before the thread ends, it restores the copying:
+glibc reuses stacks, and a later thread on this stack may fork.
 """
 
 import errno as error_names
@@ -55,7 +55,7 @@ cdef extern from *:
 
     static void keep_stack(stack_part part) { madvise(part.start, part.size, MADV_KEEPONFORK); }
 
-    /* Create a thread that receives no signals: they belong to Python's. */
+    /* Create a thread that blocks all signals, so that Python's threads receive them. */
     static int create_thread(pthread_t *handle, void *(*body)(void *), void *argument) {
         pthread_attr_t attributes;
         sigset_t all, before;
@@ -131,7 +131,7 @@ cdef enum:
 
 
 cdef void thread_schedule(thread_t *t) noexcept nogil:
-    """Request priority and CPU for the calling thread, and note what was obtained."""
+    """Request priority and CPU for the calling thread, and record the result."""
     t.priority_error = set_priority(t.priority) if t.priority > 0 else 0
     t.cpu_error = set_cpu(t.cpu) if t.cpu >= 0 else 0
     sharpen_timers()
@@ -154,7 +154,7 @@ cdef void *thread_body(void *argument) noexcept nogil:
 
 
 cdef int thread_start(thread_t *t) noexcept nogil:
-    """Start the body once the scheduling is known. Return 0 or -errno."""
+    """Start the thread and wait until its scheduling is set. Return 0 or -errno."""
     cdef int rc
     t.started = 0
     t.stop = 0
@@ -170,7 +170,7 @@ cdef int thread_start(thread_t *t) noexcept nogil:
 
 
 cdef void thread_join(thread_t *t) noexcept nogil:
-    """End the thread. In a forked child there is none."""
+    """End the thread; a no-op in a forked child, which has no copy of it."""
     if t.running and t.owner == getpid():
         cat_store_release32(&t.stop, 1)
         pthread_join(t.handle, NULL)

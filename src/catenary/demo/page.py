@@ -27,7 +27,7 @@ MEANING = {
     "process": "the Python body of the loop",
     "send": "end of the body → frame sent",
     "in_controller": "receive + process + send",
-    "tail": "frame sent → start of the next wait",
+    "post_processing": "frame sent → start of the next wait",
     "round_trip": "frame sent → frame received",
 }
 

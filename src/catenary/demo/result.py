@@ -17,7 +17,7 @@ Reals = npt.NDArray[np.float64]
 Figures = Mapping[str, float]
 Bucket = tuple[float, float, int]  # lower, upper [s], count
 
-PHASES = ("period", "lateness", "receive", "process", "send", "in_controller", "tail")
+PHASES = ("period", "lateness", "receive", "process", "send", "in_controller", "post_processing")
 # A set-point written in one cycle is sent in the next cycle. The first position that it affects is
 # received one cycle later.
 TRANSPORT_CYCLES = 2

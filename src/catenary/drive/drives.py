@@ -16,22 +16,15 @@ from catenary.drive.arguments import (
     AxisSource,
     Columns,
     PdoList,
-    axis_modes,
-    axis_names,
     axis_sources,
     clock_request,
-    cycles_between,
-    force_and_torque,
-    known,
     mode_of,
     named_columns,
-    start_up_list,
     warn_of_default_velocity,
-    written_pdos,
 )
-from catenary.drive.axis import MEASURED, Axis, column_bank
+from catenary.drive.axis import Axis, column_bank
+from catenary.drive.axis_options import AxisOptions, CommonOptions, PerAxis, make_axes
 from catenary.drive.homing import HomingMethod
-from catenary.drive.limits import LimitOptions
 from catenary.drive.motions import HALT
 from catenary.drive.move import Move, Moves
 from catenary.drive.move_request import (
@@ -42,11 +35,10 @@ from catenary.drive.move_request import (
     values_of,
 )
 from catenary.drive.objects import ACTUAL_VELOCITY
-from catenary.drive.port import AxisPort, PutRate
+from catenary.drive.port import AxisFacts, AxisPort, PutRate
 from catenary.drive.rates import RateColumns
 from catenary.drive.request import Request
 from catenary.drive.state_machine import RequestedState
-from catenary.drive.units import AxisUnits, one_each, per_axis
 from catenary.drive.values import Array, AxisValues
 from catenary.plan.cycle import Bank, OnLoss
 from catenary.plan.request import DeviceRequest, DistributedClock, ImageLayout, RequestTables, Views
@@ -56,7 +48,6 @@ from catenary.types import UDINT
 from catenary.wire.cia402 import IN_FAULT, AxisState
 
 V = TypeVar("V")
-PerAxis: TypeAlias = V | Sequence[V]
 Axes: TypeAlias = int | Sequence[int] | slice
 
 STATES = {int(state): state for state in AxisState}
@@ -166,70 +157,41 @@ class Drives(Request):
         start_up: Sequence[StartUp] = (),
     ) -> None:
         sources = axis_sources(subs)
-        n = len(sources)
-        metres = per_axis("metres_per_turn", metres_per_turn, n)
-        units = map(
-            AxisUnits,
-            per_axis("counts_per_turn", counts_per_turn, n),
-            per_axis("gear_ratio", gear_ratio, n),
-            per_axis("direction", direction, n),
-            per_axis("offset", offset, n),
-            per_axis("velocity_unit", velocity_unit, n),
-            per_axis("rated_torque", rated_torque, n),
-            metres,
-        )
-        options = map(
-            LimitOptions,
-            per_axis("position_min", position_min, n),
-            per_axis("position_max", position_max, n),
-            per_axis("velocity_limit", velocity_limit, n),
-            force_and_torque(
-                per_axis("force_limit", force_limit, n),
-                per_axis("torque_limit", torque_limit, n),
-                metres,
-            ),
-            per_axis("acceleration_limit", acceleration_limit, n),
-            per_axis("deceleration_limit", deceleration_limit, n),
-            per_axis("torque_slope", torque_slope, n),
-            per_axis("step_limit", step_limit, n),
-            (on_loss,) * n
-            if on_loss is None or isinstance(on_loss, str)
-            else one_each("on_loss", on_loss, n),
-        )
-        first_modes = (mode,) * n if isinstance(mode, str) else one_each("mode", mode, n)
         super().__init__([sub for sub, _ in sources])
         self._columns = named_columns(columns)
-        written = written_pdos(pdos, self._columns)
         self._clock = clock_request(dc)
-        self._axes = tuple(
-            Axis(
-                name=name,
-                device=sub.position,
-                slot=slot,
-                modes=axis_modes(first, other_modes),
-                units=unit,
-                options=limits,
-                measured=known(tuple(MEASURED) if measured is None else measured),
-                measured_required=measured is not None,
-                columns=self._columns,
-                divider=cycles_between("divider", divider),
-                required=required,
-                homing=home,
-                pdos=written,
-                objects=start_up_list(start_up),
-            )
-            for (sub, slot), name, first, unit, limits, home in zip(
-                sources,
-                axis_names(sources, names),
-                first_modes,
-                units,
-                options,
-                per_axis("homing", homing, n),
-                strict=True,
-            )
+        common = CommonOptions(
+            names=names,
+            other_modes=other_modes,
+            measured=measured,
+            columns=self._columns,
+            required=required,
+            divider=divider,
+            pdos=pdos,
+            start_up=start_up,
         )
-        for axis in self._axes:
-            axis.options.check(axis.name, axis.modes, axis.units.names)
+        options = AxisOptions(
+            mode=mode,
+            counts_per_turn=counts_per_turn,
+            gear_ratio=gear_ratio,
+            direction=direction,
+            offset=offset,
+            velocity_unit=velocity_unit,
+            rated_torque=rated_torque,
+            metres_per_turn=metres_per_turn,
+            position_min=position_min,
+            position_max=position_max,
+            velocity_limit=velocity_limit,
+            torque_limit=torque_limit,
+            force_limit=force_limit,
+            step_limit=step_limit,
+            acceleration_limit=acceleration_limit,
+            deceleration_limit=deceleration_limit,
+            torque_slope=torque_slope,
+            on_loss=on_loss,
+            homing=homing,
+        )
+        self._axes = make_axes(sources, options, common)
         warn_of_default_velocity(self._axes)
         self._period_ns = 0
         self._is_read = False  # settings of the drives, since the last plan
@@ -569,17 +531,9 @@ class Drives(Request):
         def write(place: int, value: int) -> Pending[None]:
             return sdo.request_write(axis.index(place), 0, value, type=UDINT)
 
-        return AxisPort(
-            views,
-            index,
-            name=axis.name,
-            units=axis.units,
-            exchange=period * axis.divider,
-            period=period,
-            measures_velocity=self._measures_velocity[index],
-            write=write,
-            put_rate=put_rate,
-        )
+        measures_velocity = self._measures_velocity[index]
+        facts = AxisFacts(axis.name, axis.units, period, period * axis.divider, measures_velocity)
+        return AxisPort(views, index, facts, write=write, put_rate=put_rate)
 
     def _slices(self, reals: Array, integers: Array, *, output: bool) -> dict[str, Array]:
         """Return the part of the bank array that belongs to each column."""

@@ -26,6 +26,26 @@ REQUESTED_SHIFT = 6  # position of the requested state in axis_flags
 JUMPS = 3  # noise of an estimated velocity at standstill [counts per exchange]
 
 
+class AxisFacts(NamedTuple):
+    """Values of an axis that do not change while the loop is open."""
+
+    name: str
+    units: AxisUnits
+    period: float  # [s] of the loop
+    exchange: float  # [s] between two exchanges of its device
+    measures_velocity: bool  # False: the velocity is estimated
+
+    @property
+    def standstill(self) -> float:
+        """Largest velocity of an axis at rest.
+
+        An estimated velocity jumps by a count per exchange while the axis stands.
+        """
+        jump = JUMPS * abs(self.units.position_scale) / self.exchange
+        least = self.units.defaults.standstill
+        return least if self.measures_velocity else max(least, jump)
+
+
 class AxisPort:
     """Owner of the data that a move writes to one axis: target, mode, bits of the controlword."""
 
@@ -33,24 +53,18 @@ class AxisPort:
         self,
         views: Views,
         index: int,
+        facts: AxisFacts,
         *,
-        name: str,
-        units: AxisUnits,
-        exchange: float,
-        period: float,
-        measures_velocity: bool,
         write: WriteObject,
         put_rate: PutRate,
     ) -> None:
         self._views = views
         self._index = index
-        self.name = name
-        self.units = units
-        self.exchange = exchange  # [s] between two exchanges of its device
-        # An estimated velocity jumps by a count per exchange while the axis stands.
-        jump = 0.0 if measures_velocity else JUMPS * abs(units.position_scale) / exchange
-        self._standstill = max(units.defaults.standstill, jump)
-        self.period = period  # [s] of the loop
+        self.name = facts.name
+        self.units = facts.units
+        self.exchange = facts.exchange  # [s] between two exchanges of its device
+        self.period = facts.period  # [s] of the loop
+        self._standstill = facts.standstill
         self.write_object = write
         self.put_rate = put_rate
         self.now = 0.0  # [s] time of the cycle

@@ -164,13 +164,15 @@ def per_axis(name: str, value: V | Sequence[V], n: int) -> tuple[V, ...]:
 
     Args:
         name: name of the option, for messages.
-        value: one value for all axes, or a sequence with one per axis.
+        value: one value for all axes (a str is one value), or a sequence with one per axis.
         n: number of axes.
 
     Raises:
         ValueError: The number of values is wrong.
     """
-    return one_each(name, value, n) if isinstance(value, Sequence) else (value,) * n
+    if isinstance(value, str) or not isinstance(value, Sequence):
+        return (value,) * n
+    return one_each(name, value, n)
 
 
 def one_each(name: str, values: Sequence[V], n: int) -> tuple[V, ...]:

@@ -17,7 +17,7 @@ from catenary.plan.cycle import ClockPlan
 from catenary.plan.layout import UnitLayout
 from catenary.plan.planner import Plan
 from catenary.plan.start_up import WATCHDOG_DIVIDER, DevicePlan, Download
-from catenary.procedure.pdo import LEFT_ALONE
+from catenary.procedure.pdo import OPTIONAL_ABORTS
 
 EMERGENCIES = 16  # that the master stores for each device
 REQUEST_SIZE = 256  # bytes of an object read by request; a longer one takes a blocking call
@@ -161,7 +161,7 @@ def _download_if_there(master: Reservation, position: int, download: Download) -
     try:
         master.download(position, download.index, download.subindex, download.data)
     except SdoAbort as abort:
-        if abort.code not in LEFT_ALONE:
+        if abort.code not in OPTIONAL_ABORTS:
             raise
 
 

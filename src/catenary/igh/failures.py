@@ -61,25 +61,13 @@ def refused(index: int, number: int, library: Library) -> LinkError:
         library: The library that was called.
     """
     node = NODE.format(index)
-    if not os.path.exists(node) and number != errno.EBUSY:
-        if not MODULE.exists():
-            return LinkError(
-                f"master {index}: the kernel module ec_master is not loaded, {node} does not exist",
-                hint="sudo systemctl start ethercat; if that fails, the module was not built "
-                "for this kernel: docs/how_to/igh.md",
-            )
+    if number == errno.EBUSY:
         return LinkError(
-            f"master {index}: the module ec_master is loaded, but {node} does not exist",
-            hint=f"set MASTER{index}_DEVICE in /etc/ethercat.conf, then "
-            "sudo systemctl restart ethercat",
+            f"master {index} is reserved by another application",
+            hint=f"end it first: sudo fuser -v {node} shows its name",
         )
-    if number != errno.EBUSY and not os.access(node, os.R_OK | os.W_OK):
-        return LinkError(
-            f"master {index}: no permission to open {node}",
-            hint='echo \'KERNEL=="EtherCAT[0-9]*", MODE="0660", GROUP="realtime"\' | sudo tee '
-            "/etc/udev/rules.d/99-ethercat.rules; sudo udevadm control --reload; sudo udevadm "
-            "trigger; then join that group: sudo usermod -aG realtime $USER",
-        )
+    if not os.access(node, os.R_OK | os.W_OK):
+        return _unusable_node(index, node)
     if number == errno.ENODEV:
         return LinkError(
             f"master {index} waits for its network interface: no interface has the address of "
@@ -92,17 +80,34 @@ def refused(index: int, number: int, library: Library) -> LinkError:
             f"master {index} cannot start operation: the kernel refuses (EIO)",
             hint="dmesg | tail shows the reason",
         )
-    if number == errno.EBUSY:
-        return LinkError(
-            f"master {index} is reserved by another application",
-            hint=f"end it first: sudo fuser -v {node} shows its name",
-        )
     return LinkError(
         f"master {index}: {library.path} (version {library.version}) and the kernel module "
         f"(version {_module_version()}) do not work together",
         hint="they come from two builds with different ioctl() versions: check with ethercat "
         "version; install both from one source, then sudo systemctl restart ethercat. If the "
         f"versions agree, another application may hold the master: sudo fuser -v {node}",
+    )
+
+
+def _unusable_node(index: int, node: str) -> LinkError:
+    """Return the error for a device node that does not exist or cannot be opened."""
+    if not os.path.exists(node):
+        if not MODULE.exists():
+            return LinkError(
+                f"master {index}: the kernel module ec_master is not loaded, {node} does not exist",
+                hint="sudo systemctl start ethercat; if that fails, the module was not built "
+                "for this kernel: docs/how_to/igh.md",
+            )
+        return LinkError(
+            f"master {index}: the module ec_master is loaded, but {node} does not exist",
+            hint=f"set MASTER{index}_DEVICE in /etc/ethercat.conf, then "
+            "sudo systemctl restart ethercat",
+        )
+    return LinkError(
+        f"master {index}: no permission to open {node}",
+        hint='echo \'KERNEL=="EtherCAT[0-9]*", MODE="0660", GROUP="realtime"\' | sudo tee '
+        "/etc/udev/rules.d/99-ethercat.rules; sudo udevadm control --reload; sudo udevadm "
+        "trigger; then join that group: sudo usermod -aG realtime $USER",
     )
 
 

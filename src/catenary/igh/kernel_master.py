@@ -82,7 +82,7 @@ class KernelMaster:
             requests: The process-data requests of the loop.
             period_ns: The period of the loop.
         """
-        from catenary.plan.planner import gather_requests
+        from catenary.plan.combination import gather_requests
 
         asked = gather_requests(requests, period_ns)
         for sub in self.main.subs:

@@ -1,7 +1,8 @@
-"""A fault injector for a link: lose, delay, duplicate or corrupt frames, deterministically.
+"""Fault injector for a link: loses, delays, duplicates or corrupts frames, deterministically.
 
-All received frames, and delayed sent frames, pass through one store in order of their due time. The
-fault of a frame is decided once, when it enters. The cost is a copy of each received frame.
+All received frames, and sent frames that are delayed, pass through one store in the order of their
+due times. The faults of a frame are selected once, when it enters. The cost is one copy of each
+received frame.
 """
 
 from libc.stdint cimport int64_t, uint8_t, uint32_t, uint64_t
@@ -45,8 +46,8 @@ ctypedef struct rule:
     int traffic
     int offset                        # -1: anywhere
     bint always
-    uint64_t below                    # drawn numbers below this hit
-    int64_t start                     # of the frame numbers hit
+    uint64_t below                    # a random number below this selects the frame
+    int64_t start                     # first affected frame number; then stop and step of the range
     int64_t stop
     int64_t step
     int64_t delay_ns
@@ -83,7 +84,7 @@ ctypedef struct injector_state:
 
 
 cdef uint64_t draw(injector_state *injector) noexcept nogil:
-    """splitmix64 (Steele, Lea, Flood 2014)."""
+    """Return a random number by splitmix64 (Steele, Lea, Flood 2014)."""
     cdef uint64_t z
     injector.random += <uint64_t> 0x9E3779B97F4A7C15
     z = injector.random
@@ -226,7 +227,7 @@ cdef void send_due(injector_state *injector) noexcept nogil:
 
 
 cdef int take_in(injector_state *injector) noexcept nogil:
-    """Select the faults of frames received by the inner link. Return 0, or -errno."""
+    """Read the frames of the inner link and select their faults. Return 0 or -errno."""
     cdef const uint8_t *frame = NULL
     cdef int k, length
     for k in range(TAKEN_AT_ONCE):
@@ -242,7 +243,7 @@ cdef int injector_send(void *self, const uint8_t *frame, uint32_t length) noexce
     cdef injector_state *injector = <injector_state *> self
     send_due(injector)
     if length > CAT_FRAME_MAX:
-        return injector.inner.send(injector.inner.self, frame, length)  # which refuses it
+        return injector.inner.send(injector.inner.self, frame, length)  # the inner link refuses it
     return enter(injector, SENT, frame, length)
 
 
@@ -273,7 +274,7 @@ cdef int64_t due_of(const held_frame *slot) noexcept nogil:
 
 
 cdef int injector_wait_until(void *self, int64_t deadline, int wake_on_frame) noexcept nogil:
-    """Wait like the inner link, but wake for delayed frames and not for lost ones."""
+    """Wait like the inner link, but wake up for delayed frames and not for lost frames."""
     cdef injector_state *injector = <injector_state *> self
     cdef int64_t arrival, until
     cdef int status
@@ -296,7 +297,7 @@ cdef int injector_wait_until(void *self, int64_t deadline, int wake_on_frame) no
 
 
 cdef class FaultInjector(WrapperLink):
-    """Owns the faults of the frames of `link`. The same `seed` and frames give the same faults."""
+    """Wrapper that injects faults into `link`. The same seed and frames give the same faults."""
     cdef injector_state injector
 
     def __init__(self, link, *faults, seed=0):
@@ -311,7 +312,7 @@ cdef class FaultInjector(WrapperLink):
         self.table.wait_until = injector_wait_until
 
     def inject(self, *faults):
-        """Replace all faults, also while frames are sent. Without arguments, remove all faults."""
+        """Replace all faults, even during operation. Without arguments, remove all faults."""
         if len(faults) > MAX_RULES:
             raise ValueError(f"{len(faults)} faults; at most {MAX_RULES}")
         cdef uint32_t other = 1 - (self.injector.active & 1)
@@ -322,12 +323,12 @@ cdef class FaultInjector(WrapperLink):
         cat_store_release32(&self.injector.active, other)
 
     def seen(self, direction="received", *, traffic="all"):
-        """Return the number of frames so far, which is the number of the next frame."""
+        """Return the number of frames so far, which is also the number of the next frame."""
         return self.injector.seen[DIRECTIONS.index(direction)][TRAFFICS.index(traffic)]
 
     @property
     def injected(self):
-        """Number of faults so far, by kind."""
+        """Number of injected faults, by kind."""
         return {kind: self.injector.injected[i] for i, kind in enumerate(KINDS)}
 
 

@@ -1,8 +1,8 @@
-"""Hold SIGINT, SIGTERM and SIGHUP in the calling thread while it forks.
+"""Fork hooks that block SIGINT, SIGTERM and SIGHUP in the calling thread during a fork.
 
-This is compiled, because Python runs signal handlers in functions written in Python and in
-`signal.pthread_sigmask`. An exception of a handler within a fork hook is lost, and a program would
-continue after Ctrl-C. Here, signals stay blocked until `os.fork` has returned.
+They are compiled, because Python runs signal handlers inside Python functions and inside
+`signal.pthread_sigmask`. An exception of a handler within a fork hook would be lost, and a program
+would continue after Ctrl-C. Here, signals stay blocked until `os.fork` has returned.
 """
 
 cdef extern from *:

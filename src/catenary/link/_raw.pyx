@@ -1,13 +1,13 @@
-"""The raw link: AF_PACKET frames of one NIC, received from a ring in memory shared with the kernel.
+"""Raw link: AF_PACKET frames of one NIC, received through a ring in memory shared with the kernel.
 
-`interface.py` opens, checks and binds the socket. This file contains only the calls of a cycle. Send
-takes one system call, receive none (0.07 us per frame including the call from Python, with 50 frames
-waiting on a veth; 0.7 us by `recv`, if the kernel refuses the ring).
+`interface.py` opens, checks and binds the socket. This file contains only the calls of a cycle. A
+send takes one system call, a receive none. With 50 queued frames on a veth, a receive takes 0.07 us
+per frame including the call from Python. With `recv`, if the kernel refuses the ring, it takes 0.7 us.
 
-Closing: a native thread may be inside a call, or read a frame in the ring. `close` replaces the ring
-by zero pages and the descriptor by a socket without a peer. Both keep their address and number, so
-that such a thread finds no frame, instead of a fault or another file. The kernel releases the
-interface at once; pages and number are released with the object.
+Closing: a native thread may be inside a call, or read a frame in the ring. `close` therefore replaces
+the ring by zero pages and the descriptor by a socket without a peer. Address and descriptor number
+stay the same, so such a thread finds no frame and causes no fault. The kernel releases the interface
+at once; pages and descriptor are released with the object.
 """
 
 import os
@@ -75,7 +75,7 @@ cdef extern from "<time.h>" nogil:
 
 cdef enum:
     SECOND = 1_000_000_000
-    ODD_FRAMES = 16                   # too long or too short, skipped in one call
+    ODD_FRAMES = 16                   # frames that are too long or too short, skipped in one call
 
 ctypedef struct raw_state:
     int fd
@@ -200,7 +200,7 @@ cdef int pending_error(raw_state *raw) noexcept nogil:
 
 
 cdef class RawLink(TableLink):
-    """Owns an AF_PACKET socket and, unless `ring_size` is 0, the mapping of its TPACKET_V2 ring.
+    """Owner of an AF_PACKET socket and, unless `ring_size` is 0, of its mapped TPACKET_V2 ring.
 
     `receive_path` describes how frames are received: "mapped ring", or "recv (reason)".
     """
@@ -214,7 +214,7 @@ cdef class RawLink(TableLink):
     def __init__(self, str name not None, socket, size_t ring_size, int slot_size,
                  str receive_path not None):
         if ring_size and (slot_size < 2048 or ring_size < <size_t> slot_size):
-            raise ValueError(f"a ring of {ring_size} bytes holds no slot of {slot_size}")
+            raise ValueError(f"a ring of {ring_size} bytes cannot hold a slot of {slot_size} bytes")
         self.name = name
         self.receive_path = receive_path
         if ring_size:
@@ -232,11 +232,11 @@ cdef class RawLink(TableLink):
         return self.raw.fd
 
     def forget(self):
-        """Close the copies of ring and socket in a forked child. The parent's stay open."""
+        """Close the copies of ring and socket in a forked child; the parent's stay open."""
         self.close()
 
     def flush(self):
-        """Drop the frames received so far. Return their number."""
+        """Discard the frames received so far; return their number."""
         cdef const uint8_t *frame = NULL
         cdef int count = 0
         while self.table.receive(self.table.self, &frame) > 0:
@@ -244,7 +244,7 @@ cdef class RawLink(TableLink):
         return count
 
     def explain(self, int number):
-        from catenary.link.interface import no_link  # which needs this module
+        from catenary.link.interface import no_link  # avoids a circular import
 
         return no_link(self.name, number)
 
@@ -259,7 +259,7 @@ cdef class RawLink(TableLink):
         return 0
 
     cdef int close_table(self) except -1:
-        """Replace the ring by zero pages (TP_STATUS_KERNEL: no frame), and the socket."""
+        """Replace the ring by zero pages (TP_STATUS_KERNEL: no frame), and replace the socket."""
         if self.raw.ring != NULL and mmap(
             self.raw.ring, self.ring_size, PROT_READ | PROT_WRITE,
             MAP_PRIVATE | MAP_ANONYMOUS | MAP_FIXED | MAP_NORESERVE, -1, 0,

@@ -1,8 +1,8 @@
-"""A recorder for a link: it writes every frame, in both directions, to a pcapng file.
+"""Recorder for a link: writes every frame, in both directions, to a pcapng file.
 
-In the cycle, a frame is copied into a ring of complete pcapng blocks (about 0.1 us). A separate
-thread writes the ring to the file. It never delays the cycle: if the ring is full, frames are
-dropped and counted. In virtual time, the caller writes the file when the ring is half full, and no
+The cycle copies each frame as a complete pcapng block into a ring (about 0.1 us). A separate thread
+writes the ring to the file. It never delays the cycle: if the ring is full, frames are dropped and
+counted. In virtual time, the caller's thread writes the file whenever the ring is half full, and no
 frame is dropped.
 """
 
@@ -183,23 +183,23 @@ cdef int recorder_wait_until(void *self, int64_t deadline, int wake_on_frame) no
 
 
 cdef class Recorder(WrapperLink):
-    """Owns a pcapng file that receives all frames of `link`, with timestamps in ns.
+    """Owner of a pcapng file with all frames of `link` and their timestamps in ns.
 
     Timestamps are the time of day, or the virtual time of a link in virtual time. A frame is
     recorded after it was sent, so an answer may precede its question by the duration of the call.
-    `dropped` counts the frames that the file lacks; `close` issues a warning about them.
+    `dropped` counts frames that are missing in the file; if there are any, `close` issues a warning.
     """
     cdef recorder_state recorder
     cdef cat_memory memory                # the ring
     cdef pthread_t writer
     cdef bint writing
-    cdef pid_t owner                      # the process that writes: in a forked child nothing does
+    cdef pid_t owner                      # process that writes the file; a forked child does not
     cdef readonly str path
 
     def __init__(self, link, path):
         self.recorder.ring = <uint8_t *> cat_memory_take(&self.memory, 1, RING_BYTES)
         if self.recorder.ring == NULL:
-            raise MemoryError(f"{RING_BYTES} bytes for the recorder's ring")
+            raise MemoryError(f"cannot allocate {RING_BYTES} bytes for the ring of the recorder")
         self.path = os.fspath(path)
         self.owner = getpid()
         self.recorder.fd = os.open(self.path, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, 0o644)
@@ -222,31 +222,31 @@ cdef class Recorder(WrapperLink):
         self.recorder.inner = self.inner
         self.recorder.inline_writer = (self.inner.flags & CAT_LINK_VIRTUAL_TIME) != 0
         if not self.recorder.inline_writer:
-            cat_memory_touch(&self.memory)  # not locked: the cycle needs the lockable memory
+            cat_memory_touch(&self.memory)  # not locked: lockable memory is left to the cycle
             self.recorder.stamp_offset = time.time_ns() - self.inner.now(self.inner.self)
             self.start_writer()
         return 0
 
     cdef int start_writer(self) except -1:
-        """Start the writer without real-time priority, even if the calling thread has one."""
+        """Start the writer thread without real-time priority, even if the caller has one."""
         cdef pthread_attr_t attributes
         pthread_attr_init(&attributes)
         pthread_attr_setinheritsched(&attributes, PTHREAD_EXPLICIT_SCHED)
         cdef int status = pthread_create(&self.writer, &attributes, run_writer, &self.recorder)
         pthread_attr_destroy(&attributes)
         if status != 0:
-            raise OSError(status, f"no thread for the recorder: {os.strerror(status)}")
+            raise OSError(status, f"cannot start the thread of the recorder: {os.strerror(status)}")
         self.writing = True
         return 0
 
     @property
     def recorded(self):
-        """Number of frames in the file or in the ring."""
+        """Number of frames recorded so far, including those not yet written to the file."""
         return cat_load_relaxed64(&self.recorder.recorded)
 
     @property
     def dropped(self):
-        """Number of frames that the file lacks, because the disk was too slow or full."""
+        """Number of frames missing in the file because the disk was too slow or full."""
         return cat_load_relaxed64(&self.recorder.dropped)
 
     cdef int stop_writer(self) except -1:
@@ -267,7 +267,7 @@ cdef class Recorder(WrapperLink):
 
     cdef int finish_file(self) except -1:
         if self.owner != getpid():
-            os.close(self.recorder.fd)  # a copy: the parent keeps writing
+            os.close(self.recorder.fd)  # this is a copy; the parent keeps writing
             return 0
         with nogil:
             drain(&self.recorder)

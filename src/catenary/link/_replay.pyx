@@ -1,8 +1,8 @@
-"""A link that replays the answers of a recorded segment, deterministically and in virtual time.
+"""Link that replays the answers of a recorded segment, deterministically and in virtual time.
 
-A sent frame is looked up by its datagrams with all indices 0 (FNV-1a hash, then comparison). The
-answers to the same question are returned in the recorded order; the last one is repeated. An answer
-has the indices of the sent frame and arrives after the recorded latency.
+A sent frame is found by its datagrams with all indices set to 0 (FNV-1a hash, then comparison). The
+answers to the same question are returned in the recorded order; the last answer is repeated. An
+answer gets the indices of the sent frame and arrives after the recorded latency.
 """
 
 from libc.errno cimport EINVAL, EMSGSIZE, ENOBUFS
@@ -21,7 +21,7 @@ LATENCY_MAX = 900 * 10**9             # [ns] a quarter of an hour
 
 cdef enum:
     QUEUE = 64                        # pending answers; a power of two
-    HEADER_SIZE = 16                  # Ethernet's and EtherCAT's
+    HEADER_SIZE = 16                  # Ethernet and EtherCAT headers
     DATAGRAM_HEADER = 10
     DATAGRAM_OVERHEAD = 12            # header and working counter
 
@@ -58,7 +58,7 @@ ctypedef struct replay_state:
 
 
 cdef uint64_t hash_of(const uint8_t *data, uint32_t length) noexcept nogil:
-    """FNV-1a, 64 bits."""
+    """Return the FNV-1a hash, 64 bits."""
     cdef uint64_t value = <uint64_t> 0xCBF29CE484222325
     cdef uint32_t i
     for i in range(length):
@@ -71,7 +71,7 @@ cdef uint32_t datagram_size(const uint8_t *datagram) noexcept nogil:
 
 
 cdef uint32_t ask(const uint8_t *frame, uint32_t length, uint8_t *asked) noexcept nogil:
-    """Copy the datagrams with all indices 0. Return their length; 0 if the frame is malformed."""
+    """Copy the datagrams, set their indices to 0 and return their length; 0 if malformed."""
     cdef uint32_t at = HEADER_SIZE
     cdef uint32_t size
     while at + DATAGRAM_OVERHEAD <= length:
@@ -177,9 +177,9 @@ cdef int replay_wait_until(void *self, int64_t deadline, int wake_on_frame) noex
 
 
 cdef class Replay(TableLink):
-    """Owns the answers of a recording: a pcapng or pcap file, or pairs of (frame sent, answer).
+    """Owner of the answers in a recording: a pcapng or pcap file, or pairs of (sent frame, answer).
 
-    `unmatched` counts frames without an answer in the recording. They are not answered, like lost
+    `unmatched` counts frames that have no answer in the recording. The replay treats them like lost
     frames. `first_unmatched` is the first of them.
 
     Raises:
@@ -187,7 +187,7 @@ cdef class Replay(TableLink):
         ValueError: The pairs are invalid.
     """
     cdef replay_state replay
-    cdef object kept                  # the bytes that the tables point into
+    cdef object kept                  # owners of the bytes that the tables point to
     cdef bint is_file
 
     def __init__(self, recording):
@@ -214,7 +214,7 @@ cdef class Replay(TableLink):
         self.replay.questions = <question *> calloc(slots, sizeof(question))
         self.replay.answers = <answer *> calloc(count, sizeof(answer))
         if self.replay.questions == NULL or self.replay.answers == NULL:
-            raise MemoryError(f"{count} answers")
+            raise MemoryError(f"cannot allocate memory for {count} answers")
         self.replay.mask = slots - 1
         self.kept = answers
         for asked, exchanges in answers.items():
@@ -222,7 +222,7 @@ cdef class Replay(TableLink):
         return 0
 
     cdef uint32_t fill_question(self, bytes asked, list exchanges, uint32_t used) except 0:
-        """Add a question with its answers, from number `used` on. Return the next free number."""
+        """Add a question and its answers, starting at number `used`; return the next free number."""
         cdef uint32_t length = <uint32_t> len(asked)
         cdef question *slot = find(&self.replay, asked, length)
         slot.bytes = asked

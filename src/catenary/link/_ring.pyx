@@ -1,12 +1,12 @@
-"""A ring of devices on two links: every frame is sent on both, and delivered once.
+"""Ring of devices on two links: every frame is sent on both links and delivered once.
 
 In a closed ring, all devices process the copy sent on the first link, which arrives on the second.
-The other copy passes unprocessed. In a cut ring, both copies turn round at the cut and return on the
-link on which they were sent. The receiver gets one frame in both cases (native/ring_merge.h).
+No device processes the other copy. In a cut ring, both copies turn back at the cut and return on the
+link on which they were sent. In both cases, the receiver gets one frame (native/ring_merge.h).
 
-After one copy has arrived, the ring waits `pair_wait` for the other. It does not wait if that copy
-was missing several times in a row and the first copy has met all devices. The cost is a copy of each
-frame and two system calls to send.
+After one copy has arrived, the ring waits `pair_wait` for the other. It does not wait if the other
+copy was missing several times in a row and the first copy has reached all devices. The cost is a copy
+of each frame and two system calls per send.
 """
 
 from libc.errno cimport EINTR, EMSGSIZE, errno
@@ -66,7 +66,7 @@ cdef enum:
     MARK = 11                         # last byte of the source address: identifies the copy
     SECOND_BIT = 0x80
     SOURCE = 6
-    PROCESSED = 0x02                  # of the source address's first byte: a controller was passed
+    PROCESSED = 0x02                  # bit of the first source address byte, set by a controller
     DATAGRAMS = CAT_ETHERNET_HEADER + CAT_ETHERCAT_HEADER
     INDEX = DATAGRAMS + 1             # of the first datagram
     HEADERS = DATAGRAMS + CAT_DATAGRAM_HEADER + CAT_DATAGRAM_COUNTER  # of the first datagram
@@ -83,7 +83,7 @@ ctypedef struct slot_t:
     uint8_t expected                  # copies sent: bit 0 first, bit 1 second
     uint8_t back                      # copies that returned
     uint8_t delivered
-    int64_t since                     # time at which the first copy returned
+    int64_t since                     # time at which the first copy returned [ns]
     uint64_t order                    # order of completion
     uint8_t sent[CAT_FRAME_MAX]
     uint8_t copies[2][CAT_FRAME_MAX]
@@ -98,7 +98,7 @@ ctypedef struct ring_t:
     uint32_t counted[2]               # devices that answered the last broadcast of each copy
     uint32_t total                    # devices that answered the last broadcast that was delivered
     uint64_t unpaired                 # frames delivered from one copy because the other was late
-    uint64_t alien                    # frames of other senders, or outdated ones
+    uint64_t alien                    # frames of other senders, or late frames
     uint64_t send_errors[2]
     uint8_t pending[SLOTS]            # indices with a copy, in no order
     slot_t *slots
@@ -112,7 +112,7 @@ cdef inline int64_t ring_now(void *self) noexcept nogil:
 
 
 cdef void forget(ring_t *ring, uint8_t index) noexcept nogil:
-    """Remove an index from the pending ones."""
+    """Remove an index from the pending indices."""
     cdef uint32_t i
     for i in range(ring.waiting):
         if ring.pending[i] == index:
@@ -156,7 +156,7 @@ cdef int ring_send(void *self, const uint8_t *frame, uint32_t length) noexcept n
         status = ring.links[side].send(ring.links[side].self, copy, length)
         if status < 0:
             ring.send_errors[side] += 1
-            note_missed(ring, side)   # a port without a carrier refuses frames: none returns
+            note_missed(ring, side)   # a port without a carrier refuses frames, so no copy returns
             worst = status
         else:
             slot.expected |= 1 << side
@@ -204,7 +204,7 @@ cdef void take(ring_t *ring, int arrived, const uint8_t *frame, uint32_t length)
 cdef bint is_copy(const slot_t *slot, const uint8_t *frame, uint32_t length) noexcept nogil:
     """Return True if the frame has the EtherCAT header, datagrams and NOP of the sent frame.
 
-    The NOP contains the cycle number, which distinguishes outdated frames (core/_frames.pyx).
+    The NOP contains the cycle number, which identifies late frames (core/_frames.pyx).
     """
     if length < DATAGRAMS + <uint32_t> (frame[14] | (frame[15] & 7) << 8):
         return False
@@ -223,7 +223,7 @@ cdef inline bint is_processed(const uint8_t *frame) noexcept nogil:
 
 
 cdef inline bint lacks_devices(ring_t *ring, const slot_t *slot, int side) noexcept nogil:
-    """Return True for a broadcast that met fewer devices than the last one (cut ring)."""
+    """Return True for a broadcast that reached fewer devices than the last one (cut ring)."""
     return slot.sent[16] == CAT_BRD and first_counter(slot.copies[side], slot.length) < ring.total
 
 
@@ -234,14 +234,14 @@ cdef int64_t due_at(ring_t *ring, const slot_t *slot) noexcept nogil:
         return slot.since
     missing = SECOND if slot.back == 1 else FIRST
     if not is_processed(slot.copies[1 - missing]) and not is_processed(slot.sent):
-        return NEVER                  # the copy has met no device, so it contains no data
+        return NEVER                  # no device has processed this copy, so it contains no data
     if ring.missed[missing] >= GIVEN_UP and not lacks_devices(ring, slot, 1 - missing):
         return slot.since
     return slot.since + ring.pair_wait
 
 
 cdef int next_due(ring_t *ring, int64_t *when) noexcept nogil:
-    """Return the place in `pending` of the frame that is due first; -1 if there is none."""
+    """Return the position in `pending` of the frame to deliver first; -1 if there is none."""
     cdef int best = -1
     cdef uint32_t i
     cdef int64_t due
@@ -304,7 +304,7 @@ cdef int ring_wait_until(void *self, int64_t deadline, int wake_on_frame) noexce
         status = wait_for_either(ring, min(deadline, due))
         if status < 0:
             return status
-        if ring_now(ring) >= deadline:  # also under a flood of frames that are not ours
+        if ring_now(ring) >= deadline:  # even if foreign frames keep arriving
             take_in(ring)
             next_due(ring, &due)
             return 1 if due <= ring_now(ring) else 0
@@ -333,22 +333,22 @@ cdef int wait_for_either(ring_t *ring, int64_t deadline) noexcept nogil:
     if ready < 0:
         return -errno
     if ready > 0 and not (fds[0].revents & POLLIN or fds[1].revents & POLLIN):
-        # A NIC that went down reports its error until it is read; the other one keeps working.
+        # A NIC that went down reports an error until it is read; the other NIC keeps working.
         silence(a, &fds[0])
         silence(b, &fds[1])
     return 1 if ready > 0 else 0
 
 
 cdef void silence(cat_link *link, const pollfd *fd) noexcept nogil:
-    """Clear the error of a socket by a receive without waiting."""
+    """Clear the error of a socket by a wait that has already expired."""
     if fd.revents and not fd.revents & POLLIN:
         link.wait_until(link.self, 0, 1)
 
 
 cdef class RingLink(TableLink):
-    """Owns the two links of a ring, and closes both.
+    """Owner of the two links of a ring.
 
-    `pair_wait` is the longest wait of one copy of a frame for the other [s].
+    `pair_wait` is the maximum time to wait for the second copy of a frame after the first [s].
     """
     cdef ring_t ring
     cdef cat_memory memory            # the slots
@@ -357,7 +357,7 @@ cdef class RingLink(TableLink):
 
     def __init__(self, first, second, double pair_wait=100e-6):
         if not 0 <= pair_wait <= 1:
-            raise ValueError(f"pair_wait={pair_wait} s: from 0 to 1 s")
+            raise ValueError(f"pair_wait={pair_wait} s: must be from 0 to 1 s")
         self.ring.slots = <slot_t *> cat_memory_take(&self.memory, SLOTS, sizeof(slot_t))
         if self.ring.slots == NULL:
             raise MemoryError
@@ -397,7 +397,7 @@ cdef class RingLink(TableLink):
         if both == 0:
             raise ValueError(
                 f"{self.name}: a ring needs two network interfaces, or the two ends of one virtual"
-                " segment; put recorders and fault injectors round the ring"
+                " segment; wrap recorders and fault injectors around the ring"
             )
         return 0
 
@@ -423,7 +423,7 @@ cdef class RingLink(TableLink):
 
     @property
     def counts(self):
-        """Counters: frames with only one copy in time, alien frames, send errors of each link."""
+        """Counts of unpaired frames (one copy was late), alien frames and send errors per link."""
         return {
             "unpaired": self.ring.unpaired,
             "alien": self.ring.alien,
@@ -453,12 +453,12 @@ def merge(bytes first not None, bytes second not None):
     """Merge two copies into one frame.
 
     Raises:
-        ValueError: They are not copies of one frame.
+        ValueError: The arguments are not copies of the same frame.
     """
     cdef bytearray merged = bytearray(first)
     cdef uint8_t *out = merged
     if cat_ring_merge(out, <uint32_t> len(first), <const uint8_t *> second, <uint32_t> len(second)):
-        raise ValueError("not two copies of one frame")
+        raise ValueError("the arguments are not two copies of one frame")
     return bytes(merged)
 
 

@@ -19,14 +19,14 @@ class TableLink:
     def now(self) -> int: ...
     def wait_until(self, deadline_ns: int, wake_on_frame: bool) -> bool: ...
     def explain(self, number: int) -> LinkError | None:
-        """Return a LinkError that explains an errno; None if only its name is known."""
+        """Return a LinkError that explains an errno; None if the link cannot explain it."""
 
     def close(self) -> None: ...
     def __enter__(self) -> Self: ...
     def __exit__(self, *exc_info: object) -> None: ...
 
 def explained_by(link: object, number: int) -> LinkError | None:
-    """Return the result of `explain` of a link; None for a Python link without this method."""
+    """Return a link's error for an errno; None if the link cannot explain it."""
 
 class WrapperLink(TableLink):
     @property

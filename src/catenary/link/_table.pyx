@@ -1,9 +1,9 @@
 """The Python methods of a link, over its C table (`native/link.h`).
 
 Compiled links derive from `TableLink`, fill its `table` and inherit the rest. `close` first replaces
-the calls of the table: a later call returns -EBADF. A native thread may still be inside a former
-call, or read a frame that it received. Therefore `close_table` must keep the memory and descriptors
-of the calls valid. They are released with the last holder of the table (`__dealloc__`).
+the functions of the table, so that later calls return -EBADF. A native thread may still be inside an
+earlier call, or read a frame that it received. `close_table` must therefore keep the memory and
+descriptors of these functions valid. `__dealloc__` releases them after the last use of the table.
 """
 
 from cpython.exc cimport PyErr_CheckSignals
@@ -56,7 +56,7 @@ cdef int closed_wait_until(void *self, int64_t deadline, int wake_on_frame) noex
 
 
 cdef class TableLink:
-    """Owns one link table; a base for the compiled links of this package."""
+    """Owner of a link table; base class of the compiled links."""
 
     def __cinit__(self):
         memset(&self.table, 0, sizeof(cat_link))
@@ -67,8 +67,8 @@ cdef class TableLink:
     cdef int close_table(self) except -1:
         """Release the device or the file.
 
-        It is called at most once, after the calls were replaced. Another thread may still be inside
-        one of them.
+        It is called at most once, after the functions of the table were replaced. Another thread may
+        still be inside one of the old functions.
         """
         return 0
 
@@ -79,7 +79,7 @@ cdef class TableLink:
 
     @property
     def capsule(self):
-        """The table for compiled users. The capsule keeps this link alive, but not open."""
+        """Link table for compiled code, in a capsule that keeps this object alive but not open."""
         capsule = PyCapsule_New(&self.table, CAT_LINK_CAPSULE, release_owner)
         PyCapsule_SetContext(capsule, <void *> <PyObject *> self)
         Py_INCREF(self)
@@ -90,7 +90,7 @@ cdef class TableLink:
         return self.table.send == closed_send
 
     def open_link(self):
-        """Return this link: an open link is its own source."""
+        """Return this link, which is already open."""
         return self
 
     def send(self, bytes frame not None):
@@ -121,7 +121,7 @@ cdef class TableLink:
         return status == 1
 
     def explain(self, int number):
-        """Return a LinkError that explains an errno; None if only its name is known."""
+        """Return a LinkError that explains an errno; None if the link cannot explain it."""
         return None
 
     cdef failed(self, str verb, int number):
@@ -148,13 +148,13 @@ cdef class TableLink:
 
 
 def explained_by(link, int number):
-    """Return the result of `explain` of a link; None for a Python link without this method."""
+    """Return a link's error for an errno; None if the link cannot explain it."""
     explain = getattr(link, "explain", None)
     return None if explain is None else explain(number)
 
 
 cdef class WrapperLink(TableLink):
-    """Owns the link that it wraps, and closes it, too. A base for recorders and fault injectors."""
+    """Owner of another link, which it wraps and closes; base class of recorders and injectors."""
 
     cdef int wrap(self, object link) except -1:
         """Open `link` if it is a source, and use its table, clock and flags."""

@@ -26,11 +26,11 @@ class Fault:
         kind: "lose", "delay", "duplicate" or "corrupt".
         direction: "sent" or "received".
         traffic: "all", "cyclic" or "acyclic".
-        frames: Numbers of the affected frames; None affects all.
+        frames: Numbers of the affected frames; None for all frames.
         probability: Probability of the fault for each of these frames.
-        delay: The delay [s]; only for kind "delay".
-        offset: Byte to invert, only for kind "corrupt"; None inverts a random bit of the EtherCAT
-            part.
+        delay: Delay [s]; only for kind "delay".
+        offset: Offset of the byte to invert, only for kind "corrupt"; None inverts a random bit of
+            the EtherCAT part.
     """
 
     kind: Kind

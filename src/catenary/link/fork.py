@@ -1,12 +1,12 @@
-"""Links and loops after a fork: the child inherits copies and must close them.
+"""Fork hooks: a forked child closes its copies of links and loops.
 
-The child closes its copies of sockets, so that the kernel releases an interface when its owner
-ends. It does not send, and does not wait for threads: the child has no threads of the parent. A
-fork() by a C library does not run these hooks, so owners also compare process numbers.
+The child closes its copies of sockets, so that the kernel releases an interface when the parent
+ends. It does not send, and it does not wait for threads, because it has no copy of them. A fork()
+in a C library does not run these hooks; owners therefore also compare process IDs.
 
 Signals are blocked until the child has closed its copies. Otherwise an early SIGTERM would be lost,
-because Python drops signals that its handlers have recorded before the fork ends.
-`multiprocessing.Pool.terminate` would then wait for that child for ever.
+because Python discards signals that it has recorded before the fork returns.
+`multiprocessing.Pool.terminate` would then wait for this child forever.
 """
 
 from __future__ import annotations
@@ -19,19 +19,19 @@ from catenary.link._fork_signals import hold, release
 
 
 class Inherited(Protocol):
-    """An owner of something that a forked child must not use."""
+    """Owner of a resource that a forked child must not use."""
 
     def forget(self) -> None:
-        """Close the copies of the child and refuse further use. Must not raise."""
+        """Close the copies in the child and refuse further use. Must not raise."""
         ...
 
 
-# A fork hook cannot be removed, so one hook serves all owners.
+# A fork hook cannot be removed, so all owners share one hook.
 _OWNERS: weakref.WeakSet[Inherited] = weakref.WeakSet()
 
 
 def forget_in_child(owner: Inherited) -> None:
-    """Call `owner.forget()` in every child that this process forks while the owner lives."""
+    """Call `owner.forget()` in every child that this process forks while the owner exists."""
     _OWNERS.add(owner)
 
 

@@ -1,14 +1,14 @@
-"""Pairs of frames in a recording: a frame that was sent, and the same frame when it returned.
+"""Pairs of sent and returned frames in a recording.
 
-The first conclusive criterion decides whether a frame was sent or returned:
+The first conclusive criterion determines whether a frame was sent or returned:
 
 1. The file: pcapng can store the direction of a packet.
 2. The source address: the first controller sets bit 1 of its first byte. This is inconclusive if
-   all frames of an address have the bit, because the interface's own address has it (virtual
-   interfaces, 02:...). It is also inconclusive if none has it: some simulators do not set it.
+   all frames of an address have the bit, because the address of a virtual interface contains it
+   (02:...). It is also inconclusive if none has the bit, because some simulators do not set it.
 3. The content: a frame is sent with all working counters 0, and returns with larger ones. If no
    device answered, controllers have still incremented a position or broadcast address. A frame that
-   returns unchanged does so at once or with padding; a master repeats a frame only after some ms.
+   returns unchanged returns at once, or with padding; a master repeats a frame only after some ms.
 """
 
 from __future__ import annotations
@@ -27,6 +27,8 @@ from catenary.wire.pcapng import Direction, Packet
 
 
 class Exchange(NamedTuple):
+    """A sent frame and its answer."""
+
     sent: bytes
     answer: bytes
     latency_ns: int = 0
@@ -59,7 +61,7 @@ def read_exchanges(path: str | os.PathLike[str]) -> list[Exchange]:
     A truncated capture is read up to its end.
 
     Raises:
-        DecodeError: The file is not a capture.
+        DecodeError: The file is not a pcapng or pcap capture.
     """
     return pair(decode_capture(Path(path).read_bytes()).packets)
 
@@ -67,8 +69,8 @@ def read_exchanges(path: str | os.PathLike[str]) -> list[Exchange]:
 def pair(packets: Iterable[Packet]) -> list[Exchange]:
     """Pair each answer with the oldest unanswered frame that has the same datagrams and indices.
 
-    Frames without an answer within `LOST_NS` are lost. They are omitted, and so are frames of other
-    protocols.
+    Frames without an answer within `LOST_NS` count as lost. Lost frames and frames of other
+    protocols are omitted.
     """
     seen = _ethercat(packets)
     conclusive = _conclusive_sources(seen)
@@ -88,7 +90,7 @@ def pair(packets: Iterable[Packet]) -> list[Exchange]:
 
 
 def shape_of(frame: Frame) -> Shape:
-    """Return the properties that an answer shares with its question: command, index and length."""
+    """Return command, index and data length of each datagram; an answer has the same."""
     return tuple((int(d.command), d.index, len(d.data)) for d in frame.datagrams)
 
 
@@ -121,7 +123,7 @@ def _is_outbound(each: _Seen, waiting: Sequence[_Seen], conclusive: frozenset[by
 
 
 def _came_back_uncounted(sent: _Seen, each: _Seen) -> bool:
-    """Return True if no device answered, but controllers passed the frame on."""
+    """Return True if no device answered, but controllers forwarded the frame."""
     pairs = list(zip(sent.frame.datagrams, each.frame.datagrams, strict=True))
     if any(a.data != b.data or a.ado != b.ado for a, b in pairs):
         return False
@@ -143,7 +145,7 @@ def question_of(sent: bytes) -> bytes:
     """Return the datagrams of a frame with all indices set to 0.
 
     Raises:
-        DecodeError: It is not an EtherCAT frame.
+        DecodeError: The bytes are not an EtherCAT frame.
     """
     datagrams = decode_frame(sent).datagrams
     last = len(datagrams) - 1

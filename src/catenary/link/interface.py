@@ -1,4 +1,4 @@
-"""A network interface as a link source: checks, and the AF_PACKET socket."""
+"""A network interface as a link source: checks before opening, and the AF_PACKET socket."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ PACKET_IGNORE_OUTGOING = 23
 TPACKET_V2 = 1
 
 SIOCGIFFLAGS, SIOCGIFHWADDR = 0x8913, 0x8927  # linux/sockios.h
-IFF_UP, IFF_RUNNING = 0x01, 0x40  # linux/if.h; running: there is a carrier
+IFF_UP, IFF_RUNNING = 0x01, 0x40  # linux/if.h; running: it has a carrier
 ARPHRD_ETHER, ARPHRD_LOOPBACK = 1, 772  # linux/if_arp.h
 
 SLOT_SIZE = 2048  # header and one frame of 1514 bytes
@@ -37,7 +37,7 @@ BLOCK_COUNT = 4  # 128 slots: half a millisecond of frames at line rate
 class Interface:
     """A network interface, selected by its name in `ip link`.
 
-    With `mapped_ring=False`, frames are received by `recv`, which is slower (for comparisons).
+    `mapped_ring=False` receives frames by `recv`, which is slower; it is meant for comparisons.
     """
 
     name: str
@@ -68,10 +68,10 @@ class Interface:
 
 
 def check(name: str) -> None:
-    """Check that an interface can carry frames, before a socket is opened.
+    """Check that an interface can carry EtherCAT frames.
 
     Raises:
-        LinkError: It is unknown, down or not Ethernet.
+        LinkError: The interface is unknown, down or not Ethernet.
     """
     names = [known for _, known in socket.if_nameindex()]
     if name not in names:
@@ -90,7 +90,7 @@ def check(name: str) -> None:
 
 
 def no_link(name: str, number: int) -> LinkError | None:
-    """Return the error for an interface without a carrier; None if the cause is another one.
+    """Return the error for an interface without a carrier; None if the cause differs.
 
     Without a carrier, the kernel refuses frames with ENOBUFS ("No buffer space available").
     """
@@ -106,7 +106,7 @@ def no_link(name: str, number: int) -> LinkError | None:
     return LinkError(
         f"{name} has no link: the cable is unplugged or damaged, or the first device has no power",
         hint=f"check the link lights, and that {name} is the right port; `ip link show {name}` "
-        "shows NO-CARRIER until there is a link. For a veth pair, set the other end up, too",
+        "shows NO-CARRIER until there is a link. For a veth pair, also set the other end up",
     )
 
 
@@ -117,7 +117,7 @@ def ask(asking: socket.socket, request: int, name: str) -> int:
 
 
 def open_socket(name: str) -> socket.socket:
-    """Open an AF_PACKET socket. It receives no frames before it is bound."""
+    """Open an AF_PACKET socket, which receives no frames until it is bound."""
     try:
         opened = socket.socket(socket.AF_PACKET, socket.SOCK_RAW, 0)
     except PermissionError as error:
@@ -127,7 +127,7 @@ def open_socket(name: str) -> socket.socket:
     try:
         opened.setblocking(False)
         opened.setsockopt(SOL_PACKET, PACKET_QDISC_BYPASS, 1)
-        # otherwise sent frames are received, too, and look like answers of an empty segment
+        # Otherwise, sent frames are also received and look like answers of an empty segment.
         opened.setsockopt(SOL_PACKET, PACKET_IGNORE_OUTGOING, 1)
     except OSError as error:
         opened.close()

@@ -17,19 +17,19 @@ from catenary.link.interface import (
 
 
 class NetworkInterface(NamedTuple):
-    """An Ethernet interface: `cat.MainDevice(interface.name)`."""
+    """An Ethernet interface; pass its `name` to `cat.MainDevice`."""
 
     name: str
     mac: str  # "02:00:5e:10:00:01"
-    is_up: bool  # else: sudo ip link set NAME up
-    has_link: bool  # a cable to a device that has power
+    is_up: bool  # if not: sudo ip link set NAME up
+    has_link: bool  # a cable connects it to a device that has power
 
 
 def interfaces() -> tuple[NetworkInterface, ...]:
     """Return the Ethernet interfaces of this network namespace, in the kernel's order.
 
-    WiFi interfaces are among them: the kernel shows both kinds alike, and EtherCAT does not work
-    over WiFi. No permissions are needed.
+    WiFi interfaces are included, because the kernel does not distinguish them here. EtherCAT does
+    not work over WiFi. No permissions are needed.
     """
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as asking:
         found = [_read(asking, name) for _, name in socket.if_nameindex()]
@@ -37,7 +37,7 @@ def interfaces() -> tuple[NetworkInterface, ...]:
 
 
 def _read(asking: socket.socket, name: str) -> NetworkInterface | None:
-    """Return an interface; None if it is not Ethernet, or was removed meanwhile."""
+    """Return an interface; None if it is not Ethernet or no longer exists."""
     request = struct.pack("16s24x", name.encode())  # struct ifreq
     try:
         address = fcntl.ioctl(asking, SIOCGIFHWADDR, request)

@@ -1,12 +1,12 @@
-"""Lock that allows one MainDevice per network interface, and detection of other masters.
+"""Locks that allow one MainDevice per network interface, and detection of other masters.
 
-A MainDevice holds an abstract Unix socket named after the interface. Such names belong to a
-network namespace. The kernel releases them when their process ends, also by SIGKILL. Masters
-without this lock are detected by their packet sockets, or by their frames.
+A MainDevice holds an abstract Unix socket named after the interface. Such a name is
+unique within a network namespace. The kernel releases it when the process ends, even by SIGKILL.
+Masters without this lock are detected by their packet sockets or by their frames.
 
 SOEM (oshw/linux/nicdrv.c) and IgH's generic driver (devices/generic.c) open a packet socket for
-0x88A4 and bind it to the interface: /proc/net/packet lists it. A capture program asks for all
-protocols (0x0003) and is not a master.
+0x88A4 and bind it to the interface: /proc/net/packet lists it. A capture program requests
+all protocols (0x0003) and does not count as a master.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from catenary.link.protocol import Link
 from catenary.wire.frame import is_alien
 
 NAME = "\0catenary/"  # of the lock, before the name of the interface; abstract, see unix(7)
-WAITING = 4096  # programs that may ask for the owner of a lock; nothing accepts them
+WAITING = 4096  # backlog: programs that may query the owner of a lock; no connection is accepted
 SETTLE_NS = 20_000_000  # late answers to a master that has just ended
 WINDOW_NS, WINDOWS = 40_000_000, 2  # a live master sends frames in each
 FRAMES = 256  # read per window: more than a receive ring holds
@@ -39,7 +39,7 @@ HINT = (
     "each other, and a scan stops the devices of both"
 )
 OWN_HINT = (
-    "a MainDevice of this program has it: close() that one first, as a with block does. In a "
+    "a MainDevice of this program has it: close() it first, as a with block does. In a "
     "notebook, close it before its cell runs again, or restart the kernel"
 )
 
@@ -51,10 +51,14 @@ class Ownership:
     """
 
     def __init__(self, link: Link, *, force: bool = False) -> None:
-        """Take the interfaces. Waits 0.1 s for frames of others, unless `force`.
+        """Lock the interfaces of a link. Unless `force`, listen 0.1 s for frames of other masters.
+
+        Args:
+            link: The link; a link without network interfaces needs no lock.
+            force: True to continue although another master uses an interface.
 
         Raises:
-            LinkError: another master is live on one of them, and not `force`.
+            LinkError: Another master uses one of the interfaces, and `force` is False.
         """
         self._locks: list[socket.socket] = []
         forget_in_child(self)
@@ -72,10 +76,10 @@ class Ownership:
             raise _refused(self.others)
 
     def _lock(self, raws: Sequence[RawLink], force: bool) -> Iterator[str]:
-        """Take the locks in the order of names. Yield the holders of locks that are taken.
+        """Take the locks in the order of names. Yield the holder of each lock that is not free.
 
-        Stop at the first of these unless `force` is True. Without a fixed order, two rings could
-        refuse each other.
+        Stop at the first of these unless `force` is True. The fixed order prevents two rings from
+        refusing each other.
         """
         for raw in sorted(raws, key=lambda each: each.name):
             lock = locked(raw.name)
@@ -87,7 +91,7 @@ class Ownership:
                 return
 
     def forget(self) -> None:
-        """Close the copies of a forked child."""
+        """Close the copies in a forked child."""
         self.release()
 
     def release(self) -> None:
@@ -103,7 +107,7 @@ def _refused(others: Sequence[str]) -> LinkError:
 
 
 def raw_links(link: Link) -> tuple[RawLink, ...]:
-    """Return the raw links in a link: the link itself, or those it is composed of."""
+    """Return the raw links in a link: the link itself, or its parts."""
     if isinstance(link, RawLink):
         return (link,)
     if isinstance(link, RingLink):
@@ -117,12 +121,12 @@ def locked(name: str) -> socket.socket | None:
     lock = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
     try:
         lock.bind(NAME + name)
-        lock.listen(WAITING)  # from now on, `holder` can ask for its process
+        lock.listen(WAITING)  # from here on, `holder` can query its process
     except OSError as error:
         lock.close()
         if error.errno == errno.EADDRINUSE:
             return None
-        raise LinkError(f"{name}: its lock cannot be taken: {error}") from error
+        raise LinkError(f"{name}: cannot take the lock of the interface: {error}") from error
     return lock
 
 
@@ -133,7 +137,7 @@ def holder(name: str) -> str:
         try:
             asking.connect(NAME + name)
             credentials = asking.getsockopt(socket.SOL_SOCKET, socket.SO_PEERCRED, 12)
-        except OSError:  # released meanwhile, or too many have asked
+        except OSError:  # the lock was released, or its backlog is full
             return "a process that does not report its number"
     return described(struct.unpack("3i", credentials)[0])
 
@@ -152,7 +156,7 @@ def described(pid: int) -> str:
 
 
 def other_sockets(link: Link) -> tuple[str, ...]:
-    """Describe the packet sockets for EtherCAT of others on the interfaces of a link."""
+    """Describe the EtherCAT packet sockets of other programs on the interfaces of a link."""
     return tuple(
         f"{_holder_of_socket(inode)} has an EtherCAT packet socket on {raw.name}"
         for raw in raw_links(link)
@@ -161,10 +165,10 @@ def other_sockets(link: Link) -> tuple[str, ...]:
 
 
 def lasting_sockets(link: Link) -> tuple[str, ...]:
-    """Describe these sockets of others if they are still there after 20 ms.
+    """Describe the sockets of `other_sockets` that are still open after 20 ms.
 
-    A MainDevice that is refused by our lock has opened its socket before, and closes it at once.
-    Without this wait, of two that open at the same time both would be refused.
+    A MainDevice opens its socket before it takes the lock, and closes it at once if the lock is not
+    free. Without this wait, two that open at the same time could refuse each other.
     """
     if not any(_others(raw) for raw in raw_links(link)):
         return ()
@@ -189,17 +193,17 @@ def _ethercat_sockets(name: str) -> list[int]:
 
 
 def _holder_of_socket(inode: int) -> str:
-    """Describe the process that has a socket open, as far as this user may see it."""
+    """Describe the process that has a socket open, if this user may see it."""
     wanted = f"socket:[{inode}]"
     for folder in Path("/proc").glob("[0-9]*/fd"):
-        with contextlib.suppress(OSError):  # ended meanwhile, or another user's
+        with contextlib.suppress(OSError):  # it has ended, or belongs to another user
             if wanted in map(_target, os.scandir(folder)):
                 return described(int(folder.parent.name))
     return "a process that is invisible here, or the kernel's EtherCAT master,"
 
 
 def _target(entry: os.DirEntry[str]) -> str:
-    """Return what a descriptor refers to; "" if it was closed meanwhile."""
+    """Return the target of a descriptor; "" if it no longer exists."""
     try:
         return os.readlink(entry)
     except OSError:
@@ -209,7 +213,7 @@ def _target(entry: os.DirEntry[str]) -> str:
 def foreign_frames(raws: Sequence[RawLink]) -> tuple[str, ...]:
     """Describe the interfaces on which EtherCAT frames arrive while this process sends nothing.
 
-    One burst is not enough: a segment may answer late to a master that has just been killed.
+    One burst is not sufficient: late answers to a master that was just killed may still arrive.
     """
     _pause(raws[0], SETTLE_NS)
     active = {raw.name for raw in raws}
@@ -228,7 +232,7 @@ def _pause(raw: RawLink, duration_ns: int) -> None:
 
 
 def _receives(raw: RawLink) -> bool:
-    """Read what has arrived. Return True if an EtherCAT frame is among it."""
+    """Read the frames that have arrived; return True if one of them is an EtherCAT frame."""
     active = False
     for _ in range(FRAMES):
         frame = raw.receive()

@@ -1,4 +1,4 @@
-"""Protocols of a link and of a link source."""
+"""Protocols for links and link sources."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import Protocol, Self, runtime_checkable
 
 @runtime_checkable
 class Link(Protocol):
-    """A carrier of complete Ethernet frames, from the destination MAC on, without FCS.
+    """A carrier of complete Ethernet frames: destination MAC first, no FCS.
 
     Only one thread may use it at a time. `capsule` holds the `cat_link` table of `native/link.h`,
     which has the same four calls for compiled code.
@@ -28,7 +28,7 @@ class Link(Protocol):
         ...
 
     def receive(self) -> bytes | None:
-        """Return the oldest received frame, without waiting; None if there is none."""
+        """Return the oldest received frame, without waiting; None if no frame has arrived."""
         ...
 
     def now(self) -> int:
@@ -36,10 +36,10 @@ class Link(Protocol):
         ...
 
     def wait_until(self, deadline_ns: int, wake_on_frame: bool) -> bool:
-        """Wait until a deadline or a frame.
+        """Wait until a deadline, or until a frame arrives.
 
         Args:
-            deadline_ns: The deadline on the link's clock.
+            deadline_ns: Absolute deadline on the link's clock [ns].
             wake_on_frame: True to return early when a frame arrives.
 
         Returns:
@@ -56,7 +56,7 @@ class Link(Protocol):
 
 @runtime_checkable
 class LinkSource(Protocol):
-    """A source of a link for a MainDevice: an `Interface`, a virtual segment or an open link."""
+    """An object that can open a link: an `Interface`, a virtual segment or an open link."""
 
     def open_link(self) -> Link: ...
 

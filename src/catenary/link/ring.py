@@ -22,7 +22,7 @@ class Ring:
     Args:
         first: The link of one end.
         second: The link of the other end.
-        pair_wait: Longest wait of one copy of a frame for the other [s].
+        pair_wait: Maximum time to wait for the second copy of a frame after the first [s].
     """
 
     first: Link | LinkSource
@@ -42,7 +42,7 @@ class Ring:
 
 
 def ring_of(link: Link) -> RingLink | None:
-    """Return the ring that a link is or wraps; None if there is none."""
+    """Return the RingLink that `link` is or wraps; None if it is not a ring."""
     while not isinstance(link, RingLink):
         inner = getattr(link, "link", None)
         if inner is None:

@@ -1,4 +1,4 @@
-"""State of a ring, derived from the links on which the copies of its frames returned."""
+"""State of a ring, derived from the links on which the copies of frames return."""
 
 from __future__ import annotations
 
@@ -11,12 +11,14 @@ NOWHERE = 2  # a copy has not returned yet
 
 
 class Shape(Enum):
+    """Shape of a ring."""
+
     UNKNOWN = "unknown"  # no frame has returned yet
     CLOSED = "closed"
     CUT = "cut"  # each copy returns on its side of the cut
     FIRST_ONLY = "first only"  # frames sent on the second link do not return
     SECOND_ONLY = "second only"
-    DEAD = "dead"  # no frame returns any more
+    DEAD = "dead"  # no frame returns
 
 
 class RingState(NamedTuple):
@@ -38,8 +40,8 @@ class RingState(NamedTuple):
 
         Args:
             arrived_on: For each copy, the link on which it returned last.
-            given_up: For each copy, True if it does not return any more.
-            counted: For each copy, the devices that answered its last broadcast.
+            given_up: For each copy, True if it no longer returns.
+            counted: For each copy, the number of devices that answered its last broadcast.
         """
         there = [on != NOWHERE and not gone for on, gone in zip(arrived_on, given_up, strict=True)]
         met = [count if here else 0 for count, here in zip(counted, there, strict=True)]

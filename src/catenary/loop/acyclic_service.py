@@ -18,7 +18,7 @@ from catenary.procedure.exchange import Procedure
 T = TypeVar("T")
 
 BUSY_NS = 1_000_000  # longest time between two steps while a procedure is pending
-IDLE = 0.010  # [s] between two looks at the mailboxes while no procedure is pending
+IDLE = 0.010  # [s] between two checks of the mailboxes while no procedure is pending
 
 
 class Service:
@@ -30,10 +30,10 @@ class Service:
     def __init__(self, main: MainDevice, engine: Engine, plan: Plan) -> None:
         self.runner = AcyclicRunner(engine, grain_ns=plan.cycle.period_ns // 2)
         self._watch = MailboxWatch(plan, main.subs, _mailbox_words(engine, plan), self.runner)
-        self.cycle: Callable[[], int] = partial(engine.run, 1)  # replaced when networks share time
+        self.cycle: Callable[[], int] = partial(engine.run, 1)  # replaced if networks share time
         self._main = main
         self._engine = engine
-        self._quiet_until = 0  # [ns] in virtual time: no work is due before this time
+        self._quiet_until = 0  # [ns] in virtual time: there is no work before this time
         self._ended = threading.Event()
         self._failure: Exception | None = None
         self._thread: threading.Thread | None = None
@@ -43,23 +43,24 @@ class Service:
             )
 
     def start(self) -> None:
+        """Start the service thread; a no-op in virtual time."""
         if self._thread is not None:
             self._thread.start()
 
     @property
     def beside(self) -> Callable[[], None] | None:
-        """Work for the iterating thread before every cycle; None if a thread does it."""
+        """Work for the iterating thread before every cycle; None if the service thread does it."""
         return self.step if self._thread is None else None
 
     def step_without_thread(self) -> None:
-        """Do the work between two cycles if no service thread does it."""
+        """Do the work of the service thread between two cycles, if there is no such thread."""
         if self._thread is None:
             self.step()
 
     def step(self) -> None:
         """Do the work of the service thread between two cycles, in virtual time.
 
-        Usually no work is due, and the call returns at once.
+        Usually there is no work, and the call returns at once.
         """
         now = self._engine.now()
         if now >= self._quiet_until or self.runner.asked.is_set() or self._watch.sees_mail:
@@ -91,7 +92,9 @@ class Service:
             if self._thread is None:
                 self.step()
             elif not self._thread.is_alive():
-                raise LoopError("the thread of the acyclic queue has ended") from self._failure
+                raise LoopError(
+                    "the thread of the acyclic queue ended with an error"
+                ) from self._failure
         return [task.result() for task in tasks]
 
     def end(self) -> None:
@@ -113,7 +116,7 @@ class Service:
                     self._engine.acyclic_wait(BUSY_NS)
                 else:
                     self.runner.asked.wait(IDLE)
-        except Exception as failure:  # a thread has no caller: the next `converse` reports it
+        except Exception as failure:  # a thread has no caller: the next `converse` raises it
             self._failure = failure
             self.runner.close()
 

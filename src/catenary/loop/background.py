@@ -1,8 +1,8 @@
-"""A Python thread that iterates an open loop while the program does something else.
+"""Python thread that iterates an open loop while the program does other work.
 
 Theory of operation. The thread commits the targets in every cycle under a lock. `update` takes the
 same lock, so nothing is committed while a program writes its targets. The thread never waits for
-the lock. The native core limits the time for which the targets of the last update count
+the lock. The native core limits the time for which the targets of the last update are valid
 (core/_setpoints.pyx), so a program that blocks the interpreter cannot keep an axis moving. An error
 of the loop ends the thread, which leaves the loop. The next call of the program raises the error.
 In virtual time, the thread also keeps pace with the wall clock.
@@ -23,10 +23,10 @@ from catenary.loop.networks import VIRTUAL, NetworksIteration, leave_all
 from catenary.loop.session import Session
 from catenary.loop.signals import SignalGuard
 
-END_TIMEOUT = 30.0  # [s] plus some periods: leaving a loop after an error takes some seconds
-LEAVE_TIMEOUT = 1.0  # [s] for an update in progress when the loop is left
-UPDATE_TIMEOUT = 5.0  # [s] for which another thread may stay inside `update`
-BEHIND = 0.1  # [s] of lag behind the wall clock that is dropped instead of caught up
+END_TIMEOUT = 30.0  # [s] plus some periods: to leave a loop after an error takes some seconds
+LEAVE_TIMEOUT = 1.0  # [s] to wait for an update in progress when the loop is left
+UPDATE_TIMEOUT = 5.0  # [s] to wait for an update of another thread
+BEHIND = 0.1  # [s] a larger lag after the wall clock is dropped instead of caught up
 LOOK = 0.5  # [s] longest time between two checks of a waiting call
 
 
@@ -50,7 +50,7 @@ class Background:
         self._updating = 0  # identifier of the thread inside `update`
         self._cycled = threading.Condition()
         self._ended = threading.Event()
-        self._told = False  # True after the error was raised
+        self._was_raised = False  # True after the error was raised
         self._pace = _Pace(sessions[0])
         self._process = os.getpid()
         self._thread = threading.Thread(target=self._iterate, name="catenary loop", daemon=True)
@@ -64,12 +64,12 @@ class Background:
         """
         if self._sessions[0].plan.cycle.execution == "inline":
             raise ValueError(
-                "run_in_background needs a threaded loop: the frames of an inline loop would be "
-                "delayed by all other Python code"
+                "run_in_background needs a threaded loop: other Python code would delay the frames "
+                "of an inline loop"
             )
         for session in self._sessions:
             session.refuse_powered_torque("run_in_background")
-        next(self._iteration)  # the first call commits nothing: it must not coincide with an update
+        next(self._iteration)  # the first call commits nothing; later calls could meet an update
         for session in self._sessions:
             session.engine.background = True
             session.end_background = self.end
@@ -85,7 +85,10 @@ class Background:
             return
         self._thread.join(END_TIMEOUT + 8e-9 * self._sessions[0].plan.cycle.period_ns)
         if self._thread.is_alive():
-            raise LoopError("the thread that iterates the loop does not end: is a callback stuck?")
+            raise LoopError(
+                "the thread that iterates the loop does not end",
+                hint="check for a callback or a sink that does not return",
+            )
 
     @property
     def is_alive(self) -> bool:
@@ -95,18 +98,18 @@ class Background:
     def raise_error(self) -> None:
         """Raise the error that ended the loop, if any."""
         if self.error is not None:
-            self._told = True
+            self._was_raised = True
             raise self.error
 
-    def untold_error(self) -> Exception | None:
+    def unraised_error(self) -> Exception | None:
         """Return the error that ended the loop, unless a call has already raised it."""
-        error = None if self._told else self.error
-        self._told = True
+        error = None if self._was_raised else self.error
+        self._was_raised = True
         return error
 
     @contextmanager
     def update(self) -> Iterator[None]:
-        """See `Loop.update`."""
+        """Commit the writes of a block together: see `Loop.update`."""
         self._take_commit()
         try:
             self._require_alive()
@@ -131,12 +134,14 @@ class Background:
             complete = True
         finally:
             for engine, targets in zip(engines, before, strict=True):
-                if not complete and not self._ended.is_set():  # if ended: keep the leaving targets
+                if (
+                    not complete and not self._ended.is_set()
+                ):  # if ended: keep the targets of the stop
                     engine.blocks()[1][:] = targets
                 engine.end_update(complete)
 
     def wait(self, move: Awaited, timeout: float | None) -> None:
-        """See `Loop.wait`."""
+        """Wait until a move is done: see `Loop.wait`."""
         self._refuse_inside_update("wait")
         if threading.current_thread() is self._thread:
             raise RuntimeError(
@@ -151,7 +156,7 @@ class Background:
                     raise stopped_late(move, limit)
                 self._cycled.wait(LOOK)
             if move.error is not None and self._thread.is_alive():
-                self._cycled.wait(LOOK)  # the loop may be ending: prefer the original error
+                self._cycled.wait(LOOK)  # if the loop is ending, prefer the original error
         if move.error is not None:
             self.raise_error()
             raise move.error
@@ -161,7 +166,7 @@ class Background:
         self._require_alive()
         if not self._commit.acquire(timeout=UPDATE_TIMEOUT):
             raise LoopError(
-                f"another thread has been inside loop.update() for {UPDATE_TIMEOUT:g} s",
+                f"another thread has been inside loop.update() for more than {UPDATE_TIMEOUT:g} s",
                 hint="compute and wait before `with loop.update():`; inside it, only write targets",
             )
         self._updating = threading.get_ident()
@@ -169,19 +174,20 @@ class Background:
     def _refuse_inside_update(self, call: str) -> None:
         if self._updating == threading.get_ident():
             raise RuntimeError(
-                f"loop.{call}() inside `with loop.update():`, which commits at its end: leave it"
+                f"loop.{call}() was called inside `with loop.update():`, which commits at its end: "
+                "leave the block first"
             )
 
     def _require_alive(self) -> None:
         self.raise_error()
         self._sessions[0].require_open()
         if self._ended.is_set():
-            raise RuntimeError("the loop is closed or being left")
+            raise RuntimeError("the loop is closed, or is closing")
 
     def _end_updates(self) -> None:
         """Refuse further updates, and wait at most a second for one in progress.
 
-        A later write must not replace the targets of leaving.
+        A later write must not replace the targets of the final stop.
         """
         self._ended.set()
         if self._updating != threading.get_ident() and self._commit.acquire(timeout=LEAVE_TIMEOUT):
@@ -208,7 +214,7 @@ class Background:
             self._cycled.notify_all()
 
     def _fail(self, error: Exception) -> None:
-        """Leave the loop as a `with` block would."""
+        """Leave the loop like the end of a `with` block."""
         for session in self._sessions:
             session.report_end(error)
         self.error = error
@@ -217,12 +223,12 @@ class Background:
 
 
 def program_ends() -> bool:
-    """Return True in the functions of `atexit`: Python marks its main thread as ended before."""
+    """Return True while `atexit` functions run: Python has marked its main thread as ended."""
     return not threading.main_thread().is_alive()
 
 
 class _Pace:
-    """Pace of virtual time, limited to the wall clock."""
+    """Owns the offset of virtual time, which it keeps from overtaking the wall clock."""
 
     def __init__(self, session: Session) -> None:
         self._engine = session.engine

@@ -17,11 +17,11 @@ from catenary.procedure.sync import rejoin
 
 NS = 1e-9
 SETTLE_TIMEOUT = 2.0  # [s] before OP is requested: drives check their synchronisation
-SILENT = 16  # consecutive cycles without the reference: not just lost frames
+SILENT = 16  # consecutive cycles without the reference clock: more than lost frames
 
 
 class Clocks:
-    """Owns the view of an open loop's distributed clocks; the values are those of the last cycle.
+    """Owns the view of an open loop's distributed clocks, as of the last cycle.
 
     Print it for a table. All times are in seconds.
     """
@@ -41,11 +41,11 @@ class Clocks:
         self._cycle = cycle  # runs one cycle of all networks, without an application
         self._ring = ring_of(main.link)
         self._announced = False
-        self._announcing = threading.Lock()  # the iterating thread and the ring watch announce
+        self._announcing = threading.Lock()  # for the iterating thread and the ring watch
 
     @property
     def reference(self) -> SubDevice:
-        """The reference clock's device: all other clocks follow it."""
+        """Device with the reference clock, which all other clocks follow."""
         return self._main.subs[self._plan.reference]
 
     @property
@@ -73,7 +73,7 @@ class Clocks:
     def differences(self) -> Mapping[int, float]:
         """Offset of each clock from the reference (0x092C) [s], by position; positive: ahead.
 
-        The values are means over the last readings; each cycle reads one device. NaN before the
+        Each value is a mean over the last readings. Each cycle reads one device. NaN before the
         first reading.
         """
         return {
@@ -90,7 +90,7 @@ class Clocks:
     def phase_error(self) -> float:
         """Lateness of the cycle starts in the reference's time [s], a mean over about 16 cycles.
 
-        If the reference follows the MainDevice: the offset by which the reference is ahead.
+        If the reference follows the MainDevice, it is the offset by which the reference is ahead.
         """
         return self._clock.figures()["mean_error"] * NS
 
@@ -103,13 +103,13 @@ class Clocks:
     def rate(self) -> float:
         """Relative rate of the reference clock against the machine's clock; positive: faster.
 
-        The phase controller estimates it. It is 0 if the reference follows.
+        The phase controller estimates it. It is 0 if the reference follows the MainDevice.
         """
         return self._clock.figures()["rate"]
 
     @property
     def missed(self) -> int:
-        """Number of cycles without an answer of the reference clock."""
+        """Number of cycles without an answer from the reference clock."""
         return int(self._clock.figures()["missed"])
 
     @property
@@ -140,7 +140,7 @@ class Clocks:
         if not self.locked:
             raise ClockError(
                 f"clocks not within {within * 1e6:g} us after {timeout:g} s: {self._trouble()}",
-                hint="use a longer timeout or a wider bound; print(loop.clocks) shows all clocks",
+                hint="use a longer timeout or a larger bound; print(loop.clocks) shows all clocks",
             )
 
     def settle(self, check: Callable[[int], None]) -> None:
@@ -150,7 +150,7 @@ class Clocks:
     def rejoin(self, position: int, plan: DevicePlan) -> Procedure[None]:
         """Set the clock and start the SYNC signals of a device that was switched off.
 
-        It runs between PRE-OP and SAFE-OP; a no-op for a device without a clock.
+        It runs between PRE-OP and SAFE-OP. It is a no-op for a device without a clock.
 
         Args:
             position: Position of the device.
@@ -169,7 +169,7 @@ class Clocks:
     def announce(self) -> None:
         """Put an event if the clocks have become locked or unlocked since the last one."""
         with self._announcing:
-            _ = self._clock.changes  # acknowledge: the event below covers all changes
+            _ = self._clock.changes  # acknowledged here: the event below covers all changes
             locked = self.locked
             if locked is self._announced:
                 return
@@ -214,8 +214,8 @@ class Clocks:
     def _cut(self) -> int | None:
         """Position before the cut that separates clocks in an open ring; -1: the first cable.
 
-        None without such a cut. Clocks after the cut follow the extrapolated time of the reference,
-        and their difference is not measured.
+        None if there is no such cut. Clocks after the cut follow the extrapolated time of the
+        reference, and their differences are not measured.
         """
         if self._ring is None:
             return None
@@ -234,7 +234,7 @@ class Clocks:
                 f"the cycle starts are {difference * 1e6:+.3f} us off the reference clock's phase"
             )
         if difference == float("inf"):
-            return f"{sub.station} has not reported its difference"
+            return f"the difference of {sub.station} was not read yet"
         return f"{sub.station} is {difference * 1e6:+.3f} us off {self.reference.station}"
 
     @property
@@ -248,5 +248,5 @@ class Clocks:
         if locked:
             return ClockLocked(now, None, f"all clocks are within {within}", difference, self.bound)
         who = self.reference if self._silent else sub
-        message = f"clocks left the bound of {within}: {self._trouble()}"
+        message = f"clocks exceeded the bound of {within}: {self._trouble()}"
         return ClockUnlocked(now, who, message, difference, self.bound)

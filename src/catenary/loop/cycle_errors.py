@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import NamedTuple
 
 from catenary.errors import DriveError, StateError, WorkingCounterError
@@ -14,26 +15,30 @@ from catenary.wire.cia402 import IN_FAULT, AxisState
 from catenary.wire.drive_error import error_text
 
 
+@dataclass(frozen=True, slots=True)
+class Evidence:
+    """Answers of all devices to a read of the AL status, and further findings."""
+
+    answers: Sequence[Answer]
+    findings: Sequence[Finding] = ()  # faults that silent devices or error counters indicate
+    mute: Sequence[int] = ()  # positions of devices without inputs even in a separate frame
+    tight: str = ""  # hint that the period may be too short; or empty
+    without_address: Sequence[Answer] = ()  # silent at their addresses while others answer
+    other_masters: Sequence[str] = ()  # evidence of another master, as text
+
+
 def silence_error(
-    answers: Sequence[Answer],
-    suspects: Sequence[int],
-    lost: int,
-    log: Log | None,
-    findings: Sequence[Finding] = (),
-    mute: Sequence[int] = (),
-    tight: str = "",
+    evidence: Evidence, suspects: Sequence[int], lost: int, log: Log | None
 ) -> WorkingCounterError:
     """Return the error for `lost` bad cycles in a row.
 
     Args:
-        answers: Answers of all devices to a read of the AL status.
+        evidence: Answers of all devices, and further findings.
         suspects: Positions of the devices whose sync units failed.
         lost: Number of bad cycles.
         log: The last cycles.
-        findings: Faults that silent devices or error counters point to.
-        mute: Positions of devices whose inputs are missing even in a separate frame.
-        tight: Hint that the period may be too short; or empty.
     """
+    answers, findings = evidence.answers, evidence.findings
     silent = [answer.station for answer in answers if answer.word is None]
     others = [a for a in answers if a.station.position in suspects and a.word is not None]
     stray = [answer for answer in others if is_astray(answer)]
@@ -46,17 +51,17 @@ def silence_error(
     elif stray:
         who = f"not in OP: {'; '.join(map(described, stray))}"
         hint = "a device that was switched off and on again must be brought to OP again"
-    elif mute:
-        named = ", ".join(str(a.station) for a in answers if a.station.position in mute)
+    elif evidence.mute:
+        named = ", ".join(str(a.station) for a in answers if a.station.position in evidence.mute)
         who = f"in OP, but without process data: {named}"
         hint = (
-            "its FMMU or SyncManager was switched off by another program on this segment or by "
-            "the device itself; read its registers with `catenary reg read`"
+            "another program on this segment or the device itself has switched off its FMMU or "
+            "SyncManager; read its registers with `catenary reg read`"
         )
     else:
         who = f"all devices answer single reads; affected: devices {listed(suspects)}"
         who += "".join(f"; {each.where}: {each.evidence}" for each in findings)
-        hint = tight or (
+        hint = evidence.tight or (
             "frames are lost, corrupted or late: check the cables and other traffic on the "
             "port; if the segment is a program on a busy machine, allow more lost cycles with "
             "StopPolicy(lost_limit=...)"
@@ -67,7 +72,12 @@ def silence_error(
 
 
 def tight_period(wire_ns: int, period_ns: int) -> str:
-    """Return a hint if the cyclic frames take most of the period; else an empty text."""
+    """Return a hint if the cyclic frames take most of the period, otherwise an empty text.
+
+    Args:
+        wire_ns: Wire time of the cyclic frames [ns].
+        period_ns: Period of the cycle [ns].
+    """
     if 2 * wire_ns < period_ns:
         return ""
     return (
@@ -106,21 +116,22 @@ def state_error(
 
 
 def _suspicion(answer: Answer, other_masters: Sequence[str]) -> str:
-    """Return evidence of another master. A device that leaves OP by itself gives a reason."""
+    """Return the hint that another master is the cause; empty if the device gives a reason."""
     if other_masters:
         return f"another EtherCAT master is live: {'; '.join(other_masters)}; end it"
     if answer.code or (answer.word or 0) & ERROR_FLAG:
         return ""
     return (
-        "it gives no reason, so its state was probably requested: check for a second master on "
-        "this line or in another container; a device that was switched off and on also shows INIT"
+        "it gives no reason, so another program probably requested the state: check for a second "
+        "master on this line or in another container. A device that was switched off and on also "
+        "shows INIT"
     )
 
 
-def forgetful_error(silent: Sequence[Answer], al_status: int, log: Log | None) -> StateError:
+def address_error(silent: Sequence[Answer], al_status: int, log: Log | None) -> StateError:
     """Return the error for devices that lost their addresses while all frames return.
 
-    Such a device was switched off for a moment.
+    Such a device was switched off for a short time.
 
     Args:
         silent: Answers of the devices that do not answer to their addresses.
@@ -136,8 +147,8 @@ def forgetful_error(silent: Sequence[Answer], al_status: int, log: Log | None) -
         actual=int(AlState.INIT),
         code=0,
         log=log,
-        hint="it was replaced, or switched off and on in less time than the loop tolerates lost "
-        "frames: check its supply; a new scan() and Loop bring it up again",
+        hint="it was replaced, or switched off and on in a shorter time than lost_limit: check its "
+        "supply; a new scan() and Loop start it again",
     )
     for other in silent[1:]:
         error.add_note(f"also: {other.station}")
@@ -152,7 +163,7 @@ class AxisTrouble(NamedTuple):
     code: int | None  # object 0x603F; None: it could not be read
 
     def __str__(self) -> str:
-        state = self.state.name if self.state is not None else "in no state of CiA 402"
+        state = self.state.name if self.state is not None else "not in a state of CiA 402"
         if self.code is None:
             return f"{self.name}: {state}, its error code cannot be read"
         return f"{self.name}: {state}, error code 0x{self.code:04X} ({error_text(self.code)})"
@@ -198,4 +209,5 @@ def described(answer: Answer) -> str:
 
 
 def listed(positions: Sequence[int]) -> str:
+    """Return positions as text."""
     return ", ".join(map(str, positions)) or "none"

@@ -13,7 +13,7 @@ PARTS = ("subs", "pdos", "tables", "bind")  # of a LoopRequest
 
 
 class LoopRequest(ProcessDataRequest, Protocol):
-    """A request that names its devices."""
+    """Process-data request that names its devices."""
 
     @property
     def subs(self) -> Sequence[SubDevice]: ...
@@ -37,8 +37,8 @@ def by_network(requests: Sequence[LoopRequest]) -> list[tuple[MainDevice, list[L
         mains = {id(sub.main): _main_of(sub) for sub in request.subs}
         if len(mains) > 1:
             raise ValueError(
-                "a request names devices of several MainDevices: make one request for each, and "
-                "pass both to the Loop"
+                "a request names devices of several MainDevices: make one request for each of "
+                "them, and pass all requests to the Loop"
             )
         for key, main in mains.items():
             networks.setdefault(key, (main, []))[1].append(request)
@@ -50,7 +50,7 @@ def by_network(requests: Sequence[LoopRequest]) -> list[tuple[MainDevice, list[L
 def check_request(request: object) -> None:
     """Raise TypeError for an object that is not a process-data request, such as a SubDevice."""
     if isinstance(request, type) or not all(hasattr(request, name) for name in PARTS):
-        raise TypeError(f"a Loop takes process-data requests ({REQUESTS}), not {request!r}")
+        raise TypeError(f"a Loop accepts process-data requests ({REQUESTS}), not {request!r}")
 
 
 def _main_of(sub: SubDevice) -> MainDevice:

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Protocol
 
 from catenary.bus import CycleClock, Pending
 from catenary.core import Engine
-from catenary.errors import CatenaryError
+from catenary.loop.cycle_errors import Evidence
 from catenary.loop.watches.device import Attendance
 
 
@@ -15,7 +16,7 @@ class Exchange(Protocol):
 
     @property
     def watch(self) -> Attendance:
-        """The watch over lost and returning devices; after `attend`."""
+        """Watch of lost and returning devices; available after `attend`."""
 
     def make_engine(self) -> Engine:
         """Return the engine of the session's plan."""
@@ -27,13 +28,13 @@ class Exchange(Protocol):
         """Make the watches that run while the loop is open."""
 
     def bring_to_op(self) -> list[Pending[None]]:
-        """Bring the devices from SAFE-OP to OP while cycles flow; return the watches that run."""
+        """Bring the devices from SAFE-OP to OP while cycles flow; return the running watches."""
 
-    def silence_error(self) -> CatenaryError:
-        """Query the devices, and return the error for cycles without answers."""
+    def query_silence(self, suspects: Sequence[int]) -> Evidence:
+        """Query all devices after cycles without answers from the suspected positions."""
 
-    def raise_astray(self) -> None:
-        """Raise StateError if a required device is out of OP."""
+    def query_states(self) -> Evidence:
+        """Query all devices for their states."""
 
     def error_code(self, axis: int) -> int | None:
         """Return object 0x603F of an axis; None if the drive does not answer."""

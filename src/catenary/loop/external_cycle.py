@@ -1,4 +1,4 @@
-"""Loop whose frames another master exchanges (`bus.Carrier`) and whose devices it controls."""
+"""Exchange of a session on frames and devices of another master (`bus.Carrier`)."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from catenary.bus import Carrier, CycleClock, MainDevice, Pending, SubDevice
 from catenary.bus.event_types import DeviceLost, DeviceReturned, StateLost
 from catenary.core import Engine
 from catenary.errors import CatenaryError, ConfigurationError
-from catenary.loop.cycle_errors import described, is_astray, silence_error, state_error
+from catenary.loop.cycle_errors import Evidence, described, is_astray
 from catenary.loop.session import FATAL, Session
 from catenary.loop.watches.device import LOOK, Attendance
 from catenary.plan.cycle import DatagramKind
@@ -28,15 +28,18 @@ class CarriedExchange:
         self._session = session
 
     def make_engine(self) -> Engine:
+        """Return the engine over the carrier's images."""
         cycle = replace(self._session.plan.cycle, clock=None)  # the carrier keeps the clocks
         return Engine(cycle, self._session.main.link.capsule, self._carrier.image)
 
     def cycle_clock(self) -> CycleClock:
+        """Return the carrier's view of the distributed clocks."""
         clock = self._carrier.clock
         assert clock is not None  # `configure` has made it
         return clock
 
     def attend(self) -> None:
+        """Make the watch of devices."""
         optional = {
             position
             for unit in self._session.plan.cycle.sync_units
@@ -66,23 +69,17 @@ class CarriedExchange:
             sub.state = AlState.OP
         return [self._session.service.runner.submit(self.watch.run())]
 
-    def silence_error(self) -> CatenaryError:
-        """Query all devices through the carrier, and return the error."""
-        session = self._session
-        lost, log, suspects = session.engine.lost_in_row, session.log(), session.suspects()
-        session.stop_axes_at_once()
-        [answers] = session.service.converse(self._carrier.survey())
-        return silence_error(answers, suspects, lost, log)
+    def query_silence(self, suspects: Sequence[int]) -> Evidence:
+        """Query all devices through the carrier."""
+        return self.query_states()
 
-    def raise_astray(self) -> None:
-        log = self._session.log()
+    def query_states(self) -> Evidence:
+        """Query all devices through the carrier for their states."""
         [answers] = self._session.service.converse(self._carrier.survey())
-        needed = [a for a in answers if self.watch.requires(a.station.position)]
-        error = state_error(needed, log)
-        if error is not None:
-            raise error
+        return Evidence(answers)
 
     def error_code(self, axis: int) -> int | None:
+        """Return object 0x603F of the axis; None if the drive does not answer."""
         plan = self._session.plan.cycle.axes[axis]
         sub = self._session.main.subs[plan.device]
         try:
@@ -127,7 +124,7 @@ class CarriedWatch:
 
     @property
     def excuses(self) -> bool:
-        """True if all devices that are out of OP are optional, as of the last look."""
+        """True if all devices that are out of OP are optional, as of the last survey."""
         required = (a for a in self._answers if self.requires(a.station.position))
         return bool(self._optional) and not any(is_astray(answer) for answer in required)
 
@@ -136,10 +133,13 @@ class CarriedWatch:
         return position not in self._optional
 
     def release(self, sub: SubDevice) -> None:
-        """Raise ValueError: the carrier holds no device, it brings devices back itself."""
-        raise ValueError(f"{sub.station} is not held: the kernel master leads devices back itself")
+        """Raise ValueError: a carrier does not hold devices, but brings them back itself."""
+        raise ValueError(
+            f"{sub.station} is not held: the kernel master brings devices back to OP itself"
+        )
 
     def _report(self, answers: Sequence[Answer]) -> None:
+        """Put an event for each change since the last answers."""
         before = {answer.station.position: answer.word for answer in self._answers}
         now = self._engine.now() * 1e-9
         for answer in answers:
@@ -170,7 +170,7 @@ def carried(plan: Plan) -> Plan:
     kinds = {datagram.kind for frame in plan.cycle.frames for datagram in frame.datagrams}
     if DatagramKind.CYCLE_NUMBER in kinds:
         raise ConfigurationError(
-            "exact_matching=True: another master makes the frames on this network",
+            "exact_matching=True is not possible: another master makes the frames on this network",
             hint="omit the option, or open the network interface directly",
         )
     return replace(plan, cycle=replace(plan.cycle, frames=()))

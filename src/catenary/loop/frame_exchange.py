@@ -1,4 +1,4 @@
-"""Exchange of a session's own frames."""
+"""Exchange of a session that sends its own frames."""
 
 from __future__ import annotations
 
@@ -9,9 +9,8 @@ from catenary.core import Engine
 from catenary.errors import CatenaryError
 from catenary.link import ring_of
 from catenary.loop.cycle_errors import (
-    forgetful_error,
-    silence_error,
-    state_error,
+    Evidence,
+    is_astray,
     tight_period,
 )
 from catenary.loop.session import Session
@@ -48,7 +47,7 @@ class FrameExchange:
         return clock
 
     def attend(self) -> None:
-        """Make the watches over devices, error counters and repeated frames."""
+        """Make the watches of devices, error counters and repeated frames."""
         session = self._session
         engine, put = session.engine, session.main.events.put
 
@@ -63,14 +62,13 @@ class FrameExchange:
             now=now,
             rejoin=None if session.clocks is None else session.clocks.rejoin,
             cables_seen=session.announce_clocks,
-            on_return=session.stop.on_return,
-            on_replacement=session.stop.on_replacement,
+            policy=session.stop,
         )
         self.errors = ErrorWatch(session.main, now=now)
         self.frames = FrameWatch(self._repeated_frames, put=put, now=now)
 
     def _repeated_frames(self) -> int:
-        """Return the number of frames that returned repeatedly, or that a ring could not assign."""
+        """Return the number of frames that returned again or that a ring could not assign."""
         ring = ring_of(self._session.main.link)
         unassigned = 0 if ring is None else ring.counts["alien"]
         return self._session.engine.counters["repeated"] + unassigned
@@ -89,12 +87,9 @@ class FrameExchange:
         watches = (self.watch, self.errors, self.frames)
         return [session.service.runner.submit(watch.run()) for watch in watches]
 
-    def silence_error(self) -> CatenaryError:
-        """Query all devices, and return the error with the place where the silence begins."""
+    def query_silence(self, suspects: Sequence[int]) -> Evidence:
+        """Query all devices, and find the place where the silence begins."""
         session, converse = self._session, self._session.service.converse
-        lost, log = session.engine.lost_in_row, session.log()
-        suspects = session.suspects()
-        session.stop_axes_at_once()  # before the queries, for the devices that still answer
         [answers] = converse(survey(self._stations))
         [noise] = converse(self.errors.look())
         silent = [answer.station.position for answer in answers if answer.word is None]
@@ -102,8 +97,7 @@ class FrameExchange:
         [mute] = converse(probe_inputs(self._input_areas(suspects)))
         cycle = session.plan.cycle
         tight = tight_period(cycle.wire_ns, cycle.period_ns)
-        findings = silence or noise
-        return silence_error(answers, suspects, lost, log, findings, mute=mute, tight=tight)
+        return Evidence(answers, silence or noise, mute, tight)
 
     def _input_areas(self, positions: Sequence[int]) -> dict[int, tuple[int, int]]:
         """Return the logical areas of the devices' inputs: position → (start, length)."""
@@ -114,25 +108,27 @@ class FrameExchange:
             if fmmu.direction is Direction.INPUT
         }
 
-    def raise_astray(self) -> None:
-        """Raise StateError if a required device is out of OP.
+    def query_states(self) -> Evidence:
+        """Query all devices for their states.
 
-        A device that does not answer at its address twice, while others do, has lost the
+        A required device that does not answer at its address twice, while others do, has lost the
         address.
         """
         session = self._session
-        log = session.log()
-        for look in range(2):
+        others = session.main.other_masters
+        for _ in range(2):
             [answers] = session.service.converse(survey(self._stations))
-            needed = [a for a in answers if self.watch.requires(a.station.position)]
-            error = state_error(needed, log, session.main.other_masters)
-            if error is not None:
-                raise error
-            silent = [answer for answer in needed if answer.word is None]
-            if not silent or len(silent) == len(answers) or session.engine.al_status == AlState.OP:
-                return
-            if look:
-                raise forgetful_error(silent, session.engine.al_status, log)
+            required = [a for a in answers if self.watch.requires(a.station.position)]
+            silent = [answer for answer in required if answer.word is None]
+            all_in_op = session.engine.al_status == AlState.OP
+            if (
+                any(map(is_astray, required))
+                or not silent
+                or all_in_op
+                or len(silent) == len(answers)
+            ):
+                return Evidence(answers, other_masters=others)
+        return Evidence(answers, without_address=silent, other_masters=others)
 
     def error_code(self, axis: int) -> int | None:
         """Return object 0x603F of the axis; None if the drive does not answer."""

@@ -1,7 +1,7 @@
-"""The interpreter's switch interval while inline loops are open.
+"""Switch interval of the interpreter while inline loops are open.
 
 A thread that needs the interpreter waits for the switch interval (5 ms in CPython). Then the thread
-that holds the interpreter must release it. A busy second thread delays an inline loop as long.
+that holds the interpreter must release it. A busy second thread delays an inline loop by this time.
 """
 
 from __future__ import annotations
@@ -14,22 +14,22 @@ from contextlib import contextmanager
 HALF_A_MICROSECOND = 0.5e-6  # CPython keeps whole microseconds and truncates the rest
 
 _lock = threading.Lock()  # for the two variables below
-_wanted: list[float] = []
+_requested: list[float] = []
 _before = 0.0
 
 
 @contextmanager
 def switch_interval(seconds: float) -> Iterator[None]:
-    """Set the switch interval [s]: the shortest of nested ones; the last exit restores it."""
+    """Set the switch interval to the shortest of all nested ones [s]; the last exit restores it."""
     global _before
     with _lock:
-        if not _wanted:
+        if not _requested:
             _before = sys.getswitchinterval()
-        _wanted.append(seconds)
-        sys.setswitchinterval(min(_wanted) + HALF_A_MICROSECOND)
+        _requested.append(seconds)
+        sys.setswitchinterval(min(_requested) + HALF_A_MICROSECOND)
     try:
         yield
     finally:
         with _lock:
-            _wanted.remove(seconds)
-            sys.setswitchinterval((min(_wanted) if _wanted else _before) + HALF_A_MICROSECOND)
+            _requested.remove(seconds)
+            sys.setswitchinterval((min(_requested) if _requested else _before) + HALF_A_MICROSECOND)

@@ -1,7 +1,7 @@
 """Loop: it plans the requests, brings the devices to OP, and runs the cycle.
 
-Entering ends with the drives enabled and holding, or in a safe state with a specific error.
-Leaving always stops the drives natively before the states go down.
+After entry, the drives are enabled and hold, or they are in a safe state and a specific error was
+raised. Leaving always stops the drives natively before the devices leave OP.
 """
 
 from __future__ import annotations
@@ -11,7 +11,6 @@ import warnings
 import weakref
 from collections.abc import Iterator, Sequence
 from contextlib import AbstractContextManager
-from functools import partial
 from types import TracebackType
 
 from catenary.bus import SubDevice
@@ -20,7 +19,7 @@ from catenary.errors import LawError
 from catenary.log import Log
 from catenary.loop.background import Background, program_ends
 from catenary.loop.clocks import Clocks
-from catenary.loop.devices import LoopRequest, by_network
+from catenary.loop.devices import LoopRequest
 from catenary.loop.laws.law import Law, LawFunction
 from catenary.loop.laws.law import law as made_law
 from catenary.loop.laws.run import LawRun, Numbers
@@ -28,28 +27,25 @@ from catenary.loop.moves import Awaited, require_move, wait_for_move
 from catenary.loop.network import ENDING, TROUBLE, Network, Settings, leave_method
 from catenary.loop.networks import (
     NetworksIteration,
-    clocks_of_several,
-    cpus_for,
     leave_all,
+    make_networks,
     share_time,
 )
-from catenary.loop.options import ClockOptions, Scheduling, StopPolicy, check_groups, one_of
-from catenary.loop.publishing import one_sink_each
+from catenary.loop.options import ClockOptions, Scheduling, StopPolicy
 from catenary.loop.session import Session, take_down
 from catenary.loop.signals import SignalGuard
 from catenary.loop.stream import Stream
 from catenary.loop.timing import Timing
 from catenary.plan.cycle import ExecutionMode
-from catenary.plan.planner import Plan, period_in_ns
+from catenary.plan.planner import Plan
 from catenary.plan.sink import Sink
 from catenary.wire.al import AlState
 
-LOG_LIMIT = 2**24  # cycles, about a gigabyte
 LEAVE_TIMEOUT = 60.0  # [s] to wait for another thread that leaves the loop
 
 
 class Loop:
-    """Cyclic exchange of the devices that its requests name: a context manager and an iterator.
+    """Cyclic exchange with the devices of its requests: a context manager and an iterator.
 
         with cat.Loop(arm, period=1e-3) as loop:
             for cycle in loop:
@@ -63,22 +59,22 @@ class Loop:
     Args:
         requests: `Drives`, `Inputs`, `Outputs` and other process-data requests.
         period: Period of the cycle [s].
-        execution: "threaded": a native thread exchanges the frames and Python follows. "inline":
-            the thread that iterates exchanges the frames itself.
+        execution: "threaded": a native thread exchanges the frames, and Python follows. "inline":
+            the iterating thread exchanges the frames itself.
         enable: True to enable the drives on entry.
         watchdog: Watchdog time of the devices' outputs [s]; 0: off; None: 0.1 s, in CST the longer
             of 10 ms and five exchanges.
-        cpu: CPU of the native thread; several networks: one for each. None: unchanged; with several
+        cpu: CPU of the native thread, or one CPU for each network. None: unchanged; for several
             networks the last CPUs, if there are more CPUs than networks.
         priority: SCHED_FIFO priority of the native thread; None: unchanged.
         log: Number of cycles in the log and in the log of an error.
         laws: Laws to compile on entry, before OP. Other laws are compiled when they are started.
-        sink: Receiver of every cycle, for example a `Share` for other processes. Several networks:
-            one for each.
-        stop: Limits that stop axes or end the loop.
+        sink: Receiver of every cycle, for example a `Share` for other processes, or one for each
+            network.
+        stop: Conditions that stop axes or end the loop.
         scheduling: Waiting for time and frames.
         clocks: Synchronisation of the distributed clocks.
-        log_axes: True to log the values of every axis too (docs/how_to/recording.md).
+        log_axes: True to log also the values of every axis (docs/how_to/recording.md).
 
     Raises:
         ValueError: An option is impossible, or a request names devices of several MainDevices.
@@ -101,22 +97,6 @@ class Loop:
         clocks: ClockOptions = ClockOptions(),
         log_axes: bool = False,
     ) -> None:
-        one_of("execution", execution, ("threaded", "inline"))
-        check_groups(stop, scheduling, clocks)
-        period_in_ns(period)
-        if scheduling.busy_wait >= period:
-            raise ValueError(
-                f"busy_wait={scheduling.busy_wait} s: must be less than the period of {period} s"
-            )
-        if not 1 <= log <= LOG_LIMIT:
-            raise ValueError(f"log={log} cycles: must be 1 to {LOG_LIMIT}")
-        groups = by_network(requests)
-        count = len(groups)
-        if count > 1:
-            refuse_for_several(execution, laws)
-            clocks = clocks_of_several(clocks)
-        elif cpu is not None and not isinstance(cpu, int):
-            raise ValueError(f"cpu={cpu}: one network has one thread, on one CPU")
         settings = Settings(
             period=period,
             execution=execution,
@@ -129,14 +109,9 @@ class Loop:
             scheduling=scheduling,
             clocks=clocks,
         )
-        cpus = cpus_for(count, cpu) if count > 1 else [cpu if isinstance(cpu, int) else None]
-        self._networks = tuple(
-            Network(main, mine, settings, cpu=one, sink=its)
-            for (main, mine), one, its in zip(groups, cpus, one_sink_each(sink, count), strict=True)
-        )
-        self._quorum = checked_quorum(scheduling.quorum, count)
+        self._networks = make_networks(requests, settings, cpu, sink)
+        self._quorum = checked_quorum(scheduling.quorum, len(self._networks))
         self._enable = enable
-        self._faults = stop.raise_faults
         leaving = (Loop.close, Loop.__exit__, Loop._leave, leave_open_loop)
         self._guard = SignalGuard(tuple(each.__code__ for each in leaving))
         self._leaving = threading.RLock()
@@ -146,7 +121,9 @@ class Loop:
 
     def __enter__(self) -> Loop:
         if any(session.is_open for session in self._sessions):
-            raise RuntimeError("the loop is open: `with` and open() open it; use one of them, once")
+            raise RuntimeError(
+                "the loop is already open: use either `with` or open(), and only once"
+            )
         for network in self._networks:
             network.main.require_no_loop()
         try:
@@ -156,7 +133,7 @@ class Loop:
                 network.current_session = None
             abandon = leave_method(self._abandon)
             sessions = [network.prepare(abandon) for network in self._networks]
-            self._leave_at_the_latest(sessions)
+            self._leave_at_exit(sessions)
             if len(sessions) > 1:
                 share_time(sessions)
             for session in sessions:
@@ -166,11 +143,11 @@ class Loop:
                     session.enable()
             for session in sessions:
                 session.reset_figures()
-            return self  # inside `try`: a signal may arrive at this line too
+            return self  # inside `try`: a signal may also arrive at this line
         except BaseException as error:
             self._report_end(error)
             for problem in self._leave():
-                error.add_note(f"on the way down: {problem}")
+                error.add_note(f"while leaving: {problem}")
             raise
 
     def __exit__(
@@ -182,18 +159,21 @@ class Loop:
         if error is not None:
             self._report_end(error)
         problems = self._leave()
-        if self._background is not None and (untold := self._background.untold_error()) is not None:
-            problems.insert(0, untold)
+        if (
+            self._background is not None
+            and (unraised := self._background.unraised_error()) is not None
+        ):
+            problems.insert(0, unraised)
         if error is not None:
             for problem in problems:
-                error.add_note(f"on the way down: {problem}")
+                error.add_note(f"while leaving: {problem}")
         elif problems:
             raise problems[0]
 
     def open(self) -> Loop:
         """Enter without a `with` block, for a notebook or a server; return the loop.
 
-        `close` leaves it. The end of the program and the MainDevice's `close` leave it too.
+        `close` leaves it. The end of the program and the MainDevice's `close` also leave it.
         """
         return self.__enter__()
 
@@ -212,10 +192,10 @@ class Loop:
         """Let a Python thread iterate the loop from now on, and return at once.
 
         The thread commits the targets in every cycle: write them in `with loop.update():`. An error
-        of the loop stops the axes and closes the loop; the next `update`, `wait` or `close` raises
-        it. Interrupting the program (Ctrl-C) does not stop the loop. `close` and the end of the
-        program do. In virtual time, the thread keeps pace with the wall clock. No effect if the
-        loop already runs in the background.
+        of the loop stops the axes and closes the loop. The next `update`, `wait` or `close` raises
+        it. An interrupt of the program (Ctrl-C) does not stop the loop. `close` and the end of the
+        program stop it. In virtual time, the thread keeps pace with the wall clock. No effect if
+        the loop already runs in the background.
 
         Raises:
             ValueError: The loop is inline.
@@ -238,8 +218,8 @@ class Loop:
         """Return a context in which a program writes one consistent set of targets and requests.
 
         While the loop runs in the background, the whole set is committed when the block ends. If
-        the block raises, nothing is committed. In CSV and CST the set is valid for
-        `StopPolicy.command_timeout`; afterwards, CSV decelerates and CST is stopped.
+        the block raises, nothing is committed. In CSV and CST, the set is valid for
+        `StopPolicy.command_timeout`. After it, CSV decelerates and CST is stopped.
 
         Raises:
             RuntimeError: The loop does not run in the background: `next(loop)` commits.
@@ -247,8 +227,8 @@ class Loop:
         """
         if self._background is None:
             raise RuntimeError(
-                "update() needs run_in_background(): a program that iterates the loop itself "
-                "commits all it has written by `next(loop)`"
+                "update() needs run_in_background(); a program that iterates the loop itself "
+                "commits its targets with `next(loop)`"
             )
         return self._background.update()
 
@@ -275,8 +255,8 @@ class Loop:
     def wait(self, move: Awaited, timeout: float | None = None) -> None:
         """Iterate until a move is done: `loop.wait(arm.move_to(0.5), timeout=10.0)`.
 
-        While the loop runs in the background, only wait; any thread may call it. It returns when
-        the axes have reached their goals, or are at rest after `move.stop()`.
+        While the loop runs in the background, it only waits, and any thread may call it. It returns
+        when the axes have reached their targets, or are at rest after `move.stop()`.
 
         Args:
             move: Result of `arm.move_to`, `arm.move_by` or `arm.home`.
@@ -285,7 +265,7 @@ class Loop:
 
         Raises:
             MoveError: The move took too long or was replaced, or its axis was stopped.
-            DriveError: A drive is in fault or was stopped. The iteration can raise other errors.
+            DriveError: A drive is in fault or was stopped. The iteration may raise other errors.
             TypeError: `move` is not a move.
         """
         require_move(move)
@@ -297,10 +277,10 @@ class Loop:
     def _make_iteration(self) -> Iteration | NetworksIteration:
         first = self._opened
         if len(self._networks) > 1:
-            return NetworksIteration(self._networks, self._quorum, faults=self._faults)
+            return NetworksIteration(self._networks, self._quorum)
         return Iteration(
             first.engine,
-            partial(first.judge, faults=self._faults),
+            first.judge,
             trouble=TROUBLE,
             al_status=AlState.OP,
             beside=first.service.beside,
@@ -316,11 +296,12 @@ class Loop:
         budget: float | None = None,
         overruns: int = 3,
     ) -> LawRun:
-        """Start a compiled law. From the next cycle on, it computes the set-points in the cycle
-        thread; you can iterate the loop meanwhile, to watch.
+        """Start a compiled law. From the next cycle on, it computes the set-points.
+
+        It runs in the cycle thread. You can iterate the loop at the same time, to monitor it.
 
         Args:
-            law: Function or compiled law; it begins from the commanded set-points.
+            law: Function or `Law`. It starts from the commanded set-points.
             memory: Initial state, float64, at most 4096 numbers.
             parameters: Values from the application, float64, at most 4096 numbers.
             budget: Longest time of one step [s]; None: 0.4 periods; 0: no check. The frames need
@@ -347,16 +328,16 @@ class Loop:
         overruns: int = 3,
         compiled: bool = True,
     ) -> Numbers:
-        """Run a law to its end and return its memory; then the axes hold.
+        """Run a law to its end and return its memory. After it, the axes hold.
 
         Args:
-            law: Function or compiled law: see `start`.
+            law: Function or `Law`: see `start`.
             memory: Initial state: see `start`.
             parameters: Values from the application: see `start`.
             budget: Longest time of one step [s]: see `start`.
             overruns: Number of consecutive steps over the budget: see `start`.
-            compiled: False: run it as Python, in the thread of the caller. This is slow, but gives
-                Python's errors: use it to find mistakes.
+            compiled: False: run it as Python, in the thread of the caller. This is slow, but shows
+                Python's errors. Use it to find mistakes.
 
         Returns:
             Memory of the law after its last step.
@@ -390,7 +371,7 @@ class Loop:
         return kept
 
     def stream(self, capacity: int = 1000) -> Stream:
-        """Return a `Stream`, which a slower thread fills with set-points in advance.
+        """Return a `Stream`, which a slower thread can fill with set-points in advance.
 
         Args:
             capacity: Number of rows that the stream can hold; one row is one cycle.
@@ -399,7 +380,7 @@ class Loop:
         return self._networks[0].stream(capacity)
 
     def restore(self, sub: SubDevice) -> None:
-        """Let a held device (event DeviceHeld or DeviceReplaced) go to OP while the cycle runs.
+        """Allow a held device (event DeviceHeld or DeviceReplaced) to go to OP.
 
         The call returns at once: see `sub.state` and the events.
 
@@ -409,7 +390,7 @@ class Loop:
         for session in self._sessions:
             if session.main is sub.main:
                 return session.watch.release(sub)
-        raise ValueError(f"{sub.station} is not in this loop: it is on another MainDevice")
+        raise ValueError(f"{sub.station} is not in this loop: it belongs to another MainDevice")
 
     @property
     def networks(self) -> tuple[Network, ...]:
@@ -449,9 +430,9 @@ class Loop:
         """Run cycles, axes holding, until the clocks are locked.
 
         They are locked when every clock differs by at most `within` from the reference clock and
-        the cycle starts are in phase with it. The bound remains in force: leaving it puts a
-        `ClockUnlocked` event, returning a `ClockLocked` event. Several networks are awaited one
-        after the other.
+        the cycle starts are in phase with it. The bound remains in force: a `ClockUnlocked` event
+        reports that it is exceeded, a `ClockLocked` event that it holds again. Several networks are
+        awaited one after the other.
 
         Args:
             within: Bound of the differences and of the phase [s].
@@ -459,7 +440,7 @@ class Loop:
 
         Raises:
             ClockError: The clocks are not locked after `timeout`.
-            LoopError: An axis is powered in CST; its torque would become stale meanwhile.
+            LoopError: An axis is powered in CST; its torque would become stale during the wait.
             RuntimeError: No request has `dc=`.
         """
         self._require_foreground()
@@ -467,7 +448,9 @@ class Loop:
             n for n in self._networks if n.current_session and n.current_session.clocks is not None
         ]
         if not with_clocks:
-            raise RuntimeError("no distributed clocks in this loop: Drives(..., dc=True)")
+            raise RuntimeError(
+                "no distributed clocks in this loop: request them with Drives(..., dc=True)"
+            )
         for session in self._sessions:
             session.refuse_powered_torque("wait_locked")
         for network in with_clocks:
@@ -477,7 +460,7 @@ class Loop:
         """Raise RuntimeError if a thread iterates the loop already, or the loop is closed."""
         if self._background is not None and self._background.is_alive:
             raise RuntimeError(
-                "the loop runs in the background, where a thread iterates it: write targets in "
+                "the loop runs in the background, where a thread iterates it; write targets in "
                 "`with loop.update():`, wait with loop.wait(move), start laws with loop.start()"
             )
         self._opened.require_open()
@@ -493,7 +476,8 @@ class Loop:
             raise ValueError(f"{what} works on one network: make a separate Loop for that network")
         if self._opened.views.movers:
             raise RuntimeError(
-                f"{what} cannot begin during a move: loop.wait(move), or move.stop() and wait"
+                f"{what} cannot start during a move: first call loop.wait(move), or move.stop() "
+                "and then loop.wait(move)"
             )
         return self._opened
 
@@ -515,8 +499,8 @@ class Loop:
         for problem in self._leave():
             warnings.warn(f"the loop was left open: {problem}", RuntimeWarning, stacklevel=2)
 
-    def _leave_at_the_latest(self, sessions: Sequence[Session]) -> None:
-        """Leave the loop when it is deleted, or when the program ends, if it is open then."""
+    def _leave_at_exit(self, sessions: Sequence[Session]) -> None:
+        """Leave the loop when it is deleted or the program ends, if it is still open."""
         self._finalizer = weakref.finalize(self, leave_open_loop, sessions, self._guard)
 
     def _report_end(self, error: BaseException) -> None:
@@ -525,9 +509,9 @@ class Loop:
             session.report_end(error)
 
     def _leave(self) -> list[Exception]:
-        """Stop every network that answers, whatever happens to the others; return the problems.
+        """Stop every network, regardless of errors in the others; return the problems.
 
-        A second thread waits for the first: when it continues, nothing moves any more.
+        A second thread waits for the first one, so that all axes are at rest when it continues.
         """
         is_ours = self._leaving.acquire(timeout=LEAVE_TIMEOUT)
         try:
@@ -542,17 +526,6 @@ class Loop:
             if is_ours:
                 self._leaving.release()
         return problems
-
-
-def refuse_for_several(execution: ExecutionMode, laws: Sequence[Law | LawFunction]) -> None:
-    """Raise ValueError for options that only one network can have."""
-    if execution != "threaded":
-        raise ValueError(
-            'several networks need execution="threaded": a thread that iterates can only keep the '
-            "cycle starts of one"
-        )
-    if laws:
-        raise ValueError("laws work on one network: make a separate Loop for that network")
 
 
 def checked_quorum(quorum: int | None, count: int) -> int:
@@ -573,8 +546,8 @@ def checked_quorum(quorum: int | None, count: int) -> int:
 def leave_open_loop(sessions: Sequence[Session], guard: SignalGuard) -> None:
     """Stop the axes of a loop that is no longer referenced, then warn if it was left open.
 
-    A loop in the background may stay open until the program ends. The warning is last because it
-    may be turned into an error.
+    A loop in the background may stay open until the program ends. The warning comes last, because
+    it may be turned into an error.
 
     Args:
         sessions: Sessions of the loop.

@@ -30,16 +30,22 @@ class Awaited(Protocol):
 def require_move(move: object) -> None:
     """Raise TypeError for anything that is not a move."""
     if not hasattr(move, "patience"):
-        raise TypeError(f"loop.wait() takes a move, such as arm.move_to() returns, not {move!r}")
+        raise TypeError(f"loop.wait() needs a move, for example from arm.move_to(), not {move!r}")
 
 
 def wait_for_move(cycles: Iterator[Cycle], move: Awaited, timeout: float | None) -> None:
-    """Iterate until a move is done: see `Loop.wait`."""
+    """Iterate until a move is done: see `Loop.wait`.
+
+    Args:
+        cycles: Iterator of the loop.
+        move: Move to wait for.
+        timeout: Longest wait [s]; None: the default of the move.
+    """
     limit = move.patience if timeout is None else timeout
     begun: float | None = None
     while not move.done:
         cycle = next(cycles)
-        now = max(each.time for each in cycle.networks)  # the time of a dead network may stop
+        now = max(each.time for each in cycle.networks)  # the time of a failed network may stop
         begun = now if begun is None else begun
         if not move.done and now - begun > limit:
             raise stopped_late(move, limit)

@@ -21,22 +21,24 @@ from catenary.loop.devices import LoopRequest
 from catenary.loop.external_cycle import CarriedExchange, carried
 from catenary.loop.frame_exchange import FrameExchange
 from catenary.loop.laws.law import Law
-from catenary.loop.options import ClockOptions, Scheduling, StopPolicy
+from catenary.loop.options import ClockOptions, Scheduling, StopPolicy, check_groups, one_of
 from catenary.loop.session import Session
 from catenary.loop.stream import Stream
 from catenary.loop.timing import Timing
-from catenary.plan.cycle import ExecutionMode
+from catenary.plan.cycle import ExecutionMode, ReceiveMode
+from catenary.plan.options import PlanOptions, period_in_ns
 from catenary.plan.planner import Plan, make_plan
 from catenary.plan.sink import Sink
 from catenary.wire.al import AlState
 
 ENDING = CYCLE_WORKING_COUNTER | CYCLE_DROPPED | CYCLE_STOPPED | CYCLE_NONE | CYCLE_LAW_FAILED
 TROUBLE = ENDING | CYCLE_CLOCKS
+LOG_LIMIT = 2**24  # cycles, about a gigabyte
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Settings:
-    """Options of a loop that all of its networks share."""
+    """Options of a loop that all of its networks share. ValueError if one is impossible."""
 
     period: float
     execution: ExecutionMode
@@ -49,9 +51,60 @@ class Settings:
     scheduling: Scheduling
     clocks: ClockOptions
 
+    def __post_init__(self) -> None:
+        one_of("execution", self.execution, ("threaded", "inline"))
+        check_groups(self.stop, self.scheduling, self.clocks)
+        period_in_ns(self.period)
+        busy_wait = self.scheduling.busy_wait
+        if busy_wait >= self.period:
+            raise ValueError(
+                f"busy_wait={busy_wait} s: must be less than the period of {self.period} s"
+            )
+        if not 1 <= self.log <= LOG_LIMIT:
+            raise ValueError(f"log={self.log} cycles: must be 1 to {LOG_LIMIT}")
+
+    def plan_options(self, main: MainDevice, cpu: int | None) -> PlanOptions:
+        """Return the options of one network's plan.
+
+        Args:
+            main: MainDevice of the network.
+            cpu: CPU of its native thread; None: unchanged.
+        """
+        late_position, late_velocity, late_torque = self.stop.late_limits
+        command_velocity, command_torque = self.stop.command_timeouts
+        reference = self.clocks.reference
+        if reference is not None and reference.main is not main:
+            reference = None  # a device of another network of the loop
+        by_execution: ReceiveMode = "poll" if self.execution == "inline" else "wait"
+        return PlanOptions(
+            period=self.period,
+            execution=self.execution,
+            receive_mode=self.scheduling.receive or by_execution,
+            watchdog=self.watchdog,
+            lost_limit=self.stop.lost_limit,
+            late_limit_position=late_position,
+            late_limit_velocity=late_velocity,
+            late_limit_torque=late_torque,
+            handover=self.stop.handover,
+            command_timeout_velocity=command_velocity,
+            command_timeout_torque=command_torque,
+            stop_deadline=self.stop.stop_deadline,
+            busy_wait=self.scheduling.busy_wait,
+            collect_share=self.scheduling.collect_deadline,
+            log=self.log,
+            log_axes=self.log_axes,
+            cpu=cpu,
+            priority=self.priority,
+            clock=self.clocks.lead or "reference",
+            reference=None if reference is None else reference.position,
+            margin=self.clocks.margin,
+            burst=self.clocks.burst,
+            exact_matching=self.scheduling.exact_matching,
+        )
+
 
 class Network:
-    """Owns the session of one MainDevice in a loop: its plan, timing, clocks and log."""
+    """Owns the session of one MainDevice in a loop, with its plan, timing, clocks and log."""
 
     def __init__(
         self,
@@ -84,7 +137,9 @@ class Network:
         """Distributed clocks: print it. RuntimeError if no request has `dc=`."""
         clocks = self.session.clocks
         if clocks is None:
-            raise RuntimeError("no distributed clocks in this loop: Drives(..., dc=True)")
+            raise RuntimeError(
+                "no distributed clocks in this loop: request them with Drives(..., dc=True)"
+            )
         return clocks
 
     @property
@@ -110,14 +165,14 @@ class Network:
     def session(self) -> Session:
         """Session of the network. RuntimeError before the loop is open."""
         if self.current_session is None:
-            raise RuntimeError("the loop is not open: with Loop(...) as loop:")
+            raise RuntimeError("the loop is not open: use `with Loop(...) as loop:`")
         return self.current_session
 
     def prepare(self, abandon: Callable[[], object]) -> Session:
         """Bring all devices to SAFE-OP and compile all laws.
 
         Args:
-            abandon: Leaves the loop; called when the MainDevice is closed.
+            abandon: Function that leaves the loop. It is called when the MainDevice is closed.
         """
         self.current_session = None
         plan = self._make_plan()
@@ -140,49 +195,18 @@ class Network:
         return session
 
     def _make_plan(self) -> Plan:
-        """Return the plan of the requests. Nothing is written to the devices yet."""
+        """Return the plan of the requests. Nothing is written to the devices."""
         its = self._settings
         self.main.read_mappings(*self._requests, period=its.period)
-        late_position, late_velocity, late_torque = its.stop.late_limits
-        command_velocity, command_torque = its.stop.command_timeouts
-        reference = its.clocks.reference
-        if reference is not None and reference.main is not self.main:
-            reference = None  # a device of another network of the loop
-        receive = its.scheduling.receive
-        return make_plan(
-            [sub.description for sub in self.main.subs],
-            self._requests,
-            period=its.period,
-            execution=its.execution,
-            receive_mode=receive or ("poll" if its.execution == "inline" else "wait"),
-            watchdog=its.watchdog,
-            lost_limit=its.stop.lost_limit,
-            late_limit_position=late_position,
-            late_limit_velocity=late_velocity,
-            late_limit_torque=late_torque,
-            handover=its.stop.handover,
-            command_timeout_velocity=command_velocity,
-            command_timeout_torque=command_torque,
-            stop_deadline=its.stop.stop_deadline,
-            busy_wait=its.scheduling.busy_wait,
-            collect_share=its.scheduling.collect_deadline,
-            log=its.log,
-            clock=its.clocks.lead or "reference",
-            reference=None if reference is None else reference.position,
-            margin=its.clocks.margin,
-            burst=its.clocks.burst,
-            exact_matching=its.scheduling.exact_matching,
-            cpu=self._cpu,
-            priority=its.priority,
-            log_axes=its.log_axes,
-        )
+        devices = [sub.description for sub in self.main.subs]
+        return make_plan(devices, self._requests, its.plan_options(self.main, self._cpu))
 
     def advance(self, flags: int) -> None:
-        """Do the work that belongs to a cycle without an iteration, and raise its error, if any."""
+        """Step the acyclic queue after a cycle without an iteration; raise the cycle's error."""
         session = self.session
         session.service.step_without_thread()
         if flags & TROUBLE or session.engine.al_status != AlState.OP:
-            session.judge(flags, faults=self._settings.stop.raise_faults)
+            session.judge(flags)
 
     def wait_locked(self, within: float, timeout: float) -> None:
         """Wait until the clocks are locked: see `Loop.wait_locked`.
@@ -192,7 +216,7 @@ class Network:
             timeout: Longest wait [s].
         """
         self.clocks.wait(within, timeout, self.advance)
-        self.session.judge(CYCLE_CLOCKS, faults=self._settings.stop.raise_faults)
+        self.session.judge(CYCLE_CLOCKS)
 
 
 def leave_method(loop_leave: Callable[[], None]) -> Callable[[], object]:

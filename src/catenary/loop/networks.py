@@ -1,7 +1,7 @@
-"""Several networks in one loop: a common schedule, and an engine and native thread for each.
+"""Several networks in one loop: one schedule, and an engine and a native thread for each network.
 
-All networks use the cycle starts of the first. A failed network never delays the others: its own
-thread continues to send, and its cycles are not good.
+All networks use the cycle starts of the first. A failed network never delays the others. Its own
+thread continues to send, and its cycles are bad.
 """
 
 from __future__ import annotations
@@ -14,10 +14,13 @@ from threading import Lock
 from catenary.core import CYCLE_NONE, CYCLE_STOPPED, CYCLE_WORKING_COUNTER, Cycle
 from catenary.errors import CatenaryError, LoopError
 from catenary.link import Link
-from catenary.loop.network import TROUBLE, Network
+from catenary.loop.devices import LoopRequest, by_network
+from catenary.loop.network import TROUBLE, Network, Settings
 from catenary.loop.options import ClockOptions
+from catenary.loop.publishing import one_sink_each
 from catenary.loop.session import STOP_SLICE_NS, Session
 from catenary.loop.signals import SignalGuard
+from catenary.plan.sink import Sink
 from catenary.wire.al import AlState
 
 NETWORK_TROUBLE = CYCLE_WORKING_COUNTER | CYCLE_STOPPED | CYCLE_NONE
@@ -40,7 +43,7 @@ class NetworksCycle(Cycle):
 
     @property
     def ok(self) -> bool:
-        """True if at least as many networks as the quorum were good.
+        """True if the number of good networks reached the quorum.
 
         A network with devices out of OP is not good, even if it answers.
         """
@@ -71,10 +74,9 @@ class NetworksCycle(Cycle):
 class NetworksIteration:
     """Iterator that steps all networks once per `next` and yields their common NetworksCycle."""
 
-    def __init__(self, networks: Sequence[Network], quorum: int, *, faults: bool) -> None:
+    def __init__(self, networks: Sequence[Network], quorum: int) -> None:
         self._sessions = [network.session for network in networks]
         self._quorum = quorum
-        self._faults = faults
         self._dead: set[int] = set()  # identities of the failed networks that have not returned
         self._cycle: NetworksCycle | None = None
         self.commit_lock: Lock | None = None  # see core.Iteration
@@ -120,7 +122,7 @@ class NetworksIteration:
                 mover.step(its.time)
 
     def _judge(self, cycle: NetworksCycle, flags: Sequence[int]) -> None:
-        """Raise the error that ends the loop: too few networks, or trouble in a live one."""
+        """Raise the error that ends the loop: too few networks, or a fault in a live one."""
         alive = [self._lives(one, mine) for one, mine in zip(self._sessions, flags, strict=True)]
         cycle.alive = tuple(alive)
         for one, mine, lives in zip(self._sessions, flags, alive, strict=True):
@@ -129,13 +131,13 @@ class NetworksIteration:
             if mine & TROUBLE or one.engine.al_status != AlState.OP:
                 if not lives:
                     self._stop_others(one)
-                one.judge(mine, faults=self._faults)
+                one.judge(mine)
 
     def _lives(self, one: Session, flags: int) -> bool:
-        """Return whether a network is alive.
+        """Return True if a network is alive.
 
-        A failed network that answers again counts once its devices are in OP. Devices that were
-        stopped by their watchdogs thus do not stop the other networks.
+        A failed network is alive again when its devices are in OP. Thus, devices that their
+        watchdogs stopped do not stop the other networks.
         """
         if flags & NETWORK_TROUBLE:
             self._dead.add(id(one))
@@ -149,6 +151,47 @@ class NetworksIteration:
                 one.stop_axes_at_once()
 
 
+def make_networks(
+    requests: Sequence[LoopRequest],
+    settings: Settings,
+    cpu: int | Sequence[int] | None,
+    sink: Sink | Sequence[Sink] | None,
+) -> tuple[Network, ...]:
+    """Return one network for each MainDevice of the requests.
+
+    Args:
+        requests: Process-data requests.
+        settings: Options that all networks share.
+        cpu: CPU of the native thread, or one for each network; None: see `cpus_for`.
+        sink: Receiver of every cycle, or one for each network.
+
+    Raises:
+        ValueError: An option is impossible for this number of networks.
+    """
+    groups = by_network(requests)
+    count = len(groups)
+    if count > 1:
+        refuse_for_several(settings)
+        settings = replace(settings, clocks=clocks_of_several(settings.clocks))
+    return tuple(
+        Network(main, mine, settings, cpu=one, sink=its)
+        for (main, mine), one, its in zip(
+            groups, cpus_for(count, cpu), one_sink_each(sink, count), strict=True
+        )
+    )
+
+
+def refuse_for_several(settings: Settings) -> None:
+    """Raise ValueError for options that only one network can have."""
+    if settings.execution != "threaded":
+        raise ValueError(
+            'several networks need execution="threaded": a thread that iterates can only keep the '
+            "cycle starts of one"
+        )
+    if settings.laws:
+        raise ValueError("laws work on one network: make a separate Loop for that network")
+
+
 def share_time(sessions: Sequence[Session]) -> None:
     """In virtual time, let this thread run the cycles of all networks in turns.
 
@@ -160,7 +203,7 @@ def share_time(sessions: Sequence[Session]) -> None:
         return
     if not all(virtual) or not _have_one_clock([one.main.link for one in sessions]):
         raise ValueError(
-            "the networks of one loop need a common time: give their segments the same clock, "
+            "the networks of one loop need the same clock: give it to their segments, "
             "Segment(..., clock=VirtualClock())"
         )
     for one in sessions:
@@ -168,11 +211,11 @@ def share_time(sessions: Sequence[Session]) -> None:
 
 
 def leave_all(sessions: Sequence[Session], guard: SignalGuard) -> list[Exception]:
-    """Stop every network that answers, whatever happens to the others; return the problems.
+    """Stop every network, regardless of errors in the others; return the problems.
 
     Args:
         sessions: Sessions of the loop.
-        guard: Shortens the waits at a second signal.
+        guard: Signal handlers; a second signal shortens the waits.
     """
     problems: list[Exception] = []
     try:
@@ -188,11 +231,11 @@ def leave_all(sessions: Sequence[Session], guard: SignalGuard) -> list[Exception
 
 
 def brake(sessions: Sequence[Session], guard: SignalGuard) -> None:
-    """Stop all axes of all networks together; wait for standstill, or until the deadline.
+    """Stop all axes of all networks together, and wait for standstill, or until the deadline.
 
     Args:
         sessions: Sessions of the loop.
-        guard: Ends the wait at a second signal.
+        guard: Signal handlers; a second signal ends the wait.
     """
     for one in sessions:
         one.make_outputs_safe()
@@ -225,12 +268,14 @@ def cpus_for(count: int, cpu: int | Sequence[int] | None) -> list[int | None]:
 
     Args:
         count: Number of networks.
-        cpu: Requested CPU or CPUs. None: the last ones, if there are more CPUs than networks; else
-            unchanged.
+        cpu: Requested CPU or CPUs. None: unchanged; for several networks the last CPUs, if there
+            are more CPUs than networks.
 
     Raises:
         ValueError: The number of CPUs is not the number of networks.
     """
+    if count == 1 and isinstance(cpu, Sequence):
+        raise ValueError(f"cpu={cpu}: one network has one thread, on one CPU")
     if isinstance(cpu, int):
         return [cpu] * count
     if cpu is not None:
@@ -238,13 +283,13 @@ def cpus_for(count: int, cpu: int | Sequence[int] | None) -> list[int | None]:
             raise ValueError(f"cpu: {len(cpu)} CPUs for {count} networks; give one CPU for each")
         return list(cpu)
     allowed = sorted(os.sched_getaffinity(0))
-    if len(allowed) <= count:
+    if count == 1 or len(allowed) <= count:
         return [None] * count
     return list(allowed[-count:])
 
 
 def _have_one_clock(links: Sequence[Link]) -> bool:
-    """Return whether advancing the first clock advances all clocks."""
+    """Return True if advancing the first clock advances all clocks."""
     first, *others = links
     later = max(link.now() for link in links) + 1000
     first.wait_until(later, False)
@@ -257,4 +302,4 @@ def _stands(session: Session) -> bool:
     try:
         return session.engine.run_until_stopped(STOP_SLICE_NS)
     except (CatenaryError, OSError):
-        return True  # the link failed: no further action is possible
+        return True  # the link failed, so that no further action is possible

@@ -10,16 +10,17 @@ from typing import Literal
 from catenary.bus import SubDevice
 from catenary.plan.clocks import BURST
 from catenary.plan.cycle import FollowedClock, ReceiveMode
+from catenary.plan.options import (
+    COMMAND_TIMEOUT_TORQUE,
+    COMMAND_TIMEOUT_VELOCITY,
+    HANDOVER,
+    LATE_LIMIT_POSITION,
+    LATE_LIMIT_TORQUE,
+    LATE_LIMIT_VELOCITY,
+)
 
 AxisStopReaction = Literal["raise", "event"]
 ReturnPolicy = Literal["restore", "hold"]
-
-HANDOVER = 0.020  # [s], CST
-LATE_LIMIT_POSITION = 0.050  # [s], CSP
-LATE_LIMIT_VELOCITY = 0.050  # [s], CSV
-LATE_LIMIT_TORQUE = 0.010  # [s], CST
-COMMAND_TIMEOUT_VELOCITY = 0.200  # [s], CSV
-COMMAND_TIMEOUT_TORQUE = 0.020  # [s], CST
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -32,8 +33,8 @@ class StopPolicy:
         handover: Time for which CST keeps its torque after a law or stream ended, before a quick
             stop [s].
         command_timeout: In the background, time for which the targets of an update are valid [s].
-            After it, CSV decelerates and CST stops quickly. None: 0.2 s in CSV, 20 ms in CST. CSP
-            holds without limit.
+            After it, CSV decelerates and CST makes a quick stop. None: 0.2 s in CSV, 20 ms in CST.
+            CSP holds without limit.
         stop_deadline: Time for the axes to reach standstill when the loop is left [s].
         lost_limit: Number of consecutive bad cycles that raises WorkingCounterError.
         raise_faults: True: raise DriveError if a drive is in fault or leaves OPERATION_ENABLED by
@@ -42,7 +43,7 @@ class StopPolicy:
             DriveError. "event": only the event `AxisStopped`; see `Drives.stopped`.
         on_return: Reaction if an optional device returns. "restore": replay its start-up objects
             and bring it to OP. "hold": keep it in PRE-OP until `Loop.restore`.
-        on_replacement: The same for another device of the same product in its place. A held
+        on_replacement: The same, if another device of the same product is in its place. A held
             replacement is not even brought to PRE-OP.
 
     Raises:
@@ -65,7 +66,7 @@ class StopPolicy:
                 f"late_limit={self.late_limit} s: must be 0 (never) or a positive time"
             )
         if not 0 < self.handover < math.inf:
-            raise ValueError(f"handover must be positive and finite [s], not {self.handover}")
+            raise ValueError(f"handover={self.handover} s: must be positive and finite")
         if not 0 <= self.stop_deadline < math.inf:
             raise ValueError(f"stop_deadline={self.stop_deadline} s: must be 0 or a positive time")
         check_count("lost_limit", self.lost_limit, 1)
@@ -100,14 +101,14 @@ class Scheduling:
         receive: Waiting of the cycle for its frames: "poll", "wait" or "busy". None: "wait" when
             threaded, "poll" when inline.
         busy_wait: Time of a busy-wait before each cycle start [s]; the rest of the wait is a sleep.
-            It costs that much processor time per cycle.
+            It costs this processor time per cycle.
         switch_interval: Switch interval of the interpreter while an inline loop is open in real
             time [s]. None: unchanged; see `interpreter` in `Loop.timing`.
         collect_deadline: If threaded, share of the period in which frames may return. The budget of
             a law shortens it.
         exact_matching: True: every cyclic frame carries the cycle number in a NOP datagram. A frame
             that a loop in the wiring or a second sender repeats is then never accepted as a current
-            one. This costs 16 bytes and 1.3 us of wire time per frame.
+            one. It costs 16 bytes and 1.3 us of wire time per frame.
         quorum: Number of networks that must be good for a cycle to be good. None: all.
 
     Raises:

@@ -47,7 +47,7 @@ class Publisher:
         self._report(type(error).__name__, str(error), self._engine.now() * 1e-9, None, {})
 
     def close(self) -> None:
-        """Close the sink; call it after the engine has stopped."""
+        """Close the sink. Call this after the engine has stopped."""
         if self._ended:
             return
         self._ended = True
@@ -76,7 +76,7 @@ class Publisher:
 
 
 def plain(value: object) -> object:
-    """Return a value that JSON can represent; numbers and texts are unchanged."""
+    """Return a value that JSON can represent. Numbers and texts are unchanged."""
     if isinstance(value, bytes):
         return value.hex(" ")
     if isinstance(value, tuple):
@@ -232,7 +232,7 @@ def one_sink_each(sinks: Sink | Sequence[Sink] | None, networks: int) -> list[Si
     given = list(sinks) if isinstance(sinks, Sequence) else [sinks]
     if len(given) != networks:
         raise ValueError(
-            f"sink: {len(given)} for {networks} networks; give each network its own sink: "
+            f"sink: {len(given)} sinks for {networks} networks; give each network its own: "
             "sink=[cat.Share('upper'), cat.Share('lower')]"
         )
     return list(given)

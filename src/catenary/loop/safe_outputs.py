@@ -1,4 +1,4 @@
-"""Safe values of outputs when a loop ends: set at once, exchanged before the states go down."""
+"""Safe values of outputs at the end of a loop: exchanged before the devices leave OP."""
 
 from __future__ import annotations
 
@@ -12,7 +12,8 @@ from catenary.loop.signals import SignalGuard
 from catenary.plan.cycle import CyclePlan
 from catenary.plan.request import Views
 
-TIMEOUT_NS = 100_000_000  # for an exchange with safe outputs, or this number of exchanges:
+# Wait for an exchange with safe outputs: the longer of these.
+TIMEOUT_NS = 100_000_000
 EXCHANGES = 5
 
 
@@ -45,7 +46,9 @@ def confirm_safe(
         return
     units = {area.sync_unit for area in plan.output_areas}
     missing = required = {unit for unit in units if not plan.sync_units[unit].optional}
-    turn = max(plan.sync_units[unit].divider for unit in units) + 2  # one may be under way
+    turn = (
+        max(plan.sync_units[unit].divider for unit in units) + 2
+    )  # one exchange may be in progress
     for done in range(max(TIMEOUT_NS // plan.period_ns, EXCHANGES * turn)):
         if cycle() & (CYCLE_STOPPED | CYCLE_NONE):
             missing = required
@@ -57,7 +60,7 @@ def confirm_safe(
         return
     names = ", ".join(f"device {a.name}" for a in plan.output_areas if a.sync_unit in missing)
     raise LoopError(
-        f"{names}: did not confirm the safe values of the outputs",
+        f"{names} did not confirm the safe values of its outputs",
         hint="a device that answers has received them, even if another device of its sync unit is "
         "silent; the outputs of a silent device depend on its watchdog",
     )

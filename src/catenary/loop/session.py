@@ -14,48 +14,39 @@ from catenary.core import (
     AXIS_FOLLOWED,
     CYCLE_CLOCKS,
     CYCLE_DROPPED,
-    CYCLE_LAW_FAILED,
     CYCLE_NONE,
     CYCLE_OK,
     CYCLE_STOPPED,
     CYCLE_WORKING_COUNTER,
     REQUEST_ENABLED,
-    REQUEST_QUICK_STOP,
     REQUEST_RESET,
 )
-from catenary.errors import CatenaryError, DriveError, LinkError, LoopError
+from catenary.errors import CatenaryError, LinkError, LoopError
 from catenary.link import forget_in_child
 from catenary.log import Log
 from catenary.loop.acyclic_service import Service
 from catenary.loop.buffers import bind_requests
 from catenary.loop.clocks import Clocks
-from catenary.loop.cycle_errors import (
-    AxisTrouble,
-    drive_error,
-)
 from catenary.loop.exchange import Exchange
+from catenary.loop.fault_report import FaultReport
 from catenary.loop.interpreter import switch_interval
 from catenary.loop.laws.runner import LawRunner
-from catenary.loop.log_rows import read_log
 from catenary.loop.options import StopPolicy
 from catenary.loop.publishing import Publisher
 from catenary.loop.safe_outputs import confirm_safe, make_safe
 from catenary.loop.signals import SignalGuard
-from catenary.loop.stop_error import stopped_error
 from catenary.loop.timing import Timing
-from catenary.loop.watches.axis import AxisWatch, RefusedMode, StoppedAxis
 from catenary.plan.planner import Plan
-from catenary.plan.request import ProcessDataRequest
+from catenary.plan.request import ProcessDataRequest, Views
 from catenary.plan.sink import Sink
-from catenary.plan.stop_reason import UNASKED, StopReason
 from catenary.wire.al import AlState
-from catenary.wire.cia402 import IN_FAULT, AxisState, Mode, state_of
+from catenary.wire.cia402 import IN_FAULT, AxisState, Mode
 
 FATAL = CYCLE_WORKING_COUNTER | CYCLE_STOPPED | CYCLE_NONE
-ENABLE_TIMEOUT_NS = 5_000_000_000  # longer than slow mains contactors and brakes need
-ENABLE_CYCLES = 20  # at least, for long periods
-SETTLE_CYCLES = 50  # at most, until the first cycle with all answers
-STOP_SLICE_NS = 20_000_000  # between checks of "hurry" while the drives brake
+ENABLE_TIMEOUT_NS = 5_000_000_000  # longer than slow mains contactors and brakes take
+ENABLE_CYCLES = 20  # shortest timeout [cycles], for long periods
+SETTLE_CYCLES = 50  # longest wait for the first cycle with all answers
+STOP_SLICE_NS = 20_000_000  # between checks of `guard.hurry` while the drives brake
 
 
 class Session:
@@ -75,27 +66,20 @@ class Session:
         self.plan = plan
         self.exchange: Exchange = exchange(self)
         self.engine = self.exchange.make_engine()
-        self.views = bind_requests(
-            requests,
-            plan.tables,
-            self.engine.buffers,
-            is_open=lambda: self.is_open,
-            is_led=lambda: self.engine.led,
-        )
-        self._axis_watch = AxisWatch(self.views, plan.cycle.axes)
+        self.views = self._bind(requests)
         self.stop = stop
         self.laws = LawRunner(self.engine, plan)
-        clock = plan.cycle.clock
-        self.clocks: Clocks | None = None
-        if clock is not None:
-            self.clocks = Clocks(main, self.engine, self.exchange.cycle_clock(), clock, self.cycle)
+        self.faults = FaultReport(
+            main, plan.cycle, self.engine, self.views, self.exchange, self.laws, stop
+        )
+        self.clocks = self._make_clocks()
         self.service = Service(main, self.engine, plan)
         self.exchange.attend()
         self.watch = self.exchange.watch
         self.switch_interval: float | None = None  # [s] of the interpreter, inline
         self._attached = ExitStack()
         self._opened = self._left = False
-        self._abandon = abandon  # leaves the loop if the MainDevice is closed before it
+        self._abandon = abandon  # leaves the loop if the MainDevice is closed first
         self._process = os.getpid()
         forget_in_child(self)
         self._companions: Sequence[Session] = ()
@@ -104,6 +88,22 @@ class Session:
         self._counted: Mapping[str, int] = {}  # counters of the engine when the loop was entered
         self.end_background: Callable[[], None] = _no_background  # the thread that iterates
         self.service.cycle = self.cycle
+
+    def _bind(self, requests: Sequence[ProcessDataRequest]) -> Views:
+        """Give the requests their parts of the engine's buffers, and return all of them."""
+        return bind_requests(
+            requests,
+            self.plan.tables,
+            self.engine.buffers,
+            is_open=lambda: self.is_open,
+            is_led=lambda: self.engine.led,
+        )
+
+    def _make_clocks(self) -> Clocks | None:
+        clock = self.plan.cycle.clock
+        if clock is None:
+            return None
+        return Clocks(self.main, self.engine, self.exchange.cycle_clock(), clock, self.cycle)
 
     # Opening
 
@@ -167,10 +167,12 @@ class Session:
     def enable(self) -> None:
         """Reset faults and enable all axes.
 
-        Position axes hold when this returns; velocity and torque axes wait for their first targets.
+        Position axes hold when this returns. Velocity and torque axes wait for their first targets.
         """
         in_position = np.isin(self.views.mode_target, (Mode.CSP, Mode.PP))
-        if (~in_position & self._in_fault()).any():  # enabling resets too late for their targets
+        if (
+            ~in_position & self._in_fault()
+        ).any():  # the reset by `enable` would come after their first targets
             self._request(REQUEST_RESET, ~in_position & self._in_fault())
             self._await(lambda: ~in_position & self._in_fault())
         self._request(REQUEST_ENABLED, np.ones_like(in_position))
@@ -185,23 +187,23 @@ class Session:
         return np.isin(self.views.axis_state, [int(state) for state in IN_FAULT])
 
     def _await(self, waiting: Callable[[], npt.NDArray[np.bool_]]) -> None:
-        """Run cycles until no axis is waiting; raise DriveError for axes that still wait."""
-        patience = max(ENABLE_TIMEOUT_NS, ENABLE_CYCLES * self.plan.cycle.period_ns)
-        deadline = self.engine.now() + patience
+        """Run cycles until no axis is waiting; raise DriveError at the timeout."""
+        timeout_ns = max(ENABLE_TIMEOUT_NS, ENABLE_CYCLES * self.plan.cycle.period_ns)
+        deadline = self.engine.now() + timeout_ns
         while True:
             flags = self.cycle()
             if flags & CYCLE_DROPPED:
-                self._announce_axes()
+                self.faults.report_axes()
             axes = np.flatnonzero(waiting()).tolist()
             if not axes:
                 return
             if flags & FATAL or self.engine.al_status != AlState.OP:
-                self.judge(flags, faults=False)
+                self.judge(flags, enabling=True)
             if self.engine.now() > deadline:
-                raise self._drive_error(axes, "cannot be enabled")
+                raise self.faults.drive_error(axes, "cannot be enabled")
 
     def refuse_powered_torque(self, call: str) -> None:
-        """Raise LoopError for axes that are powered in CST: a waiting call commits no torque."""
+        """Raise LoopError if an axis is powered in CST, since `call` commits no torque."""
         views = self.views
         in_torque = (views.mode_target == Mode.CST) | (views.mode_actual == Mode.CST)
         powered = (views.axis_state == AxisState.OPERATION_ENABLED) & in_torque
@@ -209,7 +211,8 @@ class Session:
             return
         names = [self.plan.cycle.axes[i].name for i in np.flatnonzero(powered).tolist()]
         raise LoopError(
-            f"{call}: {', '.join(names)} powered in CST, but the call commits no torque set-points",
+            f"{call}: {', '.join(names)} powered in CST, and "
+            "the call commits no torque set-points during its wait",
             log=self.log(),
             hint="call it before the first torque is committed, disable the axes, or switch to CSP",
         )
@@ -221,7 +224,7 @@ class Session:
             self.raise_ended(flags)
             if flags & CYCLE_OK:
                 return
-        raise self.exchange.silence_error()
+        raise self.faults.silence()
 
     # Session
 
@@ -239,86 +242,34 @@ class Session:
         period = self.plan.cycle.period_ns * 1e-9
         return Timing(engine.histograms(), since, period=period, scheduling=engine.scheduling)
 
-    def judge(self, flags: int, *, faults: bool) -> None:
-        """Announce the events of a cycle in trouble, and raise its error, if any.
+    def judge(self, flags: int, *, enabling: bool = False) -> None:
+        """Put the events of a cycle, and raise the exception that ends the loop, if any.
 
         Args:
             flags: Flags of the cycle.
-            faults: True to raise DriveError for drives in fault or stopped by themselves.
+            enabling: True while the drives are being enabled: a fault is then not an error.
         """
         for mover in list(self.views.movers):
             mover.check()
-        self.raise_ended(flags)
-        stops = self._announce_axes() if flags & CYCLE_DROPPED else []
+        error = self.faults.error(flags, enabling=enabling)
         if flags & CYCLE_CLOCKS:
             self.announce_clocks()
-        if flags & CYCLE_WORKING_COUNTER:
-            raise self.exchange.silence_error()
-        if flags & CYCLE_LAW_FAILED:
-            self.laws.raise_failure(self.log())
-        if self.engine.al_status != AlState.OP and not self.watch.excuses:
-            self.exchange.raise_astray()
-            stops += self._announce_axes(explained=True)  # the flags of its cycles are lost
-        states = [state_of(word) for word in self.views.statusword.tolist()]
-        faulty = [
-            axis
-            for axis, state in enumerate(states)
-            if state in IN_FAULT and self.watch.requires(self.plan.cycle.axes[axis].device)
-        ]
-        if faulty and faults:
-            if self.engine.al_status != AlState.OP:
-                self.exchange.raise_astray()  # the fault may be its consequence
-            raise self._drive_error(faulty, "in fault")
-        self._raise_stopped([s for s in stops if self.watch.requires(s.device)], faults=faults)
-
-    def _announce_axes(self, *, explained: bool = False) -> list[StoppedAxis]:
-        """Put an event for each axis that the core stopped unasked and each refused mode.
-
-        Args:
-            explained: True if no flag of a cycle caused the call: see `new_refusals`.
-
-        Returns:
-            The new stops.
-        """
-        stops = self._axis_watch.new_stops()
-        refusals = self._axis_watch.new_refusals(explained=explained or bool(stops))
-        now = self.engine.now() * 1e-9
-        news: list[StoppedAxis | RefusedMode] = [stop for stop in stops if not stop.requested]
-        for each in [*news, *refusals]:
-            self.main.events.put(each.event(now, self.main.subs[each.device]))
-        return stops
-
-    def _raise_stopped(self, stops: Sequence[StoppedAxis], *, faults: bool) -> None:
-        """Raise DriveError for required axes that stopped without a request."""
-        left = [s.axis for s in stops if s.reason is StopReason.LEFT_OPERATION]
-        faulty = [s.axis for s in stops if s.reason is StopReason.FAULT]
-        if faults and faulty:
-            raise self._drive_error(faulty, "in fault")
-        if faults and left:
-            raise self._drive_error(left, "left OPERATION_ENABLED by itself")
-        unasked = [s for s in stops if s.reason in UNASKED]
-        if unasked and self.stop.on_axis_stopped == "raise":
-            log = self.log()
-            self.stop_axes_at_once()
-            raise stopped_error(unasked, self.plan.cycle, log)
+        if error is not None:
+            raise error
 
     def announce_clocks(self) -> None:
+        """Put an event if the clocks have become locked or unlocked."""
         if self.clocks is not None:
             self.clocks.announce()
 
     def raise_ended(self, flags: int) -> None:
-        if flags & CYCLE_STOPPED:
-            raise LoopError("the cycle has ended: the link failed", log=self.log())
-        if flags & CYCLE_NONE:
-            raise LoopError(
-                "cycle thread stalled: no cycle completed within 1 s",
-                log=self.log(),
-                hint="the native thread does not get the CPU: see loop.scheduling",
-            )
+        """Raise LoopError for a cycle that was not run."""
+        if (error := self.faults.ended(flags)) is not None:
+            raise error
 
     def log(self) -> Log:
         """Return the last cycles, oldest first."""
-        return read_log(self.engine, self.plan.cycle)
+        return self.faults.log()
 
     # Leaving
 
@@ -328,7 +279,7 @@ class Session:
         self.engine.forget()
 
     def leave(self, guard: SignalGuard) -> list[Exception]:
-        """Stop the loop and return the problems. No step depends on the success of another.
+        """Stop the loop and return the problems. A failed step does not prevent the next ones.
 
         No effect on a second call, or in a forked child.
         """
@@ -350,13 +301,15 @@ class Session:
         for step in steps:
             try:
                 step(guard)
-            except Exception as problem:  # the next step matters more; all problems are returned
+            except (
+                Exception
+            ) as problem:  # the next steps are more important; all problems are returned
                 problems.append(problem)
         self.main.events.end_loop()
         return problems
 
     def make_outputs_safe(self) -> None:
-        """Set bytes of process data to their safe values. The next cycle sends them."""
+        """Set the output bytes of process data to their safe values. The next cycle sends them."""
         make_safe(self.plan.cycle, self.views)
 
     def _confirm_safe_outputs(self, guard: SignalGuard) -> None:
@@ -368,7 +321,7 @@ class Session:
             mover.end()
 
     def _stop_axes(self, guard: SignalGuard) -> None:
-        """Stop all axes quickly (the drive's 0x605A), and run cycles until they stand."""
+        """Request a quick stop of all axes (0x605A), and run cycles until they are at rest."""
         self.engine.stop_law()
         if not self.plan.cycle.axes:
             return
@@ -379,9 +332,7 @@ class Session:
 
     def stop_axes_at_once(self) -> None:
         """Stop all axes from the next cycle on; replace requests that are not committed yet."""
-        self.views.requested_state[:] = REQUEST_QUICK_STOP
-        self.views.request[:] += 1
-        self.engine.quick_stop_all()
+        self.faults.stop_axes()
 
     def _stop_cycle(self, guard: SignalGuard) -> None:
         try:
@@ -393,7 +344,7 @@ class Session:
                 self._publisher.close()
 
     def _report_watches(self, guard: SignalGuard) -> None:
-        """Raise the error of a watch: watches are endless, so one that has ended has failed."""
+        """Raise the error of a watch. A watch is endless, so one that has ended has failed."""
         for watch in self._watches:
             if watch.error is not None and not isinstance(watch.error, LoopError):
                 raise watch.error
@@ -403,31 +354,7 @@ class Session:
             self.main.leave()
         except LinkError:
             if any(self.watch.requires(sub.position) for sub in self.main.subs):
-                raise  # otherwise the loop ends without its optional devices, as it ran
-
-    # Errors
-
-    def suspects(self) -> list[int]:
-        """Return the positions of required devices in units without a last answer."""
-        units = self.plan.cycle.sync_units
-        valid = self.engine.buffers["unit_valid"].tolist()
-        return [
-            position
-            for unit, answered in zip(units, valid, strict=True)
-            if not answered and not unit.optional
-            for position in unit.devices
-        ]
-
-    def _drive_error(self, axes: Sequence[int], what: str) -> DriveError:
-        """Return the error for some axes, with the state and error code of each drive."""
-        log = self.log()
-        states = [state_of(self.views.statusword.item(axis)) for axis in axes]
-        self.stop_axes_at_once()
-        troubles = [
-            AxisTrouble(self.plan.cycle.axes[axis].name, state, self.exchange.error_code(axis))
-            for axis, state in zip(axes, states, strict=True)
-        ]
-        return drive_error(troubles, what, log)
+                raise  # otherwise only optional devices are missing, as before
 
 
 def _no_background() -> None:
@@ -435,7 +362,7 @@ def _no_background() -> None:
 
 
 def take_down(main: MainDevice) -> list[Exception]:
-    """Bring down the devices of a loop that never started to cycle; return the problems."""
+    """Bring down the devices of a loop that never ran a cycle; return the problems."""
     try:
         main.leave()
     except CatenaryError as problem:

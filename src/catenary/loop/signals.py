@@ -1,10 +1,10 @@
-"""Ctrl-C, SIGTERM and SIGHUP while a loop is open: leaving is never interrupted.
+"""Handling of Ctrl-C, SIGTERM and SIGHUP while a loop is open: leaving is never interrupted.
 
-Handlers are only installed in the main thread, where Python delivers signals. Outside of leaving,
-Ctrl-C keeps its former effect. SIGTERM and SIGHUP (the terminal or the ssh connection closed) raise
-SystemExit unless the application handles them. All of them end in the loop's `__exit__`. While the
-loop is being left, a signal raises nothing and only shortens the waits. A signal that is ignored
-stays ignored: `nohup` ignores SIGHUP.
+Handlers are only installed in the main thread, where Python delivers signals. While the loop is
+not being left, Ctrl-C keeps its former effect. SIGTERM and SIGHUP (the terminal or the ssh
+connection closed) raise SystemExit unless the application handles them. All of them end in the
+loop's `__exit__`. While the loop is being left, a signal raises nothing and only shortens the
+waits. A signal that is ignored remains ignored: `nohup` ignores SIGHUP.
 """
 
 from __future__ import annotations
@@ -24,8 +24,8 @@ SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 class SignalGuard:
     """Owns the handlers of SIGINT, SIGTERM and SIGHUP while a loop is open.
 
-    `leaving`: the code objects of the functions that leave; a signal that finds one of them on the
-    stack only sets `hurry`. (A flag set by those functions would leave a gap at their first line.)
+    `leaving`: code objects of the functions that leave a loop. If one of them is on the stack, a
+    signal only sets `hurry`. (A flag set by these functions would leave a gap at their first line.)
     """
 
     def __init__(self, leaving: tuple[CodeType, ...]) -> None:
@@ -49,7 +49,7 @@ class SignalGuard:
     def restore(self) -> None:
         """Restore the former handlers.
 
-        In another thread Python cannot do that: the handlers stay and call the former ones.
+        Python cannot do this in another thread. There, the handlers stay and call the former ones.
         """
         if threading.current_thread() is not threading.main_thread():
             return
@@ -58,7 +58,7 @@ class SignalGuard:
             signal.signal(number, before)
 
     def forget(self) -> None:
-        """Restore the signals in a forked child: they end it as if there were no loop."""
+        """Restore the former handlers in a forked child, which has no loop."""
         self.restore()
 
     def _handle(self, number: int, frame: FrameType | None) -> None:

@@ -1,4 +1,4 @@
-"""Error for axes that the core stopped: reason, cycle and next step."""
+"""Error for axes that the core stopped: reason, cycle and advice."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ ADVICE: dict[StopReason, str] = {
         "or give StopPolicy(handover=...) a longer time [s]"
     ),
     StopReason.REFUSED: (
-        "check for NaN or a jump in the targets: begin at the commanded position and move by "
+        "check for NaN or a jump in the targets: start at the commanded position and move in "
         "small steps; Drives(step_limit=...) allows larger ones"
     ),
     StopReason.POSITION_LIMIT: (
@@ -43,9 +43,9 @@ ADVICE: dict[StopReason, str] = {
     ),
     StopReason.NOT_ENABLED: "check its main supply, safe torque off and the enable input",
 }
-GO_ON = (
+CONTINUE = (
     'StopPolicy(on_axis_stopped="event") keeps the loop running; '
-    "Drives.enable() starts the axis again"
+    "Drives.enable() enables the axis again"
 )
 
 
@@ -53,8 +53,8 @@ def stopped_error(stops: Sequence[StoppedAxis], cycle: CyclePlan, log: Log) -> D
     """Return the error for axes that were stopped without a request.
 
     Args:
-        stops: At least one.
-        cycle: The plan, for its times.
+        stops: Stops of axes, at least one.
+        cycle: Plan of the cycle, for its times.
         log: The last cycles, oldest first.
     """
     alike: dict[str, list[str]] = {}
@@ -67,7 +67,7 @@ def stopped_error(stops: Sequence[StoppedAxis], cycle: CyclePlan, log: Log) -> D
     )
     reasons = dict.fromkeys(stop.reason for stop in stops)
     advice = "; ".join(ADVICE[reason] for reason in reasons if reason in ADVICE)
-    return DriveError(report, log=log, hint=f"{advice}; {GO_ON}")
+    return DriveError(report, log=log, hint=f"{advice}; {CONTINUE}")
 
 
 def _details(stop: StoppedAxis, cycle: CyclePlan, log: Log) -> str:
@@ -100,6 +100,6 @@ def _what_was_late(stop: StoppedAxis, log: Log) -> str:
 
 
 def _trailing(flags: npt.NDArray[np.uint32], bit: int) -> int:
-    """Return the number of flags at the end that have the bit without a gap."""
+    """Return the number of consecutive flags at the end that have the bit."""
     without = np.flatnonzero((flags & bit) == 0)
     return len(flags) - (int(without[-1]) + 1 if len(without) else 0)

@@ -12,12 +12,12 @@ Rows = npt.ArrayLike
 
 
 class Stream:
-    """Set-points written ahead, one row per cycle; the cycle thread takes them in order.
+    """Set-points written ahead, one row per cycle. The cycle thread consumes them in order.
 
     From the first row until `close`, the stream sets the targets. A law that runs at the same time
-    finds the row in its targets. An empty stream is an underrun: the axes fall back, and are
-    stopped after the late limit. Meanwhile `cycle.dry` is True and `dry` counts the cycles; the
-    next row ends the underrun. Any thread may write, but only one at a time. An axis that is
+    reads the row in its targets. An empty stream is an underrun: the axes fall back, and are
+    stopped after the late limit. During an underrun, `cycle.dry` is True and `dry` counts the
+    cycles. The next row ends it. Any thread may write, but only one at a time. An axis that is
     enabled later follows the rows written after that.
     """
 
@@ -38,7 +38,7 @@ class Stream:
         """Write rows of set-points, each (k, n), or (n,) for one row.
 
         Args:
-            position: Positions [rad]; None: as commanded now.
+            position: Positions [rad]; None: the commanded ones.
             velocity: Velocities [rad/s]; None: zero.
             torque: Torques [N·m]; None: zero.
 
@@ -78,12 +78,12 @@ class Stream:
 
     @property
     def waiting(self) -> int:
-        """Number of rows that were written and not yet taken."""
+        """Number of rows that were written and not yet consumed."""
         return self._ring.waiting
 
     @property
     def taken(self) -> int:
-        """Number of rows that the cycle thread has taken."""
+        """Number of rows that the cycle thread has consumed."""
         return self._ring.taken
 
     @property
@@ -93,12 +93,12 @@ class Stream:
 
     @property
     def dry(self) -> int:
-        """Number of cycles without a row since the first one was taken."""
+        """Number of cycles without a row since the first one was consumed."""
         return self._ring.dry
 
     def close(self) -> None:
-        """Hand over to the application or the law; rows that were not taken are discarded.
+        """Return control to the application or the law, and discard the remaining rows.
 
-        Until the next commit CSP and CSV decelerate and hold; CST keeps its torque for `handover`.
+        Until the next commit, CSP and CSV decelerate and hold. CST keeps its torque for `handover`.
         """
         self._engine.set_stream(None)

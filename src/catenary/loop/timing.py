@@ -1,4 +1,4 @@
-"""Timing of a loop: the phases of its cycles as numbers, as a table and in words."""
+"""Timing of a loop: the phases of its cycles as numbers, as a table and as advice."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ from catenary.figures import FIGURES, heading
 
 NAME, FIGURE = 14, 11  # widths of a table
 COUNTED = ("late", "uncommitted", "underrun", "lost")
-BUSY_SHARE = 0.5  # of the switch interval: a wait this long shows a second busy thread
-LATE_SHARE = 0.1  # of the period: a wake-up that late is worth a sentence
+BUSY_SHARE = 0.5  # of the switch interval: a longer wait indicates a second busy thread
+LATE_SHARE = 0.1  # of the period: a later wake-up is reported
 VIRTUAL = "virtual time: the segment's own clock, not this machine's"
 
 
@@ -20,13 +20,19 @@ class Timing(Mapping[str, Mapping[str, float]]):
 
     `timing["lateness"]["p99"]`; `print(timing)` shows them in microseconds, with `verdict`.
 
-    period: wake-up to wake-up. lateness: cycle start → wake-up. receive: wake-up (threaded: last
-    frame) → inputs usable. process: the body, or the law. send: wake-up (inline: end of the body) →
-    last frame handed to the kernel. in_controller: the sum of these three. tail: post-processing
-    until the next wait. round_trip: of the last frame. output_delay: cycle start → last cyclic
-    frame handed to the kernel. input_age: frames handed to the kernel → body or law begins with
-    their inputs. interpreter: wake-up → this thread has the interpreter. Phases that did not occur
-    are left out.
+    - period: wake-up → next wake-up.
+    - lateness: cycle start → wake-up.
+    - receive: wake-up (threaded: last frame) → inputs ready.
+    - process: the body, or the law.
+    - send: wake-up (inline: end of the body) → last frame passed to the kernel.
+    - in_controller: sum of receive, process and send.
+    - post_processing: work after the frames, until the next wait.
+    - round_trip: of the last frame.
+    - output_delay: cycle start → last cyclic frame passed to the kernel.
+    - input_age: frames passed to the kernel → body or law begins with their inputs.
+    - interpreter: wake-up → this thread has the interpreter.
+
+    Phases that did not occur are omitted.
     """
 
     def __init__(
@@ -45,7 +51,7 @@ class Timing(Mapping[str, Mapping[str, float]]):
     def __getitem__(self, phase: str) -> Mapping[str, float]:
         if phase not in self._phases:
             known = ", ".join(self) or "none"
-            raise KeyError(f"no phase {phase!r} in these cycles; there are: {known}")
+            raise KeyError(f"no phase {phase!r} in these cycles; they have: {known}")
         return self._phases[phase]
 
     def __iter__(self) -> Iterator[str]:
@@ -56,12 +62,12 @@ class Timing(Mapping[str, Mapping[str, float]]):
 
     @property
     def is_virtual(self) -> bool:
-        """True if the times are of the segment's own clock, not of this machine."""
+        """True if the times are on the segment's own clock, not this machine's."""
         return self.scheduling == "virtual time"
 
     @property
     def verdict(self) -> str:
-        """Late, uncommitted, underrun and lost cycles in words, one line each, with advice."""
+        """Late, uncommitted, underrun and lost cycles as text, one line each, with advice."""
         return "\n".join(verdict(self))
 
     def __str__(self) -> str:
@@ -83,13 +89,13 @@ class Timing(Mapping[str, Mapping[str, float]]):
 
 
 def counts(counters: Mapping[str, int]) -> str:
-    """Return the counters: "5000 cycles: 12 late, 0 uncommitted, 0 underrun, 0 lost"."""
+    """Return counters as text: "5000 cycles: 12 late, 0 uncommitted, 0 underrun, 0 lost"."""
     each = ", ".join(f"{counters.get(name, 0)} {name}" for name in COUNTED)
     return f"{counters.get('cycles', 0)} cycles: {each}"
 
 
 def verdict(timing: Timing) -> Iterator[str]:
-    """Yield one line for each kind of trouble; one line if there is none."""
+    """Yield one line for each kind of problem, or one line if there is none."""
     if timing.is_virtual:
         yield VIRTUAL
     lines = [*_late(timing), *_uncommitted(timing), *_underrun(timing), *_lost(timing)]
@@ -103,7 +109,7 @@ def _late(timing: Timing) -> Iterator[str]:
     """Yield a line about skipped cycle starts, if any."""
     if not timing.counters.get("late"):
         return
-    text = f"{_of_all(timing, 'late')} late (skipped), the worst by {_most(timing, 'lateness')}"
+    text = f"{_of_all(timing, 'late')} late (skipped), by up to {_most(timing, 'lateness')}"
     if timing.is_virtual:
         yield f"{text}: the body or a task used the virtual time"
     elif _worst(timing, "process") > timing.period:
@@ -124,7 +130,7 @@ def _uncommitted(timing: Timing) -> Iterator[str]:
     else:
         yield (
             f"{text}; check for waits between two iterations, and for other processes "
-            "(`catenary doctor`); loop.stream() writes ahead"
+            "(`catenary doctor`); loop.stream() can buffer set-points"
         )
 
 
@@ -141,7 +147,7 @@ def _lost(timing: Timing) -> Iterator[str]:
     """Yield a line about cycles without all answers, if any."""
     if timing.counters.get("lost"):
         yield (
-            f"{_of_all(timing, 'lost')} lost: frames did not come back, or a device did not answer;"
+            f"{_of_all(timing, 'lost')} lost: frames did not return, or a device did not answer;"
             " `catenary diag TARGET` names the cable or the device"
         )
 
@@ -151,7 +157,7 @@ def _interpreter(timing: Timing) -> Iterator[str]:
     if waits >= BUSY_SHARE * sys.getswitchinterval():
         yield (
             f"Another Python thread keeps the interpreter for up to {waits * 1e6:.0f} us (p99): "
-            "end it, run it in a process, or shorten its turns: Scheduling(switch_interval=20e-6)."
+            "end it, move it to another process, or use Scheduling(switch_interval=20e-6)."
         )
 
 
@@ -162,7 +168,7 @@ def _nothing(timing: Timing) -> str:
         return text
     return (
         f"{text} The latest wake-up was {worst * 1e6:.0f} us after its cycle start: "
-        "`catenary doctor` shows what delays it."
+        "`catenary doctor` shows possible causes."
     )
 
 

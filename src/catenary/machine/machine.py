@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Self
+from typing import TYPE_CHECKING, Any, Self
 
 from msgspec import UNSET
 
@@ -151,15 +151,7 @@ class Machine:
             MachineFileError: The file has neither drives nor process data.
             ValueError: An option is not valid.
         """
-        found = self._opened
-        if not found.drives and not found.process_data:
-            raise self._file.error(
-                (),
-                "no drives and no process data",
-                hint="add a [drives.NAME] table: docs/reference/machine_file.md",
-            )
-        reference = self._file.tables.clocks.reference
-        options = loop_options(self._file, None if reference is UNSET else self.subs[reference])
+        options = self._file_options()
         given = {
             "period": period,
             "execution": execution,
@@ -174,7 +166,18 @@ class Machine:
             "clocks": clocks,
         }
         options |= {name: value for name, value in given.items() if value is not None}
-        return Loop(*found.requests, laws=laws, sink=sink, **options)
+        return Loop(*self.requests, laws=laws, sink=sink, **options)
+
+    def _file_options(self) -> dict[str, Any]:
+        """Return the options of the file for a loop. MachineFileError without any request."""
+        if not self.drives and not self.process_data:
+            raise self._file.error(
+                (),
+                "no drives and no process data",
+                hint="add a [drives.NAME] table: docs/reference/machine_file.md",
+            )
+        reference = self._file.tables.clocks.reference
+        return loop_options(self._file, None if reference is UNSET else self.subs[reference])
 
     @property
     def _opened(self) -> MachineParts:

@@ -19,7 +19,7 @@ from catenary.machine.file import MachineFile
 from catenary.machine.lines import KeyPath
 from catenary.machine.references import WHOLE_LISTS, axis_addresses, pdo_index
 from catenary.machine.schema import ClockTable, DrivesTable, HomingTable, Optional
-from catenary.plan.planner import period_in_ns
+from catenary.plan.options import period_in_ns
 
 T = TypeVar("T")
 

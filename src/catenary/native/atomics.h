@@ -15,7 +15,7 @@ static inline void cat_store_release64(uint64_t *p, uint64_t v) { __atomic_store
 static inline void *cat_load_acquire_pointer(void *const *p) { return __atomic_load_n(p, __ATOMIC_ACQUIRE); }
 static inline void cat_store_release_pointer(void **p, void *v) { __atomic_store_n(p, v, __ATOMIC_RELEASE); }
 static inline uint32_t cat_exchange32(uint32_t *p, uint32_t v) { return __atomic_exchange_n(p, v, __ATOMIC_ACQ_REL); }
-/* Replace *p by `to` if it is `from`; return 1 if it was. */
+/* Replace *p by `to` if it equals `from`. Return 1 if it was replaced. */
 static inline int cat_change32(uint32_t *p, uint32_t from, uint32_t to) {
     return __atomic_compare_exchange_n(p, &from, to, 0, __ATOMIC_ACQ_REL, __ATOMIC_ACQUIRE);
 }
@@ -23,9 +23,9 @@ static inline uint32_t cat_add32(uint32_t *p, uint32_t v) { return __atomic_fetc
 static inline uint32_t cat_or32(uint32_t *p, uint32_t v) { return __atomic_fetch_or(p, v, __ATOMIC_ACQ_REL); }
 static inline void cat_fence(void) { __atomic_thread_fence(__ATOMIC_SEQ_CST); }
 
-/* Copies under a seqlock: the other side may access the bytes at the same time. Afterwards the
- * reader checks whether its copy is consistent. Each word of the shared side is one relaxed atomic
- * access (Boehm, "Can seqlocks get along with programming language memory models?", 2012). */
+/* Copies under a seqlock: another thread may access the bytes at the same time. The reader
+ * checks afterwards whether its copy is consistent. Each word of the shared block is accessed by one
+ * relaxed atomic operation (Boehm, "Can seqlocks get along with programming language memory models?", 2012). */
 static inline size_t cat_shared_words(const void *shared, size_t size) {
     return (uintptr_t)shared % sizeof(uint64_t) ? 0 : size / sizeof(uint64_t);
 }

@@ -1,4 +1,4 @@
-/* A clock to wait on: that of the machine, or a virtual and shared one.
+/* The clock table: a clock with waits. It is the clock of the machine, or a virtual and shared one.
  *
  * One thread uses a table at a time; other threads may call only `wake`. Nothing here allocates,
  * raises or takes the GIL. Python passes the table in a capsule named CAT_CLOCK_CAPSULE. The holder
@@ -23,15 +23,16 @@ typedef struct cat_clock {
 
     int64_t (*now)(void *self);       /* [ns] */
 
-    /* Waits until `deadline` [ns, absolute]. 0: it has passed; 1: woken before; or -errno
-     * (-EINTR: a signal came first; call again with the same deadline to continue). */
+    /* Waits until `deadline` [ns, absolute]. Returns 0 if it has passed, 1 if woken earlier,
+     * or -errno. -EINTR: a signal interrupted the wait; call again with the same deadline. */
     int (*wait_until)(void *self, int64_t deadline);
 
-    /* Spends execution time [ns]. Virtual: lets it pass, preempted by participants of higher
-     * priority on the same processor. Machine: computes for this long. 0 or -errno, as above. */
+    /* Spends execution time [ns]. A virtual clock lets the time pass; participants of higher priority
+     * on the same processor preempt it. The machine's clock busy-waits. Returns 0, or -errno as
+     * above. */
     int (*spend)(void *self, int64_t duration);
 
-    /* Ends the running or the next `wait_until`. */
+    /* Ends the current `wait_until`, or the next one if no thread waits. */
     void (*wake)(void *self);
 } cat_clock;
 

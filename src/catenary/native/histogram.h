@@ -1,8 +1,9 @@
-/* A histogram of times [ns] or counts in fixed memory, without pointers: it can lie in memory that
- * processes share. One writer; a reader may see a value that is only partly added.
+/* Histogram of times [ns] or counts in fixed memory. It contains no pointers, so it can be placed in
+ * memory that processes share. It has one writer. A reader may see a partly added value.
  *
- * Every number up to 512 has its own bucket. Above, 256 buckets share an octave, so that a
- * percentile is wrong by at most 0.4 %. Adding takes a few nanoseconds and two cache lines.
+ * Every number up to 512 has its own bucket. Above 512, each octave has 256 buckets, so the
+ * error of a percentile is at most 0.4 %. Adding a value takes a few nanoseconds and touches two
+ * cache lines.
  */
 #ifndef CATENARY_HISTOGRAM_H
 #define CATENARY_HISTOGRAM_H
@@ -38,7 +39,7 @@ static inline int64_t cat_histogram_edge(uint32_t bucket) {
     return ((int64_t)bucket - ((int64_t)shift << CAT_OCTAVE_BITS)) << shift;
 }
 
-/* Add a value. Negative values count as 0. */
+/* Add a value; a negative value counts as 0. */
 static inline void cat_histogram_add(cat_histogram *h, int64_t value) {
     if (value < 0) value = 0;
     if (h->count == 0) h->first = h->low = h->high = value;
@@ -51,7 +52,8 @@ static inline void cat_histogram_add(cat_histogram *h, int64_t value) {
     h->count++;
 }
 
-/* Return the middle of the bucket that contains the value of this rank, within the extremes. */
+/* Return the middle of the bucket that contains the value of this rank, limited to the lowest
+ * and highest values. */
 static inline double cat_histogram_percentile(const cat_histogram *h, double fraction) {
     uint64_t rank = (uint64_t)(fraction * (double)(h->count - 1) + 0.5), below = 0;
     for (uint32_t k = 0; k < CAT_BUCKETS; k++) {

@@ -1,10 +1,10 @@
-/* The image table: how a cycle exchanges its process images with a master: our frame engine on a
- * link, or libethercat.
+/* The image table: the functions with which a cycle exchanges its process images with a master.
+ * The master is our frame engine on a link, or libethercat.
  *
  * `emit` sends the output image, `collect` fills the input image. A sync unit is valid in a cycle
  * if all of its datagrams returned with the expected working counter. The inputs of an invalid unit
- * keep their last valid values. A unit may have a divider; in the cycles between its exchanges it
- * stays unchanged.
+ * keep their last valid values. A unit with a divider is
+ * exchanged every `divider` cycles and does not change in between.
  */
 #ifndef CATENARY_IMAGE_H
 #define CATENARY_IMAGE_H
@@ -27,26 +27,26 @@ typedef struct cat_image {
     const uint32_t *unit_missed;      /* unit_count numbers: invalid exchanges in a row */
     const uint16_t *unit_counter;     /* unit_count sums of working counters in the last exchange */
     const uint8_t *ok;                /* one flag, of the last collect: every required unit that was exchanged
-                                       * is valid, and every required frame is back */
+                                       * is valid, and every required frame has returned */
     const uint8_t *whole;             /* one flag: every required unit is valid */
     const uint8_t *al_status;         /* one byte: OR of all AL states; bit 4: a device reports an error */
     const uint16_t *al_counter;       /* one value: devices that answered the AL status datagram in the last collect */
-    const int64_t *frame_stamp;       /* one value: when a collect with a deadline saw its last frame [ns] */
+    const int64_t *frame_stamp;       /* one value: time at which a collect with a deadline received its last frame [ns] */
 
-    /* Sends the frames of this cycle. 0, or -errno of the first frame that could not be sent. */
+    /* Sends the frames of this cycle. Returns 0, or -errno of the first frame that failed. */
     int (*emit)(void *self);
 
-    /* Takes the frames that have arrived and waits for the other frames of the last emit until
-     * `deadline` [ns, link clock; 0: no wait]. Returns the number of frames that are still missing,
-     * or -errno. It may be called again before the next emit. A unit is counted as missed once per
-     * emit; after all frames are back nothing changes. */
+    /* Reads the frames that have arrived and waits for the others of the last emit until `deadline`
+     * [ns, link clock; 0: no wait]. Returns the number of frames that are still missing, or -errno.
+     * It may be called again before the next emit. A unit is counted as missed at most once per
+     * emit. Once all frames have returned, further calls change nothing. */
     int (*collect)(void *self, int64_t deadline);
 
-    /* Takes the frames that have arrived between two cycles; does not judge or wait. */
+    /* Reads the frames that have arrived between two cycles, without evaluating them or waiting. */
     void (*drain)(void *self);
 
-    /* Copies the output image into the frames of the next emit, to save time there; NULL: not
-     * supported. Call it again after each later change of the output image before that emit. */
+    /* Copies the output image into the frames of the next emit, to save time in that emit. NULL if
+     * not supported. If the output image changes before that emit, call it again. */
     void (*fill)(void *self);
 } cat_image;
 

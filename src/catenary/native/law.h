@@ -1,25 +1,25 @@
-/* A control law: a function that runs in the cycle thread, and the monitor that aborts one that
- * never returns.
+/* Control laws and their monitor. A law is a function that runs in the cycle thread. The monitor
+ * aborts a law that never returns.
  *
  * `actual` and `target` point to blocks of the core with the layout of `law_fields`. Targets start
  * as the last commanded values. The core's limits apply to what the law leaves in them.
  *
  * Theory of operation
- *   A guard belongs to one thread that calls laws (the runner). `under_way` is the number of its
- *   call. A monitor is a thread that watches one guard. Every 5 ms it compares the processor time of
- *   the runner with that at which it first saw the call. Beyond `limit` it stores the number in
- *   `condemned` and sends the runner a signal. The handler leaves the call by siglongjmp if it is
- *   still the same call.
- *   Signals that arrive late or in another thread have no effect.
+ *   A guard belongs to one thread that calls laws (the runner). `under_way` is the number of the
+ *   current call. A monitor is a thread that watches one guard. Every 5 ms it reads the processor
+ *   time that the runner has used since the monitor first saw the call. If this exceeds `limit`, the
+ *   monitor stores the number of the call in `condemned` and sends a signal to the runner. The
+ *   handler leaves the call by siglongjmp if the same call is still running. Signals that arrive
+ *   late or in another thread have no effect.
  *
  * state of a monitor (futex word)
- *   PARKED  sleeps without a timeout: no law runs
- *   ACTIVE  checks every 5 ms
- *   ENDING  the thread ends
+ *   PARKED  no law runs; the monitor sleeps without a timeout
+ *   ACTIVE  the monitor checks the runner every 5 ms
+ *   ENDING  the monitor thread must exit
  *
  * The runner activates and parks the monitor. Its owner ends it when the runner has stopped.
- * Parking is one store: the monitor notices it at its next check. The cycle and a rehearsal in
- * another thread have a guard and a monitor each, so that both may run a law at once.
+ * Parking is a single store; the monitor notices it at its next check. The cycle and a rehearsal in
+ * another thread each have their own guard and monitor, so both can run a law at the same time.
  */
 #ifndef CATENARY_LAW_H
 #define CATENARY_LAW_H
@@ -57,7 +57,7 @@ typedef int (*cat_law_step)(const void *actual, void *target, double *memory, in
 typedef struct cat_law_guard {
     sigjmp_buf jump;
     uint64_t calls;               /* number of calls of the runner */
-    uint64_t under_way;           /* number of the call; 0: none */
+    uint64_t under_way;           /* number of the current call; 0: none */
     uint64_t condemned;           /* number of the call to abort */
     uint64_t limit;               /* maximum processor time of the runner in one call [ns] */
     uint32_t task;                /* thread ID of the runner in the kernel */
@@ -70,9 +70,9 @@ enum { CAT_LAW_PARKED, CAT_LAW_ACTIVE, CAT_LAW_ENDING };
 typedef struct cat_law_monitor {
     cat_law_guard guard;
     uint32_t state;               /* futex word */
-    uint32_t started;             /* the thread runs; used by its owner */
+    uint32_t started;             /* the thread is running; used only by the owner */
     pthread_t thread;
-    pid_t owner;                  /* process of the thread; a forked child does not have it */
+    pid_t owner;                  /* process that runs the thread; a forked child has no copy of it */
 } cat_law_monitor;
 
 #define CAT_LAW_SIGNAL (SIGRTMIN + 7)
@@ -88,8 +88,9 @@ static void cat_law_give_up(int number, siginfo_t *info, void *context) {
     if (call && call == cat_load_relaxed64(&guard->condemned)) siglongjmp(guard->jump, 1);
 }
 
-/* The processor time of a thread of this process [ns]; -1 if it has ended. The clock is named by the
- * thread ID (linux/posix-timers.h): unlike a pthread_t it may be used after the thread has ended. */
+/* Return the processor time of a thread of this process [ns]; -1 if the thread has ended. The clock
+ * is selected by the thread ID (linux/posix-timers.h), which stays safe to use after the thread has
+ * ended. A pthread_t does not. */
 static inline int64_t cat_law_time_used(uint32_t task) {
     struct timespec used;
     clockid_t clock = (clockid_t)((~(unsigned)task << 3) | 6u);
@@ -113,7 +114,7 @@ typedef struct cat_law_seen {
     int64_t since;                /* processor time of the runner when the call was first seen [ns] */
 } cat_law_seen;
 
-/* Abort a call that has computed for `limit`. */
+/* Abort a call that has used `limit` of processor time. */
 static inline void cat_law_check(cat_law_guard *guard, cat_law_seen *seen) {
     uint64_t call = cat_load_acquire64(&guard->under_way);
     uint32_t task = cat_load_relaxed32(&guard->task);
@@ -139,8 +140,8 @@ static void *cat_law_watch(void *argument) {
     }
 }
 
-/* Owner: start the thread, parked. `priority`: SCHED_FIFO, above the runner's; 0: that of the
- * caller. Return 0 or -errno. */
+/* Owner: start the thread in state PARKED. `priority` is its SCHED_FIFO priority, which must be
+ * higher than that of the runner; 0 keeps the caller's scheduling. Return 0 or -errno. */
 static inline int cat_law_monitor_start(cat_law_monitor *monitor, int priority) {
     struct sigaction action = {.sa_sigaction = cat_law_give_up, .sa_flags = SA_SIGINFO | SA_NODEFER};
     struct sched_param parameters = {.sched_priority = priority};
@@ -157,12 +158,12 @@ static inline int cat_law_monitor_start(cat_law_monitor *monitor, int priority) 
     if (rc) return -rc;
     monitor->started = 1;
     monitor->owner = getpid();
-    if (priority > 0) /* refused without permission, but then the runner has no priority either */
+    if (priority > 0) /* fails without permission, but then the runner has no real-time priority either */
         pthread_setschedparam(monitor->thread, SCHED_FIFO, &parameters);
     return 0;
 }
 
-/* Owner: end the thread, after the last call. */
+/* Owner: stop the thread after the last call of a law. */
 static inline void cat_law_monitor_stop(cat_law_monitor *monitor) {
     if (monitor->started && monitor->owner == getpid()) {
         cat_store_release32(&monitor->state, CAT_LAW_ENDING);
@@ -172,7 +173,7 @@ static inline void cat_law_monitor_stop(cat_law_monitor *monitor) {
     monitor->started = 0;
 }
 
-/* Runner: watch the calls of a law from now on. One system call, and one more at its first call. */
+/* Runner: start watching calls. It costs one system call, and the first call of a law another. */
 static inline void cat_law_monitor_activate(cat_law_monitor *monitor, int64_t limit) {
     monitor->guard.known = 0; /* a new thread may reuse the pthread_t of one that has ended */
     cat_store_release64(&monitor->guard.limit, (uint64_t)limit);
@@ -180,12 +181,12 @@ static inline void cat_law_monitor_activate(cat_law_monitor *monitor, int64_t li
     cat_futex_wake(&monitor->state);
 }
 
-/* Runner: stop watching; no law runs. */
+/* Runner: stop watching calls while no law runs. */
 static inline void cat_law_monitor_park(cat_law_monitor *monitor) {
     cat_store_release32(&monitor->state, CAT_LAW_PARKED);
 }
 
-/* Unblock the signal in this thread only. */
+/* Register the calling thread as the runner, and unblock the signal in this thread only. */
 static __attribute__((noinline)) void cat_law_meet_runner(cat_law_guard *guard) {
     sigset_t ours;
     sigemptyset(&ours);
@@ -196,7 +197,7 @@ static __attribute__((noinline)) void cat_law_meet_runner(cat_law_guard *guard) 
     guard->known = 1;
 }
 
-/* Run one step. Return its result, or CAT_LAW_ABORTED if the monitor has aborted it. */
+/* Run one step. Return its result, or CAT_LAW_ABORTED if the monitor aborted it. */
 static inline int cat_law_call(cat_law_guard *guard, cat_law_step step, const void *actual,
                                void *target, const cat_law_numbers *n, double time) {
     int rc;

@@ -1,26 +1,28 @@
-/* Memory of the cycle: no page faults in the cycle thread, and locked if the system permits it.
+/* Memory of the cycle. It causes no page faults in the cycle thread and is locked if the system
+ * permits it.
  *
- * cat_memory_take    return a zeroed part that begins at a cache line
+ * cat_memory_take    return a zeroed part, aligned to a cache line
  * cat_memory_settle  touch every page, then lock it (real time only, before the cycle uses it)
  * cat_memory_touch   touch every page without locking: for memory of lower priority
  * cat_memory_free    release everything; the kernel unlocks unmapped pages
  *
  * A memory is a list of chunks. A chunk is a mapping of whole pages: this header, then its parts. A
- * new chunk is made when the newest is full. Parts are not returned to a chunk: they live as long
- * as their owner.
+ * new chunk is allocated when the newest is full. A part cannot be freed alone; it lives as long as
+ * the memory.
  *
- * state  RESERVED  mapped, not touched: sufficient for virtual time
- *        TOUCHED   every page has a frame of its own; `error` is the reason why it is not locked
+ * state  RESERVED  mapped but not touched; sufficient for virtual time
+ *        TOUCHED   every page has a page frame; `error` is the reason why it is not locked
  *        LOCKED    touched, and never swapped out
  *
- * The kernel refuses a whole chunk that exceeds RLIMIT_MEMLOCK: the first to settle is locked
- * first. A page is touched by an atomic addition of 0, so that an owner may settle at any time.
+ * The kernel refuses a whole chunk that exceeds RLIMIT_MEMLOCK: memories that
+ * settle first are locked first. Touching adds 0 to a byte of each page atomically, so an owner may
+ * settle its memory at any time.
  *
- * A forked child finds zeros in touched memory (MADV_WIPEONFORK). Copy-on-write would cost the cycle of
- * the parent one page fault per page. MADV_DONTFORK would end a child that reads a NumPy view. In the
- * child the header of a chunk is zero, too: cat_memory_free forgets it without an effect.
+ * A forked child finds zeros in touched memory (MADV_WIPEONFORK). Copy-on-write would cause one page
+ * fault per page in the cycle of the parent. With MADV_DONTFORK, a child that reads a NumPy view would
+ * crash. In the child, the header of a chunk is also zero, so cat_memory_free has no effect.
  *
- * AddressSanitizer does not know parts of a mapping. There each part is a heap block of its own.
+ * AddressSanitizer cannot check parts of a mapping. With it, each part is a separate heap block.
  */
 #ifndef CATENARY_LOCKED_MEMORY_H
 #define CATENARY_LOCKED_MEMORY_H
@@ -45,7 +47,7 @@ typedef struct cat_chunk {
 } cat_chunk;
 
 typedef struct cat_memory {
-    cat_chunk *chunks;                /* the newest first */
+    cat_chunk *chunks;                /* list, newest first */
 } cat_memory;
 
 /* Sums over several memories. */
@@ -93,7 +95,7 @@ static inline void *cat_memory_take(cat_memory *memory, size_t count, size_t siz
     return part;
 }
 
-/* Give every page of a range a frame of its own. */
+/* Touch every page of a range, so that each has its own page frame. */
 static inline void cat_touch(void *start, size_t size) {
     size_t page = (size_t)sysconf(_SC_PAGESIZE), at;
     volatile uint8_t *bytes = (volatile uint8_t *)start;
@@ -101,8 +103,8 @@ static inline void cat_touch(void *start, size_t size) {
         __atomic_fetch_add(bytes + at, 0, __ATOMIC_RELAXED);
 }
 
-/* Give every page of a chunk a frame of its own, also after a fork. Linux before 4.14 refuses to
- * wipe and copies instead: the child is safe without it (`forget`), the parent's cycle is slower. */
+/* Touch every page of a chunk and exclude it from copy-on-write. Linux before 4.14 refuses
+ * MADV_WIPEONFORK: then a fork slows the cycle of the parent. The child does not depend on it. */
 static inline void cat_chunk_touch(cat_chunk *chunk) {
 #ifndef __SANITIZE_ADDRESS__
     madvise(chunk, chunk->size, MADV_WIPEONFORK);

@@ -1,5 +1,5 @@
 /* A bounded ring of Ethernet frames between one producer thread and one consumer thread.
- * Neither waits for the other: push fails on a full ring, peek returns NULL on an empty one.
+ * Neither waits for the other. Push fails if the ring is full; peek returns NULL if it is empty.
  */
 #ifndef CATENARY_PACKET_RING_H
 #define CATENARY_PACKET_RING_H

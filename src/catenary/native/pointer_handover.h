@@ -1,11 +1,13 @@
-/* A pointer from one owner thread to one user thread, with an acknowledgement of its use.
+/* Hand-over of a pointer from one owner thread to one user thread. The owner can check whether the
+ * user still uses the pointer.
  *
- * offered  the pointer of the owner; NULL: none
- * claimed  the pointer that the user works with; NULL: none
+ * offered  the pointer that the owner offers; NULL: none
+ * claimed  the pointer that the user has in use; NULL: none
  *
  * Each is one atomic word, so that a pointer is never paired with the state of another one. The
  * user claims a pointer before it reads the object, and checks afterwards that it is still offered
- * (a hazard pointer: Michael, IEEE TPDS 15(6), 2004). The owner keeps what is offered or claimed.
+ * (a hazard pointer: Michael, IEEE TPDS 15(6), 2004). The owner keeps an
+ * offered or claimed object alive.
  * Both words use sequentially consistent order: each side stores one word, then loads the other.
  *
  * Two uses: `claim` reads a pointer that stays offered. `take` removes a request from the word, so
@@ -28,8 +30,8 @@ static inline void *cat_pointer_offer(cat_pointer *p, void *pointer) {
     return __atomic_exchange_n(&p->offered, pointer, __ATOMIC_SEQ_CST);
 }
 
-/* Owner: return 1 if the user has `pointer` or may still get it. The offer is read first: a request
- * moves from `offered` to `claimed`, never back. */
+/* Owner: return 1 if the user has `pointer` or may still get it. `offered` is read first, because a
+ * request only moves from `offered` to `claimed`. */
 static inline int cat_pointer_is_used(const cat_pointer *p, const void *pointer) {
     return __atomic_load_n(&p->offered, __ATOMIC_SEQ_CST) == pointer
         || __atomic_load_n(&p->claimed, __ATOMIC_SEQ_CST) == pointer;
@@ -52,8 +54,8 @@ static inline void *cat_pointer_claim(cat_pointer *p) {
     }
 }
 
-/* User: remove the request. Return 0: none; 1: *pointer is the requested object, claimed until
- * `release` or the next `take`, or NULL for CAT_POINTER_NONE. */
+/* User: remove the request. Return 0 if there is none. Return 1 otherwise: *pointer is the requested
+ * object, claimed until `release` or the next `take`, or NULL for CAT_POINTER_NONE. */
 static inline int cat_pointer_take(cat_pointer *p, void **pointer) {
     void *offered = __atomic_load_n(&p->offered, __ATOMIC_SEQ_CST);
     do {

@@ -1,14 +1,14 @@
-/* Merging of the two copies of an EtherCAT frame that were sent from both ends of a ring.
+/* Merge of the two copies of an EtherCAT frame that were sent from both ends of a ring.
  *
  * Data areas that devices read into start as zero in both copies. The result is therefore the OR of
- * the two, and its working counter their sum. In a closed ring the second copy passes unprocessed
- * and adds nothing. In a broken ring each copy meets only the devices of its side (ETG.1000.4
+ * the two, and its working counter their sum. In a closed ring no device processes the second copy,
+ * so it adds nothing. In a broken ring each copy meets only the devices of its side (ETG.1000.4
  * §4.3). SOEM (nicdrv.c, `ecx_outframe_red` and `ecx_waitinframe_red`) instead sends an empty
  * broadcast on the second link. In a broken ring it then sends what returned on the first link
- * again on the second. This needs no merging and passes the time on beyond the break, but a cycle
- * takes two round trips. A datagram that the second copy does not carry is a NOP there and is left
- * unchanged. So is the time, which the second copy writes to devices beyond a break instead of
- * reading the reference clock.
+ * again on the second. This needs no merge and carries the time beyond the break, but a cycle takes
+ * two round trips. A datagram that the second copy lacks is a NOP there; it is not merged. The
+ * datagram of the time is not merged either: beyond a break, the second copy writes the time to the
+ * devices instead of reading the reference clock.
  */
 #ifndef CATENARY_RING_MERGE_H
 #define CATENARY_RING_MERGE_H
@@ -23,21 +23,22 @@ enum {
 
 static inline uint32_t cat_word(const uint8_t *p) { return (uint32_t)p[0] | (uint32_t)p[1] << 8; }
 
-/* Return the whole size of the datagram at `at`, or 0 if it exceeds the frame's `end`. */
+/* Return the total size of the datagram at `at`, or 0 if it exceeds the frame's `end`. */
 static inline uint32_t cat_datagram_size(const uint8_t *frame, uint32_t at, uint32_t end) {
     if (at + CAT_DATAGRAM_HEADER + CAT_DATAGRAM_COUNTER > end) return 0;
     uint32_t size = CAT_DATAGRAM_HEADER + (cat_word(frame + at + 6) & 0x7FFu) + CAT_DATAGRAM_COUNTER;
     return at + size <= end ? size : 0;
 }
 
-/* Return the end of the datagrams according to the EtherCAT header; 0: beyond the frame's length. */
+/* Return the end of the datagrams according to the EtherCAT header; 0 if it exceeds the
+ * length of the frame. */
 static inline uint32_t cat_datagrams_end(const uint8_t *frame, uint32_t length) {
     if (length < CAT_MERGE_HEADER) return 0;
     uint32_t end = CAT_MERGE_HEADER + (cat_word(frame + 14) & 0x7FFu);
     return end <= length ? end : 0;
 }
 
-/* Return the offset and size of the data of the first NOP datagram; 0: the frame has none. */
+/* Return the offset and size of the data of the first NOP datagram; 0 if there is none. */
 static inline uint32_t cat_find_nop(const uint8_t *frame, uint32_t length, uint32_t *size) {
     uint32_t end = cat_datagrams_end(frame, length);
     for (uint32_t at = CAT_MERGE_HEADER; at < end;) {
@@ -52,7 +53,8 @@ static inline uint32_t cat_find_nop(const uint8_t *frame, uint32_t length, uint3
     return 0;
 }
 
-/* Return 1 if the second copy's datagram must not be merged: it is a different request. */
+/* Return 1 if the second copy's datagram must not be merged, because it is a different
+ * request. */
 static inline int cat_is_apart(const uint8_t *mine, const uint8_t *other) {
     return other[0] == CAT_NOP || (other[0] == CAT_FRMW && cat_word(other + 2) != cat_word(mine + 2));
 }
@@ -78,7 +80,8 @@ static inline int cat_ring_merge(uint8_t *frame, uint32_t length, const uint8_t 
     return 0;
 }
 
-/* Return 1 if all bytes are zero. Such a FRMW carries no time and would write zeros to all devices. */
+/* Return 1 if all bytes are zero. A FRMW with zeros contains no time and would write
+ * zeros to all devices. */
 static inline int cat_is_zero(const uint8_t *data, uint32_t size) {
     for (uint32_t i = 0; i < size; i++)
         if (data[i]) return 0;
@@ -86,9 +89,9 @@ static inline int cat_is_zero(const uint8_t *data, uint32_t size) {
 }
 
 /* Make the second copy: datagrams that must not be sent twice become NOPs. These are datagrams with
- * a position, which would count from the other end. So are those that read at one device and write
- * at all others, if their data is zero. Other FRMW data is the expected time of the reference clock:
- * the second copy addresses no device with it, and so steers the clocks beyond a break. */
+ * a position address, because positions would count from the other end, and a FRMW whose data is
+ * zero. A FRMW with other data contains the expected time of the reference clock. The second copy
+ * sends it to an address that no device has, so it only writes the time to clocks beyond a break. */
 static inline void cat_ring_second(uint8_t *frame, uint32_t length) {
     uint32_t end = cat_datagrams_end(frame, length);
     for (uint32_t at = CAT_MERGE_HEADER; at < end;) {

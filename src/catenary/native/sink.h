@@ -1,4 +1,4 @@
-/* The sink table: a consumer of every cycle, called after the frames and the hand-over.
+/* The sink table: a consumer that receives the data of every cycle after the hand-over to Python.
  *
  * `put` is called once per cycle, in the post-processing, by the thread that runs the cycle,
  * without the GIL. It must not block, allocate or raise, because it delays the next cycle start.
@@ -16,7 +16,7 @@
 
 typedef struct cat_sink {
     uint32_t version;                 /* CAT_SINK_VERSION */
-    uint32_t record_size;             /* sizes of the three blocks it was made for [bytes] */
+    uint32_t record_size;             /* sizes of the three blocks that the sink expects [bytes] */
     uint32_t actual_size;
     uint32_t target_size;
     void *self;

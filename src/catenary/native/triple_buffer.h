@@ -1,7 +1,8 @@
-/* The latest value from one writer thread to one reader thread, never torn, never waiting.
+/* Triple buffer: passes the latest value from one writer thread to one reader thread. Neither thread
+ * waits, and the reader never sees a torn value.
  *
- * Three slots: the writer owns one, the reader owns one, the third is offered. Publishing and
- * taking exchange the own slot for the offered one. A value that the reader does not take in time
+ * Three slots: the writer owns one, the reader owns one, the third is offered. To
+ * publish or to take a value, a thread exchanges its own slot for the offered one. A value that the reader does not take in time
  * is overwritten by the next one.
  */
 #ifndef CATENARY_TRIPLE_BUFFER_H
@@ -10,11 +11,11 @@
 #include <stdint.h>
 #include "atomics.h"
 
-#define CAT_TRIPLE_NEW 4u             /* flag added to the slot number: not taken yet */
+#define CAT_TRIPLE_NEW 4u             /* flag in `offered`: the reader has not taken this slot yet */
 
-/* Each word has 60 bytes on both sides, so that two words never share a cache line of 64 bytes,
- * wherever the structure lies. Its alignment is that of a uint32_t, because it is a member of
- * Python objects, which are aligned to 16 bytes. */
+/* Each word has 60 bytes of padding on both sides, so that two words never share a cache line of 64
+ * bytes at any address. The structure is not aligned to a cache line, because it is a member of
+ * Python objects, which are aligned to 16 bytes only. */
 typedef struct cat_triple {
     uint8_t before[60];
     uint32_t offered;             /* slot | CAT_TRIPLE_NEW */
@@ -31,12 +32,12 @@ static inline void cat_triple_init(cat_triple *triple) {
     triple->front = 2u;
 }
 
-/* Offer the filled slot `back`; afterwards `back` is another slot. */
+/* Offer the filled slot `back`, and set `back` to a free slot. */
 static inline void cat_triple_publish(cat_triple *triple) {
     triple->back = cat_exchange32(&triple->offered, triple->back | CAT_TRIPLE_NEW) & 3u;
 }
 
-/* Return 1 if `front` is now a newer slot; 0: nothing new, `front` is unchanged. */
+/* Set `front` to the newest slot. Return 1, or 0 if there is no new value. */
 static inline int cat_triple_take(cat_triple *triple) {
     if (!(cat_load_acquire32(&triple->offered) & CAT_TRIPLE_NEW)) return 0;
     triple->front = cat_exchange32(&triple->offered, triple->front) & 3u;

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from catenary.plan.cycle import CyclePlan, Number, NumberKind
+    from catenary.plan.options import PlanOptions
     from catenary.plan.planner import Plan, make_plan
     from catenary.plan.request import (
         DeviceRequest,
@@ -28,6 +29,7 @@ __all__ = [
     "NumberKind",
     "ObjectReference",
     "Plan",
+    "PlanOptions",
     "ProcessDataRequest",
     "RequestTables",
     "Views",
@@ -36,6 +38,7 @@ __all__ = [
 
 _HOMES = {
     **dict.fromkeys(("CyclePlan", "Number", "NumberKind"), "catenary.plan.cycle"),
+    "PlanOptions": "catenary.plan.options",
     **dict.fromkeys(("Plan", "make_plan"), "catenary.plan.planner"),
     **dict.fromkeys(
         (

@@ -1,4 +1,4 @@
-"""Facts about an axis that the plan shows and the core does not need."""
+"""Facts about an axis for the printed plan. The core does not need them."""
 
 from __future__ import annotations
 

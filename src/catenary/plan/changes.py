@@ -1,4 +1,4 @@
-"""Changes that a plan makes on a device, as text: old and new values."""
+"""Changes that a plan makes to a device, as text: old and new values."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from catenary.plan.pdo_search import pdo_names, place_names
 
 
 class Change(NamedTuple):
-    """One object of a device that gets another value. `old`: empty if it is not known.
+    """Object of a device that gets another value. `old`: empty if it is not known.
 
     `what`: "0x1C13" or "0x1A00" for a list of PDOs or entries, "0x6060:00" for a value.
     """
@@ -45,7 +45,7 @@ def mapping_changes(
 def value_changes(
     device: DeviceDescription, start_up: Sequence[tuple[int, int, bytes]]
 ) -> list[Change]:
-    """Return the objects of a start-up list that do not have their values yet."""
+    """Return the objects of a start-up list that differ from the values in the device."""
     changes = []
     for index, subindex, data in start_up:
         old = device.known_value(index, subindex)

@@ -1,7 +1,7 @@
 """Choice of clocks, SYNC times, and the time of the cyclic frames before SYNC0.
 
-SYNC0 of all devices fires at multiples of the period in the reference clock's time, moved by the
-shift of each device. Frames leave early enough before the common SYNC0 time to reach all devices:
+SYNC0 of all devices fires at multiples of the period in the reference clock's time, plus the shift
+of each device. Frames leave early enough before the common SYNC0 time to reach all devices:
 
     cycle start ──allowance── frames on the wire ──hops── SYNC0 (shift 0)
 
@@ -23,22 +23,22 @@ from catenary.plan.cycle import ClockPlan, ExecutionMode, FollowedClock, FramePl
 from catenary.wire.clock import Activation
 from catenary.wire.frame import wire_time_ns
 
-if TYPE_CHECKING:  # needs NumPy, a scan does not
+if TYPE_CHECKING:  # request.py imports NumPy, which a scan does not need
     from catenary.plan.request import DistributedClock
 
 SYNC_BY_ECAT = 0x0300  # AssignActivate: cyclic operation and SYNC0, controlled by EtherCAT
 BURST = 15_000  # frames: ESC data sheet I §9.1.5; KickCAT uses 15 000, ethercrab 10 000
-START_DELAY_NS = 100_000_000  # to the first SYNC pulse: as SOEM (`SyncDelay`) and IgH
-HOP_NS = 1000  # through a device and its cable: 0.3 µs by E-bus, up to 1 µs by Ethernet PHYs
-# Share of the period between the cycle start and the frames. Threaded: for the lateness of the
-# wake-up. Inline and with a law: also for the calculation, which precedes the frames.
+START_DELAY_NS = 100_000_000  # until the first SYNC pulse, as in SOEM (`SyncDelay`) and IgH
+HOP_NS = 1000  # delay of a device and its cable: 0.3 µs by E-bus, up to 1 µs by Ethernet PHYs
+# Share of the period between the cycle start and the frames. Threaded: it covers a late wake-up.
+# Inline or with a law: it also covers the calculation, which precedes the frames.
 ALLOWANCE: dict[ExecutionMode, float] = {"threaded": 0.2, "inline": 0.5}
 
-# Phase controller (docs/how_to/clocks.md): a critically damped loop with this time constant. It
-# begins faster and slows down. Its change of the period is limited.
+# Phase controller (docs/how_to/clocks.md): a critically damped loop with this time constant. Its
+# bandwidth starts higher and decreases. Its change of the period is limited.
 TIME_CONSTANT = 0.1  # [s]
-CYCLES_MIN = 16  # least cycles of a time constant: the response takes one or two cycles
-RATE_LIMIT = 1e-3  # of the period: the interpolation of a servo is not affected
+CYCLES_MIN = 16  # shortest time constant [cycles]; the response takes one or two cycles
+RATE_LIMIT = 1e-3  # of the period; small enough for the interpolation of a servo
 DRIFT_LIMIT = 8e-4  # of the period, permanent part: crystals 2 · 100 ppm, NTP slew 500 ppm
 STEP_SHARE = 1 / 8  # of the period: a larger phase error is a step, not drift
 BOUND_NS = 1000
@@ -128,23 +128,23 @@ def choose_clocks(
 
 
 def make_sync(device: DeviceDescription, request: DistributedClock, period_ns: int) -> SyncPlan:
-    """Return the SYNC unit settings of a device: as requested, else from the OpMode in its SII.
+    """Return the settings of a device's SYNC unit, as requested or from the OpMode in its SII.
 
     Args:
         device: Device.
         request: Clock request.
-        period_ns: Period of the cycle.
+        period_ns: Period of the device's exchange [ns].
     """
     mode = _op_mode(device, request)
-    cycle_ns = _given(request.sync0, mode.sync0_ns or _multiple(period_ns, mode.sync0_factor))
+    cycle_ns = _in_ns(request.sync0, mode.sync0_ns or _multiple(period_ns, mode.sync0_factor))
     assign = mode.assign_activate if request.assign_activate is None else request.assign_activate
     if request.sync1 is not None:
         assign |= Activation.SYNC1 << 8
     plan = SyncPlan(
         assign,
         cycle_ns,
-        _given(request.sync1, _sync1_ns(mode, cycle_ns, period_ns)),
-        _given(request.shift, mode.shift_ns),
+        _in_ns(request.sync1, _sync1_ns(mode, cycle_ns, period_ns)),
+        _in_ns(request.shift, mode.shift_ns),
         mode.name,
     )
     _check_sync(device, request, plan, period_ns)
@@ -166,7 +166,7 @@ def make_clock_plan(
         choice: Reference clock and followers.
         frames: Frames of the cycle.
         device_count: Number of devices on the segment.
-        period_ns: Period of the cycle.
+        period_ns: Period of the cycle [ns].
         execution: Execution mode of the loop.
         margin: Time between the cycle start and the frames [s]; None: by the execution mode.
         burst: Number of frames for static drift compensation.
@@ -175,7 +175,7 @@ def make_clock_plan(
         ConfigurationError: The frames do not fit into the period.
     """
     if burst < 0:
-        raise ConfigurationError(f"a burst of {burst} frames", hint="0 or more")
+        raise ConfigurationError(f"a burst of {burst} frames", hint="use 0 or more frames")
     wire_ns = sum(wire_time_ns(len(frame.template)) for frame in frames) + HOP_NS * device_count
     allowance_ns = round(ALLOWANCE[execution] * period_ns if margin is None else margin * 1e9)
     if allowance_ns < 0 or wire_ns + allowance_ns > period_ns:
@@ -206,10 +206,10 @@ def make_clock_plan(
 def start_time_ns(now_ns: int, syncs: Sequence[SyncPlan]) -> int:
     """Return the first SYNC0 time.
 
-    It is late enough to configure all devices before, and all SYNC signals coincide at it.
+    All devices can be configured before this time. All SYNC signals coincide at it.
 
     Args:
-        now_ns: Present time of the reference clock.
+        now_ns: Present time of the reference clock [ns].
         syncs: SYNC units of all devices.
     """
     span = math.lcm(*(sync.span_ns for sync in syncs))
@@ -219,7 +219,7 @@ def start_time_ns(now_ns: int, syncs: Sequence[SyncPlan]) -> int:
 def _existing(devices: Sequence[DeviceDescription], position: int) -> DeviceDescription:
     if not 0 <= position < len(devices):
         raise ConfigurationError(
-            f"clocks: there is no device {position}, the segment has {len(devices)}",
+            f"clocks: there is no device {position}; the segment has {len(devices)} devices",
             hint="scan again, or correct the position",
         )
     return devices[position]
@@ -230,7 +230,7 @@ def _check_follower(device: DeviceDescription, reference: DeviceDescription | No
         raise _no_clock(device, "dc= was requested")
     if reference is not None and device.position < reference.position:
         raise ConfigurationError(
-            f"{device} lies before {reference}, the reference clock: frames pass it before they "
+            f"{device} precedes {reference}, the reference clock: frames pass it before they "
             "carry the time",
             hint="choose a reference clock before all devices with dc=",
         )
@@ -238,7 +238,7 @@ def _check_follower(device: DeviceDescription, reference: DeviceDescription | No
 
 def _no_clock(device: DeviceDescription, why: str) -> ConfigurationError:
     only = device.controller.supports_clocks
-    what = "it only stamps receive times" if only else "it has no distributed clock"
+    what = "it only latches receive times" if only else "it has no distributed clock"
     return ConfigurationError(
         f"{device}: {why}, but {what}",
         hint="omit dc= for this device, or look for a variant of it with distributed clocks",
@@ -264,7 +264,7 @@ def _named_mode(device: DeviceDescription, name: str) -> OpMode:
     raise ConfigurationError(
         f"{device}: its EEPROM has no OpMode {name!r}; it has {known or 'none'}",
         hint="choose one of these" * bool(known)
-        or "write what its ESI file says: cat.DistributedClock(assign_activate=..., sync0=...)",
+        or "use the values of its ESI file: cat.DistributedClock(assign_activate=..., sync0=...)",
     )
 
 
@@ -279,9 +279,9 @@ def _check_sync(
     if not _starts_sync(plan.assign_activate):
         own = request.assign_activate is None
         raise ConfigurationError(
-            f"{eeprom if own else device}: AssignActivate 0x{plan.assign_activate:04X} starts no "
-            "SYNC signal",
-            hint="its ESI file has the right one (Dc/OpMode/AssignActivate), often 0x0300: "
+            f"{eeprom if own else device}: AssignActivate 0x{plan.assign_activate:04X} does "
+            "not start a SYNC signal",
+            hint="use the value of its ESI file (Dc/OpMode/AssignActivate), often 0x0300: "
             f"{replace(request, assign_activate=SYNC_BY_ECAT)}",
         )
     if not 0 < plan.cycle_ns < REGISTER_END or plan.sync1_ns >= REGISTER_END:
@@ -293,9 +293,9 @@ def _check_sync(
     if plan.cycle_ns % period_ns and period_ns % plan.cycle_ns:
         own = request.sync0 is None
         raise ConfigurationError(
-            f"{eeprom if own else device}: SYNC0 every {plan.cycle_ns / 1e3:g} us does not go with "
+            f"{eeprom if own else device}: SYNC0 every {plan.cycle_ns / 1e3:g} us does not fit "
             f"a period of {period_ns / 1e3:g} us",
-            hint="one must be a multiple of the other; change the period"
+            hint="one must be a multiple of the other: change the period"
             + f", or override the EEPROM: {replace(request, sync0=period_ns / 1e9)}" * own,
         )
     if abs(plan.shift_ns) >= plan.span_ns:
@@ -303,7 +303,7 @@ def _check_sync(
         raise ConfigurationError(
             f"{eeprom if own else device}: a shift of {_time(plan.shift_ns)} is not less than the "
             f"cycle of {_time(plan.span_ns)}",
-            hint="shifts lie within one cycle"
+            hint="use a shift of less than one cycle"
             + f"; override the EEPROM: {replace(request, shift=0.0)}" * own,
         )
 
@@ -312,8 +312,8 @@ def _time(ns: int) -> str:
     return f"{ns / 1e9:.4g} s" if abs(ns) >= 1_000_000_000 else f"{ns / 1e3:g} us"
 
 
-def _given(seconds: float | None, else_ns: int) -> int:
-    return else_ns if seconds is None else round(seconds * 1e9)
+def _in_ns(seconds: float | None, default_ns: int) -> int:
+    return default_ns if seconds is None else round(seconds * 1e9)
 
 
 def _starts_sync0(assign_activate: int) -> bool:
@@ -329,7 +329,7 @@ def _starts_sync(assign_activate: int) -> bool:
 
 
 def _multiple(period_ns: int, factor: int) -> int:
-    """Return a multiple or an integer part of the period: ETG.2000, CycleTimeSync0@Factor."""
+    """Return a multiple or an integer fraction of the period: ETG.2000, CycleTimeSync0@Factor."""
     if factor < 0:
         return period_ns // -factor
     return period_ns * (factor or 1)
@@ -339,9 +339,10 @@ def _sync1_ns(mode: OpMode, cycle_ns: int, period_ns: int) -> int:
     """Return register 0x09A4: the time from SYNC0 to the SYNC1 that follows it.
 
     ETG.2000, Dc/OpMode/CycleTimeSync1@Factor: the cycle of SYNC1 in SYNC0 cycles; if
-    negative, in periods. This cycle is that of SYNC0 plus the register (Beckhoff, ESC data sheet I
-    §9.2.3.5; so SOEM's `ecx_dcsync01` and IgH, master/fsm_slave_config.c). An EL3702 with four-fold
-    oversampling has the factors -4 and -1: 250 us and 750 us at 1 ms (ecmc's notes on DC clocks).
+    negative, in periods. It is the SYNC0 cycle plus the register (Beckhoff, ESC data sheet I
+    §9.2.3.5; also SOEM's `ecx_dcsync01` and IgH's master/fsm_slave_config.c). An EL3702 with
+    four-fold oversampling has the factors -4 and -1: 250 us and 750 us at 1 ms (ecmc's notes on DC
+    clocks).
     """
     span_ns = -mode.sync1_factor * period_ns
     if mode.sync1_factor >= 0:

@@ -67,7 +67,7 @@ class ImageArea:
     """Bytes of an image that an application reads or writes unchanged.
 
     Their place among the private bytes follows from the sizes of the areas before it in the plan.
-    `safe`: of outputs, the bytes that are sent when the loop ends; as long as the area.
+    `safe`: for outputs, the bytes that are sent when the loop ends. It has the size of the area.
     """
 
     name: str
@@ -79,10 +79,12 @@ class ImageArea:
 
 
 class DatagramKind(IntEnum):
+    """Purpose of a datagram in the cycle."""
+
     PROCESS_DATA = 0
     AL_STATUS = 1  # the BRD of every cycle
-    CLOCK = 2  # distributed clocks: FPWR our time, FRMW the reference's, FPRD a difference
-    CYCLE_NUMBER = 3  # a NOP that no device changes; makes the matching of the frame exact
+    CLOCK = 2  # FPWR of our time, FRMW of the reference clock's time, or FPRD of a difference
+    CYCLE_NUMBER = 3  # a NOP, which no device changes; it identifies the frame exactly
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,13 +98,15 @@ class Copy:
 
 @dataclass(frozen=True, slots=True)
 class DatagramPlan:
+    """One datagram of a cyclic frame."""
+
     kind: DatagramKind
     command: int
     offset: int  # of its 10-byte header, from the start of the Ethernet frame
     length: int  # of its data
     expected_counter: int
     sync_unit: int  # -1: none
-    outputs: tuple[Copy, ...] = ()  # image → frame, before sending
+    outputs: tuple[Copy, ...] = ()  # image → frame, before the send
     inputs: tuple[Copy, ...] = ()  # frame → image, after a valid return
 
 
@@ -122,7 +126,7 @@ class FramePlan:
 
 @dataclass(frozen=True, slots=True)
 class SyncUnit:
-    """Unit of validity: devices whose data is valid or stale together."""
+    """Unit of validity: the data of its devices is valid or stale together."""
 
     name: str
     devices: tuple[int, ...]  # positions
@@ -145,9 +149,10 @@ class AxisLimits:
 
 @dataclass(frozen=True, slots=True)
 class AxisPlan:
-    """One CiA 402 axis: slot k of a device (objects + 0x800·k), each quantity's place or None.
+    """One CiA 402 axis: slot k of a device (objects + 0x800·k), and the places of its quantities.
 
-    A linear axis has m, m/s and N where rad, rad/s and N·m are given here.
+    A quantity that is not exchanged is None. A linear axis has m, m/s and N where rad, rad/s and
+    N·m are given here.
     """
 
     name: str
@@ -173,9 +178,9 @@ class AxisPlan:
     # docs/explanation/safety.md
     acceleration: float = 25.0  # [rad/s²] on return to the set-points
     deceleration: float = 25.0  # [rad/s²] to standstill, and before a position limit in CSV
-    linear: bool = False  # m, m/s and N instead
-    standstill: float = 0.05  # [rad/s] at most: at rest
-    step_floor: float = 0.1  # [rad] the default step limit is at least this
+    linear: bool = False  # True: m, m/s and N instead
+    standstill: float = 0.05  # [rad/s] largest velocity of an axis at rest
+    step_floor: float = 0.1  # [rad] smallest default of the step limit
     torque_slope: float | None = None  # [N·m/s] on return to the set-points in CST; None: at once
     on_loss: OnLoss = "quick_stop"  # reaction when the core stops the axis
 
@@ -194,8 +199,8 @@ class ClockPlan:
     followers: tuple[int, ...]  # positions of devices with SYNC signals, without the reference
     stations: tuple[int, ...]  # the same, by station address
     phase_ns: int  # of the cycle starts in the reference's time, modulo the period
-    wire_ns: int  # wire time of the frames, through all devices
-    allowance_ns: int  # from the cycle start to the frames, at most
+    wire_ns: int  # wire time of the frames, and the delay of all devices
+    allowance_ns: int  # longest time from the cycle start to the frames
     bandwidth: float  # final bandwidth of the phase controller [1 / cycle]
     rate_limit_ns: float  # largest total change of a period
     drift_limit_ns: float  # permanent part of it
@@ -206,10 +211,12 @@ class ClockPlan:
 
 @dataclass(frozen=True, slots=True)
 class CyclePlan:
+    """All data that the core needs to run a cycle."""
+
     period_ns: int
     execution: ExecutionMode
     receive_mode: ReceiveMode
-    collect_deadline_ns: int  # threaded: how long after the wake-up the frames may come back
+    collect_deadline_ns: int  # threaded: time from the wake-up until the frames must be back
     output_size: int
     input_size: int
     frames: tuple[FramePlan, ...]
@@ -220,21 +227,21 @@ class CyclePlan:
     input_columns: tuple[Column, ...] = ()
     output_areas: tuple[ImageArea, ...] = ()
     input_areas: tuple[ImageArea, ...] = ()
-    lost_limit: int = 3  # cycles in a row before WorkingCounterError
-    # Without fresh set-points for this long (at least 3 cycles): quick stop. 0: off, not in CST
+    lost_limit: int = 3  # consecutive bad cycles before WorkingCounterError
+    # Time without fresh set-points (at least 3 cycles) before a quick stop. 0: never; not in CST
     late_limit_position_ns: int = 50_000_000  # CSP
     late_limit_velocity_ns: int = 50_000_000  # CSV
     late_limit_torque_ns: int = 10_000_000  # CST
-    handover_ns: int = 20_000_000  # CST keeps its torque for this long after a law or stream ended
-    # Set-points of a program in the background count for this long after an update
-    command_timeout_velocity_ns: int = 200_000_000  # CSV, then it decelerates
-    command_timeout_torque_ns: int = 20_000_000  # CST, then quick stop
-    stop_deadline_ns: int = 2_000_000_000  # quick stop to standstill, at most
+    handover_ns: int = 20_000_000  # time for which CST keeps its torque after a law or stream ended
+    # Time for which the set-points of a background program are valid after an update
+    command_timeout_velocity_ns: int = 200_000_000  # CSV; afterwards it decelerates
+    command_timeout_torque_ns: int = 20_000_000  # CST; afterwards quick stop
+    stop_deadline_ns: int = 2_000_000_000  # longest time from quick stop to standstill
     wire_ns: int = 0  # wire time of the cyclic frames in the busiest cycle
-    acyclic_ns: int = 0  # wire time per cycle for acyclic frames; one frame in any case
-    busy_wait_ns: int = 0  # before each cycle start; costs as much processor time
-    log_cycles: int = 1000  # how far the log reaches back
-    log_axes: bool = False  # the log has the values of the axes, too
+    acyclic_ns: int = 0  # wire time per cycle for acyclic frames; one frame is always sent
+    busy_wait_ns: int = 0  # busy-wait before each cycle start; it costs this processor time
+    log_cycles: int = 1000  # number of cycles in the log
+    log_axes: bool = False  # True if the log also has the values of the axes
     cpu: int | None = None  # of the native thread
-    priority: int | None = 80  # SCHED_FIFO; None: leave the scheduling as it is
+    priority: int | None = 80  # SCHED_FIFO; None: unchanged
     clock: ClockPlan | None = None  # None: no distributed clocks

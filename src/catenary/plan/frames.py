@@ -1,11 +1,11 @@
 """Frames of a cycle from its units, with templates and expected counters. ETG.1000.4 §5.4.
 
 A device adds to a logical datagram's working counter: LRD 1, LWR 1, LRW 1 for a read and 2 for
-a write (ETG.1000.4 table 14), once per datagram however many FMMUs it has.
+a write (ETG.1000.4 table 14), once per datagram, regardless of its number of FMMUs.
 
-Frames are matched by an index of 7 bits (core/_frames.pyx). An index returns after 128 frames, so
-that at most 32 frames may be sent in one cycle. With `exact_matching` each frame also carries the
-cycle number, and 128 frames are possible.
+Frames are matched by an index of 7 bits (core/_frames.pyx). An index is used again after 128
+frames, so that at most 32 frames may be sent in one cycle. With `exact_matching` each frame also
+carries the cycle number, and 128 frames are possible.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ from catenary.wire.register import (
 )
 
 CYCLE_NUMBER_SIZE = OVERHEAD + 4  # bytes of a datagram with a number of 32 bits
-FRAMES_PER_CYCLE_MAX = 32  # an index returns after four cycles at least
+FRAMES_PER_CYCLE_MAX = 32  # an index is used again after at least four cycles
 EXACT_FRAMES_MAX = 128  # all indices, 0x00 to 0x7F
 FRAMES_MAX = 1024  # of all dividers and phases together
 ACYCLIC_GUARD = 0.1  # of the period: free of acyclic frames, so that the next cycle is not delayed
@@ -72,7 +72,7 @@ def make_frames(
     """Return the frames of one cycle, in the order they are sent.
 
     Frame 0 begins with the BRD of AL status, which every device answers, and carries the time.
-    Units with a divider have frames of their own, so that the other cycles do not carry them.
+    Units with a divider have their own frames, so that the other cycles do not carry them.
 
     Args:
         units: Units of the layout, in its order.
@@ -82,12 +82,11 @@ def make_frames(
         exact_matching: True if every frame carries the cycle number.
 
     Raises:
-        ConfigurationError: More frames in one cycle than indices can tell apart.
+        ConfigurationError: One cycle needs more frames than there are indices.
     """
     pieces = [_al_status(device_count), *_of_clocks(clocks)]
     for number, unit in enumerate(units):
-        for piece in _of_unit(unit, number):
-            pieces.append(replace(piece, divider=unit.divider, phase=unit.phase))
+        pieces.extend(_of_unit(unit, number))
     pieces.extend(_of_mailboxes(mailboxes))
     room = MAXIMUM_PAYLOAD - (CYCLE_NUMBER_SIZE if exact_matching else 0)
     batches = _batches(pieces, room)
@@ -99,12 +98,12 @@ def make_frames(
 
 
 def frames_per_cycle(frames: Sequence[FramePlan]) -> int:
-    """Return an upper bound of the frames sent in one cycle: for each divider its fullest phase."""
+    """Return an upper bound of the frames in one cycle: the busiest phase of each divider."""
     return _per_cycle(frames, lambda frame: 1)
 
 
 def cyclic_wire_time_ns(frames: Sequence[FramePlan]) -> int:
-    """Return the wire time of the frames of one cycle [ns], by the same upper bound."""
+    """Return an upper bound of the wire time of the frames in one cycle [ns]."""
     return _per_cycle(frames, lambda frame: wire_time_ns(len(frame.template)))
 
 
@@ -120,7 +119,7 @@ def acyclic_wire_time_ns(cyclic_ns: int, period_ns: int) -> int:
     """
     if cyclic_ns > period_ns:
         raise ConfigurationError(
-            f"the cyclic frames take {cyclic_ns / 1e3:g} us at 100 Mbit/s, the period is "
+            f"the cyclic frames take {cyclic_ns / 1e3:g} us at 100 Mbit/s; the period is "
             f"{period_ns / 1e3:g} us",
             hint="use a longer period, fewer objects, or exchange devices less often (divider=...)",
         )
@@ -134,9 +133,8 @@ def check_return(cyclic_ns: int, period_ns: int, deadline_ns: int) -> None:
             f"period={period_ns * 1e-9:g} s is too short: the cyclic frames take "
             f"{cyclic_ns / 1e3:g} us at 100 Mbit/s, and must be back {deadline_ns / 1e3:g} us "
             "after the cycle start",
-            hint="a longer period, fewer objects, "
-            "some devices less often (divider=...), or a later "
-            "deadline, Scheduling(collect_deadline=...)",
+            hint="use a longer period, fewer objects, a divider for some devices (divider=...), "
+            "or a later deadline, Scheduling(collect_deadline=...)",
         )
 
 
@@ -157,12 +155,12 @@ def _check_count(frames: Sequence[FramePlan], exact_matching: bool) -> None:
         return
     if busiest <= limit:
         raise ConfigurationError(
-            f"{len(frames)} frames for all dividers and phases, at most {FRAMES_MAX}",
+            f"{len(frames)} frames for all dividers and phases; the limit is {FRAMES_MAX}",
             hint="exchange fewer devices with dividers (divider=...)",
         )
-    more = "" if exact_matching else f", Scheduling(exact_matching=True) allows {EXACT_FRAMES_MAX}"
+    more = "" if exact_matching else f"; Scheduling(exact_matching=True) allows {EXACT_FRAMES_MAX}"
     raise ConfigurationError(
-        f"{busiest} frames in one cycle, at most {limit}: an index of 7 bits identifies them{more}",
+        f"{busiest} frames in one cycle; the limit is {limit}, because an index has 7 bits{more}",
         hint="map fewer objects, or exchange some devices less often (divider=...)",
     )
 
@@ -191,8 +189,8 @@ def _al_status(device_count: int) -> _Piece:
 def _of_clocks(clocks: ClockChoice | None) -> list[_Piece]:
     """Return the datagrams of the clocks.
 
-    They carry our time to the reference clock if it follows us, its time to all other clocks, and
-    the difference of one device. The core addresses another device in each cycle.
+    They carry our time to the reference clock if it follows us, the reference's time to all other
+    clocks, and the difference of one device, which changes in each cycle.
 
     Times have four bytes: the loop of a controller compares four, IgH sends four, and a 32-bit
     clock would refuse eight. A broadcast read of all differences would OR sign-magnitude numbers.
@@ -219,7 +217,7 @@ def _clock_piece(
 
 
 def _of_mailboxes(area: MailboxArea | None) -> list[_Piece]:
-    """Return the datagram of the mailboxes. It has no sync unit: a cycle is good without it."""
+    """Return the datagram of the mailboxes. It has no sync unit: a cycle without it is good."""
     if area is None or not area.devices:
         return []
     inputs = (Copy(0, area.input_offset, area.size),)
@@ -237,52 +235,41 @@ def _of_mailboxes(area: MailboxArea | None) -> list[_Piece]:
 
 
 def _of_unit(unit: UnitLayout, number: int) -> list[_Piece]:
-    out_size, in_size = unit.output_size, unit.input_size
-    if unit.logical_read_write and out_size and in_size:
-        return [
-            _Piece(
-                DatagramKind.PROCESS_DATA,
-                EcatCommand.LRW,
-                unit.logical_start,
-                out_size + in_size,
-                2 * unit.output_devices + unit.input_devices,
-                number,
-                outputs=(Copy(0, unit.output_offset, out_size),),
-                inputs=(Copy(out_size, unit.input_offset, in_size),),
-            )
-        ]
-    pieces = []
-    if out_size:
-        outputs = (Copy(0, unit.output_offset, out_size),)
-        pieces.append(
-            _Piece(
-                DatagramKind.PROCESS_DATA,
-                EcatCommand.LWR,
-                unit.logical_start,
-                out_size,
-                unit.output_devices,
-                number,
-                outputs=outputs,
-            )
-        )
-    if in_size:
-        inputs = (Copy(0, unit.input_offset, in_size),)
-        pieces.append(
-            _Piece(
-                DatagramKind.PROCESS_DATA,
-                EcatCommand.LRD,
-                unit.logical_start + out_size,
-                in_size,
-                unit.input_devices,
-                number,
-                inputs=inputs,
-            )
-        )
-    return pieces
+    """Return the datagrams of a unit: one LRW if its devices allow it, otherwise LWR and LRD."""
+    outputs = _Piece(
+        DatagramKind.PROCESS_DATA,
+        EcatCommand.LWR,
+        unit.logical_start,
+        unit.output_size,
+        unit.output_devices,
+        number,
+        outputs=(Copy(0, unit.output_offset, unit.output_size),),
+        divider=unit.divider,
+        phase=unit.phase,
+    )
+    inputs = replace(
+        outputs,
+        command=EcatCommand.LRD,
+        address=unit.logical_start + unit.output_size,
+        length=unit.input_size,
+        expected_counter=unit.input_devices,
+        outputs=(),
+        inputs=(Copy(0, unit.input_offset, unit.input_size),),
+    )
+    if not (unit.logical_read_write and outputs.length and inputs.length):
+        return [piece for piece in (outputs, inputs) if piece.length]
+    both = replace(
+        outputs,
+        command=EcatCommand.LRW,
+        length=outputs.length + inputs.length,
+        expected_counter=2 * unit.output_devices + unit.input_devices,
+        inputs=(Copy(unit.output_size, unit.input_offset, unit.input_size),),
+    )
+    return [both]
 
 
 def _batches(pieces: Sequence[_Piece], room: int) -> list[list[_Piece]]:
-    """Return the pieces by frame: each in the first frame of its cycles with enough room.
+    """Return the datagrams by frame: each in the first frame of its cycles with enough room.
 
     Args:
         pieces: Datagrams in order.

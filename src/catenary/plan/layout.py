@@ -2,18 +2,18 @@
 
 - A unit is the content of one datagram (LRW; or LRD and LWR if a device has no LRW). A device is
   never split over units or datagrams (docs/reference/deviations.md): after the loss of one of two
-  frames, its data would be of different cycles.
+  frames, its data would come from different cycles.
 - An optional device is a separate unit, so its loss does not affect others. Devices with the same
-  divider share units; the units of a divider take turns, so that a cycle carries as little as
-  possible.
+  divider share units. The units of a divider are sent in different cycles, which keeps each cycle
+  short.
 - Inside a unit: the outputs of its devices, then their inputs, both by position.
-- Every device starts at a new byte and fills whole bytes, even a terminal of four bits. Sharing
-  bytes by bit-wise FMMUs would save some bytes. But writes would need the neighbour's bits, the ESC
-  would need bit-wise FMMUs, and mismatches as in SOEM#958 would follow. IgH does likewise.
-- SyncManagers with adjacent memory share an FMMU: terminals have few of them.
-- The control byte is the SII's, except for the watchdog trigger of outputs. It is set if and only
-  if the watchdog is on: some SIIs have it clear, and Beckhoff's slave stack code answers 0x001F if
-  the bit and the time contradict each other.
+- Every device starts at a new byte and fills whole bytes, even a terminal of four bits. Bit-wise
+  FMMUs would save some bytes. However, a write would need the neighbour's bits, not every ESC has
+  bit-wise FMMUs, and mismatches as in SOEM#958 would occur. IgH also uses whole bytes.
+- SyncManagers with adjacent memory share an FMMU, because terminals have few FMMUs.
+- The control byte comes from the SII, except for the watchdog trigger of outputs. That bit is set
+  if and only if the watchdog is on. Some SIIs have it clear, and Beckhoff's slave stack code
+  answers 0x001F if the bit and the time contradict each other.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from catenary.plan.numbers import ANY, MappedNumber, Which, find_number, numbers
 from catenary.wire.sync_manager import WATCHDOG_TRIGGER
 
 LOGICAL_BASE = 0x0001_0000
-LOGICAL_STRIDE = 0x0000_0800  # units start at multiples: no two share an FMMU's range
+LOGICAL_STRIDE = 0x0000_0800  # units start at its multiples, so that no two share an FMMU's range
 UNIT_MAX = 1472  # bytes of a unit: 1486 of a frame minus 14 of the AL status datagram
 EXACT_UNIT_MAX = UNIT_MAX - 16  # with a cycle number in each frame
 
@@ -73,7 +73,7 @@ class DeviceLayout:
     """Place of one device's process data."""
 
     position: int
-    sync_unit: int  # -1: has no process data
+    sync_unit: int  # -1: no process data
     output_offset: int  # bytes, in the image of outputs
     output_size: int
     input_offset: int
@@ -98,7 +98,7 @@ class UnitLayout:
     output_size: int
     input_offset: int
     input_size: int
-    output_devices: int  # that count LWR or the 2 of LRW
+    output_devices: int  # devices that add 1 to the counter of LWR, or 2 to that of LRW
     input_devices: int
 
 
@@ -132,7 +132,7 @@ class DeviceData:
 
 @dataclass(frozen=True, slots=True)
 class Layout:
-    """All places. Implements `plan.request.ImageLayout`."""
+    """Places of the process data of all devices. Implements `plan.request.ImageLayout`."""
 
     units: tuple[UnitLayout, ...]
     devices: tuple[DeviceLayout, ...]
@@ -201,7 +201,9 @@ def make_layout(devices: Sequence[DeviceData], unit_max: int = UNIT_MAX) -> Layo
 def _grouped(devices: Sequence[DeviceData], unit_max: int) -> list[list[DeviceData]]:
     """Return the devices by unit, in the order of their first member."""
     groups: list[list[DeviceData]] = []
-    room: dict[tuple[bool, int], int] = {}  # LRW or not, divisor → rank of the group being filled
+    room: dict[
+        tuple[bool, int], int
+    ] = {}  # (LRW, divider) → rank of the group that is being filled
     for data in devices:
         if data.size == 0:
             continue
@@ -210,7 +212,7 @@ def _grouped(devices: Sequence[DeviceData], unit_max: int) -> list[list[DeviceDa
                 f"{data.description}: {data.output_size} bytes of outputs and {data.input_size} "
                 f"bytes of inputs are {data.size} bytes of process data; a device is exchanged in "
                 f"one datagram, which holds {unit_max} bytes",
-                hint=f"map fewer objects: {data.size - unit_max} bytes less",
+                hint=f"map fewer objects, at least {data.size - unit_max} bytes less",
             )
         if data.optional:
             groups.append([data])
@@ -294,9 +296,9 @@ def _managers(data: DeviceData, direction: Direction) -> tuple[SyncManagerPlan, 
         channel = channels.get(assignment.sync_manager)
         if channel is None or channel.use is not direction.use:
             raise ConfigurationError(
-                f"{device}: its PDOs name SyncManager {assignment.sync_manager} for "
-                f"{direction.noun}, which its SII does not have as such",
-                hint="its SII is wrong; ask the maker for a corrected image",
+                f"{device}: its PDOs use SyncManager {assignment.sync_manager} for "
+                f"{direction.noun}, but its SII does not define this SyncManager for them",
+                hint="its SII is wrong; request a corrected image from the manufacturer",
             )
         plans.append(
             SyncManagerPlan(
@@ -350,6 +352,6 @@ def _fmmus(
         raise ConfigurationError(
             f"{device}: its process data needs {len(plans)} FMMUs, its controller has "
             f"{device.controller.fmmu_count}",
-            hint="map fewer SyncManagers",
+            hint="use fewer SyncManagers",
         )
     return tuple(plans)

@@ -4,8 +4,8 @@ One bit per device is mapped by a spare FMMU: "mailbox full" in the status of Sy
 bit 3). SOEM maps the whole byte into the group's inputs (ec_config.c), KickCAT a bit (bus.cc),
 TwinCAT uses its "SyncM status" FMMU; IgH and others poll the register.
 
-The bits have their own datagram. A register answers in every state; in the datagram of the process
-data it would count as inputs that are missing.
+The bits have their own datagram. A register answers in every state. In the datagram of the process
+data, its answer would count like inputs and could hide missing ones.
 """
 
 from __future__ import annotations

@@ -1,17 +1,17 @@
-"""Choose the PDOs that carry the wanted objects, ETG.1000.6 §5.6.7.4 (0x1C12, 0x1C13 and PDOs).
+"""Choice of PDOs for the requested objects, ETG.1000.6 §5.6.7.4 (0x1C12, 0x1C13 and PDOs).
 
 The order of preference:
 
-1. As assigned now: nothing is written. Optional objects that are not mapped are left out.
-2. Another combination of the PDOs that the device offers (`pdo_search.py`): 0x1C1x is written.
-   It carries optional objects too, if one combination can.
-3. A PDO that is not fixed gets new entries (`pdo_rewrite.py`), if the SII allows it: the missing
-   required objects.
+1. The present assignment: nothing is written. Optional objects that are not mapped are left out.
+2. Another combination of the PDOs that the device offers (`pdo_search.py`): 0x1C1x is written. The
+   combination also carries optional objects if possible.
+3. A PDO that is not fixed also gets the missing required objects (`pdo_rewrite.py`), if the SII
+   allows it.
 
 An optional object never causes a write: the device may refuse it although its SII allows it, and
-the bring-up would fail for an object that is not needed. A mapping that the application writes
-down is tried whatever the SII says, because the permission bits of SIIs are often wrong. IgH
-(fsm_pdo.c) honours both bits as well, but warns and goes on.
+the bring-up would fail for an object that is not needed. A mapping that the application specifies
+is tried regardless of the SII, because the permission bits of SIIs are often wrong. IgH (fsm_pdo.c)
+also honours both bits, but warns and continues.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ from catenary.plan.pdo_search import (
     pdo_names,
 )
 
-if TYPE_CHECKING:  # request.py needs NumPy, a scan does not
+if TYPE_CHECKING:  # request.py imports NumPy, which a scan does not need
     from catenary.plan.request import ObjectReference, WrittenPdo
 
 BITS_MAX = 1486 * 8  # a device's data must fit one datagram of one frame
@@ -48,42 +48,42 @@ OFFERS_SHOWN = 12
 def make_mapping(
     device: DeviceDescription,
     direction: Direction,
-    wanted: Sequence[ObjectReference],
+    requested: Sequence[ObjectReference],
     written: Sequence[WrittenPdo] = (),
 ) -> Mapping:
     """Return the mapping that carries all required objects and changes least.
 
     Args:
-        device: The device, with the mapping that it has now.
+        device: The device, with its present mapping.
         direction: Outputs or inputs.
-        wanted: Objects. Optional ones are left out where they would need a rewrite.
-        written: PDOs of this direction that the application wrote down; none: search.
+        requested: Objects. Optional ones that would need a rewrite are left out.
+        written: PDOs of this direction that the application specified; empty: search.
 
     Raises:
-        MappingError: No way is left. The error names each alternative and why it failed.
+        MappingError: No mapping is possible. The error names each alternative and its obstacle.
     """
-    wanted = tuple(dict.fromkeys(wanted))
+    requested = tuple(dict.fromkeys(requested))
     if written:
         mapping = write_down(device, direction, written)
-        _check_written(device, direction, mapping, wanted)
+        _check_written(device, direction, mapping, requested)
     else:
-        mapping = _search(device, direction, wanted)
+        mapping = _search(device, direction, requested)
     _check_size(device, direction, mapping)
     mapped = {(entry.index, entry.subindex) for entry in mapped_entries(mapping.assignments)}
-    left_out = [each for each in wanted if (each.index, each.subindex) not in mapped]
+    left_out = [each for each in requested if (each.index, each.subindex) not in mapped]
     return replace(mapping, left_out=tuple(left_out))
 
 
 def _search(
-    device: DeviceDescription, direction: Direction, wanted: Sequence[ObjectReference]
+    device: DeviceDescription, direction: Direction, requested: Sequence[ObjectReference]
 ) -> Mapping:
-    required = [each for each in wanted if each.required]
+    required = [each for each in requested if each.required]
     current = Mapping(device.assignments(direction))
     if not _missing(current, required):
         return current
     if device.coe:
         check_channel(device, direction)
-    found = _assign_most(device, direction, wanted)
+    found = _assign_most(device, direction, requested)
     if found is not None:
         return replace(found, rejected=(_as_now(current, required),))
     rejected = (_as_now(current, required), _no_combination(device, direction, required))
@@ -94,32 +94,34 @@ def _search(
     return replace(rewrite(device, direction, missing, required), rejected=rejected)
 
 
-def _missing(mapping: Mapping, wanted: Sequence[ObjectReference]) -> list[ObjectReference]:
-    return [each for each in wanted if not any_carries(mapping.pdos, each)]
+def _missing(mapping: Mapping, requested: Sequence[ObjectReference]) -> list[ObjectReference]:
+    return [each for each in requested if not any_carries(mapping.pdos, each)]
 
 
 def _assign(
-    device: DeviceDescription, direction: Direction, wanted: Sequence[ObjectReference]
+    device: DeviceDescription, direction: Direction, requested: Sequence[ObjectReference]
 ) -> Mapping | None:
-    """Return a combination of the PDOs that the device offers; None: it has or allows none."""
+    """Return a combination of the PDOs that the device offers; None if none is possible."""
     if assignment_refusal(device, direction):
         return None
     assigned, offered, elsewhere = available_pdos(device, direction)
-    here = [each for each in wanted if not any_carries(elsewhere, each)]
+    here = [each for each in requested if not any_carries(elsewhere, each)]
     found = find_combination(assigned, offered, here)
     return None if found is None else with_pdos(device, direction, found.pdos)
 
 
 def _assign_most(
-    device: DeviceDescription, direction: Direction, wanted: Sequence[ObjectReference]
+    device: DeviceDescription, direction: Direction, requested: Sequence[ObjectReference]
 ) -> Mapping | None:
-    """Return a combination that carries the required objects, and as many optional ones as it can;
-    None: no combination carries the required objects."""
-    kept = [each for each in wanted if each.required]
+    """Return a combination with all required objects and as many optional ones as possible.
+
+    None if no combination carries the required objects.
+    """
+    kept = [each for each in requested if each.required]
     found = _assign(device, direction, kept)
     if found is None:
         return None
-    for reference in wanted:
+    for reference in requested:
         more = None if reference.required else _assign(device, direction, [*kept, reference])
         if more is not None:
             kept.append(reference)
@@ -127,10 +129,10 @@ def _assign_most(
     return found
 
 
-def _as_now(current: Mapping, wanted: Sequence[ObjectReference]) -> str:
+def _as_now(current: Mapping, requested: Sequence[ObjectReference]) -> str:
     lengths = {(e.index, e.subindex): e.bit_length for e in mapped_entries(current.assignments)}
     reasons = []
-    for each in _missing(current, wanted):
+    for each in _missing(current, requested):
         bits = lengths.get((each.index, each.subindex))
         other = f"is mapped with {bits} bits, {each.bit_length} were requested"
         reasons.append(f"{object_names([each])} {'is not mapped' if bits is None else other}")
@@ -152,12 +154,12 @@ def _check_written(
     device: DeviceDescription,
     direction: Direction,
     mapping: Mapping,
-    wanted: Sequence[ObjectReference],
+    requested: Sequence[ObjectReference],
 ) -> None:
-    missing = [each for each in _missing(mapping, wanted) if each.required]
+    missing = [each for each in _missing(mapping, requested) if each.required]
     if missing:
         carried = pdo_names(mapping.pdos)
-        reason = f"as written down ({carried}): {object_names(missing)} is not in them"
+        reason = f"as specified ({carried}): {object_names(missing)} is not in them"
         _refuse(device, direction, missing, (reason,))
 
 
@@ -167,7 +169,7 @@ def _check_size(device: DeviceDescription, direction: Direction, mapping: Mappin
             raise MappingError(
                 f"{device}: {assignment.byte_length} bytes of {direction.noun} in SyncManager "
                 f"{assignment.sync_manager} do not fit a datagram of {BITS_MAX // 8} bytes",
-                hint="ask for fewer objects",
+                hint="request fewer objects",
             )
 
 
@@ -180,8 +182,8 @@ def _refuse(
     alternatives = "".join(f"\n    {each}" for each in rejected)
     raise MappingError(
         f"{device}: its {direction.noun} cannot carry {object_names(missing)}:{alternatives}",
-        hint=f"{_offers(device, direction)}; ask for these, use SDO for the others, or write the "
-        "PDOs down with pdos=",
+        hint=f"{_offers(device, direction)}; request these, use SDO for the others, or "
+        "specify the PDOs with pdos=",
     )
 
 

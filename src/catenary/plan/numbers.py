@@ -23,6 +23,8 @@ ANY = Which()
 
 
 class EntryPlace(NamedTuple):
+    """Entry of a PDO, and its place in an image."""
+
     pdo: Pdo
     entry: Entry
     bit: int  # from the start of the image
@@ -55,7 +57,7 @@ class MappedNumber:
 
 
 def numbers(assignments: Sequence[Assignment], offset: int) -> tuple[MappedNumber, ...]:
-    """Return the mapped objects in the order of the image, gaps left out."""
+    """Return the mapped objects in the order of the image, without gaps."""
     return tuple(
         MappedNumber(
             pdo.index,
@@ -71,7 +73,7 @@ def numbers(assignments: Sequence[Assignment], offset: int) -> tuple[MappedNumbe
 def find_number(
     mapped: Sequence[MappedNumber], index: int, subindex: int, which: Which
 ) -> Number | None:
-    """Return the place of an object: of `which` if it is mapped like this, else the first."""
+    """Return the place of an object: the one that `which` selects, otherwise the first."""
     found = [each for each in mapped if (each.index, each.subindex) == (index, subindex)]
     if not found:
         return None

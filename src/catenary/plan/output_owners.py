@@ -28,7 +28,7 @@ class Owned(NamedTuple):
     request: int  # its rank
     what: str
     bytes: range
-    by_axis: bool = False  # by the core, for an axis
+    by_axis: bool = False  # True if the core writes them for an axis
 
 
 def check_owners(
@@ -40,7 +40,7 @@ def check_owners(
     """Check that no byte of the outputs is written by two requests, or by an axis and a column.
 
     Raises:
-        ConfigurationError: Names both writers and the byte.
+        ConfigurationError: A byte has two writers. The error names them.
     """
     owners: dict[int, Owned] = {}
     for rank, table in enumerate(tables):

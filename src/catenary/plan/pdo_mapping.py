@@ -1,4 +1,4 @@
-"""Mapping: the process data of one device in one direction, and the difference from now."""
+"""Mapping: the process data of one device in one direction, and the changes to obtain it."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, NamedTuple
 from catenary.errors import MappingError
 from catenary.model.device import Assignment, DeviceDescription, Direction, Pdo, mapped_pdos
 
-if TYPE_CHECKING:  # request.py needs NumPy, a scan does not
+if TYPE_CHECKING:  # request.py imports NumPy, which a scan does not need
     from catenary.plan.request import ObjectReference
 
 
@@ -18,13 +18,13 @@ ASSIGNMENT_BASE = 0x1C10  # + SyncManager
 
 @dataclass(frozen=True, slots=True)
 class Mapping:
-    """The process data of one device in one direction, and what must be written to get it."""
+    """Process data of one device in one direction, and the changes to obtain it."""
 
     assignments: tuple[Assignment, ...]
     rewritten: tuple[Pdo, ...] = ()  # PDOs with new entries
     reassigned: tuple[int, ...] = ()  # SyncManagers with another list of PDOs
-    rejected: tuple[str, ...] = ()  # alternatives that change less, and why each failed
-    left_out: tuple[ObjectReference, ...] = ()  # optional objects that it does not carry
+    rejected: tuple[str, ...] = ()  # alternatives that change less, and their obstacles
+    left_out: tuple[ObjectReference, ...] = ()  # optional objects that are not mapped
 
     @property
     def changed(self) -> bool:
@@ -37,7 +37,7 @@ class Mapping:
 
 
 class AvailablePdos(NamedTuple):
-    """The PDOs of a device in one direction, by their assignment."""
+    """PDOs of a device in one direction, by their assignment."""
 
     assigned: tuple[Pdo, ...]  # to the SyncManager of process data
     offered: tuple[Pdo, ...]  # all that can be assigned to it, `assigned` included
@@ -45,7 +45,7 @@ class AvailablePdos(NamedTuple):
 
 
 def process_data_channel(device: DeviceDescription, direction: Direction) -> int | None:
-    """Return the SyncManager of the process data of a direction; None: there is none."""
+    """Return the SyncManager of the process data of a direction; None if it does not exist."""
     for assignment in device.assignments(direction):
         return assignment.sync_manager
     for channel in device.sync_managers:
@@ -58,13 +58,13 @@ def check_channel(device: DeviceDescription, direction: Direction) -> int:
     """Return the SyncManager of the process data of a direction.
 
     Raises:
-        MappingError: There is none.
+        MappingError: It does not exist.
     """
     channel = process_data_channel(device, direction)
     if channel is None:
         raise MappingError(
             f"{device} has no SyncManager for {direction.noun}",
-            hint=f"ask this device for no {direction.noun}; `catenary sii` shows its SyncManagers",
+            hint=f"request no {direction.noun} of it; `catenary sii` shows its SyncManagers",
         )
     return channel
 
@@ -83,7 +83,7 @@ def available_pdos(device: DeviceDescription, direction: Direction) -> Available
 
 
 def assignment_refusal(device: DeviceDescription, direction: Direction) -> str:
-    """Return why the assignment cannot be changed; empty if it can.
+    """Return the reason why the assignment cannot be changed; empty if it can.
 
     Raises:
         MappingError: The device has a CoE mailbox, but no SyncManager for the direction.
@@ -93,16 +93,16 @@ def assignment_refusal(device: DeviceDescription, direction: Direction) -> str:
     channel = check_channel(device, direction)
     index = ASSIGNMENT_BASE + channel
     if not device.mailbox.pdo_assign:
-        return f"its SII says that 0x{index:04X} cannot be changed"
+        return f"its SII does not allow changes of 0x{index:04X}"
     if any(a.fixed for a in device.assignments(direction) if a.sync_manager == channel):
-        return f"its dictionary says that 0x{index:04X} is read-only"
+        return f"0x{index:04X} is read-only in its dictionary"
     return ""
 
 
 def with_pdos(device: DeviceDescription, direction: Direction, pdos: Sequence[Pdo]) -> Mapping:
     """Return the mapping with these PDOs on the SyncManager of process data.
 
-    What differs from the device's own is marked as rewritten or reassigned.
+    Differences from the device's own mapping are marked as rewritten or reassigned.
     """
     channel = check_channel(device, direction)
     now = {each.sync_manager: each for each in device.assignments(direction)}

@@ -1,4 +1,4 @@
-"""New entries for a PDO: the missing objects, or what the application wrote down."""
+"""New entries for a PDO: the missing objects, or the entries that the application specified."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from catenary.model.device import DeviceDescription, Direction, Entry, Pdo, mapp
 from catenary.plan.pdo_mapping import Mapping, assignment_refusal, available_pdos, with_pdos
 from catenary.plan.pdo_search import carries, pdo_names
 
-if TYPE_CHECKING:  # request.py needs NumPy, a scan does not
+if TYPE_CHECKING:  # request.py imports NumPy, which a scan does not need
     from catenary.plan.request import ObjectReference, WrittenPdo
 
 ENTRIES_MAX = 254  # subindices of a mapping object, ETG.1000.6 table 75
@@ -20,7 +20,7 @@ ENTRIES_MAX = 254  # subindices of a mapping object, ETG.1000.6 table 75
 def rewrite_refusal(
     device: DeviceDescription, direction: Direction, missing: Sequence[ObjectReference]
 ) -> str:
-    """Return why the missing objects cannot be added to a PDO; empty if they can."""
+    """Return the reason why the missing objects cannot be added to a PDO; empty if they can."""
     if device.mailbox is None or not device.coe:
         return "it has no CoE mailbox to change its mapping"
     for reference in missing:
@@ -30,7 +30,7 @@ def rewrite_refusal(
         if reason := _other_length(device, direction, reference):
             return reason
     if not device.mailbox.pdo_configuration:
-        return "its SII says that the entries of PDOs cannot be changed"
+        return "its SII does not allow changes of PDO entries"
     if _changeable(device, direction) is None:
         pdos = device.pdos(direction)
         if not all(pdo.fixed for pdo in pdos):
@@ -47,7 +47,7 @@ def rewrite(
 ) -> Mapping:
     """Return the mapping with the missing objects appended to a PDO that is not fixed.
 
-    Without room for all, the PDO carries only the required objects that are in no other PDO.
+    If there is not enough room, the PDO carries only the required objects that are in no other PDO.
     """
     pdo = _changeable(device, direction)
     assert pdo is not None
@@ -70,7 +70,7 @@ def write_down(
     """Return the mapping of exactly these PDOs, in this order.
 
     Raises:
-        MappingError: The entries of a PDO are neither written down nor known, or the device has no
+        MappingError: The entries of a PDO are neither specified nor known, or the device has no
             SyncManager for them.
     """
     known = {pdo.index: pdo for pdo in device.pdos(direction)}
@@ -82,14 +82,14 @@ def write_down(
         elif each.index not in known:
             raise MappingError(
                 f"{device}: neither its dictionary nor its SII has PDO 0x{each.index:04X}",
-                hint=f"write its entries down; the device has {pdo_names(device.pdos(direction))}",
+                hint=f"specify its entries; the device has {pdo_names(device.pdos(direction))}",
             )
         pdos.append(pdo)
     return with_pdos(device, direction, pdos)
 
 
 def _changeable(device: DeviceDescription, direction: Direction) -> Pdo | None:
-    """Return the first assigned PDO that is not fixed; else one that can be assigned."""
+    """Return the first assigned PDO that is not fixed, otherwise one that can be assigned."""
     assigned, offered, _ = available_pdos(device, direction)
     if assignment_refusal(device, direction):
         offered = ()
@@ -101,8 +101,10 @@ def _changeable(device: DeviceDescription, direction: Direction) -> Pdo | None:
 def _not_mappable(
     device: DeviceDescription, direction: Direction, reference: ObjectReference
 ) -> str:
-    """Return the dictionary's objection. The device itself judges an object never read: it refuses
-    the mapping before SAFE-OP."""
+    """Return the reason in the dictionary why an object cannot be mapped; empty if there is none.
+
+    An object that was not read is accepted. If necessary, the device refuses it before SAFE-OP.
+    """
     known = device.known_object(reference.index, reference.subindex)
     if known is None:
         return ""
@@ -119,11 +121,11 @@ def _not_mappable(
 def _other_length(
     device: DeviceDescription, direction: Direction, reference: ObjectReference
 ) -> str:
-    """Return the objection to an object that would be mapped a second time with another length."""
+    """Return the reason if the object is already mapped with another length; otherwise empty."""
     for entry in mapped_entries(device.assignments(direction)):
         if (entry.index, entry.subindex) == (reference.index, reference.subindex):
             place = f"0x{entry.index:04X}:{entry.subindex:02X}"
-            return f"{place} is mapped with {entry.bit_length} bits already"
+            return f"{place} is already mapped with {entry.bit_length} bits"
     return ""
 
 

@@ -27,7 +27,14 @@ def report(
     layout: Layout,
     axes: Sequence[AxisReport] = (),
 ) -> str:
-    """Return the lines of `print(plan)`."""
+    """Return a plan as text, for `print(plan)`.
+
+    Args:
+        cycle: Plan of the cycle.
+        devices: Plans of the devices.
+        layout: Places of the process data.
+        axes: Reports of all axes, in their order.
+    """
     clocks = [] if cycle.clock is None else _clocks(cycle.clock, cycle.period_ns, devices)
     return "\n".join(
         [
@@ -103,11 +110,11 @@ def _start_up(devices: Sequence[DevicePlan]) -> Iterator[str]:
 
 
 def _download(owner: str, download: Download, old: Mapping[str, str]) -> str:
-    """`old`: values of objects that change, by place."""
+    """Return one download as text. `old`: values of the objects that change, by place."""
     before = old.get(download.place)
     value = download.text or download.data.hex(" ")
     unverified = ", not verified" if download.text and not download.verify else ""
-    change = f"{value} (as it is)" if before is None else f"{before} → {value}"
+    change = f"{value} (unchanged)" if before is None else f"{before} → {value}"
     return f"        {owner:<15} {download.place}  {change}{unverified}"
 
 
@@ -125,7 +132,7 @@ def _axes(cycle: CyclePlan, axes: Sequence[AxisReport]) -> Iterator[str]:
         f"CST keeps its torque for {cycle.handover_ns / 1e6:g} ms after a law or stream ended"
     )
     yield (
-        "    in the background, an update counts for "
+        "    in the background, an update is valid for "
         f"{cycle.command_timeout_velocity_ns / 1e6:g} ms in CSV and PV, "
         f"{cycle.command_timeout_torque_ns / 1e6:g} ms in CST"
     )
@@ -137,7 +144,7 @@ def _axes(cycle: CyclePlan, axes: Sequence[AxisReport]) -> Iterator[str]:
 def _sync(sync: SyncPlan) -> str:
     """Return one device's SYNC signals and the related settings, as text."""
     second = f", SYNC1 {sync.sync1_ns / 1e3:g} us later" * (Activation.SYNC1 in sync.activation)
-    hidden = "" if Activation.SYNC0 in sync.activation else " (not shown to the device)"
+    hidden = "" if Activation.SYNC0 in sync.activation else " (not signalled to the device)"
     mode = f", OpMode {sync.op_mode!r}" * bool(sync.op_mode)
     return (
         f"SYNC0 every {sync.cycle_ns / 1e3:g} us{hidden}, "
@@ -191,7 +198,7 @@ def _wire_time(cycle: CyclePlan) -> str:
 
 
 def _exact_matching(frames: Sequence[FramePlan]) -> Iterator[str]:
-    """Yield the cost of the cycle numbers. A frame below Ethernet's minimum is padded anyway."""
+    """Yield the cost of the cycle numbers. Some may be free, in the padding of short frames."""
     sizes = [
         (HEADER_SIZE + sum(OVERHEAD + d.length for d in frame.datagrams), OVERHEAD + number.length)
         for frame in frames

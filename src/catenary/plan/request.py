@@ -1,6 +1,6 @@
 """Process-data requests (`ProcessDataRequest`): objects to exchange, before their places are known.
 
-`loop` and `drive` share this interface: a Loop takes requests of any kind.
+`loop` and `drive` share this interface: a Loop accepts requests of any kind.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ SYNC_TIME_END = 4.29  # [s] the registers 0x09A0 and 0x09A4 have 32 bits [ns]
 class ObjectReference:
     """Entry of the object dictionary, to be mapped into the process data.
 
-    If it is not `required`, it is omitted if the device cannot map it.
+    If it is not `required` and the device cannot map it, it is omitted.
     """
 
     index: int
@@ -51,7 +51,7 @@ class ObjectReference:
 
 @dataclass(frozen=True, slots=True)
 class WrittenPdo:
-    """PDO that the application wrote down. `entries`: None: as the device has it."""
+    """PDO that the application specified. `entries`: None to keep the entries of the device."""
 
     index: int
     entries: tuple[ObjectReference, ...] | None = None
@@ -65,15 +65,15 @@ class WrittenPdo:
 class DistributedClock:
     """Distributed clocks of a device: SYNC signals, in phase with those of all other devices.
 
-    Values of None come from an OpMode of the device's SII. Without a name this is the first one
-    that starts SYNC0, else the first one that starts SYNC1. Without any: SYNC0 every period, no
-    shift, no SYNC1, 0x0300.
+    Values of None come from an OpMode of the device's SII: the one named `op_mode`, otherwise the
+    first one that starts SYNC0 or, if there is none, SYNC1. Without any OpMode: SYNC0 every period,
+    no shift, no SYNC1, AssignActivate 0x0300.
 
     Args:
         op_mode: Name of the OpMode, as in the ESI file; case is ignored.
-        sync0: Period of SYNC0 [s], a multiple or an integer part of the loop's period.
+        sync0: Period of SYNC0 [s], a multiple or an integer fraction of the loop's period.
         sync1: Time from SYNC0 to SYNC1 [s].
-        shift: Time of SYNC0 after the common SYNC0 time [s]; negative: before. Less than a cycle.
+        shift: Time of SYNC0 after the common SYNC0 time [s], less than a cycle; negative: before.
         assign_activate: Registers 0x0980 and 0x0981, as in the ESI file; 0x0500: SYNC1 alone.
 
     Raises:
@@ -88,16 +88,16 @@ class DistributedClock:
 
     def __post_init__(self) -> None:
         if self.sync0 is not None and not 1e-9 <= self.sync0 < SYNC_TIME_END:
-            raise ValueError(f"sync0={self.sync0}: a period of 1 ns to {SYNC_TIME_END} s")
+            raise ValueError(f"sync0={self.sync0} s: must be 1 ns to {SYNC_TIME_END} s")
         if self.sync1 is not None and not 0 <= self.sync1 < SYNC_TIME_END:
-            raise ValueError(f"sync1={self.sync1}: SYNC1 comes 0 to {SYNC_TIME_END} s after SYNC0")
+            raise ValueError(f"sync1={self.sync1} s: must be 0 to {SYNC_TIME_END} s")
         if self.shift is not None and not math.isfinite(self.shift):
-            raise ValueError(f"shift={self.shift}: must be a finite time [s]")
+            raise ValueError(f"shift={self.shift} s: must be finite")
         if self.assign_activate is not None and not 0 <= self.assign_activate <= 0xFFFF:
-            raise ValueError(f"assign_activate={self.assign_activate}: a word, 0 to 0xFFFF")
+            raise ValueError(f"assign_activate={self.assign_activate}: must be 0 to 0xFFFF")
 
     def __str__(self) -> str:
-        """Return the call that makes it, as a user writes it."""
+        """Return the call that makes this value, as source text."""
         given = [
             f"{name}={value!r}"
             for name, value in (
@@ -117,24 +117,22 @@ class DistributedClock:
 class DeviceRequest:
     """Objects that one device must exchange cyclically.
 
-    An existing mapping is only changed if a requested object is missing, or by `pdos`. If several
-    requests name a device, the smallest `divider` counts. The device is required if any of them
-    requires it.
+    An existing mapping is only changed if a requested object is missing, or by `pdos`. Several
+    requests may name one device. Its divider is then the greatest common divisor of theirs, and it
+    is required if any of them requires it.
     """
 
     outputs: tuple[ObjectReference, ...] = ()  # MainDevice → device (RxPDO)
     inputs: tuple[ObjectReference, ...] = ()  # device → MainDevice (TxPDO)
-    start_up: tuple[
-        tuple[int, int, bytes], ...
-    ] = ()  # SDO downloads in PRE-OP: index, subindex, data
+    start_up: tuple[tuple[int, int, bytes], ...] = ()  # SDOs in PRE-OP: index, subindex, data
     clock: DistributedClock | None = None
     divider: int = 1  # cycles between two exchanges
-    required: bool = True  # the cycle is only good with it
-    pdos: tuple[WrittenPdo, ...] = ()  # exactly these, in their directions; otherwise a search
+    required: bool = True  # True if a cycle without it is bad
+    pdos: tuple[WrittenPdo, ...] = ()  # instead of a search, in their directions
     objects: tuple[StartUp, ...] = ()  # start-up objects of the application, in their order
 
     def written(self, direction: Direction) -> tuple[WrittenPdo, ...]:
-        """Return the PDOs of a direction that the application wrote down."""
+        """Return the PDOs of a direction that the application specified."""
         return tuple(pdo for pdo in self.pdos if pdo.direction is direction)
 
 
@@ -154,7 +152,7 @@ class ImageLayout(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class RequestTables:
-    """Axes and columns of a request. `axis_reports` has one entry per axis, or none."""
+    """Axes and columns of a request. `axis_reports` has one entry per axis, or is empty."""
 
     axes: tuple[AxisPlan, ...] = ()
     output_columns: tuple[Column, ...] = ()
@@ -171,17 +169,18 @@ class Mover(Protocol):
         """Write the targets of the next commit. `now`: time of the cycle [s]."""
 
     def check(self) -> None:
-        """Check the axes after a cycle in trouble."""
+        """End the motions of stopped axes, after a bad cycle."""
 
     def end(self) -> None:
-        """End the motion because the loop ends."""
+        """End all motions, because the loop ends."""
 
 
 @dataclass(frozen=True, slots=True)
 class Views:
     """Views of the part of the loop's private buffers that belongs to one request; no copies.
 
-    n axes; columns by bank. `actual_*` only change in `next(loop)`, which also reads `target_*`.
+    Arrays have n axes, or the columns of a bank. Only `next(loop)` changes `actual_*` and reads
+    `target_*`.
     """
 
     actual_position: Reals  # (n,) [rad]
@@ -201,27 +200,31 @@ class Views:
     target_velocity: Reals
     target_torque: Reals
     mode_target: Modes
-    requested_state: Bytes  # (n,) 0 disabled, 1 enabled, 2 quick stop, 3 disabled with a fault
-    # reset (so that a fault can be acknowledged without moving on); taken over when
-    request: Serials  # (n,) has changed: a dropped request is restored only by a new request
-    controlword_bits: Words  # (n,) the mode's own control bits (4, 5, 6, 9, 11 to 15), or-ed in
+    # requested_state (n,): 0 disabled, 1 enabled, 2 quick stop, 3 disabled with a fault reset (it
+    # acknowledges a fault without motion). It takes effect when `request` changes. After a stop by
+    # the core, only a new request enables the axis again.
+    requested_state: Bytes
+    request: Serials  # (n,) serial number of the request
+    controlword_bits: Words  # (n,) the mode's own control bits (4, 5, 6, 9, 11 to 15), added by OR
     input_reals: Reals
     input_integers: Integers
     input_bits: Bytes
-    input_bytes: Bytes  # of the areas, one after the other
+    input_bytes: Bytes  # of all areas, in order
     output_reals: Reals
     output_integers: Integers
     output_bits: Bytes
     output_bytes: Bytes
     unit_valid: Bytes  # (units of the whole plan,) 1 if the unit's last exchange was valid
     movers: list[Mover] = field(default_factory=list)  # of the whole loop, during their motion
-    # Returns True while the loop runs; afterwards requests have no effect
+    # Returns True while the loop runs. Afterwards, requests have no effect.
     is_open: Callable[[], bool] = lambda: True
     # Returns True while a law or a stream sets the targets
     is_led: Callable[[], bool] = lambda: False
 
 
 class ProcessDataRequest(Protocol):
+    """Request for process data of some devices, such as `Drives` or `ProcessData`."""
+
     def pdos(self, period_ns: int) -> Mapping[int, DeviceRequest]:
         """Return the requested objects by device position."""
 

@@ -14,14 +14,14 @@ Block = Literal["record", "actual", "target"]
 
 @dataclass(frozen=True, slots=True)
 class SinkField:
-    """A value of a cycle and its place in one of the three blocks of native/sink.h."""
+    """Value of a cycle, and its place in one of the three blocks of native/sink.h."""
 
     name: str
     block: Block
     offset: int  # bytes, in its block
     format: str  # NumPy's, of one number: "<f8"
     count: int | None = None  # None: a single number
-    unit: str = ""  # "rad", "ns"; "": a count, a code, or as the device has it
+    unit: str = ""  # "rad", "ns"; "": a count, a code, or a unit of the device
     per_axis: bool = False  # one number for each axis, in their order
 
 
@@ -43,19 +43,21 @@ class SinkLayout:
 class Incident:
     """Event outside of the cyclic data."""
 
-    kind: str  # the name of an event's class ("DeviceLost") or of the error that ended the loop
+    kind: str  # class name of an event ("DeviceLost") or of the error that ended the loop
     message: str
-    time: float  # of the link's clock [s]
-    position: int | None = None  # of the device; None: about the segment
-    details: Mapping[str, object] = field(default_factory=dict)  # numbers and texts, by name
+    time: float  # on the link's clock [s]
+    position: int | None = None  # of the device; None: the segment
+    details: Mapping[str, object] = field(default_factory=dict)  # numbers and texts by name
 
 
 class Sink(Protocol):
+    """Receiver of every cycle of a loop."""
+
     def open(self, layout: SinkLayout) -> object:
         """Return a capsule of native/sink.h for the layout, once a loop has its plan."""
 
     def report(self, incident: Incident) -> None:
-        """Receive an incident; from any thread but the cycle's."""
+        """Receive an incident. Any thread except the cycle thread may call this."""
 
     def close(self) -> None:
-        """End: the loop publishes nothing more. Another `open` may follow."""
+        """End the publication. Another `open` may follow."""

@@ -4,7 +4,7 @@ The order of the SDOs: start-up objects of the application with `before_mapping`
 own objects, the other start-up objects of the application.
 
 The order inside a changed mapping is the one of ETG.1020 §"PDO mapping": empty the assignment,
-empty and fill the mapping, fill the assignment. Only what differs is written. An assignment that
+empty and fill the mapping, fill the assignment. Only differences are written. An assignment that
 cannot be changed is not emptied.
 """
 
@@ -14,7 +14,7 @@ import struct
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from typing import cast
+from typing import TYPE_CHECKING, cast
 
 from catenary.errors import ConfigurationError
 from catenary.model.device import (
@@ -34,21 +34,24 @@ from catenary.plan.start_up_object import StartUp
 from catenary.types import Scalar, by_index
 from catenary.wire.register import watchdog_unit_ns
 
+if TYPE_CHECKING:  # request.py imports NumPy, which a scan does not need
+    from catenary.plan.request import DeviceRequest
+
 WATCHDOG_DIVIDER = 2498  # the controller's reset value
 WATCHDOG_UNIT_NS = watchdog_unit_ns(WATCHDOG_DIVIDER)  # 100 µs
 
 
 @dataclass(frozen=True, slots=True)
 class Download:
-    """One SDO download. `entry`: the entry that it maps, for error messages."""
+    """One SDO download. `entry`: the entry that it maps, if any, for error messages."""
 
     index: int
     subindex: int
     data: bytes
     entry: Entry | None = None
-    optional: bool = False  # skipped if the device has no such object, or a fixed one
-    verify: bool = False  # read back and compared, unless it can only be written
-    text: str = ""  # the value that the application gave; empty: one of ours
+    optional: bool = False  # skipped if the object does not exist or is read-only
+    verify: bool = False  # read back and compared, unless it is write-only
+    text: str = ""  # value as the application gave it; empty for our own objects
 
     @property
     def place(self) -> str:
@@ -74,7 +77,7 @@ class DevicePlan:
     watchdog_ns: int  # of process data; 0: off
     sync: SyncPlan | None = None  # None: no SYNC signals
     changes: tuple[Change, ...] = ()  # what the downloads change, with old and new values
-    rejected: tuple[str, ...] = ()  # mappings that change less, and why each failed
+    rejected: tuple[str, ...] = ()  # mappings that change less, and their obstacles
     left_out: tuple[str, ...] = ()  # optional objects that are not exchanged
 
     @property
@@ -93,33 +96,36 @@ class DevicePlan:
 
 def make_device_plan(
     device: DeviceDescription,
+    request: DeviceRequest,
     outputs: Mapping,
     inputs: Mapping,
     layout: DeviceLayout,
-    start_up: Sequence[tuple[int, int, bytes]],
     watchdog_ns: int,
     sync: SyncPlan | None = None,
-    objects: Sequence[StartUp] = (),
 ) -> DevicePlan:
     """Return the plan of one device.
 
     Args:
         device: Description of the device.
+        request: Its combined request, with the objects to write.
         outputs: Mapping of the outputs.
         inputs: Mapping of the inputs.
         layout: Place of its process data.
-        start_up: Our own objects: index, subindex, data.
         watchdog_ns: Watchdog time of the process data; 0: off.
         sync: Settings of the SYNC unit; None: no SYNC signals.
-        objects: Start-up objects of the application.
 
     Raises:
         ConfigurationError: The device cannot have a start-up object, or its type is unknown.
     """
-    requested = tuple(Download(index, subindex, data) for index, subindex, data in start_up)
-    before, after = object_downloads(device, objects)
-    told = sync.objects if sync is not None and device.coe else ()
-    clocks = tuple(Download(*each, optional=True) for each in told)
+    before, after = object_downloads(device, request.objects)
+    of_sync = sync.objects if sync is not None and device.coe else ()
+    start_up = (
+        *(Download(*each) for each in request.start_up),
+        *(Download(*each, optional=True) for each in of_sync),
+        *after,
+    )
+    written = [(each.index, each.subindex, each.data) for each in (*before, *start_up)]
+    left_out = outputs.left_out + inputs.left_out
     return DevicePlan(
         position=device.position,
         name=device.name,
@@ -130,22 +136,17 @@ def make_device_plan(
         layout=layout,
         before_mapping=before,
         mapping=(*mapping_downloads(outputs), *mapping_downloads(inputs)),
-        start_up=(*requested, *clocks, *after),
+        start_up=start_up,
         mapping_changed=outputs.changed or inputs.changed,
         watchdog_ns=watchdog_ns,
         sync=sync,
         changes=(
             *mapping_changes(device, Direction.OUTPUT, outputs),
             *mapping_changes(device, Direction.INPUT, inputs),
-            *value_changes(
-                device,
-                [(d.index, d.subindex, d.data) for d in (*before, *requested, *clocks, *after)],
-            ),
+            *value_changes(device, written),
         ),
         rejected=outputs.rejected + inputs.rejected,
-        left_out=tuple(
-            f"0x{each.index:04X}:{each.subindex:02X}" for each in outputs.left_out + inputs.left_out
-        ),
+        left_out=tuple(f"0x{each.index:04X}:{each.subindex:02X}" for each in left_out),
     )
 
 
@@ -164,28 +165,28 @@ def object_downloads(
     return tuple(before), tuple(after)
 
 
-def _object_download(device: DeviceDescription, wanted: StartUp) -> Download:
+def _object_download(device: DeviceDescription, requested: StartUp) -> Download:
     if not device.coe:
         raise ConfigurationError(
-            f"{device}: start-up object {wanted.place} cannot be written: the device has no CoE "
+            f"{device}: start-up object {requested.place} cannot be written: the device has no CoE "
             "mailbox",
             hint="give start_up= only to devices with an object dictionary",
         )
-    kind = wanted.type
-    known = device.known_object(wanted.index, wanted.subindex)
-    if wanted.needs_type:
-        kind = _dictionary_type(device, wanted, known)
+    kind = requested.type
+    known = device.known_object(requested.index, requested.subindex)
+    if requested.needs_type:
+        kind = _dictionary_type(device, requested, known)
     return Download(
-        wanted.index,
-        wanted.subindex,
-        wanted.encode(kind),
-        verify=wanted.verify and (known is None or known.readable),
-        text=wanted.text(kind),
+        requested.index,
+        requested.subindex,
+        requested.encode(kind),
+        verify=requested.verify and (known is None or known.readable),
+        text=requested.text(kind),
     )
 
 
 def _dictionary_type(
-    device: DeviceDescription, wanted: StartUp, known: ObjectInformation | None
+    device: DeviceDescription, requested: StartUp, known: ObjectInformation | None
 ) -> Scalar:
     if known is not None and known.data_type:
         with suppress(ValueError):
@@ -195,16 +196,16 @@ def _dictionary_type(
     elif known.data_type:
         why = f"its data type 0x{known.data_type:04X} is not a base data type"
     else:
-        why = f"the device does not tell its data type ({known.bit_length} bits)"
+        why = f"the device does not report its data type ({known.bit_length} bits)"
     raise ConfigurationError(
-        f"{device}: the type of start-up object {wanted.place} is unknown: {why}",
-        hint="give the type of the manual, StartUp(..., type=types.UDINT), or bytes; "
+        f"{device}: the type of start-up object {requested.place} is unknown: {why}",
+        hint="give the type from the manual, StartUp(..., type=types.UDINT), or bytes; "
         "`catenary sdo` lists the objects of a device",
     )
 
 
 def restoring_downloads(device: DeviceDescription, plan: DevicePlan) -> tuple[Download, ...]:
-    """Return the downloads that bring back the mapping that the device had before the plan."""
+    """Return the downloads that restore the mapping that the device had before the plan."""
     downloads: list[Download] = []
     for direction in Direction:
         difference = _difference(device, direction, plan.assignments(direction))
@@ -221,7 +222,7 @@ def restoring_downloads(device: DeviceDescription, plan: DevicePlan) -> tuple[Do
 
 
 def renewed(plan: DevicePlan, device: DeviceDescription) -> DevicePlan:
-    """Return the plan for a device that restarts; only differences of the mapping are written.
+    """Return the plan for a device that restarts, with only the necessary mapping changes.
 
     Args:
         plan: Plan of the device.
@@ -237,26 +238,26 @@ def renewed(plan: DevicePlan, device: DeviceDescription) -> DevicePlan:
 
 
 def _difference(
-    device: DeviceDescription, direction: Direction, wanted: tuple[Assignment, ...]
+    device: DeviceDescription, direction: Direction, requested: tuple[Assignment, ...]
 ) -> Mapping:
     entries = {pdo.index: shape(pdo) for pdo in device.pdos(direction)}
     now = device.assignments(direction)
     lists = {each.sync_manager: [pdo.index for pdo in each.pdos] for each in now}
     return Mapping(
-        wanted,
+        requested,
         rewritten=tuple(
-            pdo for each in wanted for pdo in each.pdos if entries.get(pdo.index) != shape(pdo)
+            pdo for each in requested for pdo in each.pdos if entries.get(pdo.index) != shape(pdo)
         ),
         reassigned=tuple(
             each.sync_manager
-            for each in wanted
+            for each in requested
             if lists.get(each.sync_manager, []) != [pdo.index for pdo in each.pdos]
         ),
     )
 
 
 def mapping_downloads(mapping: Mapping) -> tuple[Download, ...]:
-    """Return the downloads that write a mapping; empty if the device has it already."""
+    """Return the downloads that write a mapping; empty if the device already has it."""
     rewritten = {pdo.index for pdo in mapping.rewritten}
     downloads: list[Download] = []
     for assignment in mapping.assignments:
@@ -272,11 +273,11 @@ def mapping_downloads(mapping: Mapping) -> tuple[Download, ...]:
             for step in _pdo_downloads(pdo)
         ]
         keeps_list = assignment.fixed and assignment.sync_manager not in mapping.reassigned
-        downloads += contents if keeps_list else _assigned(assignment, contents)
+        downloads += contents if keeps_list else _assignment_downloads(assignment, contents)
     return tuple(downloads)
 
 
-def _assigned(assignment: Assignment, contents: Sequence[Download]) -> list[Download]:
+def _assignment_downloads(assignment: Assignment, contents: Sequence[Download]) -> list[Download]:
     index = ASSIGNMENT_BASE + assignment.sync_manager
     ranks = enumerate(assignment.pdos, start=1)
     return [

@@ -1,4 +1,4 @@
-"""StartUp: an object that the application has written to a device before SAFE-OP."""
+"""StartUp: a value that the application writes to an object of a device before SAFE-OP."""
 
 from __future__ import annotations
 
@@ -13,17 +13,17 @@ MAPPING_OBJECTS = (range(0x1600, 0x1800), range(0x1A00, 0x1C00), range(0x1C10, 0
 
 @dataclass(frozen=True, slots=True)
 class StartUp:
-    """An object that is written to a device in PRE-OP, each time the loop starts it.
+    """Value of an object that is written to a device in PRE-OP, each time the loop starts it.
 
     It is written again when the device returns after a loss.
 
     Args:
-        index: Of the object, 0 to 0xFFFF.
-        subindex: 0 to 0xFF.
-        value: In the unit of the device; bytes are sent as they are.
-        type: Of `catenary.types`. None: from the device's object dictionary.
-        before_mapping: Write it before the PDO mapping; else after it.
-        verify: Read it back and compare. Objects that can only be written are not read.
+        index: Index of the object, 0 to 0xFFFF.
+        subindex: Subindex, 0 to 0xFF.
+        value: Value in the unit of the device. Bytes are sent unchanged.
+        type: A type of `catenary.types`. None: from the device's object dictionary.
+        before_mapping: True to write it before the PDO mapping; False: after it.
+        verify: True to read it back and compare. Write-only objects are not read.
 
     Raises:
         ValueError: The index, the subindex or the value is out of range, or the object belongs to
@@ -42,13 +42,13 @@ class StartUp:
     def __post_init__(self) -> None:
         if isinstance(self.index, str) or isinstance(self.subindex, str):
             raise TypeError(
-                f"start-up object: index and subindex are numbers, not {self.index!r} and "
+                f"start-up object: index and subindex must be numbers, not {self.index!r} and "
                 f"{self.subindex!r}"
             )
         if not 0 <= self.index <= 0xFFFF or not 0 <= self.subindex <= 0xFF:
             raise ValueError(f"start-up object {self.place}: an index has 16 bits, a subindex 8")
         if any(self.index in objects for objects in MAPPING_OBJECTS):
-            # Unknown to the plan, other bytes would reach the controlword and the targets.
+            # The plan would not know this mapping: wrong bytes would reach controlword and targets.
             raise ValueError(
                 f"start-up object {self.place} is part of the PDO mapping; write the mapping with "
                 "pdos= of the request"
@@ -73,7 +73,7 @@ class StartUp:
         return self.type is None and not isinstance(self.value, bytes)
 
     def encode(self, kind: Scalar | None) -> bytes:
-        """Return the bytes that are sent. `kind`: None for bytes without a type."""
+        """Return the bytes to send. `kind`: type of the value; None for bytes without a type."""
         if kind is None or (self.type is None and isinstance(self.value, bytes)):
             if not isinstance(self.value, bytes):
                 raise TypeError(f"start-up object {self.place}: {self.value!r} needs a type")

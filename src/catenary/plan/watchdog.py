@@ -1,7 +1,7 @@
-"""The time of each device's process-data watchdog, ETG.1000.4 §6.3 (registers 0x0400, 0x0420).
+"""Time of each device's process-data watchdog, ETG.1000.4 §6.3 (registers 0x0400, 0x0420).
 
 After a crash of the MainDevice a drive uses its last outputs until the watchdog expires. In CSP and
-CSV its own loops hold it meanwhile. In CST it applies a stale torque, so the default is short.
+CSV its own loops hold it until then. In CST it applies a stale torque, so the default is short.
 """
 
 from __future__ import annotations
@@ -12,9 +12,9 @@ from catenary.plan.start_up import WATCHDOG_UNIT_NS
 from catenary.wire.cia402 import SLOT_OFFSET, Object
 
 DEFAULT_NS = 100_000_000
-TORQUE_NS = 10_000_000  # default in CST, or
-TORQUE_EXCHANGES = 5  # as long as so many exchanges of the device, if that is longer
-LEAST_EXCHANGES = 3  # a watchdog must outlive so many lost exchanges
+TORQUE_NS = 10_000_000  # shortest default in CST
+TORQUE_EXCHANGES = 5  # shortest default in CST [exchanges of the device]
+LEAST_EXCHANGES = 3  # shortest watchdog time [exchanges of the device]
 COUNT_MAX = 0xFFFF
 SLOTS = 8  # axes of a device, ETG.6010
 TARGET_TORQUES = frozenset(Object.TARGET_TORQUE + SLOT_OFFSET * slot for slot in range(SLOTS))
@@ -26,10 +26,10 @@ def choose_watchdog(
     """Return the watchdog time of a device [ns], 0 for off.
 
     Args:
-        device: The device, for error messages.
+        device: Device, for error messages.
         request: Its process-data request; a required target torque means CST.
-        seconds: The application's choice [s]; 0: off, None: the default.
-        period_ns: Period of the cycle.
+        seconds: Time that the application requests [s]; 0: off; None: the default.
+        period_ns: Period of the cycle [ns].
 
     Raises:
         ValueError: The register cannot hold the time, or it is shorter than three exchanges.
@@ -74,10 +74,10 @@ def _check(
     if watchdog_ns < LEAST_EXCHANGES * period_ns:
         raise ValueError(
             f"watchdog of {seconds:.4f} s would expire after less than {LEAST_EXCHANGES} periods "
-            f"of {period} s; use a longer watchdog=... of the Loop"
+            f"of {period} s; use a longer Loop(watchdog=...)"
         )
     raise ValueError(
         f"{device}: exchanged every {request.divider} cycles of {period} s, less than "
-        f"{LEAST_EXCHANGES} times within the watchdog of {seconds:.4f} s; use a smaller divisor, "
-        "or a longer watchdog=... of the Loop"
+        f"{LEAST_EXCHANGES} times within the watchdog of {seconds:.4f} s; use a smaller divider, "
+        "or a longer Loop(watchdog=...)"
     )

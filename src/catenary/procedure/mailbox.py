@@ -111,8 +111,8 @@ def converse(
         sent, stale = yield from _post(channel, message)
         if sent and not stale:
             channel.repetitions = 0  # the mailbox was empty: no repetition is pending
-        if sent and channel.thinks_ns:
-            yield after(channel.thinks_ns * 1e-9)
+        if sent and channel.answer_delay_ns:
+            yield after(channel.answer_delay_ns * 1e-9)
         if stale and (older := (yield from _take(channel))) is not None:
             _drop_late(channel, older)
         before = channel.dropped
@@ -274,7 +274,7 @@ def _stuck(channel: MailboxChannel, full: bool) -> MailboxError:
 
 def _fetch(channel: MailboxChannel, deadline: Deadline) -> Procedure[Mailbox | None]:
     """Return the next message of the device; None if the deadline has passed."""
-    pace = Pace(max(POLL, channel.thinks_ns * 1e-10))  # a tenth of the expected time
+    pace = Pace(max(POLL, channel.answer_delay_ns * 1e-10))  # a tenth of the expected time
     empty_ns: int | None = None
     while True:
         arrived, received, time_ns = yield from _poll(channel)

@@ -13,7 +13,7 @@ from catenary.wire import coe
 from catenary.wire.mailbox import Mailbox
 
 EMERGENCIES_KEPT = 64
-THINKS_FIRST_NS = 100_000
+ANSWER_DELAY_FIRST_NS = 100_000
 THINKS_MAX_NS = 20_000_000
 
 
@@ -51,7 +51,7 @@ class MailboxChannel:
     # Active and waiting conversations; the first one has the mailbox.
     turns: deque[object] = field(default_factory=deque)
     posted_ns: int | None = None  # time of the last request, until its answer arrives
-    thinks_ns: int = 0  # expected time until the device answers
+    answer_delay_ns: int = 0  # expected time until the device answers
     unsure_ns: int | None = None  # time of a lost frame that may have emptied the mailbox
     owed: bool = False  # a request timed out; its answer may still arrive
     undescribed: int = 0  # number of missing or malformed SDO information answers in a row
@@ -88,11 +88,11 @@ class MailboxChannel:
             empty_ns: Time of the last poll without an answer; None if the first poll succeeded.
         """
         if empty_ns is None:
-            self.thinks_ns = self.thinks_ns * 9 // 10
+            self.answer_delay_ns = self.answer_delay_ns * 9 // 10
         elif self.posted_ns is not None:
             # A single slow answer must not delay all further polls.
-            limit_ns = max(2 * self.thinks_ns, THINKS_FIRST_NS)
-            self.thinks_ns = min(empty_ns - self.posted_ns, limit_ns, THINKS_MAX_NS)
+            limit_ns = max(2 * self.answer_delay_ns, ANSWER_DELAY_FIRST_NS)
+            self.answer_delay_ns = min(empty_ns - self.posted_ns, limit_ns, THINKS_MAX_NS)
         self.posted_ns = None
 
     def listen(self, listener: Listener) -> None:

@@ -22,11 +22,11 @@ from catenary.plan.pdo_search import place_names
 from catenary.plan.start_up import DevicePlan, Download, restoring_downloads
 from catenary.procedure.exchange import Procedure
 from catenary.procedure.mailbox import MailboxChannel
-from catenary.procedure.sdo import NOT_THERE, download, refused, upload, upload_small
+from catenary.procedure.sdo import OBJECT_MISSING, download, refused, upload, upload_small
 
 WRITE_ONLY = frozenset((0x0601_0000, 0x0601_0001))  # abort codes of an object that cannot be read
 # Abort codes of an optional object that is absent, read-only, or refuses the value or the state
-LEFT_ALONE = NOT_THERE | {0x0601_0000, 0x0601_0002, 0x0609_0030, 0x0800_0020, 0x0800_0022}
+OPTIONAL_ABORTS = OBJECT_MISSING | {0x0601_0000, 0x0601_0002, 0x0609_0030, 0x0800_0020, 0x0800_0022}
 
 
 def read_mapping(
@@ -87,7 +87,7 @@ def _write_object(channel: MailboxChannel, step: Download) -> Procedure[None]:
     try:
         yield from download(channel, step.index, step.subindex, step.data)
     except SdoAbort as abort:
-        if not (step.optional and abort.code in LEFT_ALONE):
+        if not (step.optional and abort.code in OPTIONAL_ABORTS):
             what = f"start-up object {step.place} = {step.text or step.data.hex(' ')}"
             raise refused(channel, step.index, step.subindex, abort.code, what=what) from abort
     if not step.verify:

@@ -39,7 +39,7 @@ class Presence(NamedTuple):
     alias: int
 
 
-def look_around(at_most: int) -> Procedure[list[Presence]]:
+def find_devices(at_most: int) -> Procedure[list[Presence]]:
     """Return the present devices, by position.
 
     The result is empty if devices appear or disappear at the same time; try again later. In a cut

@@ -40,7 +40,7 @@ UPLOAD_LIMIT = 1 << 20  # bytes: larger than all known objects
 UPLOAD_TIMEOUT = 60.0  # [s] for all segments: 1 MiB in mailboxes of 128 bytes, 7 ms each
 SMALL_LIMIT = 4096  # bytes: most of these objects have at most 4, but some are strings
 SMALL_TIMEOUT = 5.0  # [s] per object
-NOT_THERE = frozenset((0x0602_0000, 0x0609_0011))  # no such object, no such subindex
+OBJECT_MISSING = frozenset((0x0602_0000, 0x0609_0011))  # no such object, no such subindex
 
 
 def upload(
@@ -110,6 +110,14 @@ def _upload(
             f"the limit is {limit}",
             hint="if the object is that large, increase the limit; else its firmware is at fault",
         )
+    return (yield from _upload_segments(channel, first, timeout))
+
+
+def _upload_segments(
+    channel: MailboxChannel, first: UploadResponse, timeout: float
+) -> Procedure[bytes]:
+    """Read the segments of an object after its first response, ETG.1000.6 §5.6.2.6."""
+    index, subindex = first.index, first.subindex
     data = bytearray(first.data)
     toggle, last = False, False
     deadline = Deadline(timeout)

@@ -13,7 +13,7 @@ from typing import NamedTuple, TypeVar
 from catenary.errors import CatenaryError, DecodeError, MailboxError, ResponseTimeout, SdoAbort
 from catenary.procedure.exchange import Procedure
 from catenary.procedure.mailbox import MailboxChannel, converse, exclusively, further
-from catenary.procedure.sdo import NOT_THERE, decoded, refused
+from catenary.procedure.sdo import OBJECT_MISSING, decoded, refused
 from catenary.procedure.station import Deadline
 from catenary.wire.mailbox import Mailbox, Type
 from catenary.wire.sdo_information import (
@@ -269,7 +269,7 @@ def _enumerated(places: list[str]) -> str:
 
 
 def _is_absent(error: CatenaryError) -> bool:
-    return isinstance(error, SdoAbort) and error.code in NOT_THERE
+    return isinstance(error, SdoAbort) and error.code in OBJECT_MISSING
 
 
 def _count_objects(channel: MailboxChannel) -> Procedure[int]:

@@ -29,7 +29,7 @@ from catenary.procedure.clocks import (
 )
 from catenary.procedure.exchange import Procedure, Reply, Request, read, write
 from catenary.procedure.mailbox import MailboxChannel
-from catenary.procedure.pdo import LEFT_ALONE
+from catenary.procedure.pdo import OPTIONAL_ABORTS
 from catenary.procedure.sdo import download, upload
 from catenary.procedure.station import Station, answered
 from catenary.wire.datagram import EcatCommand
@@ -191,7 +191,7 @@ def write_types(channel: MailboxChannel, types: Mapping[int, bytes]) -> Procedur
         try:
             yield from download(channel, index, 1, kind)
         except SdoAbort as abort:
-            if abort.code not in LEFT_ALONE:
+            if abort.code not in OPTIONAL_ABORTS:
                 raise
 
 

@@ -20,7 +20,7 @@ from catenary.realtime._task import ENDED, FAILED, STARTED, Block, Releases
 from catenary.realtime.running_task import Running
 from catenary.realtime.system import libc
 from catenary.realtime.system.preparation import SET_CAPABILITIES, Session
-from catenary.realtime.system.scheduling import Scheduling, refusal, what_scheduling
+from catenary.realtime.system.scheduling import Scheduling, current_scheduling, refusal
 from catenary.realtime.task import Task
 from catenary.realtime.task_memory import Place
 
@@ -132,7 +132,7 @@ def schedule(task: Task, best_effort: bool) -> Scheduling:
             hint=f"run as root, or run once: {SET_CAPABILITIES}; or add an rtprio line to "
             "/etc/security/limits.d; or set best_effort=True to continue without it",
         )
-    return replace(what_scheduling(), refusals=tuple(refusals))
+    return replace(current_scheduling(), refusals=tuple(refusals))
 
 
 def leave_priority() -> None:

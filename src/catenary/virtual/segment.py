@@ -96,12 +96,8 @@ class Segment:
         ring: bool = False,
         link_loss_detection: float | Literal["enhanced", "standard"] = "enhanced",
     ) -> None:
-        if clock not in ("virtual", "monotonic") and not isinstance(clock, SharedClock):
-            raise ValueError(
-                f'clock must be "virtual", "monotonic" or a VirtualClock, not {clock!r}'
-            )
         self._devices = list(devices)
-        self.clock: ClockKind = "monotonic" if clock == "monotonic" else "virtual"
+        self.clock = _clock_kind(clock)
         wiring = Wiring([device.ports for device in devices], behind or {}, ring=ring)
         self._core = Core(
             len(self._devices),
@@ -253,6 +249,12 @@ class Segment:
     def _plug_first(self, devices: int) -> None:
         for number in range(len(self._devices)):
             self._wires.plug_cable(number, number < devices, at_once=True)
+
+
+def _clock_kind(clock: object) -> ClockKind:
+    if clock not in ("virtual", "monotonic") and not isinstance(clock, SharedClock):
+        raise ValueError(f'clock must be "virtual", "monotonic" or a VirtualClock, not {clock!r}')
+    return "monotonic" if clock == "monotonic" else "virtual"
 
 
 def _detection_ns(given: float | str) -> int:

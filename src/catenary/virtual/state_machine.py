@@ -73,7 +73,7 @@ class StateMachine:
         self.refused: dict[int, tuple[int, int | None]] = {}  # state → AL status code, count
         self.delays: dict[int, int | None] = {}  # state → delay [ns]; None: never reached
 
-    def obey(self) -> None:
+    def follow_request(self) -> None:
         """Handle a write to AL control."""
         control = self._device.fetch_al_control()
         requested, acknowledged = control & 0x0F, bool(control & ACKNOWLEDGE)
@@ -120,7 +120,7 @@ class StateMachine:
     def _enter(self, state: int, identify: bool) -> None:
         lack = self._device.lacks_for_op() if (self.state, state) == (SAFE_OP, OP) else 0
         if lack:
-            # Wait for process data or pulses, until `something_arrived` or the time limit.
+            # Wait for process data or pulses, until `report_arrival` or the time limit.
             self._waiting = identify, self._request
             self._later(TIMEOUTS_NS[lack], lambda: self.fail(SAFE_OP, lack))
             return
@@ -129,7 +129,7 @@ class StateMachine:
         shown = IDENTIFICATION if identify and self._identification else 0
         self._device.show_al_status(state | shown, self._identification if shown else 0)
 
-    def something_arrived(self) -> None:
+    def report_arrival(self) -> None:
         """Complete a waiting request for OP, after the first process data or SYNC pulse."""
         waiting, self._waiting = self._waiting, None
         if waiting is not None and waiting[1] == self._request:

@@ -1,4 +1,4 @@
-"""The watch over the error counters, fed by hand."""
+"""Watch of the error counters, with simulated answers."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def play(main: cat.MainDevice, *answers: Answer) -> None:
         step = watch.send([])
 
 
-def test_it_goes_on_when_two_devices_answer_to_one_address() -> None:
+def test_it_continues_if_two_devices_have_the_same_address() -> None:
     """Somebody joined with an old station address: that is no reason to be blind from then on."""
     with cat.MainDevice(Segment([Coupler(), Servo()])) as main:
         main.scan()

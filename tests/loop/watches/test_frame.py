@@ -1,4 +1,4 @@
-"""The watch over repeated frames, fed by hand."""
+"""Watch of repeated frames, with a simulated counter."""
 
 from __future__ import annotations
 

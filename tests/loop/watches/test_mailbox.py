@@ -1,4 +1,4 @@
-"""Emergencies in real time: the thread beside the loop sees the bit of the mailbox and reads it."""
+"""Emergencies in real time: the service thread reads a mailbox whose bit is set."""
 
 from __future__ import annotations
 

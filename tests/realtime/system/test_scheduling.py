@@ -8,7 +8,7 @@ import sys
 
 import pytest
 
-from catenary.realtime.system.scheduling import Scheduling, request_scheduling, what_scheduling
+from catenary.realtime.system.scheduling import Scheduling, current_scheduling, request_scheduling
 
 
 def in_another_process(code: str) -> str:
@@ -21,7 +21,7 @@ def in_another_process(code: str) -> str:
 
 
 def test_the_default_is_not_real_time():
-    now = what_scheduling()
+    now = current_scheduling()
     assert now.policy == "SCHED_OTHER"
     assert not now.real_time
     assert now.cpus == tuple(sorted(os.sched_getaffinity(0)))
@@ -32,7 +32,8 @@ def test_a_request_is_granted_or_refused_with_a_reason():
         "got = request_scheduling(priority=42); "
         "print(got.real_time or 'SCHED_FIFO 42 refused' in str(got), "
         "got.memory_locked or 'mlockall refused' in str(got), "
-        "(got.policy, got.priority) == (what_scheduling().policy, what_scheduling().priority))"
+        "(got.policy, got.priority) == "
+        "(current_scheduling().policy, current_scheduling().priority))"
     )
     assert answer == "True True True"
 

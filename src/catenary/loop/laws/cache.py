@@ -1,9 +1,9 @@
 """Cache of compiled laws in Numba's format, in a folder that only this user can write.
 
-Numba unpickles the files of its cache. A user who can write there can run code as the user of the
-law. Numba itself uses `__pycache__` next to the source. That folder may belong to another user, be
-writable for a group, or be set by $NUMBA_CACHE_DIR. Catenary uses ~/.cache/catenary/laws (below
-$XDG_CACHE_HOME if that is set), with mode 0700.
+Numba unpickles the files of its cache. A user with write access can therefore run code as the user
+of the law. Numba itself uses `__pycache__` next to the source. That folder may belong to another
+user, be writable for a group, or be set by $NUMBA_CACHE_DIR. Catenary uses ~/.cache/catenary/laws
+(below $XDG_CACHE_HOME if that is set), with mode 0700.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ OTHERS_WRITE = 0o022
 def make_cache(function: Callable[..., Any]) -> Any | None:
     """Return Numba's cache of a function, with all of its dependencies in the key.
 
-    Return None if the source is not a file. Warn and return None if there is no private folder.
+    Return None if the source is not a file. Warn and return None if no private folder is possible.
     """
     source = inspect.getfile(function)
     if not os.path.exists(source):  # typed at a prompt, or in a zip
@@ -38,8 +38,9 @@ def make_cache(function: Callable[..., Any]) -> Any | None:
         folder = private_folder(cache_folder())
     except (OSError, RuntimeError) as error:  # RuntimeError: no home
         warnings.warn(
-            f"compiled laws are not cached, every start compiles them again: {error}. Only you and "
-            "root may own or write the folders of the cache; set $XDG_CACHE_HOME to another place",
+            f"compiled laws are not cached, so every start compiles them again: {error}. Only you "
+            "and root may own or write the folders of the cache; set $XDG_CACHE_HOME to another "
+            "folder",
             RuntimeWarning,
             stacklevel=2,
         )
@@ -55,9 +56,9 @@ def cache_folder() -> Path:
 
 
 def private_folder(folder: Path) -> Path:
-    """Create a folder that only this user can write, mode 0700. Return it without links.
+    """Create a folder that only this user can write, with mode 0700, and return its real path.
 
-    The folders above it, up to the home, are checked too, as in OpenSSH's StrictModes (misc.c,
+    The folders above it, up to the home, are also checked, as in OpenSSH's StrictModes (misc.c,
     safe_path). Each is checked before anything below it is created or changed, because root can
     have the HOME of another user (sudo).
 
@@ -84,10 +85,10 @@ def private_folder(folder: Path) -> Path:
         raise PermissionError(f"{folder} is a link")
     if stat.S_IMODE(status.st_mode) != 0o700:
         real.chmod(0o700)
-    for path in real.glob("*.nb[ci]"):  # from before the folder was private
+    for path in real.glob("*.nb[ci]"):  # they may be older than the mode of the folder
         found = path.lstat()
         if found.st_uid != os.geteuid() or found.st_mode & OTHERS_WRITE:
-            raise PermissionError(f"others can write {path}")
+            raise PermissionError(f"other users can write {path}")
     return real
 
 
@@ -103,7 +104,7 @@ def _refuse_writable(place: Path) -> None:
     status = place.stat()
     _refuse_foreign(place, status)
     if status.st_mode & OTHERS_WRITE and not status.st_mode & stat.S_ISVTX:
-        raise PermissionError(f"others can write in {place}")
+        raise PermissionError(f"other users can write in {place}")
 
 
 def _refuse_foreign(place: Path, status: os.stat_result) -> None:

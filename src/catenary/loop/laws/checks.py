@@ -29,6 +29,7 @@ def check_source(function: Callable[..., Any]) -> None:
 
 
 def place(function: Callable[..., Any], line: int) -> str:
+    """Return a line of a function's source as text: `file:line`."""
     return f"{inspect.getsourcefile(function) or '?'}:{line}"
 
 
@@ -40,12 +41,12 @@ def forbidden(tree: ast.AST, *, handled: bool) -> Iterator[tuple[ast.stmt | ast.
             yield (
                 node,
                 f"`{word}` without a handler",
-                "return True to end the law, or write what is wrong into memory",
+                "return True to end the law, or write an error code to memory",
             )
         elif isinstance(node, ast.Call) and called(node) == "print":
-            yield node, "`print` takes the GIL", "write to memory and print it from Python"
+            yield node, "`print` needs the GIL", "write to memory and print it from Python"
         elif isinstance(node, ast.With) and any(map(is_object_mode, node.items)):
-            yield node, "object mode takes the GIL", "do that part in Python, outside the law"
+            yield node, "object mode needs the GIL", "do that part in Python, outside the law"
         elif isinstance(node, ast.Try):
             inner = ast.Module(body=node.body, type_ignores=[])
             yield from forbidden(inner, handled=handled or bool(node.handlers))
@@ -60,10 +61,12 @@ def forbidden(tree: ast.AST, *, handled: bool) -> Iterator[tuple[ast.stmt | ast.
 
 
 def called(node: ast.Call) -> str:
+    """Return the name of the called function; empty if it has none."""
     return node.func.id if isinstance(node.func, ast.Name) else ""
 
 
 def is_object_mode(item: ast.withitem) -> bool:
+    """Return True if a `with` statement enters Numba's object mode."""
     expression = item.context_expr
     function = expression.func if isinstance(expression, ast.Call) else expression
     name = function.attr if isinstance(function, ast.Attribute) else getattr(function, "id", "")

@@ -47,14 +47,14 @@ def shell(actual_at, target_at, memory_at, memory_count, parameters_at, paramete
 
 @dataclass(frozen=True, slots=True)
 class CompiledLaw:
-    """Owns the machine code: keep the object while the address is in use."""
+    """Owns the machine code of a law. Keep the object while the address is in use."""
 
     address: int
     code: object
 
 
 def compile_law(law: Law, layout: LawLayout) -> CompiledLaw:
-    """Compile a law, or take it from the cache (cache.py).
+    """Compile a law, or load it from the cache (cache.py).
 
     Args:
         law: Law to compile.
@@ -86,7 +86,7 @@ def compile_law(law: Law, layout: LawLayout) -> CompiledLaw:
 
 @contextmanager
 def counted_allocations() -> Iterator[Callable[[], int]]:
-    """Yield a function that counts the arrays compiled laws allocated since the block began."""
+    """Yield a function that returns the number of arrays that compiled laws allocated so far."""
     runtime: Any = import_module("numba.core.runtime")
     runtime._nrt_python.memsys_enable_stats()
     try:
@@ -109,7 +109,7 @@ def _numba(law: Law) -> Any:
 
 
 def _inner(numba: Any, function: Callable[..., Any]) -> Any:
-    """Return the law itself; from the cache if its source is a file."""
+    """Return the function for Numba, with a cache if its source is a file."""
     inner = numba.njit(boundscheck=True, error_model="numpy", nogil=True)(function)
     cache = make_cache(function)
     if cache is not None:
@@ -141,7 +141,7 @@ def _returned(numba: Any, law: Law, inner: Any, layout: LawLayout) -> str:
         return "number"
     raise LawError(
         f"law {law} returns {returned}",
-        hint="a law must return True when it has finished, else False or None",
+        hint="a law must return True when it has finished, otherwise False or None",
     )
 
 
@@ -164,7 +164,7 @@ def _shell(numba: Any, law: Law, inner: Any, layout: LawLayout, returned: str) -
 
 
 def _readable(error: Exception) -> str:
-    """Return the first sentences of Numba's message, and the place that it names."""
+    """Return the first lines of Numba's message, and the place that it names."""
     text = re.sub(r"\x1b\[[0-9;]*m", "", str(error))
     said = [line.strip() for line in text.splitlines() if line.strip()]
     reasons = [line for line in said if not line.startswith(("Failed in", "During", "File", ">>>"))]

@@ -19,8 +19,8 @@ CONSTANTS = (bool, int, float, complex, str, bytes, tuple)
 def dependencies(function: Callable[..., Any]) -> tuple[str, ...]:
     """Return everything that the machine code of a law depends on, as comparable texts.
 
-    These are the values of the globals that the law and its callees use, and the stamps of the
-    files of these callees and of used modules.
+    These are the values of the globals that the law and its callees use, and the time stamps and
+    sizes of the files of these callees and of used modules.
     """
     found: set[str] = set()
     waiting, seen = [function], {id(function)}
@@ -66,7 +66,7 @@ def _names(code: CodeType) -> Iterator[str]:
 
 
 def _stamps(module: ModuleType) -> Iterator[str]:
-    """Yield the stamp of a module's file; for a package, of all files in its folder."""
+    """Yield the stamp of a module's file, and for a package those of all files in its folder."""
     for folder in getattr(module, "__path__", ()):
         yield from map(_stamp, Path(folder).glob("*.py"))
     if getattr(module, "__file__", None):
@@ -77,5 +77,5 @@ def _stamp(path: Path) -> str:
     try:
         status = path.stat()
     except OSError:
-        return f"{path}: not there"  # source typed at a prompt or in a zip
+        return f"{path}: missing"  # source typed at a prompt or in a zip
     return f"{path}: {status.st_mtime_ns} {status.st_size}"

@@ -1,4 +1,4 @@
-"""Control laws: Python functions marked by `@cat.law`, compiled on the robot."""
+"""Control laws: Python functions marked with `@cat.law`, compiled on the controlling machine."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ class Law:
 
         actual: n, ok, dt [s], and per axis position [rad], velocity [rad/s], torque [N·m], enabled.
         target: position, velocity and torque per axis, which the law writes.
-        memory: State of the law, float64, kept from cycle to cycle.
+        memory: State of the law, float64. It is kept from cycle to cycle.
         parameters: Values from the application, float64; they may change while the law runs.
         time: Time since the first cycle of the law [s].
         enabled, dt, ok, n: The same as in `actual`.
@@ -31,8 +31,8 @@ class Law:
     `target["Output 1"] = 1`), or all columns as the arrays reals, integers and bits. The axes are
     those of all Drives of the loop, in order.
 
-    The law returns True or another non-zero number when it has finished, else False, 0 or None.
-    Calling a Law calls the function in Python, with all of Python's errors.
+    The law returns True or another non-zero number when it has finished, otherwise False, 0 or
+    None. A direct call of a Law runs the function as Python, with Python's errors.
     """
 
     def __init__(self, function: LawFunction) -> None:
@@ -51,7 +51,7 @@ class Law:
 
 
 def law(function: LawFunction) -> Law:
-    """Make a control law from a function: see `Law`. `loop.run(pd, memory=[...])` runs it."""
+    """Make a control law from a function: see `Law`. Run it with `loop.run(pd, memory=[...])`."""
     return function if isinstance(function, Law) else Law(function)
 
 
@@ -60,7 +60,7 @@ def arguments_of(function: LawFunction) -> tuple[str, ...]:
 
     Raises:
         TypeError: The object is not a plain function.
-        LawError: A law cannot have one of the arguments.
+        LawError: An argument has another name than those in `ARGUMENTS`, or a wrong kind.
     """
     if not inspect.isfunction(function):
         raise TypeError(f"a law must be a plain function, not {function!r}")

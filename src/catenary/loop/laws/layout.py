@@ -21,12 +21,14 @@ BANKS = {Bank.REAL: "reals", Bank.INTEGER: "integers", Bank.BIT: "bits"}
 
 @dataclass(frozen=True, slots=True)
 class LawLayout:
+    """NumPy types of the blocks that a law reads and writes."""
+
     actual: RecordType
     target: RecordType
 
 
 def law_layout(engine: Engine, tables: Sequence[RequestTables]) -> LawLayout:
-    """Return the records of a loop's law."""
+    """Return the NumPy types for the laws of a loop."""
     (actual, target), (inputs, outputs) = engine.law_fields(), engine.blocks()
     return LawLayout(
         record_type(actual, (table.input_columns for table in tables), len(inputs)),
@@ -86,7 +88,7 @@ def named(
 
 
 def record_at(block: memoryview, layout: RecordType) -> np.record:
-    """Return the block as a record for a law that runs as Python; nothing is copied.
+    """Return the block as a record, without a copy, for a law that runs as Python.
 
     Args:
         block: Block of the core.

@@ -18,7 +18,7 @@ Numbers = npt.NDArray[np.float64]
 
 
 class LawRun:
-    """Law that runs natively in the cycle. Made by `Loop.start` and `Loop.run`."""
+    """Law that runs natively in the cycle; the result of `Loop.start`."""
 
     def __init__(
         self,
@@ -51,6 +51,7 @@ class LawRun:
 
     @property
     def running(self) -> bool:
+        """True until the law has ended."""
         return not self._native.ended
 
     @property
@@ -68,6 +69,7 @@ class LawRun:
 
     @property
     def steps(self) -> int:
+        """Number of steps so far."""
         return self._native.figures["steps"]
 
     @property
@@ -109,7 +111,7 @@ class LawRun:
                 "check for a division by zero, or a NaN input (a quantity that the drive lacks)",
             ),
             core.LAW_OVERRUN: lambda: (
-                f"took longer than its budget too often, at most {self.longest * 1e6:.0f} us",
+                f"exceeded its budget too often, with up to {self.longest * 1e6:.0f} us",
                 "make it faster, or raise the limits: Loop.run(..., budget=..., overruns=...)",
             ),
         }

@@ -1,4 +1,4 @@
-"""Laws of an open loop: they are compiled, tried, started, and run natively or as Python."""
+"""Compilation, trial and execution of the laws of an open loop, natively or as Python."""
 
 from __future__ import annotations
 
@@ -65,9 +65,9 @@ class LawRunner:
             ValueError: An argument is impossible.
         """
         if budget is not None and not budget >= 0:
-            raise ValueError(f"budget={budget} s: must not be negative")
+            raise ValueError(f"budget={budget} s: must be 0 or more")
         if overruns < 1:
-            raise ValueError(f"overruns={overruns}: at least 1")
+            raise ValueError(f"overruns={overruns}: must be at least 1")
         compiled = self.compile(law)
         given = numbers("parameters", parameters)
         native = core.Law(
@@ -87,7 +87,7 @@ class LawRunner:
     def _try(self, law: Law, native: core.Law) -> None:
         """Run steps on copies of the present values.
 
-        This maps the law's pages before its first cycle, and finds errors of every step.
+        This maps the law's pages before its first cycle, and finds errors that occur in every step.
         """
         actual, target = self._engine.blocks()
         with counted_allocations() as allocated:
@@ -95,7 +95,7 @@ class LawRunner:
             if allocated():
                 warnings.warn(
                     f"law {law} allocates memory in every step, probably by an expression on whole "
-                    "arrays; this is slow at times: use a loop over the axes",
+                    "arrays; this is sometimes slow: use a loop over the axes",
                     stacklevel=4,
                 )
         if result == core.LAW_ABORTED:
@@ -114,22 +114,27 @@ class LawRunner:
         """
         while run.running:
             judge(self._engine.run_law(SLICE_NS, trouble))
-        self.raise_failure(None)
+        if (failure := self.failure(None)) is not None:
+            raise failure
 
-    def raise_failure(self, log: Log | None) -> None:
-        """Raise the error of the law if it has failed."""
+    def failure(self, log: Log | None) -> LawError | None:
+        """Return the error of the law if it has failed, once.
+
+        Args:
+            log: The last cycles.
+        """
         run = self._run
         error = run.error(self._axes, log, lambda: self._replay(run)) if run else None
         if error is not None:
             self._run = None
-            raise error
+        return error
 
     def _replay(self, run: LawRun) -> str:
         """Run the last step again as Python on copies; return its exception as text."""
         try:
             time = (run.steps - 1) * self._period_ns * 1e-9
             self._step(run.law, run.memory, run.parameters, time, copies=True)
-        except Exception as error:  # whatever the law raises
+        except Exception as error:  # any error of the law
             line = traceback.extract_tb(error.__traceback__)[-1].lineno
             return f" ({type(error).__name__}: {error}, line {line})"
         return ""

@@ -1,4 +1,4 @@
-"""Changes since the last call: axes that the core stopped, and modes that drives refused."""
+"""Watch of axes: new stops by the core, and mode changes that drives refused."""
 
 from __future__ import annotations
 
@@ -17,36 +17,46 @@ from catenary.wire.cia402 import Mode
 
 
 class StoppedAxis(NamedTuple):
-    """One stop of an axis by the core."""
+    """Stop of an axis by the core."""
 
-    axis: int  # its number in the plan
+    axis: int  # number in the plan
     name: str
     device: int
     mode: int  # mode of operation that the drive shows
     reason: StopReason
     cycle: int
-    requested: bool  # by the application or the loop
+    requested: bool  # True if the application or the loop requested it
 
     @property
     def message(self) -> str:
-        """Axis, cycle and reason."""
+        """Axis, cycle and reason, as text."""
         return f"{self.name} was stopped in cycle {self.cycle}: {self.reason.text}"
 
     def event(self, now: float, sub: SubDevice) -> AxisStopped:
-        """Return the event at `now` [s]."""
+        """Return the event of the stop.
+
+        Args:
+            now: Present time [s].
+            sub: Device of the axis.
+        """
         return AxisStopped(now, sub, self.message, self.name, self.reason, self.cycle)
 
 
 class RefusedMode(NamedTuple):
-    """A change of mode that a drive did not make."""
+    """Mode change that a drive refused."""
 
     axis: int
     name: str
     device: int
-    mode: int  # requested
+    mode: int  # requested mode of operation
 
     def event(self, now: float, sub: SubDevice) -> ModeRefused:
-        """Return the event at `now` [s]."""
+        """Return the event of the refusal.
+
+        Args:
+            now: Present time [s].
+            sub: Device of the axis.
+        """
         message = (
             f"{self.name} did not change to {mode_name(self.mode)} (0x6061); it continues in its "
             "former mode"
@@ -55,7 +65,7 @@ class RefusedMode(NamedTuple):
 
 
 class AxisWatch:
-    """Owns the stops and refused modes that were already announced."""
+    """Owns the stops and refused modes that were already reported."""
 
     def __init__(self, views: Views, axes: Sequence[AxisPlan]) -> None:
         self._views = views
@@ -72,11 +82,11 @@ class AxisWatch:
         return [self._stop(axis) for axis in np.flatnonzero(changed & (reasons != 0)).tolist()]
 
     def new_refusals(self, *, explained: bool) -> list[RefusedMode]:
-        """Return the refused changes of mode since the last call.
+        """Return the mode changes that were refused since the last call.
 
         Args:
-            explained: True if a new stop explains the call. False: flags that were already reported
-                count as new, because the application repeated the request.
+            explained: True if a new stop is the reason of the call. False: flags that were already
+                reported are new again, because the application repeated the request.
         """
         flagged = (self._views.axis_flags & AXIS_MODE_REFUSED) != 0
         new = flagged & ~self._refused

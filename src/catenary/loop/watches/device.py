@@ -1,4 +1,4 @@
-"""Watch over the devices of a running loop: it tracks lost, faulted and returning devices.
+"""Watch of the devices of a running loop: it tracks lost, faulted and returning devices.
 
 The watch is one endless procedure in the acyclic queue. While the cycle finds all devices in OP, it
 only reads a flag of the core. Otherwise it queries all devices, reports changes as events, and
@@ -25,7 +25,7 @@ from catenary.bus.pending import Pending
 from catenary.errors import CatenaryError
 from catenary.link import ring_of
 from catenary.loop.cycle_errors import described
-from catenary.loop.options import ReturnPolicy
+from catenary.loop.options import StopPolicy
 from catenary.loop.watches.ring import RingWatch
 from catenary.model.device import Identity
 from catenary.model.device_matching import vacancies
@@ -40,12 +40,12 @@ from catenary.wire.al import ERROR_FLAG, STATE_MASK, AlState
 Submit = Callable[[Procedure[None]], Pending[None]]
 
 LOOK = 0.010  # [s] between two reads of the core's flag, and between two surveys
-STRANGERS_MAX = 16  # further devices beyond the scanned ones that are distinguished
-FAILURES_MAX = 3  # attempts to bring a device back each time it returns
+STRANGERS_MAX = 16  # largest number of additional devices that are distinguished
+FAILURES_MAX = 3  # largest number of attempts to bring a device back after a return
 
 
 class Attendance(Protocol):
-    """Watch over the devices of a running loop."""
+    """Watch of the devices of a running loop."""
 
     @property
     def excuses(self) -> bool: ...
@@ -55,34 +55,34 @@ class Attendance(Protocol):
 
 
 class Standing(Enum):
-    """State of a device as the watch sees it."""
+    """State of a device in the watch."""
 
     RUNNING = "running"
     LOST = "lost"  # does not answer
     ASTRAY = "astray"  # answers, out of OP, its station address kept
-    RETURNING = "returning"  # a procedure is bringing it back to OP
+    RETURNING = "returning"  # a procedure brings it back to OP
     HELD = "held"  # waits for `release`
 
 
 @dataclass(slots=True)
 class Charge:
-    """Owns the watch's state of one device."""
+    """Owns the state of one device in the watch."""
 
     sub: SubDevice
     plan: DevicePlan
     required: bool
-    identity: Identity  # of the expected device: the planned one or an accepted replacement
+    identity: Identity  # of the expected device: the planned one, or an accepted replacement
     standing: Standing = Standing.RUNNING
     task: Pending[None] | None = None
     failures: int = 0
-    unread: int = 0  # attempts in which the identity of the device in its place was unreadable
+    unread: int = 0  # failed attempts to read the identity of the device in its place
     released: bool = False
 
 
 def required_positions(plan: Plan) -> frozenset[int]:
-    """Return the positions of the required devices: all but the optional ones.
+    """Return the positions of the required devices.
 
-    Empty if all exchanged devices are optional: a coupler before them is not required either.
+    None is required if all exchanged devices are optional, not even a coupler before them.
     """
     units = plan.cycle.sync_units
     if units and all(unit.optional for unit in units):
@@ -104,8 +104,7 @@ class Watch:
         now: Callable[[], float],
         rejoin: Callable[[int, DevicePlan], Procedure[None]] | None = None,
         cables_seen: Callable[[], None] = lambda: None,
-        on_return: ReturnPolicy = "restore",
-        on_replacement: ReturnPolicy = "hold",
+        policy: StopPolicy = StopPolicy(),
     ) -> None:
         required = required_positions(plan)
         self._charges = [
@@ -119,15 +118,14 @@ class Watch:
         self._now = now
         self._rejoin = rejoin
         self._cables_seen = cables_seen
-        self._on_return = on_return
-        self._on_replacement = on_replacement
+        self._policy = policy
         ring = ring_of(main.link)
         self._ring = (
             None
             if ring is None
             else RingWatch(ring, len(self._charges), report=self._report, now=now)
         )
-        self._unsettled = False  # True if a device was not running at the last look
+        self._unsettled = False  # True if a device was not running at the last survey
         self._strangers: set[tuple[int, Identity]] = set()
 
     def run(self) -> Procedure[None]:
@@ -137,7 +135,7 @@ class Watch:
                 self._ring.look()
                 self._cables_seen()
             if self._disturbed() or self._unsettled:
-                yield from self._look()
+                yield from self._survey()
                 self._unsettled = any(c.standing is not Standing.RUNNING for c in self._charges)
             yield after(LOOK)
 
@@ -145,8 +143,8 @@ class Watch:
     def excuses(self) -> bool:
         """True if the loop may continue although a device is out of OP.
 
-        This holds if, as of the last look, only optional devices are lost or out of OP. The value
-        lags by at most `LOOK`.
+        As of the last survey, only optional devices are lost or out of OP. The value is at most
+        `LOOK` old.
         """
         return not self._all_required and all(
             charge.standing not in (Standing.ASTRAY, Standing.LOST)
@@ -163,20 +161,20 @@ class Watch:
         charge = self._charges[sub.position]
         charge.released, charge.failures = True, 0
 
-    # One look
+    # One survey
 
-    def _look(self) -> Procedure[None]:
+    def _survey(self) -> Procedure[None]:
         answers = yield from survey([charge.sub.station for charge in self._charges])
         for charge, answer in zip(self._charges, answers, strict=True):
             self._judge(charge, answer)
         if any(charge.standing is Standing.LOST for charge in self._optional()):
-            yield from self._look_for_returned()
+            yield from self._find_returned()
         for charge in self._optional():
             if charge.standing is Standing.ASTRAY:
-                self._lead(charge, self._back_to_op(charge))
+                self._start_return(charge, self._back_to_op(charge))
             elif charge.standing is Standing.HELD and charge.released:
                 charge.released = False
-                self._lead(charge, self._restored(charge))
+                self._start_return(charge, self._restored(charge))
 
     def _optional(self) -> Iterator[Charge]:
         return (charge for charge in self._charges if not charge.required)
@@ -194,12 +192,12 @@ class Watch:
                 return
             self._conclude(charge, task)
         if answer.word is None:
-            self._lose(charge)
+            self._set_lost(charge)
         elif answer.word & (STATE_MASK | ERROR_FLAG) == AlState.OP:
-            if charge.standing is Standing.LOST and not self._lets_in(charge):
-                self._welcome(charge)  # hold it: it has never left OP
+            if charge.standing is Standing.LOST and not self._may_return(charge):
+                self._handle_return(charge)  # to hold it: it has never left OP
             elif charge.standing is not Standing.HELD:
-                self._is_back(charge)
+                self._set_running(charge)
         elif charge.standing is Standing.RUNNING:
             charge.standing = Standing.ASTRAY
             charge.sub.state = None
@@ -209,10 +207,10 @@ class Watch:
                 StateLost(self._now(), charge.sub, message, int(AlState.OP), state, answer.code)
             )
         elif charge.standing is Standing.LOST:
-            # Only the cable was pulled: the device kept its address, and its watchdog stopped it.
-            self._welcome(charge)
+            # Only the cable was pulled. The device kept its address, and its watchdog stopped it.
+            self._handle_return(charge)
 
-    def _lose(self, charge: Charge) -> None:
+    def _set_lost(self, charge: Charge) -> None:
         if charge.standing in (Standing.RUNNING, Standing.ASTRAY, Standing.HELD):
             self._report(
                 DeviceLost(
@@ -221,7 +219,7 @@ class Watch:
             )
         charge.standing, charge.failures, charge.sub.state = Standing.LOST, 0, None
 
-    def _is_back(self, charge: Charge) -> None:
+    def _set_running(self, charge: Charge) -> None:
         if charge.standing is Standing.LOST:
             self._report_returned(charge)
         charge.standing, charge.failures, charge.sub.state = Standing.RUNNING, 0, AlState.OP
@@ -231,7 +229,7 @@ class Watch:
         self._report(DeviceReturned(self._now(), charge.sub, message))
 
     def _conclude(self, charge: Charge, task: Pending[None]) -> None:
-        """Evaluate a procedure that has ended and was to bring a device back."""
+        """Evaluate the ended procedure that was to bring a device back."""
         charge.task = None
         charge.standing = Standing.ASTRAY
         if task.error is None:
@@ -248,15 +246,15 @@ class Watch:
         message = f"{charge.sub.station} is held: {reason}"
         self._report(DeviceHeld(self._now(), charge.sub, message, state, reason))
 
-    def _lead(self, charge: Charge, conversation: Procedure[None]) -> None:
+    def _start_return(self, charge: Charge, conversation: Procedure[None]) -> None:
         charge.standing = Standing.RETURNING
         charge.task = self._submit(conversation)
 
-    # Coming back
+    # Return of devices
 
-    def _look_for_returned(self) -> Procedure[None]:
-        """Find returned devices: without a valid address, in free places of the network."""
-        present = yield from restore.look_around(len(self._charges) + STRANGERS_MAX)
+    def _find_returned(self) -> Procedure[None]:
+        """Find returned devices without a valid address, and assign them to vacant places."""
+        present = yield from restore.find_devices(len(self._charges) + STRANGERS_MAX)
         known = [charge.plan.station_address for charge in self._charges]
         free = vacancies([presence.station_address for presence in present], known)
         taken: set[int] = set()
@@ -269,12 +267,12 @@ class Watch:
             charge = yield from self._recognise(present[rank], lost)
             if charge is not None:
                 taken.add(charge.plan.position)
-                self._welcome(charge)
+                self._handle_return(charge)
 
     def _recognise(
         self, presence: restore.Presence, lost: Sequence[Charge]
     ) -> Procedure[Charge | None]:
-        """Give a device the address of its place; return None if it has no place here."""
+        """Give a returned device the address of its place; return None if it has no place here."""
         found: Identity | None = None
         for charge in lost:
             if charge.sub.alias and charge.sub.alias != presence.alias:
@@ -287,14 +285,14 @@ class Watch:
                 elif found.same_kind(charge.plan.identity):
                     yield from restore.give_address(presence, station)
             except CatenaryError as error:
-                # Lost again, or its identity is unreadable: it must not answer for the former one.
+                # It is lost again, or unreadable: it must not answer in place of the former one.
                 yield from restore.forget_address(presence)
                 self._note_unread(charge, error)
                 return None
             if found.same_kind(charge.plan.identity):
                 if found.serial == charge.identity.serial:
                     return charge
-                return (yield from self._exchanged(charge, presence, found))
+                return (yield from self._handle_replacement(charge, presence, found))
         yield from restore.forget_address(presence)
         if lost and found is not None:
             self._report_replaced(lost[0], presence, found)
@@ -308,12 +306,12 @@ class Watch:
             message = f"{charge.sub.station} is held: {reason}"
             self._report(DeviceHeld(self._now(), charge.sub, message, 0, reason))
 
-    def _exchanged(
+    def _handle_replacement(
         self, charge: Charge, presence: restore.Presence, found: Identity
     ) -> Procedure[Charge | None]:
         """Handle a replacement: the same product with another serial number."""
         self._report_replaced(charge, presence, found)
-        if self._on_replacement == "restore" or charge.released:
+        if self._policy.on_replacement == "restore" or charge.released:
             charge.identity = found  # the place now belongs to this device
             self._strangers = {each for each in self._strangers if each[0] != charge.plan.position}
             return charge
@@ -321,7 +319,7 @@ class Watch:
         return None
 
     def _report_replaced(self, charge: Charge, presence: restore.Presence, found: Identity) -> None:
-        """Put the event once for each device in a place that is not its own."""
+        """Put the event once for each device that is in a wrong place."""
         if (charge.plan.position, found) in self._strangers:
             return
         self._strangers.add((charge.plan.position, found))
@@ -329,27 +327,28 @@ class Watch:
         message = f"{charge.sub.station} was replaced: found {found} instead of {expected}"
         self._report(DeviceReplaced(self._now(), charge.sub, message, expected, found))
 
-    def _welcome(self, charge: Charge) -> None:
+    def _handle_return(self, charge: Charge) -> None:
         """Bring back or hold a device that was lost and has its address again."""
         charge.unread = 0
         self._report_returned(charge)
-        if self._lets_in(charge):
+        if self._may_return(charge):
             charge.released = False
-            self._lead(charge, self._restored(charge))
+            self._start_return(charge, self._restored(charge))
         else:
-            self._lead(charge, self._waiting(charge))
+            self._start_return(charge, self._waiting(charge))
 
-    def _lets_in(self, charge: Charge) -> bool:
-        return self._on_return == "restore" or charge.released or charge.required
+    def _may_return(self, charge: Charge) -> bool:
+        return self._policy.on_return == "restore" or charge.released or charge.required
 
     def _back_to_op(self, charge: Charge) -> Procedure[None]:
-        """Acknowledge the error; the configuration is usually intact. On failure, start at INIT."""
+        """Request OP, as the configuration is usually intact. After a failure, start from INIT."""
         if charge.failures == 0:
             yield from request_state(charge.sub.station, AlState.OP)
         else:
             yield from self._restored(charge)
 
     def _restored(self, charge: Charge) -> Procedure[None]:
+        """Configure the device from INIT on, and bring it to OP."""
         sub, plan = charge.sub, charge.plan
         yield from restore.bring_to_pre_op(sub.station, sub.channel)
         sub.state = AlState.PRE_OP

@@ -1,7 +1,7 @@
-"""Watch over the error counters of a running loop, which are read once per second.
+"""Watch of the error counters of the devices, which are read once per second.
 
-It runs as an endless procedure in the acyclic queue and sends one frame per 46 devices and second.
-A finding about a cable, a device or its supply becomes an event, repeated at most once per minute.
+It is an endless procedure in the acyclic queue, and sends one frame per second for 46 devices.
+A finding about a cable, a device or its supply becomes an event, at most once per minute.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ class ErrorWatch:
         self._put = main.events.put
         self._now = now
         self._last: Totals = ()
-        self._told: dict[str, float] = {}  # place → time of its last event [s]
+        self._reported: dict[str, float] = {}  # place → time of its last event [s]
         self.topology = make_topology(
             [sub.description.open_ports for sub in self._subs],
             ring=ring_of(main.link) is not None,
@@ -45,7 +45,7 @@ class ErrorWatch:
             yield after(PERIOD)
 
     def look(self) -> Procedure[Sequence[Finding]]:
-        """Return the findings since the last reading; none at the first reading.
+        """Return the findings since the last reading; none after the first reading.
 
         `main.diagnose()` covers the counts from before the loop.
         """
@@ -61,9 +61,9 @@ class ErrorWatch:
 
     def _report(self, finding: Finding) -> None:
         now = self._now()
-        if now - self._told.get(finding.where, -SILENCE) < SILENCE:
+        if now - self._reported.get(finding.where, -SILENCE) < SILENCE:
             return
-        self._told[finding.where] = now
+        self._reported[finding.where] = now
         sub = self._subs[finding.devices[-1]] if finding.devices else None
         message = f"{finding.where}: {finding.evidence}"
         self._put(FaultFound(now, sub, message, finding))

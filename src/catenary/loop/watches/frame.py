@@ -1,4 +1,4 @@
-"""The watch over duplicate frames of a running loop, from counters of the core and of a ring.
+"""Watch of duplicate frames, by counters of the core and of a ring.
 
 A frame that returns a second time, in its cycle or later, is counted as repeated. Single ones occur
 when a switch or a NIC repeats a frame. Many of them indicate a loop in the wiring or a second
@@ -13,7 +13,7 @@ from catenary.bus.event_types import DuplicateFrames, Event
 from catenary.procedure.exchange import Procedure, after
 
 PERIOD = 1.0  # [s] between two readings of the counters
-DUPLICATES_MIN = 10  # frames in one period that raise the event
+DUPLICATES_MIN = 10  # smallest number of frames in one period that puts an event
 SILENCE = 60.0  # [s] between two events
 
 
@@ -51,7 +51,7 @@ class FrameWatch:
             return
         self._reported = now
         message = (
-            f"{repeated} frames in {interval:.1f} s came back more than once: suspect a loop in "
-            "the wiring or a second sender; Scheduling(exact_matching=True) rejects such frames"
+            f"{repeated} frames in {interval:.1f} s returned more than once: check for a loop "
+            "in the wiring or a second sender; Scheduling(exact_matching=True) rejects such frames"
         )
         self._put(DuplicateFrames(now, None, message, repeated, interval))

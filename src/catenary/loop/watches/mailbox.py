@@ -1,8 +1,8 @@
-"""Detection of mailbox messages that devices send unasked: emergencies and late answers.
+"""Watch of mailboxes, for messages that were not requested: emergencies and late answers.
 
 If a device has a spare FMMU, the full bit of its mailbox is part of the cyclic data and costs no
 extra frame (plan/mailboxes.py). The other devices are polled by register, one device at a time. If
-all devices have such a bit, they are still polled, but less often.
+all devices have such a bit, they are also polled, but less often.
 """
 
 from __future__ import annotations
@@ -15,17 +15,17 @@ from catenary.plan.planner import Plan
 from catenary.procedure.exchange import Procedure
 from catenary.procedure.mailbox import MailboxChannel, drain, exclusively
 
-ASK_NS = 10_000_000  # between two polls if a device has no bit in the cyclic data
-TRUST_NS = 100_000_000  # between two polls if all devices have one
+POLL_NS = 10_000_000  # between two polls if a device has no bit in the cyclic data
+SLOW_POLL_NS = 100_000_000  # between two polls if all devices have one
 
 NEVER_NS = 1 << 62
 
 
 class MailboxWatch:
-    """Owns the checks of mailboxes while a loop runs. The thread that steps the queue calls `look`.
+    """Owns the state of the mailbox checks. The thread that steps the queue calls `look`.
 
-    `words`: last integers of the loop's private input buffer, one bit per device; they change as
-    the loop is iterated.
+    `words`: last integers of the loop's private input buffer, with one bit per device. Each
+    iteration updates them.
     """
 
     def __init__(
@@ -37,8 +37,8 @@ class MailboxWatch:
         self._shown = plan.mailboxes.devices
         with_mailbox = [sub.position for sub in subs if sub.channel is not None]
         unseen = [position for position in with_mailbox if position not in self._shown]
-        self._asked = unseen or with_mailbox
-        self._pace_ns = ASK_NS if unseen else TRUST_NS
+        self._polled = unseen or with_mailbox
+        self._pace_ns = POLL_NS if unseen else SLOW_POLL_NS
         self._next = 0
         self._due_ns = 0
         self._reading: dict[int, Pending[None]] = {}
@@ -52,7 +52,7 @@ class MailboxWatch:
     @property
     def next_look_ns(self) -> int:
         """Time of the next poll [ns]."""
-        return self._due_ns if self._asked else NEVER_NS
+        return self._due_ns if self._polled else NEVER_NS
 
     def look(self, now_ns: int, cycle: int) -> None:
         """Start reading every full mailbox, except those that other procedures are using.
@@ -66,10 +66,10 @@ class MailboxWatch:
         for rank, word in enumerate(self._words):
             if word:
                 self._read_full(32 * rank, word, cycle)
-        if self._asked and now_ns >= self._due_ns:
+        if self._polled and now_ns >= self._due_ns:
             self._due_ns = now_ns + self._pace_ns
-            self._next = (self._next + 1) % len(self._asked)
-            self._read(self._asked[self._next])
+            self._next = (self._next + 1) % len(self._polled)
+            self._read(self._polled[self._next])
 
     def _note_ends(self, cycle: int) -> None:
         for position in [p for p, reading in self._reading.items() if reading.done]:
@@ -92,4 +92,4 @@ def _emptied(channel: MailboxChannel) -> Procedure[None]:
     try:
         yield from exclusively(channel, drain(channel, lambda _: None))
     except CatenaryError:
-        return  # silent or malformed: the next procedure on this mailbox reports it
+        return  # no answer or a malformed one: the next procedure on this mailbox reports it

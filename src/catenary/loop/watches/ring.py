@@ -1,4 +1,4 @@
-"""Watch over the cables of a ring, by the counters of the two copies of every cycle."""
+"""Watch of the cables of a ring, by the counters of the two copies of each frame."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ from catenary.bus.ring import Cuts, Ends, HasState, find_cuts, named
 class RingWatch:
     """Owns the cables of a ring that were reported as cut.
 
-    A change is reported when two consecutive looks find it. While a cable is being pulled, the
-    counters of the copies are from different moments.
+    A change is reported when two consecutive checks find it. While a cable is being pulled, the
+    counters of the copies belong to different times.
     """
 
     def __init__(
@@ -28,7 +28,7 @@ class RingWatch:
         self._report = report
         self._now = now
         self._found: Cuts | None = None
-        self._told: tuple[Ends, ...] = ()
+        self._reported: tuple[Ends, ...] = ()
 
     def look(self) -> None:
         """Put an event for each cable that has changed."""
@@ -37,12 +37,12 @@ class RingWatch:
         self._found = found
         if found is None or not settled:
             return
-        for cable in self._told:
+        for cable in self._reported:
             if cable not in found.cables:
-                message = f"the cable between {named(cable)} carries again"
+                message = f"the cable between {named(cable)} carries frames again"
                 self._report(LinkRestored(self._now(), None, message, cable))
         for cable in found.cables:
-            if cable not in self._told:
-                message = f"the cable between {named(cable)} does not carry; {found}"
+            if cable not in self._reported:
+                message = f"the cable between {named(cable)} does not carry frames; {found}"
                 self._report(LinkLost(self._now(), None, message, cable))
-        self._told = found.cables
+        self._reported = found.cables

@@ -41,7 +41,7 @@ class Scheduling:
         return ", ".join((policy, memory, cpus, *self.refusals))
 
 
-def what_scheduling() -> Scheduling:
+def current_scheduling() -> Scheduling:
     """Return the current scheduling of the calling thread."""
     policy = os.sched_getscheduler(0) & ~os.SCHED_RESET_ON_FORK
     return Scheduling(
@@ -81,7 +81,7 @@ def request_scheduling(
     refusals += refusal(
         f"SCHED_FIFO {priority}", lambda: os.sched_setscheduler(0, os.SCHED_FIFO, parameters)
     )
-    now = what_scheduling()
+    now = current_scheduling()
     return Scheduling(now.policy, now.priority, now.memory_locked, now.cpus, tuple(refusals))
 
 

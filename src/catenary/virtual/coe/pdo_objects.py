@@ -9,6 +9,7 @@ from __future__ import annotations
 import struct
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 
 from catenary.virtual.coe.dictionary import (
     ARRAY,
@@ -37,11 +38,21 @@ LOCAL_CONTROL = 0x0800_0021
 
 
 class _Table:
-    """Entries of one assignment or mapping: a count and the values."""
+    """Entries of one assignment or mapping: a count and the values.
 
-    def __init__(self, form: str, values: Sequence[int], places: int) -> None:
-        self._form = form
-        self.places = list(values) + [0] * (places - len(values))
+    `allowed`: the PDOs that an assignment accepts; None for a mapping.
+    """
+
+    def __init__(
+        self, values: Sequence[int], flag: int, allowed: Sequence[int] | None = None
+    ) -> None:
+        self.flag = flag
+        self.allowed = allowed
+        self.is_mapping = allowed is None
+        self.data_type, self._form, size = (
+            (UNSIGNED32, "<I", ENTRIES_MAX) if self.is_mapping else (UNSIGNED16, "<H", PDOS_MAX)
+        )
+        self.places = list(values) + [0] * (size - len(values))
         self.count = len(values)
 
     @property
@@ -88,72 +99,67 @@ class PdoObjects:
     def _add_direction(self, index: int, name: str, pdos: Sequence[Pdo], flag: int) -> _Table:
         for pdo in pdos:
             packed = [e.index << 16 | e.subindex << 8 | e.bits for e in pdo.entries]
-            table = self._mappings[pdo.index] = _Table("<I", packed, ENTRIES_MAX)
-            self._add(pdo.index, pdo.name, table, UNSIGNED32, flag)
+            table = self._mappings[pdo.index] = _Table(packed, flag)
+            self._add(pdo.index, pdo.name, table)
         assigned = [pdo.index for pdo in pdos if pdo.sync_manager != 0xFF]
         if self._quirks.power_up is not None:
             assigned = [pdo.index for pdo in pdos if pdo.index in self._quirks.power_up]
-        table = _Table("<H", assigned, PDOS_MAX)
-        allowed = [pdo.index for pdo in pdos]
-        self._add(index, name, table, UNSIGNED16, flag, allowed)
+        table = _Table(assigned, flag, allowed=[pdo.index for pdo in pdos])
+        self._add(index, name, table)
         return table
 
-    def _add(
-        self,
-        index: int,
-        name: str,
-        table: _Table,
-        data_type: int,
-        flag: int,
-        allowed: list[int] | None = None,
-    ) -> None:
-        quirks = self._quirks
-        fixed = quirks.fixed_pdos if allowed is None else quirks.fixed_lists
-        access = READ_ANY if fixed == "declared" else READ_ANY | WRITE_PRE_OP
-        bits = 16 if data_type == UNSIGNED16 else 32
-
-        def write_count(data: bytes) -> None:
-            if fixed != "no":
-                raise Abort(quirks.abort_code)
-            count = data[0]
-            if count > len(table.places):
-                raise Abort(MAPPING_TOO_LONG if allowed is None else OUT_OF_RANGE)
-            before, table.count = table.count, count
-            try:
-                self._check(table, flag, allowed)
-            except Abort:
-                table.count = before
-                raise
-
-        def write_place(place: int, data: bytes) -> None:
-            if fixed != "no":
-                raise Abort(quirks.abort_code)
-            if table.count:
-                raise Abort(SUBINDEX_0_FIRST)
-            value = table.unpack(data)
-            if allowed is None:
-                self._check_entry(value, flag)
-            elif value not in allowed and value != 0:
-                raise Abort(CANNOT_BE_MAPPED)
-            table.places[place] = value
-
-        def entry(place: int) -> Entry:
-            return Entry(
+    def _add(self, index: int, name: str, table: _Table) -> None:
+        """Add an assignment or mapping to the dictionary."""
+        access = READ_ANY if self._fixed(table) == "declared" else READ_ANY | WRITE_PRE_OP
+        count = Entry(
+            "Subindex 000",
+            UNSIGNED8,
+            8,
+            access,
+            lambda: bytes([table.count]),
+            partial(self._write_count, table),
+        )
+        places = {
+            place + 1: Entry(
                 f"Subindex {place + 1:03d}",
-                data_type,
-                bits,
+                table.data_type,
+                32 if table.is_mapping else 16,
                 access,
-                lambda: table.read(place),
-                lambda data: write_place(place, data),
+                partial(table.read, place),
+                partial(self._write_place, table, place),
             )
-
-        entries = {
-            0: Entry(
-                "Subindex 000", UNSIGNED8, 8, access, lambda: bytes([table.count]), write_count
-            )
+            for place in range(len(table.places))
         }
-        entries |= {place + 1: entry(place) for place in range(len(table.places))}
-        self._dictionary.add(index, name, entries, code=RECORD if allowed is None else ARRAY)
+        code = RECORD if table.is_mapping else ARRAY
+        self._dictionary.add(index, name, {0: count, **places}, code=code)
+
+    def _fixed(self, table: _Table) -> str:
+        return self._quirks.fixed_pdos if table.is_mapping else self._quirks.fixed_lists
+
+    def _write_count(self, table: _Table, data: bytes) -> None:
+        if self._fixed(table) != "no":
+            raise Abort(self._quirks.abort_code)
+        count = data[0]
+        if count > len(table.places):
+            raise Abort(MAPPING_TOO_LONG if table.is_mapping else OUT_OF_RANGE)
+        before, table.count = table.count, count
+        try:
+            self._check(table)
+        except Abort:
+            table.count = before
+            raise
+
+    def _write_place(self, table: _Table, place: int, data: bytes) -> None:
+        if self._fixed(table) != "no":
+            raise Abort(self._quirks.abort_code)
+        if table.count:
+            raise Abort(SUBINDEX_0_FIRST)
+        value = table.unpack(data)
+        if table.allowed is None:
+            self._check_entry(value, table.flag)
+        elif value not in table.allowed and value != 0:
+            raise Abort(CANNOT_BE_MAPPED)
+        table.places[place] = value
 
     def _check_entry(self, value: int, flag: int) -> None:
         index, subindex, bits = value >> 16, value >> 8 & 0xFF, value & 0xFF
@@ -168,9 +174,9 @@ class PdoObjects:
         if not entry.access & flag or entry.bits != bits:
             raise Abort(CANNOT_BE_MAPPED)
 
-    def _check(self, table: _Table, flag: int, allowed: list[int] | None) -> None:
-        if allowed is not None:
-            if any(pdo not in allowed for pdo in table.values):
+    def _check(self, table: _Table) -> None:
+        if table.allowed is not None:
+            if any(pdo not in table.allowed for pdo in table.values):
                 raise Abort(CANNOT_BE_MAPPED)
             values = [value for pdo in table.values for value in self._mappings[pdo].values]
             places = [value >> 8 for value in values if value >> 16]
@@ -179,7 +185,7 @@ class PdoObjects:
             bits = sum(value & 0xFF for value in values)
         else:
             for value in table.values:
-                self._check_entry(value, flag)
+                self._check_entry(value, table.flag)
             bits = sum(value & 0xFF for value in table.values)
         if bits > self._limit_bits:
             raise Abort(MAPPING_TOO_LONG)

@@ -22,7 +22,7 @@ from catenary.virtual.coe.quirks import NO_MAILBOX_QUIRKS, MailboxQuirks
 from catenary.virtual.crystal import EXACT, ClockBits, Crystal
 from catenary.virtual.description import Description, MappedEntry, Pdo
 from catenary.virtual.devices.application import Application, mailbox_of, sync_managers_of
-from catenary.virtual.devices.applied import AppliedDevice
+from catenary.virtual.devices.applied import AppliedDevice, MailboxOptions
 from catenary.virtual.mapping_quirks import NO_MAPPING_QUIRKS, MappingQuirks
 from catenary.virtual.scheduler import Scheduler
 from catenary.virtual.sii_quirks import NO_SII_QUIRKS, SiiQuirks
@@ -86,12 +86,10 @@ class AnalogInputs(AppliedDevice):
             alias=alias,
             serial=serial,
             lrw=lrw,
-            mailbox_bytes=mailbox_bytes,
-            mailbox_delay=mailbox_delay,
             crystal=crystal,
             clock_bits=clock_bits,
-            mailbox_quirks=mailbox_quirks,
             sii_quirks=sii_quirks,
+            mailbox=MailboxOptions(mailbox_bytes, mailbox_delay, mailbox_quirks),
         )
         self.channels = channels
         self.second_pdo = second_pdo

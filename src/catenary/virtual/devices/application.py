@@ -184,13 +184,13 @@ class Application:
         if events & _segment.EVENT_WATCHDOG:
             self._outputs_timed_out()
         if events & _segment.EVENT_AL_CONTROL:
-            self.states.obey()
+            self.states.follow_request()
         if events & _segment.EVENT_SYNC_MISSED:
             self._synchronisation_failed(SYNCHRONISATION_ERROR)
         if events & _segment.EVENT_SYNC_LOST:
             self._synchronisation_failed(FATAL_SYNC_ERROR)
         if events & (_segment.EVENT_OUTPUTS | _segment.EVENT_SYNC_SEEN):
-            self.states.something_arrived()
+            self.states.report_arrival()
         if events & _segment.EVENT_MAILBOX_READ:
             self.mailbox.answer_read()
         if events & _segment.EVENT_REPEAT_REQUEST:

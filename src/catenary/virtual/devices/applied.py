@@ -2,12 +2,29 @@
 
 from __future__ import annotations
 
-from catenary.virtual.coe.quirks import MailboxQuirks
+from dataclasses import dataclass
+
+from catenary.virtual.coe.quirks import NO_MAILBOX_QUIRKS, MailboxQuirks
 from catenary.virtual.crystal import ClockBits, Crystal
 from catenary.virtual.devices.application import Application
 from catenary.virtual.devices.device import Device
 from catenary.virtual.scheduler import Scheduler
 from catenary.virtual.sii_quirks import SiiQuirks
+
+
+@dataclass(frozen=True, slots=True)
+class MailboxOptions:
+    """Mailbox of a device. ValueError if a value is out of range."""
+
+    size: int = 128  # [bytes] of each direction
+    delay: float = 300e-6  # [s] until a request is answered
+    quirks: MailboxQuirks = NO_MAILBOX_QUIRKS
+
+    def __post_init__(self) -> None:
+        if not 32 <= self.size <= 1024 or self.size % 2:
+            raise ValueError(f"mailbox_bytes must be an even number, 32 to 1024, not {self.size}")
+        if not 0 <= self.delay <= 10:
+            raise ValueError(f"mailbox_delay must be 0 to 10 s, not {self.delay}")
 
 
 class AppliedDevice(Device):
@@ -20,12 +37,10 @@ class AppliedDevice(Device):
         alias: int,
         serial: int,
         lrw: bool,
-        mailbox_bytes: int,
-        mailbox_delay: float,
         crystal: Crystal,
         clock_bits: ClockBits,
-        mailbox_quirks: MailboxQuirks,
         sii_quirks: SiiQuirks,
+        mailbox: MailboxOptions = MailboxOptions(),
     ) -> None:
         super().__init__(
             name=name,
@@ -36,15 +51,9 @@ class AppliedDevice(Device):
             clock_bits=clock_bits,
             sii_quirks=sii_quirks,
         )
-        if not 32 <= mailbox_bytes <= 1024 or mailbox_bytes % 2:
-            raise ValueError(
-                f"mailbox_bytes must be an even number, 32 to 1024, not {mailbox_bytes}"
-            )
-        if not 0 <= mailbox_delay <= 10:
-            raise ValueError(f"mailbox_delay must be 0 to 10 s, not {mailbox_delay}")
-        self.mailbox_bytes = mailbox_bytes
-        self.mailbox_quirks = mailbox_quirks
-        self._mailbox_delay_ns = round(mailbox_delay * 1e9)
+        self.mailbox_bytes = mailbox.size
+        self.mailbox_quirks = mailbox.quirks
+        self._mailbox_delay_ns = round(mailbox.delay * 1e9)
         self._application: Application | None = None
 
     @property

@@ -22,6 +22,7 @@ from catenary.virtual.coe.dictionary import (
     UNSIGNED16,
     UNSIGNED32,
     Abort,
+    Dictionary,
     Entry,
     number,
 )
@@ -29,7 +30,7 @@ from catenary.virtual.coe.quirks import NO_MAILBOX_QUIRKS, MailboxQuirks
 from catenary.virtual.crystal import EXACT, ClockBits, Crystal
 from catenary.virtual.description import Description, MappedEntry, Pdo
 from catenary.virtual.devices.application import Application, mailbox_of, sync_managers_of
-from catenary.virtual.devices.applied import AppliedDevice
+from catenary.virtual.devices.applied import AppliedDevice, MailboxOptions
 from catenary.virtual.devices.servo_homing import add_homing, homing_presets
 from catenary.virtual.devices.servo_objects import (
     BITS,
@@ -55,6 +56,7 @@ SUPPORTED_MODES = {0, 1, 3, 6, 8, 9, 10}
 SUPPORTED_MODES_MASK = sum(1 << mode - 1 for mode in SUPPORTED_MODES - {0})  # 0x6502
 VELOCITY_BANDWIDTH = 2 * math.pi * 80  # rad/s
 POSITION_BANDWIDTH = 100.0  # rad/s
+POSITIVE = ("counts_per_turn", "inertia", "rated_torque", "max_torque_ratio", "max_velocity")
 AXIS_STRIDE, PDO_STRIDE = 0x800, 0x10
 STATES = (
     "NOT READY TO SWITCH ON",
@@ -170,29 +172,11 @@ class Servo(AppliedDevice):
             alias=alias,
             serial=serial,
             lrw=lrw,
-            mailbox_bytes=mailbox_bytes,
-            mailbox_delay=mailbox_delay,
             crystal=crystal,
             clock_bits=clock_bits,
-            mailbox_quirks=mailbox_quirks,
             sii_quirks=sii_quirks,
+            mailbox=MailboxOptions(mailbox_bytes, mailbox_delay, mailbox_quirks),
         )
-        positive = {
-            "counts_per_turn": counts_per_turn,
-            "inertia": inertia,
-            "rated_torque": rated_torque,
-            "max_torque_ratio": max_torque_ratio,
-            "max_velocity": max_velocity,
-        }
-        for field, value in positive.items():
-            if not 0 < value < math.inf:
-                raise ValueError(f"{field} must be positive, not {value}")
-        if not 1 <= axes <= _segment.AXES_MAX:
-            raise ValueError(f"axes must be 1 to {_segment.AXES_MAX}, not {axes}")
-        if not 1 <= sync_missed_limit <= 0xFFFF:
-            raise ValueError(f"sync_missed_limit must be 1 to 65535, not {sync_missed_limit}")
-        if viscous_friction < 0 or coulomb_friction < 0:
-            raise ValueError("friction must be 0 or more")
         self.axes = axes
         self.counts_per_turn = counts_per_turn
         self.velocity_counts_per_turn = velocity_counts_per_turn or counts_per_turn
@@ -208,6 +192,20 @@ class Servo(AppliedDevice):
         self.quirks = quirks
         self.mapping_quirks = mapping_quirks
         self._inertias = [inertia] * axes  # for which the loops are tuned
+        self._check_values()
+
+    def _check_values(self) -> None:
+        """Raise ValueError if a value is out of range."""
+        for field in POSITIVE:
+            value = getattr(self, field)
+            if not 0 < value < math.inf:
+                raise ValueError(f"{field} must be positive, not {value}")
+        if not 1 <= self.axes <= _segment.AXES_MAX:
+            raise ValueError(f"axes must be 1 to {_segment.AXES_MAX}, not {self.axes}")
+        if not 1 <= self.sync_missed_limit <= 0xFFFF:
+            raise ValueError(f"sync_missed_limit must be 1 to 65535, not {self.sync_missed_limit}")
+        if self.viscous_friction < 0 or self.coulomb_friction < 0:
+            raise ValueError("friction must be 0 or more")
 
     def _pdos(
         self, base: int, default: tuple[int, ...], others: tuple[tuple[int, ...], ...]
@@ -373,6 +371,12 @@ class Servo(AppliedDevice):
             slot("Interpolation time index", INTEGER8, _segment.SLOT_INTERPOLATION_EXPONENT, RW),
         ]
         dictionary.add_record(0x60C2 + base, "Interpolation time period", interpolation)
+        outputs = slot("Physical outputs", UNSIGNED32, _segment.SLOT_DIGITAL_OUTPUTS, RX)
+        dictionary.add_record(0x60FE + base, "Digital outputs", [outputs], code=ARRAY)
+        self._add_constants(dictionary, base)
+
+    def _add_constants(self, dictionary: Dictionary, base: int) -> None:
+        """Add the objects of an axis that never change."""
         torque = round(self.rated_torque * 1000)
         dictionary.add_variable(0x6075 + base, number("Motor rated current", UNSIGNED32, 1000))
         dictionary.add_variable(0x6076 + base, number("Motor rated torque", UNSIGNED32, torque))
@@ -390,8 +394,6 @@ class Servo(AppliedDevice):
             number("Motor revolutions per second", UNSIGNED32, 1),
         ]
         dictionary.add_record(0x6090 + base, "Velocity encoder resolution", velocity, code=ARRAY)
-        outputs = slot("Physical outputs", UNSIGNED32, _segment.SLOT_DIGITAL_OUTPUTS, RX)
-        dictionary.add_record(0x60FE + base, "Digital outputs", [outputs], code=ARRAY)
         number_of_type = number("Motor type", UNSIGNED16, 0x0003)  # PM synchronous motor
         dictionary.add_variable(0x6402 + base, number_of_type)
 
