@@ -34,6 +34,14 @@ def test_drives_process_data_and_devices_have_the_names_of_the_file(tmp_path: Pa
         assert machine.subs["wrist"].alias == 12
 
 
+def test_open_returns_the_machine(tmp_path: Path) -> None:
+    machine = Machine(write_small(tmp_path)).open()
+    try:
+        assert list(machine.drives) == ["arm", "gripper"]
+    finally:
+        machine.close()
+
+
 def test_a_loop_runs_with_the_options_of_the_file(tmp_path: Path) -> None:
     with Machine(write_small(tmp_path)) as machine:
         arm = machine.drives["arm"]

@@ -232,7 +232,7 @@ def one_sink_each(sinks: Sink | Sequence[Sink] | None, networks: int) -> list[Si
     given = list(sinks) if isinstance(sinks, Sequence) else [sinks]
     if len(given) != networks:
         raise ValueError(
-            f"sink: {len(given)} sinks for {networks} networks; give each network its own: "
+            f"sink: {len(given)} given for {networks} networks; give each network its own: "
             "sink=[cat.Share('upper'), cat.Share('lower')]"
         )
     return list(given)

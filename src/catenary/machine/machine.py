@@ -62,14 +62,13 @@ class Machine:
         self._found = MachineParts()
 
     def __enter__(self) -> Self:
-        self.open()
-        return self
+        return self.open()
 
     def __exit__(self, *exc_info: object) -> None:
         self.close()
 
-    def open(self) -> None:
-        """Open the link, check the identities, and bring the devices to PRE-OP.
+    def open(self) -> Self:
+        """Open the link, check the identities, and bring the devices to PRE-OP; return self.
 
         Raises:
             IdentityError: A device has another identity, or two devices have the same alias.
@@ -81,6 +80,7 @@ class Machine:
         except BaseException:
             self._main.close()
             raise
+        return self
 
     def close(self) -> None:
         """Bring all devices to INIT and close the link."""
