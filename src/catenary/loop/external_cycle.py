@@ -129,7 +129,7 @@ class CarriedWatch:
         return bool(self._optional) and not any(is_astray(answer) for answer in required)
 
     def requires(self, position: int) -> bool:
-        """Return True if the loop ends without this device."""
+        """Return True if the loss of this device ends the loop."""
         return position not in self._optional
 
     def release(self, sub: SubDevice) -> None:

@@ -153,7 +153,7 @@ class Watch:
         )
 
     def requires(self, position: int) -> bool:
-        """Return True if the loop ends without this device."""
+        """Return True if the loss of this device ends the loop."""
         return self._charges[position].required
 
     def release(self, sub: SubDevice) -> None:

@@ -45,7 +45,7 @@ class ErrorWatch:
             yield after(PERIOD)
 
     def look(self) -> Procedure[Sequence[Finding]]:
-        """Return the findings since the last reading; none after the first reading.
+        """Return the findings since the previous reading. The first call returns none.
 
         `main.diagnose()` covers the counts from before the loop.
         """
