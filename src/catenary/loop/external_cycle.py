@@ -22,7 +22,7 @@ from catenary.wire.cia402 import SLOT_OFFSET, Object
 
 
 class CarriedExchange:
-    """Owns the watch of a session on another master's frames. Implements `Exchange`."""
+    """Exchange of a session on another master's frames. Implements `Exchange`."""
 
     def __init__(self, session: Session) -> None:
         self._session = session
@@ -94,7 +94,7 @@ class CarriedExchange:
 
 
 class CarriedWatch:
-    """Owns the last state of every device, and puts an event for each change."""
+    """Watch of the states of all devices. It puts an event for each change."""
 
     def __init__(
         self,

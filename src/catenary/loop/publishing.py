@@ -27,7 +27,7 @@ EVENT_FIELDS = {field.name for field in fields(Event)}
 
 
 class Publisher:
-    """Owns a loop's connection to its sink, from `open` to `close`."""
+    """Connection of a loop to its sink, from `open` to `close`."""
 
     def __init__(self, sink: Sink, main: MainDevice, engine: Engine, plan: Plan) -> None:
         self._sink = sink

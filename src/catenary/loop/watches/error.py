@@ -23,7 +23,7 @@ SILENCE = 60.0  # [s] before the same place is reported again
 
 
 class ErrorWatch:
-    """Owns the last reading of the counters and the times of the reported findings."""
+    """Watch of the error counters. It keeps their last reading and the times of the reports."""
 
     def __init__(self, main: MainDevice, now: Callable[[], float]) -> None:
         self._subs = main.subs
