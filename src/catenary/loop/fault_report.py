@@ -47,7 +47,7 @@ RAISED = {  # stops that raise DriveError with the state of the drive, in order 
 
 
 class FaultReport:
-    """Owns the axis stops and refused modes that were reported, and makes the exceptions."""
+    """Converter of cycle flags to events and to the exception that ends the loop."""
 
     def __init__(
         self,

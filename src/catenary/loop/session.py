@@ -50,7 +50,7 @@ STOP_SLICE_NS = 20_000_000  # between checks of `guard.hurry` while the drives b
 
 
 class Session:
-    """Owns the engine of one MainDevice while its loop is open."""
+    """State of one MainDevice in a loop: engine, arrays, acyclic queue and watches."""
 
     def __init__(
         self,
