@@ -275,7 +275,7 @@ def cpus_for(count: int, cpu: int | Sequence[int] | None) -> list[int | None]:
         ValueError: The number of CPUs is not the number of networks, or `cpu` is a sequence for one
             network.
     """
-    if count == 1 and isinstance(cpu, Sequence):
+    if count == 1 and cpu is not None and not isinstance(cpu, int):
         raise ValueError(f"cpu={cpu}: give one number; one network has one thread")
     if isinstance(cpu, int):
         return [cpu] * count
