@@ -45,8 +45,9 @@ class Tasks:
         tasks: Tasks to run.
         workers: "processes" or "threads"; None selects processes for more than one task.
         clock: VirtualClock that simulates the tasks by priority and processor. A `cpu` of None
-            counts as 0.
-        session: `realtime.session()` to enter in each process; for threads, in this process.
+            counts as 0. None for real time.
+        session: `realtime.session()` to enter in each process; for threads, in this process. None
+            to change no settings of the process.
         best_effort: True to continue without refused priorities and processors.
     """
 
@@ -73,7 +74,7 @@ class Tasks:
     def __getitem__(self, name: str) -> Handle:
         if name not in self._handles:
             known = ", ".join(self._handles) or "none"
-            raise KeyError(f"unknown task {name!r}; running tasks: {known}")
+            raise KeyError(f"unknown task {name!r}; started tasks: {known}")
         return self._handles[name]
 
     def __iter__(self) -> Iterator[Handle]:
@@ -317,7 +318,7 @@ def check_set(tasks: tuple[Task, ...], workers: Workers | None) -> None:
 
 
 def make_handles(tasks: tuple[Task, ...], clock: VirtualClock | None) -> dict[str, Handle]:
-    """Create the handles. If one fails, remove all, because a virtual clock would wait for them."""
+    """Create the handles. If one fails, remove the others: a virtual clock would wait for them."""
     handles: dict[str, Handle] = {}
     try:
         for task in tasks:

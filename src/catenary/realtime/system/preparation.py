@@ -113,7 +113,7 @@ def session(
     Args:
         heap_size: heap to pre-fault and keep [bytes].
         switch_interval: longest time for which a Python thread may hold the interpreter lock [s].
-        best_effort: list refused settings in `refusals` instead of raising.
+        best_effort: True to list refused settings in `refusals` instead of raising an exception.
 
     Raises:
         RealtimeError: at the start of the block, if a setting is refused; the hint names a remedy.
