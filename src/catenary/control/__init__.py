@@ -6,8 +6,8 @@ A block has two parts. A value holds its settings (`Cascade(...)`) and provides 
 block.
 """
 
-# Steps take their numbers one by one, up to ten parameters: laws call them compiled by numba, where
-# a frozen options class is not available.
+# Step functions have up to ten parameters, because laws call them in code compiled by Numba, which
+# does not support frozen options classes.
 from catenary.control.admittance import NaturalAdmittance, natural_admittance
 from catenary.control.cascade import Cascade, cascade
 from catenary.control.collision import Residual, Threshold, model_residual, residual, threshold

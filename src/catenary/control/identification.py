@@ -24,10 +24,10 @@ class Chirp:
 
     Args:
         axes: number of axes.
-        amplitude: in the unit of the quantity that the sweep is added to.
+        amplitude: amplitude, in the unit of the quantity to which the sweep is added.
         first: frequency at the start [Hz].
         last: frequency at the end [Hz].
-        duration: of the sweep [s]. The value is zero afterwards.
+        duration: duration of the sweep [s]. The value is zero afterwards.
 
     Source: Farina, Simultaneous measurement of impulse response and distortion with a swept-sine
     technique, AES 108, 2000.
@@ -65,7 +65,7 @@ def chirp(parameters: Row, i: int, time: float) -> float:
     Args:
         parameters: `Chirp.parameters`.
         i: number of the axis.
-        time: since the start of the sweep [s].
+        time: time since the start of the sweep [s].
 
     Raises:
         ValueError: `parameters` belongs to a different block.
@@ -87,8 +87,8 @@ class FrequencyResponse:
     """Frequency response of one axis at k frequencies.
 
     `frequency` (k,) is in Hz. `response` (k,) is the complex ratio of output to input. `coherence`
-    (k,), 0 to 1, is the part of the output that depends linearly on the input: a response is
-    reliable where it is close to 1.
+    (k,), 0 to 1, is the part of the output that depends linearly on the input. The response is
+    reliable where the coherence is close to 1.
     """
 
     frequency: Row
