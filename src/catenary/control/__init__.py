@@ -2,7 +2,7 @@
 
 A block has two parts. A value holds its settings (`Cascade(...)`) and provides `.parameters` and
 `.memory` as flat rows of float64. A step function computes one step of one axis from these rows
-(`cascade(memory, parameters, i, ...)`). All state is in `memory`; fill it with zeros to reset the
+(`cascade(memory, parameters, i, ...)`). All state is in `memory`. Fill it with zeros to reset the
 block.
 """
 

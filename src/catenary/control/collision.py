@@ -34,7 +34,7 @@ class Residual:
     collision detection and hybrid force/motion control, ICRA 2005; Haddadin, De Luca and
     Albu-Schäffer, Robot collisions: a survey, IEEE T-RO 33(6), 2017, §IV. This implementation
     replaces p and the integral of Ṁ q̇ by one sum, M(q_k) (q̇_k - q̇_k-1). Summation by parts shows
-    that both are equal; the sum needs one evaluation of the model.
+    that both are equal. The sum needs only one evaluation of the model.
     """
 
     axes: int

@@ -14,7 +14,7 @@ FRICTION = 6.0
 
 @dataclass(frozen=True)
 class FeedForward:
-    """Settings of a feed-forward torque; the block has no memory.
+    """Settings of a feed-forward torque. The block has no memory.
 
     Args:
         axes: number of axes.
@@ -59,7 +59,7 @@ def feed_forward(parameters: Row, i: int, velocity: float, acceleration: float) 
 
 @dataclass(frozen=True)
 class Friction:
-    """Settings of a friction model; the block has no memory.
+    """Settings of a friction model. The block has no memory.
 
     Args:
         axes: number of axes.

@@ -23,8 +23,8 @@ FAILED = -1.0
 class Stops:
     """Results of homing for each axis, each with shape (n,).
 
-    `open` and `closed` are the positions of the stops, `meeting` is the position where the axes
-    meet [rad]; NaN while a result is not known. `failed` is True for an axis that found no stop
+    `open` and `closed` are the positions of the stops [rad]. `meeting` is the position where the
+    axes meet [rad]. An unknown result is NaN. `failed` is True for an axis that found no stop
     within its travel, or was blocked on its return.
     """
 

@@ -20,7 +20,7 @@ Vector = npt.NDArray[np.float64] | Sequence[float]
 
 @dataclass(frozen=True)
 class Chirp:
-    """Settings of a sine sweep whose frequency changes exponentially; the block has no memory.
+    """Settings of a sine sweep whose frequency changes exponentially. The block has no memory.
 
     Args:
         axes: number of axes.
@@ -117,7 +117,7 @@ def frequency_response(
         given: input (k,), in any unit.
         measured: output (k,), in any unit.
         period: time between two samples [s].
-        segment: samples per segment; the segments overlap by half and are averaged. None means an
+        segment: samples per segment. The segments overlap by half and are averaged. None means an
             eighth of the recording. The resolution is 1 / (segment · period) [Hz].
 
     Returns:

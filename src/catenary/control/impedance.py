@@ -22,7 +22,7 @@ class Impedance:
 
     A spring and a damper pull each axis to its target. A disturbance observer compensates friction.
     The nominal plant is 1 / (m s + b). The disturbance is the torque on this plant other than the
-    commanded and the measured external torque; dry friction is part of it.
+    commanded and the measured external torque. It includes dry friction.
 
     Without a torque sensor, the observer cannot distinguish friction from a contact. Set
     `compensation` to the size of the dry friction. To larger torques, the axis then yields like the

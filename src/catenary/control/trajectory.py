@@ -55,7 +55,7 @@ class Trajectory:
 
     `duration` is the time of the motion [s]. The motion ends within the last period.
 
-    The first access to `position`, `velocity` or `acceleration` computes all rows; each row takes
+    The first access to `position`, `velocity` or `acceleration` computes all rows. Each row takes
     about 10 us. A task with a deadline calls `row` to compute one row at a time.
     """
 
@@ -118,13 +118,13 @@ def trajectory(
     limits: MotionLimits,
     period: float,
 ) -> Trajectory:
-    """Return the fastest motion to rest at `goal`; all axes arrive together.
+    """Return the fastest motion to rest at `goal`. All axes arrive together.
 
     This function needs ruckig: pip install 'catenary[traj]'.
 
     Args:
         start: positions (n,) [rad] of axes at rest, or a `MotionState`.
-        goal: positions (n,) [rad]. Several goals (m, n) are reached in turn; the motion comes to
+        goal: positions (n,) [rad]. Several goals (m, n) are reached in turn. The motion comes to
             rest at each.
         limits: limits of the motion.
         period: time between two rows [s].

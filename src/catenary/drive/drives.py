@@ -67,15 +67,15 @@ class Drives(Request):
       slot.
     - `other_modes`: modes to which the axes may change while the loop runs ("hm": see `home`).
     - `measured`: which of position, velocity and torque the drives must supply. By default, all
-      three are requested; a missing velocity is estimated, a missing torque reads NaN.
+      three are requested. A missing velocity is then estimated, and a missing torque reads NaN.
     - `columns`: additional objects, as names of `NAMED_COLUMNS` or as
       `{name: (index, subindex, type)}`, with the index for slot 0. Read a column as
       `arm.actual["following_error"]`; write it as `arm.target["torque_offset"] = 0.5`. Objects that
       CiA 402 does not define are inputs, except `Channel(index, subindex, type, output=True)`.
     - `required`: if False, the loop continues without a lost drive. Its axes keep their last
-      values; enable them again when they are `present`.
+      values. Enable them again when they are `present`.
     - `divider`: cycles of the loop between two exchanges.
-    - `dc`: distributed clocks. True uses the settings in the SII of each device; a
+    - `dc`: distributed clocks. True uses the settings in the SII of each device. A
       `DistributedClock` applies to all devices.
     - `pdos`: PDOs to assign on each device, `[0x1701, 0x1B01]`, or with their entries (index,
       subindex, bits), `{0x1600: [(0x6040, 0, 16), (0x607A, 0, 32)]}`. They are written even if the
@@ -103,9 +103,9 @@ class Drives(Request):
     - `velocity_limit` [rad/s]: required for CSV, CST and PV. For CSP and PP, the default is 2π
       rad/s (0.1 m/s), with a warning. `math.inf` means no limit.
     - `torque_limit` [N·m], or `force_limit` [N] for a linear axis.
-    - `step_limit` [rad]: largest difference between two CSP set-points; a larger step is refused.
-      The default is twice the distance at `velocity_limit`, and at least 0.1 rad (5 mm). It is
-      required if `velocity_limit` is infinite.
+    - `step_limit` [rad]: largest difference between two CSP set-points. A larger step is refused.
+      The default is twice the distance in one exchange at `velocity_limit`, and at least 0.1 rad
+      (5 mm). The option is required if `velocity_limit` is infinite.
 
     Reactions to a loss of set-points. They do not change the set-points that you write:
 
@@ -326,7 +326,7 @@ class Drives(Request):
         """Start to move axes to a position, where they come to rest.
 
         Each axis moves as fast as its limits allow, so the axes do not arrive together. In CSP, the
-        loop computes the motion and writes `target.position`; the velocity profile is a trapezoid,
+        loop computes the motion and writes `target.position`. The velocity profile is a trapezoid,
         or has limited jerk. In PP, the drive computes the motion. If an axis is already moving, the
         new move replaces the present one and continues from its velocity.
 

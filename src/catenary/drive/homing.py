@@ -33,7 +33,7 @@ class HomingMethod:
         slow: speed during the search for zero (0x6099:02) [rad/s].
         acceleration: acceleration and deceleration (0x609A) [rad/s²].
         offset: distance from home to zero (0x607C) [rad]. By the standard, the axis reads -offset
-            at home; some drives read +offset.
+            at home. Some drives read +offset.
 
     Raises:
         ValueError: A value is out of range.

@@ -31,7 +31,7 @@ INFINITE = ("velocity_limit", "torque_limit")  # options that may be infinite
 class LimitOptions:
     """Options of `Drives` for the limits and reactions of one axis; None if not given.
 
-    The units below are those of a rotary axis; a linear axis has m and N instead.
+    The units below are those of a rotary axis. A linear axis has m and N instead.
     """
 
     position_min: float | None = None  # [rad]

@@ -60,7 +60,7 @@ class ProcessData(Request):
         pdos: PDOs to assign, `[0x1A01]`, or with their entries by name or as (index, subindex,
             bits), `{0x1A00: ["force", "status"]}`. None to let Catenary choose them.
         safe: values of outputs by name, or the bytes of all outputs. The loop sends them when it
-            ends for any reason; outputs without a safe value become 0. The device then leaves OP
+            ends for any reason. Outputs without a safe value become 0. The device then leaves OP
             and determines its outputs itself.
         start_up: objects to write to the device before SAFE-OP.
         divider: cycles of the loop between two exchanges.

@@ -22,7 +22,7 @@ FIRST = 100  # above all priorities of tasks, 0 (ordinary scheduling) to 99
 
 
 class Participant:
-    """Owner of one slot of a virtual clock; one thread of one process uses it."""
+    """Owner of one slot of a virtual clock. One thread of one process uses it."""
 
     def __init__(self, memory: SharedMemory, slot: int) -> None:
         self._memory = memory

@@ -39,7 +39,7 @@ class Tasks:
     """A set of tasks that run together.
 
     `with Tasks(a, b) as tasks:` starts them together, and stops them at the end of the block.
-    `tasks["a"]` is the handle of one task; `print(tasks)` shows the statistics of all jobs.
+    `tasks["a"]` is the handle of one task. `print(tasks)` shows the statistics of all jobs.
 
     Args:
         tasks: Tasks to run.
@@ -178,7 +178,7 @@ class Tasks:
         because a thread cannot be killed.
 
         Args:
-            function: the function to run; its exceptions propagate.
+            function: the function to run. Its exceptions propagate.
             arguments: further arguments of the function.
             priority: priority on the virtual clock.
             cpu: simulated processor on the virtual clock; None for its own.

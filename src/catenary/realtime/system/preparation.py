@@ -116,7 +116,7 @@ def session(
         best_effort: True to list refused settings in `refusals` instead of raising an exception.
 
     Raises:
-        RealtimeError: at the start of the block, if a setting is refused; the hint names a remedy.
+        RealtimeError: at the start of the block, if a setting is refused. The hint names a remedy.
         ValueError: `heap_size` or `switch_interval` is out of range.
     """
     return Session(heap_size, switch_interval, best_effort)
