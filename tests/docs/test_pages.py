@@ -10,16 +10,6 @@ from tests.docs.page import ROOT, run_page
 
 # Pages whose examples do not run yet. Who rewrites a page takes it off this list.
 NOT_YET = {
-    "docs/explanation/virtual_segment.md",
-    "docs/how_to/clocks.md",
-    "docs/how_to/control_blocks.md",
-    "docs/how_to/faults.md",
-    "docs/how_to/igh.md",
-    "docs/how_to/laws.md",
-    "docs/how_to/networks.md",
-    "docs/how_to/realtime.md",
-    "docs/how_to/recording.md",
-    "docs/how_to/share.md",
 }
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("**/*.md"))]
 NAMES = [

@@ -77,7 +77,7 @@ cdef struct cycle_t:
     int64_t scheduled          # cycle start of this cycle
     int64_t wake
     int64_t interval           # time since the last cycle start; -1: none
-    int64_t usable             # when Python had the inputs; 0: unknown
+    int64_t usable             # time at which the inputs were available to Python; 0: unknown
     int64_t sent               # when the last cyclic frame was handed to the kernel
     int64_t turnaround         # wake-up → last frame seen, of the last complete cycle
     int64_t process            # of this cycle; -1: no application

@@ -22,7 +22,7 @@ IDLE = 0.010  # [s] between two checks of the mailboxes while no procedure is pe
 
 
 class Service:
-    """Owns the acyclic queue of an engine and, in real time, the thread that steps it.
+    """Acyclic runner of an engine and, in real time, the thread that steps it.
 
     In virtual time there is no such thread: the caller steps the queue between two cycles.
     """

@@ -31,7 +31,7 @@ LOOK = 0.5  # [s] longest time between two checks of a waiting call
 
 
 class Background:
-    """Owns the thread that iterates an open loop, and the lock under which targets are committed.
+    """Thread that iterates an open loop, and the lock under which targets are committed.
 
     `error`: the error that ended the loop; None if there is none.
     """
@@ -228,7 +228,7 @@ def program_ends() -> bool:
 
 
 class _Pace:
-    """Owns the offset of virtual time, which it keeps from overtaking the wall clock."""
+    """Limiter that keeps virtual time from overtaking the wall clock."""
 
     def __init__(self, session: Session) -> None:
         self._engine = session.engine

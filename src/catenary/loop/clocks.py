@@ -21,7 +21,7 @@ SILENT = 16  # consecutive cycles without the reference clock: more than lost fr
 
 
 class Clocks:
-    """Owns the view of an open loop's distributed clocks, as of the last cycle.
+    """View of an open loop's distributed clocks, as of the last cycle.
 
     Print it for a table. All times are in seconds.
     """

@@ -22,7 +22,7 @@ from catenary.wire.cia402 import SLOT_OFFSET, Object
 
 
 class CarriedExchange:
-    """Owns the watch of a session on another master's frames. Implements `Exchange`."""
+    """Exchange of a session on another master's frames. Implements `Exchange`."""
 
     def __init__(self, session: Session) -> None:
         self._session = session
@@ -94,7 +94,7 @@ class CarriedExchange:
 
 
 class CarriedWatch:
-    """Owns the last state of every device, and puts an event for each change."""
+    """Watch of the states of all devices. It puts an event for each change."""
 
     def __init__(
         self,
@@ -129,7 +129,7 @@ class CarriedWatch:
         return bool(self._optional) and not any(is_astray(answer) for answer in required)
 
     def requires(self, position: int) -> bool:
-        """Return True if the loop ends without this device."""
+        """Return True if the loss of this device ends the loop."""
         return position not in self._optional
 
     def release(self, sub: SubDevice) -> None:

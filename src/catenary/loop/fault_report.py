@@ -47,7 +47,7 @@ RAISED = {  # stops that raise DriveError with the state of the drive, in order 
 
 
 class FaultReport:
-    """Owns the axis stops and refused modes that were reported, and makes the exceptions."""
+    """Converter of cycle flags to events and to the exception that ends the loop."""
 
     def __init__(
         self,
@@ -180,9 +180,9 @@ class FaultReport:
     ) -> CatenaryError | None:
         """Return the error for required axes in fault or stopped without a request."""
         requires = self._exchange.watch.requires
-        words = zip(self._plan.axes, self._views.statusword.tolist(), strict=True)
-        states = [state_of(word) if requires(axis.device) else None for axis, word in words]
-        faulty = [axis for axis, state in enumerate(states) if state in IN_FAULT]
+        states = map(state_of, self._views.statusword.tolist())
+        in_fault = [axis for axis, state in enumerate(states) if state in IN_FAULT]
+        faulty = [axis for axis in in_fault if requires(self._plan.axes[axis].device)]
         stops = [stop for stop in stops if requires(stop.device)]
         if raise_faults and faulty:
             cause = self._out_of_op() if self._engine.al_status != AlState.OP else None

@@ -29,7 +29,7 @@ from catenary.wire.cia402 import SLOT_OFFSET, Object
 
 
 class FrameExchange:
-    """Owns the watches of a session that sends its own frames. Implements `Exchange`."""
+    """Exchange of a session that sends its own frames. Implements `Exchange`."""
 
     def __init__(self, session: Session) -> None:
         self._session = session

@@ -104,7 +104,7 @@ class Settings:
 
 
 class Network:
-    """Owns the session of one MainDevice in a loop, with its plan, timing, clocks and log."""
+    """One network of a loop: its MainDevice, session, plan, timing, clocks and log."""
 
     def __init__(
         self,

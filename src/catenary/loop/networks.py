@@ -274,7 +274,7 @@ def cpus_for(count: int, cpu: int | Sequence[int] | None) -> list[int | None]:
     Raises:
         ValueError: The number of CPUs is not the number of networks.
     """
-    if count == 1 and isinstance(cpu, Sequence):
+    if count == 1 and cpu is not None and not isinstance(cpu, int):
         raise ValueError(f"cpu={cpu}: one network has one thread, on one CPU")
     if isinstance(cpu, int):
         return [cpu] * count

@@ -27,7 +27,7 @@ EVENT_FIELDS = {field.name for field in fields(Event)}
 
 
 class Publisher:
-    """Owns a loop's connection to its sink, from `open` to `close`."""
+    """Connection of a loop to its sink, from `open` to `close`."""
 
     def __init__(self, sink: Sink, main: MainDevice, engine: Engine, plan: Plan) -> None:
         self._sink = sink
@@ -199,11 +199,11 @@ def with_own_names(
 ) -> Iterator[SinkField]:
     """Yield the columns with unique names.
 
-    A name that several columns share is extended by the device, then by a number if necessary.
+    A name that is not unique gets the suffix " of device N", and a number if that is not enough.
 
     Args:
         columns: Columns and their devices.
-        taken: Names in use; it is extended.
+        taken: Names in use. The yielded names are added to it.
     """
     often = Counter(each.name for each, _ in columns)
     for each, device in columns:

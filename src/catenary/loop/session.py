@@ -50,7 +50,7 @@ STOP_SLICE_NS = 20_000_000  # between checks of `guard.hurry` while the drives b
 
 
 class Session:
-    """Owns the engine of one MainDevice while its loop is open."""
+    """State of one MainDevice in a loop: engine, arrays, acyclic queue and watches."""
 
     def __init__(
         self,
@@ -251,9 +251,9 @@ class Session:
         """
         for mover in list(self.views.movers):
             mover.check()
-        error = self.faults.error(flags, enabling=enabling)
         if flags & CYCLE_CLOCKS:
-            self.announce_clocks()
+            self.announce_clocks()  # before the queries, which take time and can fail
+        error = self.faults.error(flags, enabling=enabling)
         if error is not None:
             raise error
 

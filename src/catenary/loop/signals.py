@@ -22,7 +22,7 @@ SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 
 class SignalGuard:
-    """Owns the handlers of SIGINT, SIGTERM and SIGHUP while a loop is open.
+    """Handlers of SIGINT, SIGTERM and SIGHUP while a loop is open.
 
     `leaving`: code objects of the functions that leave a loop. If one of them is on the stack, a
     signal only sets `hurry`. (A flag set by these functions would leave a gap at their first line.)

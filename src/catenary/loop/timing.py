@@ -8,7 +8,7 @@ from collections.abc import Iterator, Mapping
 from catenary import notebook
 from catenary.figures import FIGURES, heading
 
-NAME, FIGURE = 14, 11  # widths of a table
+NAME, FIGURE = 16, 11  # widths of a table
 COUNTED = ("late", "uncommitted", "underrun", "lost")
 BUSY_SHARE = 0.5  # of the switch interval: a longer wait indicates a second busy thread
 LATE_SHARE = 0.1  # of the period: a later wake-up is reported

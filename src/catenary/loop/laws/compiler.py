@@ -47,7 +47,7 @@ def shell(actual_at, target_at, memory_at, memory_count, parameters_at, paramete
 
 @dataclass(frozen=True, slots=True)
 class CompiledLaw:
-    """Owns the machine code of a law. Keep the object while the address is in use."""
+    """Machine code of a law. Keep the object while the address is in use."""
 
     address: int
     code: object

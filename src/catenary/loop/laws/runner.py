@@ -25,7 +25,7 @@ BUDGET_SHARE = 0.4  # of the period: the frames need the remainder
 
 
 class LawRunner:
-    """Owns the compiled laws of a loop and the running law."""
+    """Compiled laws of a loop, and the running law."""
 
     def __init__(self, engine: core.Engine, plan: Plan) -> None:
         self._engine = engine

@@ -65,7 +65,7 @@ class RefusedMode(NamedTuple):
 
 
 class AxisWatch:
-    """Owns the stops and refused modes that were already reported."""
+    """Watch of the axes. It remembers the stops and refused modes already returned."""
 
     def __init__(self, views: Views, axes: Sequence[AxisPlan]) -> None:
         self._views = views

@@ -66,7 +66,7 @@ class Standing(Enum):
 
 @dataclass(slots=True)
 class Charge:
-    """Owns the state of one device in the watch."""
+    """State of one device in the watch."""
 
     sub: SubDevice
     plan: DevicePlan
@@ -92,7 +92,7 @@ def required_positions(plan: Plan) -> frozenset[int]:
 
 
 class Watch:
-    """Owns the state of every device of one network."""
+    """Watch of the devices of one network, with the state of each device."""
 
     def __init__(
         self,
@@ -153,7 +153,7 @@ class Watch:
         )
 
     def requires(self, position: int) -> bool:
-        """Return True if the loop ends without this device."""
+        """Return True if the loss of this device ends the loop."""
         return self._charges[position].required
 
     def release(self, sub: SubDevice) -> None:

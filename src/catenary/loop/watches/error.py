@@ -23,7 +23,7 @@ SILENCE = 60.0  # [s] before the same place is reported again
 
 
 class ErrorWatch:
-    """Owns the last reading of the counters and the times of the reported findings."""
+    """Watch of the error counters. It keeps their last reading and the times of the reports."""
 
     def __init__(self, main: MainDevice, now: Callable[[], float]) -> None:
         self._subs = main.subs
@@ -45,7 +45,7 @@ class ErrorWatch:
             yield after(PERIOD)
 
     def look(self) -> Procedure[Sequence[Finding]]:
-        """Return the findings since the last reading; none after the first reading.
+        """Return the findings since the previous reading. The first call returns none.
 
         `main.diagnose()` covers the counts from before the loop.
         """

@@ -22,7 +22,7 @@ NEVER_NS = 1 << 62
 
 
 class MailboxWatch:
-    """Owns the state of the mailbox checks. The thread that steps the queue calls `look`.
+    """State of the mailbox checks. The thread that steps the queue calls `look`.
 
     `words`: last integers of the loop's private input buffer, with one bit per device. Each
     iteration updates them.
