@@ -91,7 +91,8 @@ class FaultReport:
             out_of_op = self._out_of_op()
             if out_of_op is not None:
                 return out_of_op
-            stops += self.report_axes(explained=True)  # the flags of its cycles are lost
+            # The flags of the cycles during the query were not judged.
+            stops += self.report_axes(explained=True)
         return self._axis_error(stops, raise_faults=self._policy.raise_faults and not enabling)
 
     def ended(self, flags: int) -> LoopError | None:
@@ -129,10 +130,10 @@ class FaultReport:
         return drive_error(troubles, what, log)
 
     def report_axes(self, *, explained: bool = False) -> list[StoppedAxis]:
-        """Put an event for each axis that the core stopped without a request and each refused mode.
+        """Put an event for each refused mode, and for each axis that the core stopped by itself.
 
         Args:
-            explained: True if no flag of a cycle caused the call: see `AxisWatch.new_refusals`.
+            explained: True if the call has another reason: see `AxisWatch.new_refusals`.
 
         Returns:
             The new stops.
@@ -156,7 +157,7 @@ class FaultReport:
         return read_log(self._engine, self._plan)
 
     def _suspects(self) -> list[int]:
-        """Return the positions of required devices in units without a last answer."""
+        """Return the positions of required devices whose sync unit did not answer last."""
         valid = self._engine.buffers["unit_valid"].tolist()
         return [
             position

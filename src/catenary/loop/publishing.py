@@ -143,7 +143,9 @@ def of_block(block: Block, places: Places, kinds: Sequence[bool] = ()) -> Iterat
 
 
 def unit_of(name: str, kinds: Sequence[bool] = ()) -> str:
-    """Return the unit of a field: "rad"; for linear axes "m"; "rad or m" if both kinds occur.
+    """Return the unit of a field: "rad", "m" for linear axes, or "rad or m" for both kinds.
+
+    Empty if the field has no unit.
 
     Args:
         name: Name of the field.
