@@ -283,7 +283,7 @@ def test_more_frames_in_a_cycle_than_indices_are_refused_by_the_plan() -> None:
     assert len(make_plan(devices[:32], options=PlanOptions(period=5e-3)).cycle.frames) == 32
     with pytest.raises(ConfigurationError) as caught:
         make_plan(devices, options=PlanOptions(period=5e-3))
-    assert "33 frames in one cycle; the limit is 32" in str(caught.value)
+    assert "too many frames in one cycle: 33; the limit is 32" in str(caught.value)
     assert "exact_matching=True" in str(caught.value)
     exact = make_plan(devices, options=PlanOptions(period=5e-3, exact_matching=True))
     assert len(exact.cycle.frames) == 33

@@ -126,7 +126,7 @@ def _share(
 
     Args:
         places: All devices.
-        heads: The first clocks behind the port, in the order of the frame.
+        heads: The first clocks behind the port, in the order in which a frame reaches them.
         reached: Delay from the first clock when the frame leaves by the port [ns].
         away: Time until the frame returns to the port [ns].
         delays: The list to change.
@@ -164,7 +164,7 @@ def _children(places: Sequence[ClockPlace]) -> list[list[int]]:
     children: list[list[int]] = [[] for _ in places]
     for position, place in enumerate(places):
         if place.parent is not None:
-            children[place.parent].append(position)  # positions follow the order of the frame
+            children[place.parent].append(position)  # in the order in which a frame passes them
     return children
 
 

@@ -42,8 +42,8 @@ def open_ports(dl_status: int) -> Ports:
 def tree(ports: Sequence[Ports]) -> tuple[Place, ...]:
     """Return the place of each device in the tree.
 
-    If there are more devices than open ports, the registers do not describe a tree. In
-    this case, devices for which no open port remains have no parent.
+    If there are more devices than open ports, the registers do not describe a tree. In this case,
+    devices for which no open port remains have no parent.
     """
     places: list[Place] = []
     unfilled: list[tuple[int, int]] = []  # (position, port); the last one is next
