@@ -3,9 +3,9 @@
 
 Every frame is stamped when it leaves. The time that the reference clock put into it gives the phase
 of its cycle start. A PI controller with decreasing bandwidth corrects phase errors by longer or
-shorter periods (docs/how_to/clocks.md explains its gains); plan/clocks.py has the numbers. If the
-clocks follow the MainDevice, the cycle starts are set into phase once and stay on their grid. Its
-twin in Python: tests/core/phase_twin.py. Budget: 60 ns per cycle.
+shorter periods. docs/explanation/distributed_clocks.md explains its gains; plan/clocks.py has the
+numbers. If the clocks follow the MainDevice, the cycle starts are set into phase once and stay on
+their grid. Its twin in Python: tests/core/phase_twin.py. Budget: 60 ns per cycle.
 
 A reference that does not answer is no longer read in each frame. A device that was switched off
 returns with a different time, which must not reach the other clocks. All other clocks then follow

@@ -40,7 +40,7 @@ cdef struct record_t:
     int32_t receive_ns
     int32_t process_ns
     int32_t send_ns
-    int32_t tail_ns
+    int32_t post_processing_ns
     int32_t round_trip_ns
     int32_t output_delay_ns
     int32_t input_age_ns

@@ -143,7 +143,9 @@ def of_block(block: Block, places: Places, kinds: Sequence[bool] = ()) -> Iterat
 
 
 def unit_of(name: str, kinds: Sequence[bool] = ()) -> str:
-    """Return the unit of a field: "rad"; for linear axes "m"; "rad or m" if both kinds occur.
+    """Return the unit of a field: "rad", "m" for linear axes, or "rad or m" for both kinds.
+
+    Empty if the field has no unit.
 
     Args:
         name: Name of the field.
@@ -232,7 +234,7 @@ def one_sink_each(sinks: Sink | Sequence[Sink] | None, networks: int) -> list[Si
     given = list(sinks) if isinstance(sinks, Sequence) else [sinks]
     if len(given) != networks:
         raise ValueError(
-            f"sink: {len(given)} sinks for {networks} networks; give each network its own: "
+            f"sink: {len(given)} given for {networks} networks; give each network its own: "
             "sink=[cat.Share('upper'), cat.Share('lower')]"
         )
     return list(given)

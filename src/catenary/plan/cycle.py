@@ -187,7 +187,9 @@ class AxisPlan:
 
 @dataclass(frozen=True, slots=True)
 class ClockPlan:
-    """Synchronisation of the cycle and the distributed clocks (docs/how_to/clocks.md).
+    """Synchronisation of the cycle and the distributed clocks.
+
+    docs/explanation/distributed_clocks.md explains it.
 
     If `follow` is "reference", the cycle starts follow the reference clock. If it is "main", the
     reference clock follows the link's clock.

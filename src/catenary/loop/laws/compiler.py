@@ -86,7 +86,7 @@ def compile_law(law: Law, layout: LawLayout) -> CompiledLaw:
 
 @contextmanager
 def counted_allocations() -> Iterator[Callable[[], int]]:
-    """Yield a function that returns the number of arrays that compiled laws allocated so far."""
+    """Yield a function that returns the number of arrays that laws have allocated in the block."""
     runtime: Any = import_module("numba.core.runtime")
     runtime._nrt_python.memsys_enable_stats()
     try:

@@ -118,7 +118,7 @@ class LawRunner:
             raise failure
 
     def failure(self, log: Log | None) -> LawError | None:
-        """Return the error of the law if it has failed, once.
+        """Return the error of a failed law. Return None without a failure, and on later calls.
 
         Args:
             log: The last cycles.

@@ -1,7 +1,7 @@
 """Watch of the error counters of the devices, which are read once per second.
 
-It is an endless procedure in the acyclic queue, and sends one frame per second for 46 devices.
-A finding about a cable, a device or its supply becomes an event, at most once per minute.
+It is an endless procedure in the acyclic queue. For up to 46 devices, it sends one frame per
+second. A finding about a cable, a device or its supply becomes an event, at most once per minute.
 """
 
 from __future__ import annotations
