@@ -29,7 +29,7 @@ from catenary.wire.sync_manager import (
 
 
 def configure_mailbox(channel: MailboxChannel) -> Procedure[None]:
-    """Write SyncManagers 0 and 1 and reset the counters. The device must be in INIT."""
+    """Write SyncManagers 0 and 1, and reset the mailbox state. The device must be in INIT."""
     layout = channel.layout
     yield from configure_mailbox_areas(
         channel.station,
