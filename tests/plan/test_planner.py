@@ -273,7 +273,7 @@ def test_a_device_that_exceeds_a_datagram_is_refused_with_both_numbers(
         )
     text = str(caught.value)
     assert f"701 bytes of outputs and {limit - 700} bytes of inputs" in text
-    assert f"{limit + 1} bytes of process data" in text
+    assert f"{limit + 1} bytes; the process data of a device" in text
     assert f"holds {limit} bytes" in text
     assert "1 bytes less" in text
 
@@ -328,7 +328,7 @@ def test_acyclic_frames_get_the_remaining_wire_time() -> None:
 
 
 def test_a_request_for_a_missing_device() -> None:
-    with pytest.raises(ConfigurationError, match="device 9; the segment has 6"):
+    with pytest.raises(ConfigurationError, match="device 9, but the segment has 6"):
         make_plan(demo(), [asks(9)])
 
 

@@ -214,7 +214,7 @@ def _ask(
         message = decoded(channel, mailbox)
         if isinstance(message, Abort):
             # Do not compare the object: some devices return no index, or a different one. Only one
-            # service runs at a time. SOEM (ecx_SDOread) and IgH (fsm_coe.c) do not compare it either.
+            # service runs at a time. SOEM (ecx_SDOread) and IgH (fsm_coe.c) also do not compare it.
             return message
         return message if isinstance(message, expected) and matches(message) else None
 
