@@ -274,7 +274,7 @@ def test_a_device_that_exceeds_a_datagram_is_refused_with_both_numbers(
     text = str(caught.value)
     assert f"701 bytes of outputs and {limit - 700} bytes of inputs" in text
     assert f"{limit + 1} bytes; the process data of a device" in text
-    assert f"holds {limit} bytes" in text
+    assert f"one datagram of {limit} bytes" in text
     assert "1 bytes less" in text
 
 
