@@ -61,7 +61,7 @@ class MainDevice:
     def __init__(self, source: LinkSource, *, force: bool = False) -> None:
         self.subs = SubDevices()  # devices of the last scan
         self.notes: tuple[str, ...] = ()  # irregularities found by the last scan
-        self.clock_delays_ns: tuple[int | None, ...] = ()  # after the first clock, by position
+        self.clock_delays_ns: tuple[int | None, ...] = ()  # from the first clock, by position
         self.clock_epoch_ns = 0  # system time of the clocks minus link time
         self.events = Events()  # iterate over it, or call get(timeout=)
         self._callbacks = callbacks = Callbacks()

@@ -50,7 +50,7 @@ class FrameCounts:
 
 
 class LinkLent(RuntimeError):
-    """Error: a loop uses the link. Nothing was sent; use the loop's runner."""
+    """Error of a call while a loop uses the link. Nothing was sent. Use the loop's runner."""
 
 
 class BlockingRunner:
@@ -186,7 +186,7 @@ class BlockingRunner:
     ) -> None:
         """Receive the frames of one window, until a deadline."""
         deadline = self._link.now() + self._timeout_ns
-        while under_way and self._link.now() < deadline:  # the deadline holds under a flood, too
+        while under_way and self._link.now() < deadline:  # it also ends under a flood of frames
             raw = self._link.receive()
             if raw is not None:
                 self._take(raw, under_way, replies)

@@ -48,7 +48,8 @@ class SubDevice:
         self.channel = channel  # None if it has no mailbox
         self.state: AlState | None = None  # last known state; None if unknown
         self.error: CatenaryError | None = None  # of the last scan, if PRE-OP was not reached
-        self.sync_types: dict[int, bytes] = {}  # 0x1C32:01, 0x1C33:01 as found
+        # 0x1C32:01 and 0x1C33:01 before the first loop with clocks, to restore them
+        self.sync_types: dict[int, bytes] = {}
         self.sdo = Sdo(self)
 
     @property

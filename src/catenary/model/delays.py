@@ -99,7 +99,7 @@ def _start(
     children: Sequence[Sequence[int]],
     delays: list[float | None],
 ) -> None:
-    """Set the delays of the clocks that no other clock precedes; the first one has delay 0.
+    """Set the delays of the clocks without a clock before them. The first one has delay 0.
 
     Further such clocks are in other branches of a device without a clock. The frame reaches them
     after the earlier branches; the unknown cable delays are ignored.
@@ -171,7 +171,7 @@ def _children(places: Sequence[ClockPlace]) -> list[list[int]]:
 def _first_clocks(
     places: Sequence[ClockPlace], children: Sequence[Sequence[int]], start: int
 ) -> Iterator[_Head]:
-    """Yield the clocks of a branch that no other clock of the branch precedes."""
+    """Yield the first clocks of a branch: those without another clock of the branch before them."""
     waiting = [_Head(start, 0)]
     while waiting:
         head = waiting.pop()

@@ -209,7 +209,7 @@ def make_clock_plan(
 def start_time_ns(now_ns: int, syncs: Sequence[SyncPlan]) -> int:
     """Return the first SYNC0 time.
 
-    All devices can be configured before this time. All SYNC signals start together at this time.
+    All devices can be configured before this time. Apart from shifts, all SYNC signals start at it.
 
     Args:
         now_ns: Present time of the reference clock [ns].

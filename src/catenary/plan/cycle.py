@@ -230,14 +230,14 @@ class CyclePlan:
     output_areas: tuple[ImageArea, ...] = ()
     input_areas: tuple[ImageArea, ...] = ()
     lost_limit: int = 3  # consecutive bad cycles before WorkingCounterError
-    # Time without fresh set-points (at least 3 cycles) before a quick stop. 0: never; not in CST
+    # Time without fresh set-points (at least 3 cycles) before a quick stop; 0: never (not in CST)
     late_limit_position_ns: int = 50_000_000  # CSP
     late_limit_velocity_ns: int = 50_000_000  # CSV
     late_limit_torque_ns: int = 10_000_000  # CST
     handover_ns: int = 20_000_000  # time for which CST keeps its torque after a law or stream ended
     # Time for which the set-points of a background program are valid after an update
-    command_timeout_velocity_ns: int = 200_000_000  # CSV; afterwards it decelerates
-    command_timeout_torque_ns: int = 20_000_000  # CST; afterwards quick stop
+    command_timeout_velocity_ns: int = 200_000_000  # CSV; then the axis decelerates
+    command_timeout_torque_ns: int = 20_000_000  # CST; then the axis makes a quick stop
     stop_deadline_ns: int = 2_000_000_000  # longest time from quick stop to standstill
     wire_ns: int = 0  # wire time of the cyclic frames in the busiest cycle
     acyclic_ns: int = 0  # wire time per cycle for acyclic frames; one frame is always allowed

@@ -272,7 +272,7 @@ def _of_unit(unit: UnitLayout, number: int) -> list[_Piece]:
 
 
 def _batches(pieces: Sequence[_Piece], room: int) -> list[list[_Piece]]:
-    """Return the datagrams of each frame. Each goes into the first frame of its cycles with room.
+    """Return the datagrams of each frame. Each is in the first frame of its cycles that has room.
 
     Args:
         pieces: Datagrams in order.

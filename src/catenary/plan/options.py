@@ -30,7 +30,8 @@ class PlanOptions:
             device is.
         watchdog: Watchdog time of process data [s]; 0: off. None: 0.1 s, or the longer of 10 ms and
             five exchanges for devices in CST.
-        collect_share: If threaded, share of the period by which all frames must have returned.
+        collect_share: If threaded, share of the period, from the wake-up on, in which frames may
+            return.
         lost_limit: Number of consecutive bad cycles before WorkingCounterError.
         late_limit_position: Longest time without fresh set-points in CSP [s]; 0: unlimited.
         late_limit_velocity: The same in CSV [s].

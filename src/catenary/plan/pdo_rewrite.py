@@ -20,7 +20,7 @@ ENTRIES_MAX = 254  # subindices of a mapping object, ETG.1000.6 table 75
 def rewrite_refusal(
     device: DeviceDescription, direction: Direction, missing: Sequence[ObjectReference]
 ) -> str:
-    """Return the reason why no PDO can carry the missing objects too; empty if one can."""
+    """Return the reason why the missing objects cannot be added to a PDO; empty if possible."""
     if device.mailbox is None or not device.coe:
         return "it has no CoE mailbox to change its mapping"
     for reference in missing:
@@ -122,7 +122,7 @@ def _not_mappable(
 def _other_length(
     device: DeviceDescription, direction: Direction, reference: ObjectReference
 ) -> str:
-    """Return a text if the object is already mapped with another length; otherwise, return ""."""
+    """Return the reason if the object is already mapped with another length; otherwise empty."""
     for entry in mapped_entries(device.assignments(direction)):
         if (entry.index, entry.subindex) == (reference.index, reference.subindex):
             place = f"0x{entry.index:04X}:{entry.subindex:02X}"

@@ -49,7 +49,7 @@ class _State(NamedTuple):
 def find_combination(
     assigned: Sequence[Pdo], offered: Sequence[Pdo], requested: Sequence[ObjectReference]
 ) -> Combination | None:
-    """Return the combination that carries all objects and changes least; None if there is none.
+    """Return the combination that carries all objects and changes least; None if none was found.
 
     It prefers the fewest removed PDOs, then the fewest added ones, then the order of the device.
     Mandatory PDOs stay.

@@ -49,7 +49,7 @@ class Download:
     subindex: int
     data: bytes
     entry: Entry | None = None
-    optional: bool = False  # skipped if the object does not exist or is read-only
+    optional: bool = False  # True to ignore that the object is absent, read-only or refuses this
     verify: bool = False  # read back and compared, unless it is write-only
     text: str = ""  # value as the application gave it; empty for objects of Catenary
 

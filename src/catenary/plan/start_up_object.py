@@ -13,9 +13,9 @@ MAPPING_OBJECTS = (range(0x1600, 0x1800), range(0x1A00, 0x1C00), range(0x1C10, 0
 
 @dataclass(frozen=True, slots=True)
 class StartUp:
-    """Value of an object that is written to a device in PRE-OP, each time the loop starts it.
+    """Value of an object that a loop writes to a device in PRE-OP, each time the loop starts.
 
-    It is written again when the device returns after a loss.
+    The loop writes it again when the device returns after a loss.
 
     Args:
         index: Index of the object, 0 to 0xFFFF.

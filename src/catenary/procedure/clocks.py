@@ -53,7 +53,7 @@ class ClockMeasurement:
 
     delays_ns: tuple[int | None, ...]  # delay from the first clock; None without a clock
     local_times_ns: tuple[int | None, ...]  # at the last latch; None without a system time
-    latched_ns: int  # the last latch on the link's clock, exact to half a round trip
+    latched_ns: int  # last latch on the link's clock; error: up to half a round trip
 
     @property
     def first(self) -> int | None:

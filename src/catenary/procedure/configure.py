@@ -65,7 +65,7 @@ def configure_process_data(
 ) -> Procedure[None]:
     """Write the SyncManagers and FMMUs of the process data, and the watchdog.
 
-    The device must be in PRE-OP. SyncManagers of an earlier plan are disabled first, because an
+    The device must be in PRE-OP. All process-data SyncManagers are disabled first, because an
     enabled SyncManager keeps its length.
 
     Args:

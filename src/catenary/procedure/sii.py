@@ -46,8 +46,8 @@ _EIGHT_BYTES = ControlStatus(eight_bytes=True).word
 def read_image(station: Station, *, wanted: Collection[int] = WANTED) -> Procedure[bytes]:
     """Read the image up to the end mark.
 
-    Unread words of the header are zero; other categories are omitted. If there is no end mark, as
-    in an unprogrammed EEPROM, the categories are truncated.
+    Unread words of the header are zero. Categories that are not wanted are omitted. If
+    there is no end mark, as in an unprogrammed EEPROM, the categories are truncated.
 
     Args:
         station: The device.

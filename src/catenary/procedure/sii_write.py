@@ -34,7 +34,7 @@ class Change(NamedTuple):
 
 
 def changes(old: bytes, new: bytes) -> tuple[Change, ...]:
-    """Return the words in which two images differ. Those of the configuration come last.
+    """Return the words in which two images differ. The configuration and its checksum come last.
 
     While the configuration is only partly written, its checksum is wrong. The controller can
     therefore detect an interrupted write.

@@ -67,9 +67,10 @@ def count() -> Procedure[Counted]:
 
 
 def reset(device_count: int) -> Procedure[None]:
-    """Bring all devices to INIT, and clear their FMMUs, SyncManagers and SYNC signals.
+    """Request INIT from all devices, and clear their FMMUs, SyncManagers and SYNC signals.
 
-    Errors are acknowledged, and all EEPROMs are assigned to the MainDevice.
+    Errors are acknowledged, and all EEPROMs are assigned to the MainDevice. It is not an error if a
+    device does not reach INIT.
 
     Raises:
         SegmentError: The number of devices differs from `device_count`.
