@@ -42,7 +42,7 @@ cdef struct law_t:
     uint32_t given             # last request that was answered; futex word
 
 cdef class Law:
-    """A compiled function of native/law.h at `address`, with its numbers.
+    """Compiled function (native/law.h) with its memory and parameters.
 
     A step that computes for 20 ms (twice the budget, if that is more) is aborted by a monitor
     thread. The laws of an engine share this thread; the first one sets its priority. The caller
