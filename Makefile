@@ -48,7 +48,7 @@ test: $(VENV)/.with-test
 lint: $(VENV)/.with-lint
 	@$(VENV)/bin/ruff check $(wildcard $(CHECKED))
 	@$(VENV)/bin/ruff format --check $(wildcard $(CHECKED))
-	@$(VENV)/bin/python tools/words.py src benchmarks tools examples README.md CONTRIBUTING.md
+	@$(VENV)/bin/python tools/words.py src benchmarks tools examples README.md CONTRIBUTING.md docs
 	@$(VENV)/bin/mypy
 	@$(VENV)/bin/lint-imports --no-logo
 

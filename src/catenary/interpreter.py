@@ -15,7 +15,7 @@ WARNING = (
 def is_own(executable: str, prefix: str, base_prefix: str) -> bool:
     """Return True if the file that `setcap` would change belongs to a single environment.
 
-    `python -m venv` creates a link to its own Python, unless `--copies` is given.
+    `python -m venv` creates a symbolic link to the base interpreter, unless `--copies` is given.
 
     Args:
         executable: As `sys.executable`.

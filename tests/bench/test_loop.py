@@ -6,7 +6,7 @@ from importlib.util import find_spec
 import pytest
 
 from catenary.bench.loop import MODULES, check_busy_wait, own_names, show
-from catenary.bench.report import as_text
+from catenary.bench.report import COLUMNS, as_text
 from catenary.bench.setting import Setting
 from catenary.bench.statistics import combine
 from tests.bench.test_statistics import make_round
@@ -32,6 +32,12 @@ def test_the_file_has_the_setting_and_all_runs(tmp_path, capsys) -> None:
     figures = json.loads((tmp_path / "loop.json").read_text())
     assert (figures["drives"], figures["rate"], figures["ratios"]) == (2, 1000, {})
     assert [run["name"] for run in figures["runs"]] == list(MODULES)
+
+
+def test_the_names_of_the_phases_are_apart() -> None:
+    text = as_text([combine("c", [make_round(500, 4000, 5500)])], {})
+    [head] = [line for line in text.splitlines() if line.startswith("phases, median")]
+    assert head.split()[3:] == list(COLUMNS)
 
 
 def test_a_missing_ratio_is_a_dash() -> None:

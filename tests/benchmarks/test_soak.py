@@ -111,8 +111,10 @@ def test_a_device_that_is_left_in_op_is_found(monkeypatch: pytest.MonkeyPatch) -
     assert "no device left in OP" in invariants(minute)
 
 
-def test_a_device_that_is_not_led_back_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(Watch, "_lead", lambda self, charge, conversation: conversation.close())
+def test_a_device_that_is_not_brought_back_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(
+        Watch, "_start_return", lambda self, charge, conversation: conversation.close()
+    )
     minute = soaked(monkeypatch, f.LeaveState(device=TOOL, at=0.3), seconds=6.0)
     assert "all back" in invariants(minute)
 

@@ -23,7 +23,7 @@ def test_a_group_ends_before_the_next_alias() -> None:
         assert positions(subs.group(20)) == [4, 5]
         assert subs.group(30) == ()
         assert positions(subs.drives) == [1, 3, 5]
-        with pytest.raises(ValueError, match="0 means that a device has none"):
+        with pytest.raises(ValueError, match="0 means that a device has no alias"):
             subs.group(0)
 
 

@@ -1,5 +1,5 @@
-"""The phase controller in Python, written from docs/how_to/clocks.md: it and the compiled one
-judge each other."""
+"""The phase controller in Python, written from docs/explanation/distributed_clocks.md: it and
+the compiled one judge each other."""
 
 from __future__ import annotations
 

@@ -100,6 +100,7 @@ def test_the_page_is_well_formed_and_self_contained(result: Result) -> None:
     assert "A &amp; B &lt;coupler&gt;" in page
     assert "it affects; longer in 2 uncommitted cycles." in page
     assert page.count("<svg") == 2 + len(PHASES)
+    assert not [name for name in re.findall(r"<(?:th|b)\b[^>]*>([^<]*)", page) if "_" in name]
 
 
 def test_an_outlier_does_not_compress_a_histogram() -> None:

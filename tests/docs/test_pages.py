@@ -8,24 +8,6 @@ import pytest
 
 from tests.docs.page import ROOT, run_page
 
-# Pages whose examples do not run yet. Who rewrites a page takes it off this list.
-NOT_YET = {
-    "docs/explanation/safety.md",
-    "docs/explanation/virtual_segment.md",
-    "docs/how_to/clocks.md",
-    "docs/how_to/control_blocks.md",
-    "docs/how_to/faults.md",
-    "docs/how_to/igh.md",
-    "docs/how_to/laws.md",
-    "docs/how_to/mapping.md",
-    "docs/how_to/moves.md",
-    "docs/how_to/networks.md",
-    "docs/how_to/realtime.md",
-    "docs/how_to/recording.md",
-    "docs/how_to/share.md",
-    "docs/how_to/start_up_objects.md",
-    "docs/reference/machine_file.md",
-}
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("**/*.md"))]
 NAMES = [
     str(path.relative_to(ROOT))
@@ -36,11 +18,5 @@ NAMES = [
 
 @pytest.mark.parametrize("name", NAMES)
 def test_the_examples_run(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    if name in NOT_YET:
-        pytest.skip("the page is not rewritten yet")
     monkeypatch.chdir(tmp_path)
     assert run_page(ROOT / name, monkeypatch)
-
-
-def test_the_list_names_pages_with_examples() -> None:
-    assert set(NAMES) >= NOT_YET

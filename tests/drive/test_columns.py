@@ -102,7 +102,7 @@ def test_an_object_that_the_axis_writes_cannot_be_a_column(
         torque_limit=1.0,
         columns={"mine": (index, 0, kind)},
     )
-    with pytest.raises(ConfigurationError, match=rf"\.mine' is the {what} that the axis itself"):
+    with pytest.raises(ConfigurationError, match=rf"\.mine' would overwrite {what}, which"):
         main.plan(arm)
 
 

@@ -390,7 +390,7 @@ def test_a_stop_of_the_axis_ends_the_move(call: str) -> None:
 def test_a_wait_that_takes_too_long_stops_the_move() -> None:
     with opened(Servo()) as (arm, loop):
         move = arm.move_to(1.0, velocity=0.1)
-        with pytest.raises(MoveError, match=r"was still moving after 0\.5 s, 0\.9\d+ rad before"):
+        with pytest.raises(MoveError, match=r"was still moving after 0\.5 s, 0\.9\d+ rad from"):
             loop.wait(move, timeout=0.5)
         loop_for(loop, 0.2)
         assert move.outcome == "stopped"

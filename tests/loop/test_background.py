@@ -466,7 +466,7 @@ def test_interrupting_the_program_does_not_stop_the_loop(cell: Cell) -> None:
 
 def test_ctrl_c_while_closing_only_hurries(cell: Cell) -> None:
     class Interrupting:
-        def tell_end(self, error: BaseException) -> None: ...
+        def report_end(self, error: BaseException) -> None: ...
 
         def close(self) -> None:
             os.kill(os.getpid(), signal.SIGINT)

@@ -6,6 +6,7 @@ from typing import Any
 import pytest
 
 from catenary.core import (
+    CYCLE_CLOCKS,
     CYCLE_DROPPED,
     CYCLE_NONE,
     CYCLE_OK,
@@ -13,10 +14,11 @@ from catenary.core import (
     CYCLE_WORKING_COUNTER,
     REQUEST_ENABLED,
 )
-from catenary.errors import DriveError, LoopError, StateError, WorkingCounterError
+from catenary.errors import DriveError, LinkError, LoopError, StateError, WorkingCounterError
 from catenary.loop.cycle_errors import Evidence
 from catenary.loop.fault_report import FaultReport
 from catenary.loop.options import StopPolicy
+from catenary.loop.session import Session
 from catenary.plan.cycle import AxisPlan, CyclePlan, Number, NumberKind, SyncUnit
 from catenary.plan.request import RequestTables
 from catenary.plan.stop_reason import StopReason
@@ -124,3 +126,20 @@ def test_a_stop_is_an_event_and_by_default_an_error(
     assert isinstance(error, DriveError) == (reaction == "raise")
     [event] = rig.events
     assert event.time == 2.0  # type: ignore[attr-defined]
+
+
+def test_the_event_of_the_clocks_precedes_the_queries_of_a_fault() -> None:
+    calls: list[str] = []
+
+    def error(flags: int, *, enabling: bool) -> None:
+        calls.append("queries")
+        raise LinkError("the link failed during the queries")
+
+    session: Any = SimpleNamespace(
+        views=SimpleNamespace(movers=[]),
+        faults=SimpleNamespace(error=error),
+        announce_clocks=lambda: calls.append("clocks"),
+    )
+    with pytest.raises(LinkError):
+        Session.judge(session, CYCLE_CLOCKS | CYCLE_WORKING_COUNTER)
+    assert calls == ["clocks", "queries"]

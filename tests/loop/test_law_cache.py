@@ -113,7 +113,7 @@ def test_folders_above_the_home_do_not_count(
 def test_a_link_in_the_place_of_the_folder_is_refused(tmp_path: Path) -> None:
     (tmp_path / "place").mkdir(mode=0o755)
     (tmp_path / "laws").symlink_to(tmp_path / "place")
-    with pytest.raises(PermissionError, match="is a link"):
+    with pytest.raises(PermissionError, match="is a symbolic link"):
         private_folder(tmp_path / "laws")
     assert (tmp_path / "place").stat().st_mode & 0o777 == 0o755
 

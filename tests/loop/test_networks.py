@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from typing import Any
+
+import numpy as np
 import pytest
 
 import catenary as cat
@@ -42,8 +45,15 @@ def test_each_network_has_its_own_thread() -> None:
 def test_cpus() -> None:
     assert cpus_for(2, 1) == [1, 1]
     assert cpus_for(2, [2, 3]) == [2, 3]
+    assert cpus_for(1, None) == [None]
     with pytest.raises(ValueError, match="2 networks"):
         cpus_for(2, [1])
+
+
+@pytest.mark.parametrize("cpu", [[1], np.int64(1), 1.0])
+def test_one_network_takes_one_cpu_as_an_integer(cpu: Any) -> None:
+    with pytest.raises(ValueError, match="one network has one thread"):
+        cpus_for(1, cpu)
 
 
 def test_cpus_are_the_last_where_there_are_more_than_networks(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pytest
 
+from catenary.core._cycle import PHASE_NAMES
 from catenary.loop.timing import Timing
 
 FIGURES = {
@@ -39,6 +40,15 @@ def test_the_table_shows_every_figure_the_counts_and_the_verdict() -> None:
     assert row.split() == ["lateness", "5.25", "9.00", "4.00", "0.50", "5.00", "8.00", "8.90"]
     assert counts == "10 cycles: 0 late, 0 uncommitted, 0 underrun, 0 lost"
     assert verdict == "No cycle was late, uncommitted, underrun or lost."
+
+
+def test_the_columns_are_aligned_for_every_phase() -> None:
+    found = Timing(
+        {name: {"count": 1.0, **FIGURES} for name in PHASE_NAMES}, {}, period=1e-3, scheduling=FIFO
+    )
+    table = str(found).splitlines()[: 1 + len(PHASE_NAMES)]
+    assert len({len(line) for line in table}) == 1
+    assert all(len(line.split()) == 8 for line in table)
 
 
 def test_each_kind_has_a_line_of_its_own() -> None:

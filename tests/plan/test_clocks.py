@@ -354,3 +354,8 @@ def test_it_prints() -> None:
     assert "SYNC0 every 1000 us, +0 us after the common SYNC0 time, AssignActivate 0x0300" in text
     assert "us before SYNC0: margin 200 us" in text
     assert "time constant 100 ms, at most 1000 ppm of the period" in text
+
+
+def test_an_op_mode_is_a_name() -> None:
+    with pytest.raises(TypeError, match="op_mode=0: must be the name of an OpMode"):
+        DistributedClock(op_mode=0)  # type: ignore[arg-type]

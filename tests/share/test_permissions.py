@@ -93,7 +93,7 @@ def test_full_file_system_is_reported_and_leaves_no_files(
     with cat.MainDevice(segment) as main:
         arm = cat.Drives(main.scan().drives, counts_per_turn=2**20, velocity_limit=100.0)
         share = cat.Share(name)
-        no_room = pytest.raises(ShareError, match=r"has not enough space for .* MiB")
+        no_room = pytest.raises(ShareError, match=r"not enough space in .* MiB needed")
         with no_room, share, cat.Loop(arm, sink=share):
             pass
         assert segment[0].state & 0x0F == 2  # PRE-OP

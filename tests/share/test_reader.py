@@ -290,7 +290,7 @@ def test_share_that_was_not_entered_is_refused(name: str) -> None:
 
 
 def test_each_network_needs_a_sink(name: str) -> None:
-    with pytest.raises(ValueError, match="1 for 2 networks"):
+    with pytest.raises(ValueError, match="1 given for 2 networks"):
         one_sink_each(cat.Share(name), 2)
 
 

@@ -20,6 +20,7 @@ HEADLINES = {
 COLUMNS = ("period", "lateness", "receive", "process", "send", "in_controller", "post_processing")
 FIGURES = ("max", "p50", "p99")  # in the order of catenary.figures
 NAME, FIGURE, GAP = 20, 9, "   "  # width of a name, width of a figure, and separator of groups
+PHASE = 17  # width of a phase
 
 
 def machine() -> str:
@@ -107,9 +108,10 @@ def _headlines(runs: Sequence[Run]) -> str:
 
 def _phases(runs: Sequence[Run], figure: str) -> str:
     title = {"p50": "phases, median [us]"}.get(figure, f"phases, {figure} [us]")
-    lines = [f"{title:{NAME}}" + "".join(f"{name:>15}" for name in COLUMNS)]
+    lines = [f"{title:{NAME}}" + "".join(f"{name:>{PHASE}}" for name in COLUMNS)]
     lines += [
-        f"{run.name:{NAME}}" + "".join(f"{run.timing_us[name][figure]:15.2f}" for name in COLUMNS)
+        f"{run.name:{NAME}}"
+        + "".join(f"{run.timing_us[name][figure]:{PHASE}.2f}" for name in COLUMNS)
         for run in runs
     ]
     return "\n".join(lines)

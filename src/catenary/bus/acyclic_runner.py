@@ -35,7 +35,7 @@ class AcyclicQueue(Protocol):
 
 @dataclass(slots=True, eq=False)
 class _Turn:
-    """Owns the replies of one step of a task until they are complete."""
+    """Replies to one step of a task, collected until they are complete."""
 
     task: Task[Any]
     replies: list[Reply | None]
@@ -59,7 +59,7 @@ class _UnderWay:
 
 
 class AcyclicRunner:
-    """Owns the procedures that run during one cycle. Only one thread may call `step`.
+    """Runner of the procedures of an open loop. Only one thread may call `step`.
 
     Any thread may call `submit` and `run`. A pause that ends within `grain_ns` counts as ended,
     because its next frame is sent only with the next cycle.

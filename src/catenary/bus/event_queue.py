@@ -24,7 +24,7 @@ Callback = Callable[[Event], object]
 
 
 class LoopClock:
-    """Owns the zero of a loop's event times: the cycle start of its first iteration."""
+    """Zero of a loop's event times: the cycle start of its first iteration."""
 
     def __init__(self, zero_ns: Callable[[], int]) -> None:
         self._zero_ns = zero_ns  # returns a time of the link's clock; 0 before the first iteration
@@ -41,7 +41,7 @@ class LoopClock:
 
 
 class Events:
-    """Owns the events that have not been fetched. Any thread may put and get.
+    """Queue of the events that have not been fetched. Any thread may put and get.
 
         for event in main.events:                 # the pending events; never waits
             print(event)
@@ -136,7 +136,7 @@ def _stamped(event: Event, clock: LoopClock | None) -> Event:
 
 
 class Callbacks:
-    """Owns the callbacks of a MainDevice and, in real time, the thread that calls them.
+    """Callbacks of a MainDevice and, in real time, the thread that calls them.
 
     In virtual time, `deliver` calls them in the thread that advances the time: the order is the
     same in every run. An exception of a callback is logged; the other callbacks still run.

@@ -35,7 +35,7 @@ if TYPE_CHECKING:  # plan imports NumPy, which a scan does not need
 
 
 class FrameMaster:
-    """Owns the procedures that a MainDevice runs on its devices. Implements `bus.Master`."""
+    """Master that sends its own frames. Implements `bus.Master` with procedures."""
 
     def __init__(self, main: MasterOwner, *, force: bool) -> None:
         self.carrier = None

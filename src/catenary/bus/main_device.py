@@ -1,4 +1,4 @@
-"""MainDevice: owns the link to one segment and the handles of its devices."""
+"""MainDevice: the link to one segment and the handles of its devices."""
 
 from __future__ import annotations
 
@@ -46,13 +46,13 @@ LEAVE_TIMEOUT = 0.5  # [s] for each state on the way down; short for a broken se
 
 
 class MainDevice:
-    """Owns the link to one segment.
+    """Link to one segment, and the handles of its devices.
 
         with MainDevice(Interface("eth0")) as main:
             for sub in main.scan():
                 print(sub.position, sub.name, sub.identity)
 
-    Leaving the block always brings all devices to INIT.
+    Leaving the block brings all devices of the last `scan` to INIT, if they can be reached.
 
     It is the only MainDevice on its network interfaces: opening fails while another master is live,
     unless `force=True`. A forked child cannot use it and does not change its devices.
@@ -109,9 +109,9 @@ class MainDevice:
         return self.runner.counts
 
     def open(self) -> Self:
-        """Open the link and return the MainDevice. Send nothing.
+        """Open the link and return the MainDevice. No frame is sent.
 
-        On a network interface, listen 0.1 s for another master. No effect if the link is open.
+        On a network interface, listen for another master for 0.1 s. No effect if the link is open.
 
         Raises:
             LinkError: The link cannot be used, or another master is live on it, unless `force`.
@@ -133,9 +133,9 @@ class MainDevice:
         return self
 
     def forget(self) -> None:
-        """Release the parent's link and devices in a forked child. Send nothing.
+        """Release the parent's link and devices in a forked child. No frame is sent.
 
-        No effect in the process that opened it.
+        No effect in the process that opened the link.
         """
         if not self._is_inherited:
             return
@@ -161,7 +161,8 @@ class MainDevice:
     def other_masters(self) -> tuple[str, ...]:
         """Evidence of another master on the network interfaces, as text.
 
-        It was found when the link was opened with `force`, or is found now by its packet socket.
+        This is the evidence found when the link was opened with `force`. If there is none, each
+        access checks for packet sockets of other programs.
         """
         if self._link is None or self._ownership is None:
             return ()
@@ -215,7 +216,10 @@ class MainDevice:
         self.events.put(event_types.Marker(when, None, message))
 
     def deliver_events(self) -> None:
-        """Call the callbacks with pending events in virtual time; otherwise, a thread does."""
+        """In virtual time, call the callbacks with the pending events.
+
+        In real time, a thread calls them.
+        """
         self._callbacks.deliver()
 
     def scan(
@@ -293,13 +297,13 @@ class MainDevice:
     ) -> Diagnosis:
         """Read the error counters and states of all devices, and locate faults.
 
-        A fault is in a cable, a device or the power supply. The call takes a few frames. While a
-        loop runs, call it from another thread.
+        Faults are located in cables, devices and the power supply. The call sends a few frames.
+        While a loop runs, call it from another thread.
 
         Args:
-            since: Earlier diagnosis that starts the count; None for the power-up of the devices.
+            since: Earlier diagnosis to count from. None counts from the power-up of the devices.
             subs: Devices of a `passive_scan`; None for those of the last `scan`.
-            lost_frames: Number of frames that were lost or damaged in that time.
+            lost_frames: Number of frames lost or damaged since then.
         """
         chosen = self.subs if subs is None else subs
         return self.master.diagnose(chosen, since=since, lost_frames=lost_frames)
@@ -367,7 +371,7 @@ class MainDevice:
         """End operation: bring all devices to PRE-OP.
 
         Args:
-            timeout: Time for each state on the way down [s]. The kernel master uses its own.
+            timeout: Timeout for each state change [s]. The kernel master uses its own timeout.
 
         Raises:
             StateError: A device does not leave its state.
@@ -376,7 +380,7 @@ class MainDevice:
         self.master.leave(timeout)
 
     def read_objects(self, wanted: Mapping[int, Sequence[tuple[int, int]]]) -> dict[int, Objects]:
-        """Read objects of several devices before a loop.
+        """Read objects of several devices before a loop starts.
 
         Args:
             wanted: (index, subindex) of the objects, by position.
@@ -387,7 +391,7 @@ class MainDevice:
         return self.master.read_objects(wanted)
 
     def converse(self, procedure: Procedure[T]) -> T:
-        """Run a procedure and return its result, alone or through the acyclic queue of a loop."""
+        """Run a procedure and return its result. While a loop runs, use its acyclic queue."""
         while True:
             runner = self._any_runner
             try:
@@ -399,7 +403,10 @@ class MainDevice:
                     self.deliver_events()
 
     def request(self, procedure: Procedure[T]) -> Pending[T]:
-        """Start a procedure in the acyclic queue of a loop. Without a loop, run it to its end."""
+        """Start a procedure in the acyclic queue of a loop.
+
+        Without a loop, run it to completion.
+        """
         while True:
             runner = self._any_runner
             with contextlib.suppress(LinkLent):
@@ -440,7 +447,7 @@ class MainDevice:
 
     @property
     def _any_runner(self) -> Runner:
-        """The runner of the running loop, or our own."""
+        """Runner of the running loop; without a loop, that of this MainDevice."""
         if self._is_inherited:
             raise self._not_open()
         return self._attached or self.runner

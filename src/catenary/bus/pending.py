@@ -12,7 +12,7 @@ T = TypeVar("T")
 
 
 class Pending(Generic[T]):
-    """Owns one procedure that runs while the loop runs.
+    """Handle of a procedure that runs while the loop runs.
 
         answer = sub.sdo.request(0x6064, type=DINT)
         for cycle in loop:

@@ -10,7 +10,7 @@ T = TypeVar("T")
 
 
 class Task(Generic[T]):
-    """Owns a procedure: its pending requests or pause, and its result."""
+    """State of one procedure: its pending requests or pause, and its result."""
 
     def __init__(self, procedure: Procedure[T]) -> None:
         self._procedure = procedure

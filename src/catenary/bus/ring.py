@@ -139,8 +139,8 @@ def end_for_clocks(
             return topology.second_end
         cuts = find_cuts(state, device_count)
         raise ClockError(
-            f"clocks: {cuts or 'the ring is cut'}; devices after the cut share no time with those "
-            "before it",
+            f"clocks: {cuts or 'the ring is cut'}; the clocks after the cut cannot be synchronised "
+            "with those before it",
             hint="repair the cable and scan again, or omit dc=",
         )
     if topology.second_end is None or topology.contradictions:

@@ -39,7 +39,7 @@ class Runner(Protocol):
 
 @dataclass(slots=True)
 class FrameCounts:
-    """Owns the frame counts of one runner."""
+    """Frame counts of one runner."""
 
     sent: int = 0
     datagrams: int = 0
@@ -54,7 +54,7 @@ class LinkLent(RuntimeError):
 
 
 class BlockingRunner:
-    """Owns the link while a procedure runs; blocks its caller until the end."""
+    """Runner that uses the link exclusively and blocks its caller until a procedure ends."""
 
     def __init__(
         self, link: Link, *, frame_timeout: float = FRAME_TIMEOUT, attempts: int = ATTEMPTS

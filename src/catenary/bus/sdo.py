@@ -52,7 +52,7 @@ class ObjectOwner(Protocol):
 
 
 class Sdo:
-    """Owns the access to the object dictionary of one device.
+    """Access to the object dictionary of one device.
 
     Example: `sub.sdo.read(0x1018, 1, type=UDINT)`.
 

@@ -34,7 +34,8 @@ class SubDevices(Sequence[SubDevice]):
 
         Raises:
             SegmentError: No device has it, or several devices have it.
-            ValueError: The alias is not from 1 to 65535; 0 means that a device has none.
+            ValueError: The alias is not in the range 1 to 65535. 0 means that a device has no
+                alias.
         """
         found = self._with_alias(alias)
         if found is None:
@@ -47,14 +48,15 @@ class SubDevices(Sequence[SubDevice]):
         return found
 
     def group(self, alias: int) -> tuple[SubDevice, ...]:
-        """Return the device with this alias and those after it, up to the next one with an alias.
+        """Return the device with this alias and those without an alias that directly follow it.
 
-        These can be the devices of a tool, wherever it is plugged in. The tuple is empty if no
-        device has the alias.
+        For example, this finds the devices of a tool, regardless of where the tool is plugged in.
+        The tuple is empty if no device has the alias.
 
         Raises:
             SegmentError: Several devices have the alias.
-            ValueError: The alias is not from 1 to 65535; 0 means that a device has none.
+            ValueError: The alias is not in the range 1 to 65535. 0 means that a device has no
+                alias.
         """
         head = self._with_alias(alias)
         if head is None:
@@ -64,7 +66,9 @@ class SubDevices(Sequence[SubDevice]):
 
     def _with_alias(self, alias: int) -> SubDevice | None:
         if not 1 <= alias <= 0xFFFF:
-            raise ValueError(f"alias {alias} is not 1 to 65535; 0 means that a device has none")
+            raise ValueError(
+                f"alias {alias} is not in the range 1 to 65535; 0 means that a device has no alias"
+            )
         heads = [sub for sub in self._subs if sub.alias == alias]
         if len(heads) > 1:
             raise SegmentError(
@@ -96,7 +100,9 @@ class SubDevices(Sequence[SubDevice]):
     @overload
     def __getitem__(self, key: slice) -> tuple[SubDevice, ...]: ...
     def __getitem__(self, key: int | str | slice) -> SubDevice | tuple[SubDevice, ...]:
-        """Return a device by position, or by its name or order code; devices by a slice.
+        """Return the device with this position, name or order code.
+
+        A slice returns a tuple of devices.
 
         Raises:
             IndexError: There is no such position.

@@ -41,7 +41,7 @@ TARGET is one of
   eth0               a network interface; `ip link` lists them
   eth0,eth1          two interfaces, if the segment is a ring between them
   virtual            a virtual segment: coupler, outputs, three servos, outputs
-  virtual:FILE.toml  a virtual segment from a file (docs/explanation/virtual_segment.md)
+  virtual:FILE.toml  a virtual segment from a file (docs/reference/segment_file.md)
   virtual-realtime[:FILE.toml]  the same, on this machine's clock
   machine.toml       the target in a machine file (docs/reference/machine_file.md)
   igh:0              the IgH kernel master 0 (docs/how_to/igh.md): scan and sdo

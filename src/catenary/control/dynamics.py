@@ -31,8 +31,8 @@ class Dynamics:
 
     Args:
         path: MJCF or URDF file.
-        joints: names of the joints, in the order of the axes. None means all joints of the model,
-            in its order. The other joints stay at the positions of the model.
+        joints: names of the joints, in the order of the axes. None means all joints, in the
+            order of the model. Joints that are not named stay at their initial positions.
         axes: required number of joints; None for any.
         armature: inertia to add to each joint [kg·m²], one value or one per axis.
 
@@ -130,14 +130,15 @@ def inverse(memory: Row, position: Row, velocity: Row, acceleration: Row, torque
     Each call writes all inputs, so that no result depends on an earlier call.
 
     Args:
-        memory: of a `Dynamics`.
+        memory: `Dynamics.memory`.
         position: (n,) [rad].
         velocity: (n,) [rad/s].
         acceleration: (n,) [rad/s²].
         torque: output, (n,) [N·m].
 
     Raises:
-        ValueError: The memory is that of another block, or has another number of joints.
+        ValueError: `memory` belongs to a different block, or its number of joints differs from the
+            length of `position`.
     """
     check(memory, len(position))
     v = doubles(int(memory[VELOCITY]), int(memory[VELOCITIES]))
@@ -154,12 +155,13 @@ def gravity(memory: Row, position: Row, torque: Row) -> None:
     """Compute the torques that hold the arm still.
 
     Args:
-        memory: of a `Dynamics`.
+        memory: `Dynamics.memory`.
         position: (n,) [rad].
         torque: output, (n,) [N·m].
 
     Raises:
-        ValueError: The memory is that of another block, or has another number of joints.
+        ValueError: `memory` belongs to a different block, or its number of joints differs from the
+            length of `position`.
     """
     check(memory, len(position))
     v = doubles(int(memory[VELOCITY]), int(memory[VELOCITIES]))
@@ -181,7 +183,10 @@ def check(memory: Row, n: int) -> None:
 
 @compiles
 def solve(memory: Row, position: Row, torque: Row) -> None:
-    """Call `mj_inverse` at `position`; velocities and accelerations are already written."""
+    """Call `mj_inverse` at `position`.
+
+    The caller has already written velocities and accelerations.
+    """
     q = doubles(int(memory[POSITION]), int(memory[POSITIONS]))
     force = doubles(int(memory[TORQUE]), int(memory[VELOCITIES]))
     for i in range(len(position)):

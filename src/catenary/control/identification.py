@@ -63,12 +63,12 @@ def chirp(parameters: Row, i: int, time: float) -> float:
     """Return the value of the sweep, A sin(2π f₀ T / ln(f₁/f₀) ((f₁/f₀)^(t/T) - 1)).
 
     Args:
-        parameters: of a `Chirp`.
+        parameters: `Chirp.parameters`.
         i: number of the axis.
         time: since the start of the sweep [s].
 
     Raises:
-        ValueError: The parameters are those of another block.
+        ValueError: `parameters` belongs to a different block.
     """
     if parameters[0] != KIND:
         raise ValueError("chirp: not the parameters of a Chirp")

@@ -57,7 +57,7 @@ class Clock:
         """Set the bound for clock differences and phase error [ns]."""
 
     def set_epoch(self, epoch_ns: int) -> None:
-        """Set system time minus link time. Call it before `start`."""
+        """Set the epoch, which is system time minus link time [ns]. Call it before `start`."""
 
     @property
     def changes(self) -> int:

@@ -3,9 +3,10 @@
 
 The send time of every frame is recorded. The time that the reference clock wrote into it gives the
 phase of its cycle start. A PI controller with decreasing bandwidth corrects phase errors by longer
-or shorter periods. docs/how_to/clocks.md explains its gains; plan/clocks.py contains the numbers.
-If the clocks follow the MainDevice, the cycle starts are set in phase once and stay on their grid.
-tests/core/phase_twin.py is a Python model of the controller. Budget: 60 ns per cycle.
+or shorter periods. docs/explanation/distributed_clocks.md explains its gains; plan/clocks.py
+contains the numbers. If the clocks follow the MainDevice, the cycle starts are set in phase once
+and stay on their grid. tests/core/phase_twin.py is a Python model of the controller. Budget: 60 ns
+per cycle.
 
 A reference that does not answer is no longer read in each frame. A device that was switched off
 returns with a different time, which must not reach the other clocks. All other clocks then follow

@@ -40,7 +40,7 @@ cdef struct record_t:
     int32_t receive_ns
     int32_t process_ns
     int32_t send_ns
-    int32_t tail_ns
+    int32_t post_processing_ns
     int32_t round_trip_ns
     int32_t output_delay_ns
     int32_t input_age_ns
@@ -77,7 +77,7 @@ cdef struct cycle_t:
     int64_t scheduled          # cycle start of this cycle
     int64_t wake
     int64_t interval           # time since the last cycle start; -1: none
-    int64_t usable             # when Python had the inputs; 0: unknown
+    int64_t usable             # time at which the inputs were available to Python; 0: unknown
     int64_t sent               # time at which the last cyclic frame was handed to the kernel
     int64_t turnaround         # wake-up → last frame received, in the last complete cycle
     int64_t process            # of this cycle; -1: no application

@@ -133,7 +133,7 @@ RECORD_FIELDS = [
     ("receive_ns", "<i4"),
     ("process_ns", "<i4"),
     ("send_ns", "<i4"),
-    ("tail_ns", "<i4"),
+    ("post_processing_ns", "<i4"),
     ("round_trip_ns", "<i4"),
     ("output_delay_ns", "<i4"),
     ("input_age_ns", "<i4"),
@@ -163,7 +163,7 @@ cdef void clear_next_record(cycle_t *c) noexcept nogil:
     record.receive_ns = -1
     record.process_ns = -1
     record.send_ns = -1
-    record.tail_ns = -1
+    record.post_processing_ns = -1
     record.round_trip_ns = -1
     record.output_delay_ns = -1
     record.input_age_ns = -1
@@ -371,7 +371,7 @@ cdef int64_t give(cycle_t *c, record_t *record, int64_t since, const actual_t *a
 
     The record that the sink receives contains the duration without the sink.
     """
-    record.tail_ns = short_ns(now(c) - since)
+    record.post_processing_ns = short_ns(now(c) - since)
     c.sink.put(c.sink.self, c.number, record, actual.header, target.header)
     return now(c) - since
 
@@ -406,7 +406,7 @@ cdef void post_process(cycle_t *c, int64_t since, const actual_t *actual,
         if record.receive_ns >= 0 and record.send_ns >= 0:
             histogram_add(&h[IN_CONTROLLER], c.process + record.receive_ns + record.send_ns)
     took = give(c, record, since, actual, target) if c.sink != NULL else now(c) - since
-    record.tail_ns = short_ns(took)
+    record.post_processing_ns = short_ns(took)
     histogram_add(&h[POST_PROCESSING], took)
     clear_next_record(c)
 

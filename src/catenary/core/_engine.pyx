@@ -318,7 +318,7 @@ cdef class Engine:
             cycle_start(&self.e.cycle, origin_ns)
             rc = thread_start(&self.e.thread)
             if rc < 0:
-                raise OSError(-rc, f"native thread: {os.strerror(-rc)}")
+                raise OSError(-rc, f"cannot start the native thread: {os.strerror(-rc)}")
         elif not self.virtual:
             self.saved_scheduling = scheduling_save(&self.scheduling_before) == 0
             thread_schedule(&self.e.thread)

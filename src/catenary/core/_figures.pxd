@@ -5,7 +5,7 @@ from catenary.core._histogram cimport histogram_t
 from catenary.core._memory cimport cat_memory
 
 cdef class Figures:
-    """Owns the log records and the histograms of a cycle."""
+    """Log records and histograms of a cycle."""
     cdef cycle_t *cycle
     cdef histogram_t *spare
     cdef cat_memory memory     # memory of the histograms

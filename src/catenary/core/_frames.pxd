@@ -95,7 +95,7 @@ cdef struct frames_t:
     uint16_t *unit_counter
     uint8_t al_status
     uint16_t al_counter
-    int64_t frame_stamp        # when the last frames were seen; 0: not read yet
+    int64_t frame_stamp        # time at which the last frames were received; 0: clock not read yet
     uint8_t ok                 # every required due unit is valid, every required frame is back
     uint8_t whole              # every required unit is valid
     # since the last emit

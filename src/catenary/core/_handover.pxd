@@ -113,7 +113,7 @@ cdef enum:
     TARGETS = 6
 
 cdef class Handover:
-    """Owns the buffers between the cycle and Python."""
+    """Buffers between the cycle and Python."""
     cdef handover_t c
     cdef cat_memory memory     # one block per direction and slot
     cdef dict counts

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 
 class Handover:
-    """Owns the buffers between the cycle and Python."""
+    """Buffers between the cycle and Python."""
 
     def __init__(
         self, axes: int, units: int, input_counts: Sequence[int], output_counts: Sequence[int]

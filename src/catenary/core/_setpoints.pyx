@@ -349,9 +349,9 @@ cdef void judge_lateness(axes_t *x, axis_t *a) noexcept nogil:
 # ---- outputs
 
 cdef void rest(axes_t *x, axis_t *a, const target_t *t, uint32_t i) noexcept nogil:
-    """Set the targets of an unpowered axis to the actual values.
+    """Set the outputs of an unpowered axis: its actual position, zero velocity and zero torque.
 
-    In SWITCHED_ON, send the committed torque, so that it is present when the brake opens.
+    In SWITCHED_ON, send the committed torque (limited), so that it is present when the brake opens.
     """
     a.commanded_position = a.position
     a.commanded_velocity = 0.0

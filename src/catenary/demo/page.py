@@ -19,7 +19,11 @@ STYLE = Path(__file__).with_name("page.css")
 STYLES = ("a", "b", "c")
 SHOWN_SECONDS = 4.0  # drawn time at the end of the motion
 SHOWN_POINTS = 400  # points per line
-HEADINGS = {"in_controller": "in controller", "round_trip": "round trip"}
+HEADINGS = {
+    "in_controller": "in controller",
+    "post_processing": "post-processing",
+    "round_trip": "round trip",
+}
 MEANING = {
     "period": "wake-up → next wake-up",
     "lateness": "cycle start → wake-up",

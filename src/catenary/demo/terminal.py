@@ -19,7 +19,7 @@ def on_enter(action: Callable[[], object], *, source: int | None = None) -> Iter
         source: File descriptor to read; None for standard input if it is a terminal.
 
     Yields:
-        True if Enter is detected; False without a terminal.
+        True if key presses are read; False if there is no terminal to read.
     """
     descriptor = terminal() if source is None else source
     if descriptor is None:

@@ -113,7 +113,8 @@ class Drives(Request):
       `velocity_limit` / 0.25 s.
     - `acceleration_limit` [rad/s²]: the default is the deceleration. It also limits the moves,
       whose default is this option, otherwise `velocity_limit` / 0.25 s.
-    - `torque_slope` [N·m/s]: slope to zero torque in CST. By default, the torque is zero at once.
+    - `torque_slope` [N·m/s]: slope of the torque in CST on the return to the set-points. By
+      default, the torque returns at once.
     - `on_loss`: reaction when the core stops an axis: "quick_stop" (default), "disable", or
       "csp_hold" (change to CSP and hold the position). It is required in CST if the quick stop of
       the drive (0x605A) does not brake.

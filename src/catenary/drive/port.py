@@ -174,7 +174,7 @@ class AxisPort:
         """Return the error of a move that does not reach its goal."""
         remaining = failure.goal - self.position
         unit = self.units.names.position
-        left = "" if math.isnan(remaining) else f", {remaining:.4g} {unit} before its goal"
+        left = "" if math.isnan(remaining) else f", {abs(remaining):.4g} {unit} from its goal"
         return MoveError(
             f"{self.name} {failure.what}{left}",
             axis=self.name,

@@ -42,7 +42,7 @@ class AxisValues:
         mode: Modes,
         columns: Mapping[str, Array],
     ) -> None:
-        """Connect the attributes to the arrays of the loop that opens.
+        """Point the attributes at the arrays of a newly opened loop.
 
         Args:
             position: (n,) [rad].
@@ -62,6 +62,7 @@ class AxisValues:
 
         Raises:
             KeyError: The name is unknown.
+            RuntimeError: No loop has been opened yet.
         """
         if not hasattr(self, "_columns"):
             raise RuntimeError(f"{self._owner}[{name!r}] has no values before a Loop is open")
@@ -70,7 +71,8 @@ class AxisValues:
         except KeyError:
             known = ", ".join(self._columns) or "none"
             raise KeyError(
-                f"no column {name!r} in {self._owner}; requested by Drives(columns=...): {known}"
+                f"no column {name!r} in {self._owner}; columns requested with Drives(columns=...): "
+                f"{known}"
             ) from None
 
     def __setitem__(self, name: str, values: npt.ArrayLike) -> None:
@@ -78,6 +80,7 @@ class AxisValues:
 
         Raises:
             KeyError: The name is unknown.
+            RuntimeError: No loop has been opened yet.
             TypeError: The column is read-only.
         """
         array = self[name]
@@ -94,4 +97,7 @@ class AxisValues:
     def __setattr__(self, name: str, value: object) -> None:
         if name not in QUANTITIES:
             raise unknown_attribute(self, name, self._owner)
-        raise AttributeError(f"write into the array: {self._owner}.{name}[:] = ...")
+        raise AttributeError(
+            f"{self._owner}.{name} cannot be replaced; write into the array: "
+            f"{self._owner}.{name}[:] = ..."
+        )

@@ -26,7 +26,7 @@ class Unit(Protocol):
     def optional(self) -> bool: ...
 
 class KernelTime:
-    """Owns the clock of a loop on the kernel master; it carries no frames.
+    """Clock of a loop on the kernel master. As a link, it carries no frames.
 
     The clock is CLOCK_MONOTONIC, with an offset while it follows the reference clock. With
     `virtual_time`, time advances only in `wait_until`.
@@ -42,7 +42,7 @@ class KernelTime:
     def wait_until(self, deadline_ns: int, wake_on_frame: bool) -> bool: ...
 
 class Exchange:
-    """Owns the process images of one activated configuration.
+    """Process images of one activated configuration.
 
     Raises:
         ValueError: A copy exceeds its domain or its image.

@@ -8,7 +8,7 @@ from catenary.wire.clock import decode_difference
 
 
 class KernelClock:
-    """Owns the clock differences of the devices. Implements `bus.CycleClock`.
+    """Clock differences of the devices on a kernel master. Implements `bus.CycleClock`.
 
     The phase and the largest difference of all devices are measured in every cycle; `locked` is
     computed from them. Differences of single devices are read by requests, one device after the

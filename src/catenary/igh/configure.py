@@ -28,7 +28,7 @@ Copy = tuple[int, int, int]  # offset in the domain, in the image, bytes
 
 @dataclass(slots=True)
 class Domain:
-    """Owns the location of one sync unit in the master's memory."""
+    """Location of one sync unit in the master's memory."""
 
     domain: int
     divider: int

@@ -13,7 +13,7 @@ from catenary.igh.reservation import Reservation
 
 
 class KernelAccess:
-    """Owns the handles of an activated kernel master."""
+    """Access to a kernel master and, while it is activated, to its configuration."""
 
     def __init__(self, main: MasterOwner) -> None:
         self.main = main

@@ -22,7 +22,7 @@ END_TIMEOUT = 2.0  # [s] for pending calls when the master is released
 
 
 class Call(Generic[T]):
-    """Owns one call in its own thread, and its result or exception."""
+    """Call that runs in its own thread, and its result or exception."""
 
     def __init__(self, call: Callable[[], T], what: str) -> None:
         self.what = what
@@ -49,7 +49,7 @@ class Call(Generic[T]):
 
 
 class BlockingCalls:
-    """Owns the pending calls, at most one for each device."""
+    """Pending calls, at most one for each device."""
 
     def __init__(self, timeout: float = BLOCKED_TIMEOUT) -> None:
         self.timeout = timeout

@@ -38,7 +38,7 @@ _EMERGENCY = struct.Struct("<HB5s")
 
 
 class KernelCarrier:
-    """Owns an activated configuration. Implements `bus.Carrier`."""
+    """Kernel master with an activated configuration. Implements `bus.Carrier`."""
 
     def __init__(self, kernel: KernelAccess, configuration: Configuration) -> None:
         self.configuration = configuration

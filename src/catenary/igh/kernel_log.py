@@ -14,7 +14,7 @@ LINE = r"EtherCAT ERROR {}-{}: (?:AL status message|Unknown AL status code) 0x([
 
 
 class KernelLog:
-    """Owns a position in the kernel's log. Reads the records that come after it was opened."""
+    """Reader of the kernel's log, from the time at which it was opened."""
 
     def __init__(self, path: str = LOG) -> None:
         self._text = ""

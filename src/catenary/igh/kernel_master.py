@@ -34,7 +34,7 @@ RESTORE_PATIENCE = 6.0
 
 
 class KernelMaster:
-    """Owns a reserved kernel master while a MainDevice is open on it. Implements `bus.Master`.
+    """Kernel master that a MainDevice reserves while it is open. Implements `bus.Master`.
 
     The kernel changes the states of the devices, serves their mailboxes and reconfigures devices
     that return. A `Loop` exchanges the process images. Closing the MainDevice releases the master.

@@ -24,7 +24,7 @@ INSTALL = (
 
 
 class Library:
-    """Owns one loaded libethercat. Each call is an attribute: `library.ecrt_master_send(master)`.
+    """Loaded libethercat. Each call is an attribute: `library.ecrt_master_send(master)`.
 
     `returns` is True from 1.6.0 on. Before, some calls return nothing instead of 0 or -errno, and
     their return values are never read.

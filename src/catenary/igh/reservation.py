@@ -26,7 +26,7 @@ UPLOAD_LIMIT = 1 << 16  # largest object [bytes]
 
 
 class Reservation:
-    """Owns one kernel master that is reserved for this process.
+    """Kernel master that is reserved for this process.
 
     It implements `Link` with a clock only. It carries no frames: the master sends its own.
     """

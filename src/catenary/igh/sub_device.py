@@ -32,7 +32,7 @@ EMERGENCIES_KEPT = 32
 
 
 class SubDevice(bus.SubDevice):
-    """Owns the description and state of one device of the kernel master."""
+    """Description and state of one device of the kernel master."""
 
     def __init__(
         self, main: DeviceOwner, kernel: KernelAccess, description: DeviceDescription
@@ -143,7 +143,7 @@ class SubDevice(bus.SubDevice):
 
 
 class Sdo(bus.Sdo):
-    """Owns the access to the object dictionary of one device by the kernel master.
+    """Access to the object dictionary of one device through the kernel master.
 
     During operation, a request object reads objects up to 256 bytes. It takes a few cycles and no
     thread. Longer reads and all writes make a blocking call in a thread of the device, which does

@@ -79,7 +79,10 @@ cdef class TableLink:
 
     @property
     def capsule(self):
-        """Link table for compiled code, in a capsule that keeps this object alive but not open."""
+        """Capsule with the link table, for compiled code.
+
+        It keeps this object alive. `close` closes the link even if the capsule is still in use.
+        """
         capsule = PyCapsule_New(&self.table, CAT_LINK_CAPSULE, release_owner)
         PyCapsule_SetContext(capsule, <void *> <PyObject *> self)
         Py_INCREF(self)

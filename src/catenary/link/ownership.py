@@ -45,7 +45,7 @@ OWN_HINT = (
 
 
 class Ownership:
-    """Owns the locks of the network interfaces that a link uses.
+    """Locks of the network interfaces that a link uses.
 
     `others` describes the evidence of other masters that `force` has overridden.
     """

@@ -23,7 +23,7 @@ class Link(Protocol):
         """Send one frame.
 
         Raises:
-            LinkError: The device refuses the frame.
+            LinkError: The link cannot send the frame.
         """
         ...
 

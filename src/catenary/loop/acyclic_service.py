@@ -22,7 +22,7 @@ IDLE = 0.010  # [s] between two checks of the mailboxes while no procedure is pe
 
 
 class Service:
-    """Owns the acyclic queue of an engine and, in real time, the thread that steps it.
+    """Acyclic runner of an engine and, in real time, the thread that steps it.
 
     In virtual time there is no such thread: the caller steps the queue between two cycles.
     """
@@ -30,10 +30,10 @@ class Service:
     def __init__(self, main: MainDevice, engine: Engine, plan: Plan) -> None:
         self.runner = AcyclicRunner(engine, grain_ns=plan.cycle.period_ns // 2)
         self._watch = MailboxWatch(plan, main.subs, _mailbox_words(engine, plan), self.runner)
-        self.cycle: Callable[[], int] = partial(engine.run, 1)  # replaced if networks share time
+        self.cycle: Callable[[], int] = partial(engine.run, 1)  # the session replaces it
         self._main = main
         self._engine = engine
-        self._quiet_until = 0  # [ns] in virtual time: there is no work before this time
+        self._quiet_until = 0  # [ns] no work before this time (virtual time)
         self._ended = threading.Event()
         self._failure: Exception | None = None
         self._thread: threading.Thread | None = None
@@ -73,7 +73,7 @@ class Service:
         self._main.deliver_events()
 
     def converse(self, *procedures: Procedure[T]) -> list[T]:
-        """Run procedures concurrently, and cycle without an application until all have ended.
+        """Run procedures concurrently. Run cycles without the application until all have ended.
 
         Call this in the thread that iterates.
 
@@ -85,6 +85,7 @@ class Service:
 
         Raises:
             LoopError: The service thread has ended.
+            CatenaryError: A procedure failed.
         """
         tasks = [self.runner.submit(procedure) for procedure in procedures]
         while not all(task.done for task in tasks):
@@ -122,7 +123,7 @@ class Service:
 
 
 def _mailbox_words(engine: Engine, plan: Plan) -> Sequence[int]:
-    """Return the mailbox words: the last input integers."""
+    """Return the last input integers. Each of their bits shows if one mailbox is full."""
     integers = engine.buffers["input_integers"]
     words: Sequence[int] = integers[len(integers) - len(plan.mailboxes.columns) :]
     return words

@@ -3,9 +3,9 @@
 Theory of operation. The thread commits the targets in every cycle under a lock. `update` takes the
 same lock, so nothing is committed while a program writes its targets. The thread never waits for
 the lock. The native core limits the time for which the targets of the last update are valid
-(core/_setpoints.pyx), so a program that blocks the interpreter cannot keep an axis moving. An error
-of the loop ends the thread, which leaves the loop. The next call of the program raises the error.
-In virtual time, the thread also keeps pace with the wall clock.
+(core/_setpoints.pyx), so a program that blocks the interpreter cannot keep an axis moving. If the
+loop raises an error, the thread leaves the loop and ends. The next call of the program raises the
+error. In virtual time, the thread also keeps pace with the wall clock.
 """
 
 from __future__ import annotations
@@ -23,15 +23,15 @@ from catenary.loop.networks import VIRTUAL, NetworksIteration, leave_all
 from catenary.loop.session import Session
 from catenary.loop.signals import SignalGuard
 
-END_TIMEOUT = 30.0  # [s] plus some periods: to leave a loop after an error takes some seconds
+END_TIMEOUT = 30.0  # [s] plus eight periods; leaving a loop after an error takes some seconds
 LEAVE_TIMEOUT = 1.0  # [s] to wait for an update in progress when the loop is left
 UPDATE_TIMEOUT = 5.0  # [s] to wait for an update of another thread
-BEHIND = 0.1  # [s] a larger lag after the wall clock is dropped instead of caught up
+BEHIND = 0.1  # [s] virtual time does not make up for a larger lag
 LOOK = 0.5  # [s] longest time between two checks of a waiting call
 
 
 class Background:
-    """Owns the thread that iterates an open loop, and the lock under which targets are committed.
+    """Thread that iterates an open loop, and the lock under which targets are committed.
 
     `error`: the error that ended the loop; None if there is none.
     """
@@ -47,10 +47,10 @@ class Background:
         self._iteration = iteration
         self._guard = guard
         self._commit = threading.Lock()
-        self._updating = 0  # identifier of the thread inside `update`
+        self._updating = 0  # identifier of the thread inside `update`; 0: none
         self._cycled = threading.Condition()
         self._ended = threading.Event()
-        self._was_raised = False  # True after the error was raised
+        self._was_raised = False  # True if a call has raised the error
         self._pace = _Pace(sessions[0])
         self._process = os.getpid()
         self._thread = threading.Thread(target=self._iterate, name="catenary loop", daemon=True)
@@ -60,7 +60,7 @@ class Background:
 
         Raises:
             ValueError: The loop is inline and exchanges its frames in the thread of the program.
-            LoopError: An axis is powered in CST and has no torque set-points.
+            LoopError: An axis is powered in CST; this call commits no torque set-points.
         """
         if self._sessions[0].plan.cycle.execution == "inline":
             raise ValueError(
@@ -69,7 +69,7 @@ class Background:
             )
         for session in self._sessions:
             session.refuse_powered_torque("run_in_background")
-        next(self._iteration)  # the first call commits nothing; later calls could meet an update
+        next(self._iteration)  # the first step commits nothing; it must precede any update
         for session in self._sessions:
             session.engine.background = True
             session.end_background = self.end
@@ -228,7 +228,7 @@ def program_ends() -> bool:
 
 
 class _Pace:
-    """Owns the offset of virtual time, which it keeps from overtaking the wall clock."""
+    """Limiter that keeps virtual time from overtaking the wall clock."""
 
     def __init__(self, session: Session) -> None:
         self._engine = session.engine

@@ -60,7 +60,7 @@ def bind_requests(
 
 
 def part_sizes(table: RequestTables) -> dict[str, int]:
-    """Return the number of columns that a request has in each bank, and of bytes in its areas."""
+    """Return the size of each part of a request: columns of a bank, or bytes of all areas."""
     sizes = dict.fromkeys(PART_BUFFERS, 0)
     for output, columns in ((False, table.input_columns), (True, table.output_columns)):
         for column in columns:

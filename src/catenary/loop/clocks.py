@@ -1,4 +1,4 @@
-"""Distributed clocks of a loop: differences, phase error, and the lock within a bound."""
+"""Distributed clocks of a loop: their differences, phase error and synchronisation."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ from catenary.procedure.exchange import Procedure
 from catenary.procedure.sync import rejoin
 
 NS = 1e-9
-SETTLE_TIMEOUT = 2.0  # [s] before OP is requested: drives check their synchronisation
-SILENT = 16  # consecutive cycles without the reference clock: more than lost frames
+SETTLE_TIMEOUT = 2.0  # [s] longest wait for locked clocks before OP; drives check them there
+SILENT = 16  # consecutive cycles without the reference clock: too many for lost frames
 
 
 class Clocks:
-    """Owns the view of an open loop's distributed clocks, as of the last cycle.
+    """View of an open loop's distributed clocks, as of the last cycle.
 
     Print it for a table. All times are in seconds.
     """
@@ -127,7 +127,7 @@ class Clocks:
         Args:
             within: Bound [s].
             timeout: Longest wait [s].
-            check: Called with the flags of each cycle; raises for a cycle in trouble.
+            check: Function that gets the flags of each cycle. It raises the error of a bad cycle.
 
         Raises:
             ValueError: `within` is not positive.
@@ -144,7 +144,7 @@ class Clocks:
             )
 
     def settle(self, check: Callable[[int], None]) -> None:
-        """Wait before OP until the clocks are locked, at most SETTLE_TIMEOUT."""
+        """Wait before OP until the clocks are locked; after SETTLE_TIMEOUT, continue without."""
         self._run_until_locked(SETTLE_TIMEOUT, check)
 
     def rejoin(self, position: int, plan: DevicePlan) -> Procedure[None]:
@@ -167,7 +167,7 @@ class Clocks:
         yield from rejoin(devices, position, plan.sync, peers, behind, epoch_ns)
 
     def announce(self) -> None:
-        """Put an event if the clocks have become locked or unlocked since the last one."""
+        """Put an event if the clocks were locked or unlocked since the last event."""
         with self._announcing:
             _ = self._clock.changes  # acknowledged here: the event below covers all changes
             locked = self.locked
@@ -212,10 +212,10 @@ class Clocks:
 
     @property
     def _cut(self) -> int | None:
-        """Position before the cut that separates clocks in an open ring; -1: the first cable.
+        """Position of the last device before the cut of a ring; -1 if the first cable is cut.
 
-        None if there is no such cut. Clocks after the cut follow the extrapolated time of the
-        reference, and their differences are not measured.
+        None if no cut separates clocks from the reference. Clocks after the cut follow the
+        extrapolated time of the reference, and their differences are not measured.
         """
         if self._ring is None:
             return None
@@ -234,7 +234,7 @@ class Clocks:
                 f"the cycle starts are {difference * 1e6:+.3f} us off the reference clock's phase"
             )
         if difference == float("inf"):
-            return f"the difference of {sub.station} was not read yet"
+            return f"the difference of {sub.station} has not been read yet"
         return f"{sub.station} is {difference * 1e6:+.3f} us off {self.reference.station}"
 
     @property

@@ -21,8 +21,8 @@ class Evidence:
 
     answers: Sequence[Answer]
     findings: Sequence[Finding] = ()  # faults that silent devices or error counters indicate
-    mute: Sequence[int] = ()  # positions of devices without inputs even in a separate frame
-    tight: str = ""  # hint that the period may be too short; or empty
+    mute: Sequence[int] = ()  # positions of devices that return no inputs, even in a separate frame
+    tight: str = ""  # hint that the period may be too short; empty if not
     without_address: Sequence[Answer] = ()  # silent at their addresses while others answer
     other_masters: Sequence[str] = ()  # evidence of another master, as text
 
@@ -55,15 +55,15 @@ def silence_error(
         named = ", ".join(str(a.station) for a in answers if a.station.position in evidence.mute)
         who = f"in OP, but without process data: {named}"
         hint = (
-            "another program on this segment or the device itself has switched off its FMMU or "
-            "SyncManager; read its registers with `catenary reg read`"
+            "another program on this segment, or the device itself, has switched off an FMMU or "
+            "SyncManager; read the registers with `catenary reg read`"
         )
     else:
         who = f"all devices answer single reads; affected: devices {listed(suspects)}"
         who += "".join(f"; {each.where}: {each.evidence}" for each in findings)
         hint = evidence.tight or (
             "frames are lost, corrupted or late: check the cables and other traffic on the "
-            "port; if the segment is a program on a busy machine, allow more lost cycles with "
+            "port; for a virtual segment on a busy machine, allow more lost cycles with "
             "StopPolicy(lost_limit=...)"
         )
     return WorkingCounterError(
@@ -89,7 +89,7 @@ def tight_period(wire_ns: int, period_ns: int) -> str:
 def state_error(
     answers: Sequence[Answer], log: Log | None, other_masters: Sequence[str] = ()
 ) -> StateError | None:
-    """Return the error for devices that left OP; None if all are in OP.
+    """Return the error for devices that left OP; None if all devices that answer are in OP.
 
     Args:
         answers: Answers of the devices to a read of the AL status.
@@ -116,7 +116,10 @@ def state_error(
 
 
 def _suspicion(answer: Answer, other_masters: Sequence[str]) -> str:
-    """Return the hint that another master is the cause; empty if the device gives a reason."""
+    """Return the hint that another master is the cause.
+
+    Empty if there is no evidence of another master and the device gives a reason.
+    """
     if other_masters:
         return f"another EtherCAT master is live: {'; '.join(other_masters)}; end it"
     if answer.code or (answer.word or 0) & ERROR_FLAG:
@@ -131,7 +134,7 @@ def _suspicion(answer: Answer, other_masters: Sequence[str]) -> str:
 def address_error(silent: Sequence[Answer], al_status: int, log: Log | None) -> StateError:
     """Return the error for devices that lost their addresses while all frames return.
 
-    Such a device was switched off for a short time.
+    Such a device was replaced, or was switched off for a short time.
 
     Args:
         silent: Answers of the devices that do not answer to their addresses.
@@ -140,7 +143,7 @@ def address_error(silent: Sequence[Answer], al_status: int, log: Log | None) -> 
     """
     first = silent[0]
     error = StateError(
-        f"{first.station} does not answer to its address any more, and not all other devices are "
+        f"{first.station} does not answer to its address any more, and at least one device is not "
         f"in OP (OR of all AL status values: 0x{al_status:02X})",
         position=first.station.position,
         requested=int(AlState.OP),
@@ -163,7 +166,7 @@ class AxisTrouble(NamedTuple):
     code: int | None  # object 0x603F; None: it could not be read
 
     def __str__(self) -> str:
-        state = self.state.name if self.state is not None else "not in a state of CiA 402"
+        state = self.state.name if self.state is not None else "no valid CiA 402 state"
         if self.code is None:
             return f"{self.name}: {state}, its error code cannot be read"
         return f"{self.name}: {state}, error code 0x{self.code:04X} ({error_text(self.code)})"
@@ -188,7 +191,7 @@ def drive_error(axes: Sequence[AxisTrouble], what: str, log: Log | None) -> Driv
 
 
 def is_astray(answer: Answer) -> bool:
-    """Return True if a device answers and is not in OP."""
+    """Return True if a device answers, and is out of OP or reports an error."""
     return answer.word is not None and answer.word & (STATE_MASK | ERROR_FLAG) != AlState.OP
 
 
@@ -209,5 +212,5 @@ def described(answer: Answer) -> str:
 
 
 def listed(positions: Sequence[int]) -> str:
-    """Return positions as text."""
+    """Return positions as text; "none" if there are none."""
     return ", ".join(map(str, positions)) or "none"

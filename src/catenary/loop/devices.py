@@ -9,7 +9,7 @@ from catenary.bus import MainDevice, SubDevice
 from catenary.plan.request import ProcessDataRequest
 
 REQUESTS = "Drives, Inputs, Outputs or ProcessData"
-PARTS = ("subs", "pdos", "tables", "bind")  # of a LoopRequest
+PARTS = ("subs", "pdos", "tables", "bind")  # attributes of a LoopRequest
 
 
 class LoopRequest(ProcessDataRequest, Protocol):
@@ -29,6 +29,7 @@ def by_network(requests: Sequence[LoopRequest]) -> list[tuple[MainDevice, list[L
     """Return the requests of each MainDevice, in the order of first use.
 
     Raises:
+        TypeError: An object is not a process-data request, or a device has another kind of master.
         ValueError: There is no request, or one names devices of several MainDevices.
     """
     networks: dict[int, tuple[MainDevice, list[LoopRequest]]] = {}

@@ -12,7 +12,7 @@ from catenary.loop.watches.device import Attendance
 
 
 class Exchange(Protocol):
-    """Exchange of frames of our own (`FrameExchange`) or of another master (`CarriedExchange`)."""
+    """Exchange of the session's own frames, or of another master's frames (`CarriedExchange`)."""
 
     @property
     def watch(self) -> Attendance:
@@ -22,13 +22,13 @@ class Exchange(Protocol):
         """Return the engine of the session's plan."""
 
     def cycle_clock(self) -> CycleClock:
-        """Return the engine's view of the distributed clocks of the plan."""
+        """Return the view of the distributed clocks of the plan."""
 
     def attend(self) -> None:
         """Make the watches that run while the loop is open."""
 
     def bring_to_op(self) -> list[Pending[None]]:
-        """Bring the devices from SAFE-OP to OP while cycles flow; return the running watches."""
+        """Bring the devices from SAFE-OP to OP while the cycle runs; return the running watches."""
 
     def query_silence(self, suspects: Sequence[int]) -> Evidence:
         """Query all devices after cycles without answers from the suspected positions."""
@@ -37,4 +37,4 @@ class Exchange(Protocol):
         """Query all devices for their states."""
 
     def error_code(self, axis: int) -> int | None:
-        """Return object 0x603F of an axis; None if the drive does not answer."""
+        """Return object 0x603F of an axis; None if it cannot be read."""

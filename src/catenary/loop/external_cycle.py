@@ -22,20 +22,20 @@ from catenary.wire.cia402 import SLOT_OFFSET, Object
 
 
 class CarriedExchange:
-    """Owns the watch of a session on another master's frames. Implements `Exchange`."""
+    """Exchange of a session on another master's frames. Implements `Exchange`."""
 
     def __init__(self, session: Session) -> None:
         self._session = session
 
     def make_engine(self) -> Engine:
-        """Return the engine over the carrier's images."""
-        cycle = replace(self._session.plan.cycle, clock=None)  # the carrier keeps the clocks
+        """Return an engine that uses the process images of the carrier."""
+        cycle = replace(self._session.plan.cycle, clock=None)  # the carrier synchronises the clocks
         return Engine(cycle, self._session.main.link.capsule, self._carrier.image)
 
     def cycle_clock(self) -> CycleClock:
         """Return the carrier's view of the distributed clocks."""
         clock = self._carrier.clock
-        assert clock is not None  # `configure` has made it
+        assert clock is not None  # `configure` has created it
         return clock
 
     def attend(self) -> None:
@@ -59,7 +59,7 @@ class CarriedExchange:
         return carrier
 
     def bring_to_op(self) -> list[Pending[None]]:
-        """Let the carrier bring the devices to OP while cycles flow."""
+        """Let the carrier bring the devices to OP while the cycle runs."""
         required = [
             sub.position for sub in self._session.main.subs if self.watch.requires(sub.position)
         ]
@@ -79,7 +79,7 @@ class CarriedExchange:
         return Evidence(answers)
 
     def error_code(self, axis: int) -> int | None:
-        """Return object 0x603F of the axis; None if the drive does not answer."""
+        """Return object 0x603F of the axis; None if it cannot be read."""
         plan = self._session.plan.cycle.axes[axis]
         sub = self._session.main.subs[plan.device]
         try:
@@ -94,7 +94,7 @@ class CarriedExchange:
 
 
 class CarriedWatch:
-    """Owns the last state of every device, and puts an event for each change."""
+    """Watch of the states of all devices. It puts an event for each change."""
 
     def __init__(
         self,
@@ -129,7 +129,7 @@ class CarriedWatch:
         return bool(self._optional) and not any(is_astray(answer) for answer in required)
 
     def requires(self, position: int) -> bool:
-        """Return True if the loop ends without this device."""
+        """Return True if the loss of this device ends the loop."""
         return position not in self._optional
 
     def release(self, sub: SubDevice) -> None:

@@ -47,7 +47,7 @@ RAISED = {  # stops that raise DriveError with the state of the drive, in order 
 
 
 class FaultReport:
-    """Owns the axis stops and refused modes that were reported, and makes the exceptions."""
+    """Converter of cycle flags to events and to the exception that ends the loop."""
 
     def __init__(
         self,
@@ -91,7 +91,8 @@ class FaultReport:
             out_of_op = self._out_of_op()
             if out_of_op is not None:
                 return out_of_op
-            stops += self.report_axes(explained=True)  # the flags of its cycles are lost
+            # The flags of the cycles during the query were not judged.
+            stops += self.report_axes(explained=True)
         return self._axis_error(stops, raise_faults=self._policy.raise_faults and not enabling)
 
     def ended(self, flags: int) -> LoopError | None:
@@ -129,10 +130,10 @@ class FaultReport:
         return drive_error(troubles, what, log)
 
     def report_axes(self, *, explained: bool = False) -> list[StoppedAxis]:
-        """Put an event for each axis that the core stopped without a request and each refused mode.
+        """Put an event for each refused mode, and for each axis that the core stopped by itself.
 
         Args:
-            explained: True if no flag of a cycle caused the call: see `AxisWatch.new_refusals`.
+            explained: True if the call has another reason: see `AxisWatch.new_refusals`.
 
         Returns:
             The new stops.
@@ -156,7 +157,7 @@ class FaultReport:
         return read_log(self._engine, self._plan)
 
     def _suspects(self) -> list[int]:
-        """Return the positions of required devices in units without a last answer."""
+        """Return the positions of required devices whose sync unit did not answer last."""
         valid = self._engine.buffers["unit_valid"].tolist()
         return [
             position
@@ -180,9 +181,9 @@ class FaultReport:
     ) -> CatenaryError | None:
         """Return the error for required axes in fault or stopped without a request."""
         requires = self._exchange.watch.requires
-        words = zip(self._plan.axes, self._views.statusword.tolist(), strict=True)
-        states = [state_of(word) if requires(axis.device) else None for axis, word in words]
-        faulty = [axis for axis, state in enumerate(states) if state in IN_FAULT]
+        states = map(state_of, self._views.statusword.tolist())
+        in_fault = [axis for axis, state in enumerate(states) if state in IN_FAULT]
+        faulty = [axis for axis in in_fault if requires(self._plan.axes[axis].device)]
         stops = [stop for stop in stops if requires(stop.device)]
         if raise_faults and faulty:
             cause = self._out_of_op() if self._engine.al_status != AlState.OP else None

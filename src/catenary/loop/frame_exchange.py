@@ -29,7 +29,7 @@ from catenary.wire.cia402 import SLOT_OFFSET, Object
 
 
 class FrameExchange:
-    """Owns the watches of a session that sends its own frames. Implements `Exchange`."""
+    """Exchange of a session that sends its own frames. Implements `Exchange`."""
 
     def __init__(self, session: Session) -> None:
         self._session = session
@@ -68,13 +68,13 @@ class FrameExchange:
         self.frames = FrameWatch(self._repeated_frames, put=put, now=now)
 
     def _repeated_frames(self) -> int:
-        """Return the number of frames that returned again or that a ring could not assign."""
+        """Return the number of frames that returned repeatedly, or that a ring could not assign."""
         ring = ring_of(self._session.main.link)
         unassigned = 0 if ring is None else ring.counts["alien"]
         return self._session.engine.counters["repeated"] + unassigned
 
     def bring_to_op(self) -> list[Pending[None]]:
-        """Bring all devices to OP together, once the clocks are settled."""
+        """Wait for the clocks, then bring all devices to OP together."""
         session = self._session
         session.settle()
         if session.clocks is not None:
@@ -111,8 +111,8 @@ class FrameExchange:
     def query_states(self) -> Evidence:
         """Query all devices for their states.
 
-        A required device that does not answer at its address twice, while others do, has lost the
-        address.
+        If a required device does not answer to its address in two surveys while others do, it has
+        lost the address.
         """
         session = self._session
         others = session.main.other_masters
@@ -131,7 +131,7 @@ class FrameExchange:
         return Evidence(answers, without_address=silent, other_masters=others)
 
     def error_code(self, axis: int) -> int | None:
-        """Return object 0x603F of the axis; None if the drive does not answer."""
+        """Return object 0x603F of the axis; None if it cannot be read."""
         plan = self._session.plan.cycle.axes[axis]
         channel = self._session.main.subs[plan.device].channel
         if channel is None:

@@ -20,7 +20,11 @@ _before = 0.0
 
 @contextmanager
 def switch_interval(seconds: float) -> Iterator[None]:
-    """Set the switch interval to the shortest of all nested ones [s]; the last exit restores it."""
+    """Set the switch interval to the shortest requested one. The last exit restores the former one.
+
+    Args:
+        seconds: Requested switch interval [s].
+    """
     global _before
     with _lock:
         if not _requested:

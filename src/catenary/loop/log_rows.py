@@ -57,7 +57,7 @@ def log_dtype(axes: Sequence[str]) -> np.dtype[np.void]:
 
 
 def axis_names(axes: Sequence[AxisPlan]) -> list[str]:
-    """Return the name of each axis; with the device's position if names are ambiguous."""
+    """Return the name of each axis. An ambiguous name begins with the position of the device."""
     short = [axis.name.removeprefix(f"{axis.device} ") for axis in axes]
     often = Counter(short)
     return [axis.name if often[name] > 1 else name for axis, name in zip(axes, short, strict=True)]

@@ -1,7 +1,8 @@
 """Loop: it plans the requests, brings the devices to OP, and runs the cycle.
 
-After entry, the drives are enabled and hold, or they are in a safe state and a specific error was
-raised. Leaving always stops the drives natively before the devices leave OP.
+Entering enables the drives, and axes in a position mode hold. If entering fails, the loop stops the
+drives, brings the devices out of OP, and raises the error. Leaving also stops the drives, in
+compiled code, before the devices leave OP.
 """
 
 from __future__ import annotations
@@ -64,17 +65,17 @@ class Loop:
         enable: True to enable the drives on entry.
         watchdog: Watchdog time of the devices' outputs [s]; 0: off; None: 0.1 s, in CST the longer
             of 10 ms and five exchanges.
-        cpu: CPU of the native thread, or one CPU for each network. None: unchanged; for several
-            networks the last CPUs, if there are more CPUs than networks.
-        priority: SCHED_FIFO priority of the native thread; None: unchanged.
+        cpu: CPU of the native thread, or one CPU for each network. None: any CPU of the process;
+            for several networks the last CPUs, if there are more CPUs than networks.
+        priority: SCHED_FIFO priority of the native thread; None: that of the process.
         log: Number of cycles in the log and in the log of an error.
         laws: Laws to compile on entry, before OP. Other laws are compiled when they are started.
         sink: Receiver of every cycle, for example a `Share` for other processes, or one for each
             network.
         stop: Conditions that stop axes or end the loop.
-        scheduling: Waiting for time and frames.
+        scheduling: Options for sleeping and for receiving frames: see `Scheduling`.
         clocks: Synchronisation of the distributed clocks.
-        log_axes: True to log also the values of every axis (docs/how_to/recording.md).
+        log_axes: True to also log the values of every axis (docs/how_to/recording.md).
 
     Raises:
         ValueError: An option is impossible, or a request names devices of several MainDevices.
@@ -255,8 +256,9 @@ class Loop:
     def wait(self, move: Awaited, timeout: float | None = None) -> None:
         """Iterate until a move is done: `loop.wait(arm.move_to(0.5), timeout=10.0)`.
 
-        While the loop runs in the background, it only waits, and any thread may call it. It returns
-        when the axes have reached their targets, or are at rest after `move.stop()`.
+        The call returns when the axes have reached their targets, or are at rest after
+        `move.stop()`. While the loop runs in the background, the call only waits, and any thread
+        may use it.
 
         Args:
             move: Result of `arm.move_to`, `arm.move_by` or `arm.home`.
@@ -385,7 +387,7 @@ class Loop:
         The call returns at once: see `sub.state` and the events.
 
         Raises:
-            ValueError: The device belongs to another loop.
+            ValueError: The device belongs to another MainDevice, or to the kernel master.
         """
         for session in self._sessions:
             if session.main is sub.main:
@@ -394,22 +396,26 @@ class Loop:
 
     @property
     def networks(self) -> tuple[Network, ...]:
-        """Plan, timing, clocks and log of each network; one network per MainDevice."""
+        """Networks of the loop, one per MainDevice, each with its plan, timing, clocks and log."""
         return self._networks
 
     @property
     def plan(self) -> Plan:
-        """Plan of the first network: print it."""
+        """Plan of the first network; `print` shows it as text."""
         return self._networks[0].plan
 
     @property
     def timing(self) -> Timing:
-        """Timing of the cycles since the loop was opened; it stays readable afterwards."""
+        """Timing of the cycles since the loop was opened; also available after its end."""
         return self._networks[0].timing
 
     @property
     def clocks(self) -> Clocks:
-        """Distributed clocks: print it. RuntimeError if no request has `dc=`."""
+        """Distributed clocks of the first network; `print` shows them as a table.
+
+        Raises:
+            RuntimeError: No request has `dc=`.
+        """
         return self._networks[0].clocks
 
     @property
@@ -427,12 +433,12 @@ class Loop:
         return self._networks[0].histogram(phase)
 
     def wait_locked(self, within: float = 1e-6, timeout: float = 5.0) -> None:
-        """Run cycles, axes holding, until the clocks are locked.
+        """Run cycles until the clocks are locked. The axes hold.
 
         They are locked when every clock differs by at most `within` from the reference clock and
         the cycle starts are in phase with it. The bound remains in force: a `ClockUnlocked` event
         reports that it is exceeded, a `ClockLocked` event that it holds again. Several networks are
-        awaited one after the other.
+        checked one after the other.
 
         Args:
             within: Bound of the differences and of the phase [s].
@@ -497,7 +503,7 @@ class Loop:
     def _abandon(self) -> None:
         """Leave the loop because the MainDevice is being closed."""
         for problem in self._leave():
-            warnings.warn(f"the loop was left open: {problem}", RuntimeWarning, stacklevel=2)
+            warnings.warn(f"while leaving the open loop: {problem}", RuntimeWarning, stacklevel=2)
 
     def _leave_at_exit(self, sessions: Sequence[Session]) -> None:
         """Leave the loop when it is deleted or the program ends, if it is still open."""
@@ -511,7 +517,8 @@ class Loop:
     def _leave(self) -> list[Exception]:
         """Stop every network, regardless of errors in the others; return the problems.
 
-        A second thread waits for the first one, so that all axes are at rest when it continues.
+        If another thread is already leaving the loop, the call first waits for it, at most
+        `LEAVE_TIMEOUT`. The axes are then at rest when the call returns.
         """
         is_ours = self._leaving.acquire(timeout=LEAVE_TIMEOUT)
         try:
@@ -536,7 +543,7 @@ def checked_quorum(quorum: int | None, count: int) -> int:
         count: Number of networks.
 
     Raises:
-        ValueError: There are fewer networks.
+        ValueError: The quorum is not from 1 to the number of networks.
     """
     if quorum is not None and not 1 <= quorum <= count:
         raise ValueError(f"quorum={quorum}: must be 1 to the number of networks, {count}")
@@ -544,10 +551,10 @@ def checked_quorum(quorum: int | None, count: int) -> int:
 
 
 def leave_open_loop(sessions: Sequence[Session], guard: SignalGuard) -> None:
-    """Stop the axes of a loop that is no longer referenced, then warn if it was left open.
+    """Leave a loop that was deleted, or that is open at the end of the program; then warn.
 
-    A loop in the background may stay open until the program ends. The warning comes last, because
-    it may be turned into an error.
+    There is no warning at the end of the program if the loop runs in the background. The warning
+    comes last, because it may be turned into an error.
 
     Args:
         sessions: Sessions of the loop.

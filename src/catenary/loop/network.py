@@ -38,7 +38,7 @@ LOG_LIMIT = 2**24  # cycles, about a gigabyte
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Settings:
-    """Options of a loop that all of its networks share. ValueError if one is impossible."""
+    """Options of a loop that all of its networks share. Raises ValueError if one is impossible."""
 
     period: float
     execution: ExecutionMode
@@ -68,7 +68,7 @@ class Settings:
 
         Args:
             main: MainDevice of the network.
-            cpu: CPU of its native thread; None: unchanged.
+            cpu: CPU of its native thread; None: any CPU of the process.
         """
         late_position, late_velocity, late_torque = self.stop.late_limits
         command_velocity, command_torque = self.stop.command_timeouts
@@ -104,7 +104,7 @@ class Settings:
 
 
 class Network:
-    """Owns the session of one MainDevice in a loop, with its plan, timing, clocks and log."""
+    """One network of a loop: its MainDevice, session, plan, timing, clocks and log."""
 
     def __init__(
         self,
@@ -124,17 +124,21 @@ class Network:
 
     @property
     def plan(self) -> Plan:
-        """Plan of the network: print it."""
+        """Plan of the network; `print` shows it as text."""
         return self.session.plan
 
     @property
     def timing(self) -> Timing:
-        """Timing of the cycles since the loop was opened; it stays readable afterwards."""
+        """Timing of the cycles since the loop was opened; also available after its end."""
         return self.session.timing()
 
     @property
     def clocks(self) -> Clocks:
-        """Distributed clocks: print it. RuntimeError if no request has `dc=`."""
+        """Distributed clocks of the network; `print` shows them as a table.
+
+        Raises:
+            RuntimeError: No request has `dc=`.
+        """
         clocks = self.session.clocks
         if clocks is None:
             raise RuntimeError(
@@ -163,13 +167,13 @@ class Network:
 
     @property
     def session(self) -> Session:
-        """Session of the network. RuntimeError before the loop is open."""
+        """Session of the network. Raises RuntimeError before the loop is open."""
         if self.current_session is None:
             raise RuntimeError("the loop is not open: use `with Loop(...) as loop:`")
         return self.current_session
 
     def prepare(self, abandon: Callable[[], object]) -> Session:
-        """Bring all devices to SAFE-OP and compile all laws.
+        """Bring all devices to SAFE-OP, compile the laws of the options, and return the session.
 
         Args:
             abandon: Function that leaves the loop. It is called when the MainDevice is closed.
@@ -202,7 +206,11 @@ class Network:
         return make_plan(devices, self._requests, its.plan_options(self.main, self._cpu))
 
     def advance(self, flags: int) -> None:
-        """Step the acyclic queue after a cycle without an iteration; raise the cycle's error."""
+        """Step the acyclic queue after a cycle without an iteration; raise the error of the cycle.
+
+        Args:
+            flags: Flags of the cycle.
+        """
         session = self.session
         session.service.step_without_thread()
         if flags & TROUBLE or session.engine.al_status != AlState.OP:

@@ -1,6 +1,6 @@
 """Several networks in one loop: one schedule, and an engine and a native thread for each network.
 
-All networks use the cycle starts of the first. A failed network never delays the others. Its own
+All networks use the cycle starts of the first. A failed network does not delay the others. Its own
 thread continues to send, and its cycles are bad.
 """
 
@@ -77,7 +77,7 @@ class NetworksIteration:
     def __init__(self, networks: Sequence[Network], quorum: int) -> None:
         self._sessions = [network.session for network in networks]
         self._quorum = quorum
-        self._dead: set[int] = set()  # identities of the failed networks that have not returned
+        self._dead: set[int] = set()  # identities of the failed networks that have not recovered
         self._cycle: NetworksCycle | None = None
         self.commit_lock: Lock | None = None  # see core.Iteration
 
@@ -136,8 +136,8 @@ class NetworksIteration:
     def _lives(self, one: Session, flags: int) -> bool:
         """Return True if a network is alive.
 
-        A failed network is alive again when its devices are in OP. Thus, devices that their
-        watchdogs stopped do not stop the other networks.
+        A failed network is alive again when its devices are in OP. Until then, the loop may
+        continue although watchdogs have stopped these devices.
         """
         if flags & NETWORK_TROUBLE:
             self._dead.add(id(one))
@@ -193,7 +193,7 @@ def refuse_for_several(settings: Settings) -> None:
 
 
 def share_time(sessions: Sequence[Session]) -> None:
-    """In virtual time, let this thread run the cycles of all networks in turns.
+    """In virtual time, let this thread run the cycles of all networks in turn.
 
     Raises:
         ValueError: The networks have different clocks.
@@ -203,8 +203,8 @@ def share_time(sessions: Sequence[Session]) -> None:
         return
     if not all(virtual) or not _have_one_clock([one.main.link for one in sessions]):
         raise ValueError(
-            "the networks of one loop need the same clock: give it to their segments, "
-            "Segment(..., clock=VirtualClock())"
+            "the networks of one loop need the same clock: write clock = VirtualClock(), and then "
+            "Segment(..., clock=clock) for each segment"
         )
     for one in sessions:
         one.share_time([other for other in sessions if other is not one])
@@ -231,7 +231,7 @@ def leave_all(sessions: Sequence[Session], guard: SignalGuard) -> list[Exception
 
 
 def brake(sessions: Sequence[Session], guard: SignalGuard) -> None:
-    """Stop all axes of all networks together, and wait for standstill, or until the deadline.
+    """Stop all axes of all networks together. Wait for standstill, at most until the deadline.
 
     Args:
         sessions: Sessions of the loop.
@@ -268,14 +268,15 @@ def cpus_for(count: int, cpu: int | Sequence[int] | None) -> list[int | None]:
 
     Args:
         count: Number of networks.
-        cpu: Requested CPU or CPUs. None: unchanged; for several networks the last CPUs, if there
-            are more CPUs than networks.
+        cpu: Requested CPU or CPUs. None: any CPU of the process; for several networks the last
+            CPUs, if there are more CPUs than networks.
 
     Raises:
-        ValueError: The number of CPUs is not the number of networks.
+        ValueError: The number of CPUs is not the number of networks, or `cpu` is a sequence for one
+            network.
     """
-    if count == 1 and isinstance(cpu, Sequence):
-        raise ValueError(f"cpu={cpu}: one network has one thread, on one CPU")
+    if count == 1 and cpu is not None and not isinstance(cpu, int):
+        raise ValueError(f"cpu={cpu}: give one number; one network has one thread")
     if isinstance(cpu, int):
         return [cpu] * count
     if cpu is not None:

@@ -43,8 +43,8 @@ class StopPolicy:
             DriveError. "event": only the event `AxisStopped`; see `Drives.stopped`.
         on_return: Reaction if an optional device returns. "restore": replay its start-up objects
             and bring it to OP. "hold": keep it in PRE-OP until `Loop.restore`.
-        on_replacement: The same, if another device of the same product is in its place. A held
-            replacement is not even brought to PRE-OP.
+        on_replacement: Reaction if another device of the same product is in the place of an
+            optional device, "restore" or "hold". "hold" does not even bring it to PRE-OP.
 
     Raises:
         ValueError: An option is impossible.
@@ -95,11 +95,12 @@ class StopPolicy:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Scheduling:
-    """Waiting of a loop for time and frames.
+    """Options of a loop for sleeping, for receiving frames and for several networks.
 
     Args:
-        receive: Waiting of the cycle for its frames: "poll", "wait" or "busy". None: "wait" when
-            threaded, "poll" when inline.
+        receive: Method of receiving frames. "poll": sleep until the deadline, then take the frames
+            that have arrived. "wait": sleep until a frame arrives. "busy": check for frames without
+            sleeping. None: "wait" when threaded, "poll" when inline.
         busy_wait: Time of a busy-wait before each cycle start [s]; the rest of the wait is a sleep.
             It costs this processor time per cycle.
         switch_interval: Switch interval of the interpreter while an inline loop is open in real

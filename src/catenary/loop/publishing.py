@@ -27,7 +27,7 @@ EVENT_FIELDS = {field.name for field in fields(Event)}
 
 
 class Publisher:
-    """Owns a loop's connection to its sink, from `open` to `close`."""
+    """Connection of a loop to its sink, from `open` to `close`."""
 
     def __init__(self, sink: Sink, main: MainDevice, engine: Engine, plan: Plan) -> None:
         self._sink = sink
@@ -143,7 +143,9 @@ def of_block(block: Block, places: Places, kinds: Sequence[bool] = ()) -> Iterat
 
 
 def unit_of(name: str, kinds: Sequence[bool] = ()) -> str:
-    """Return the unit of a field: "rad"; for linear axes "m"; "rad or m" if both kinds occur.
+    """Return the unit of a field: "rad", "m" for linear axes, or "rad or m" for both kinds.
+
+    Empty if the field has no unit.
 
     Args:
         name: Name of the field.
@@ -199,11 +201,11 @@ def with_own_names(
 ) -> Iterator[SinkField]:
     """Yield the columns with unique names.
 
-    A name that several columns share is extended by the device, then by a number if necessary.
+    A name that is not unique gets the suffix " of device N", and a number if that is not enough.
 
     Args:
         columns: Columns and their devices.
-        taken: Names in use; it is extended.
+        taken: Names in use. The yielded names are added to it.
     """
     often = Counter(each.name for each, _ in columns)
     for each, device in columns:
@@ -232,7 +234,7 @@ def one_sink_each(sinks: Sink | Sequence[Sink] | None, networks: int) -> list[Si
     given = list(sinks) if isinstance(sinks, Sequence) else [sinks]
     if len(given) != networks:
         raise ValueError(
-            f"sink: {len(given)} sinks for {networks} networks; give each network its own: "
+            f"sink: {len(given)} given for {networks} networks; give each network its own: "
             "sink=[cat.Share('upper'), cat.Share('lower')]"
         )
     return list(given)

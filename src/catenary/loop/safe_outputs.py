@@ -1,4 +1,4 @@
-"""Safe values of outputs at the end of a loop: exchanged before the devices leave OP."""
+"""Safe values of outputs, which a loop sends at its end, before the devices leave OP."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def confirm_safe(
         plan: Plan of the cycle.
         views: All private buffers.
         cycle: Runs a cycle and returns its flags.
-        guard: Shortens the wait at a second signal.
+        guard: Signal handlers; a second signal shortens the wait.
 
     Raises:
         LoopError: A required device did not answer in time.

@@ -50,7 +50,7 @@ STOP_SLICE_NS = 20_000_000  # between checks of `guard.hurry` while the drives b
 
 
 class Session:
-    """Owns the engine of one MainDevice while its loop is open."""
+    """State of one MainDevice in a loop: engine, arrays, acyclic queue and watches."""
 
     def __init__(
         self,
@@ -86,11 +86,11 @@ class Session:
         self._watches: list[Pending[None]] = []
         self._publisher: Publisher | None = None
         self._counted: Mapping[str, int] = {}  # counters of the engine when the loop was entered
-        self.end_background: Callable[[], None] = _no_background  # the thread that iterates
+        self.end_background: Callable[[], None] = _no_background  # ends the thread that iterates
         self.service.cycle = self.cycle
 
     def _bind(self, requests: Sequence[ProcessDataRequest]) -> Views:
-        """Give the requests their parts of the engine's buffers, and return all of them."""
+        """Bind the requests to their parts of the engine's buffers; return views of all buffers."""
         return bind_requests(
             requests,
             self.plan.tables,
@@ -122,7 +122,11 @@ class Session:
         self.engine.take_turns()
 
     def cycle(self) -> int:
-        """Run one cycle without an application, and one of each companion; return its flags."""
+        """Run one cycle of this and of each companion network, without the application.
+
+        Returns:
+            Flags of the cycle of this network.
+        """
         flags = self.engine.run(1)
         for other in self._companions:
             if other.is_open:
@@ -148,10 +152,10 @@ class Session:
             raise RuntimeError("the loop is closed: open it again, or use it in a with block")
 
     def open(self, origin_ns: int = 0) -> None:
-        """Start the cycle, and bring the devices from SAFE-OP to OP while valid outputs flow.
+        """Start the cycle, and bring the devices from SAFE-OP to OP while it sends valid outputs.
 
         Args:
-            origin_ns: A cycle start of the schedule to follow; 0: a new schedule.
+            origin_ns: Cycle start of the schedule to follow [ns]; 0: a new schedule.
         """
         self._attached.enter_context(self.main.attached(self.service.runner, self._abandon))
         inline = self.plan.cycle.execution == "inline" and self.engine.scheduling != "virtual time"
@@ -183,7 +187,7 @@ class Session:
         self.views.request[axes] += 1
 
     def _in_fault(self) -> npt.NDArray[np.bool_]:
-        """(n,) True for each axis that is in fault or reacts to one."""
+        """Return (n,) True for each axis that is in fault or in its fault reaction."""
         return np.isin(self.views.axis_state, [int(state) for state in IN_FAULT])
 
     def _await(self, waiting: Callable[[], npt.NDArray[np.bool_]]) -> None:
@@ -211,8 +215,8 @@ class Session:
             return
         names = [self.plan.cycle.axes[i].name for i in np.flatnonzero(powered).tolist()]
         raise LoopError(
-            f"{call}: {', '.join(names)} powered in CST, and "
-            "the call commits no torque set-points during its wait",
+            f"{call} is not possible: {', '.join(names)} powered in CST, and "
+            "the call commits no torque set-points",
             log=self.log(),
             hint="call it before the first torque is committed, disable the axes, or switch to CSP",
         )
@@ -226,7 +230,7 @@ class Session:
                 return
         raise self.faults.silence()
 
-    # Session
+    # While the loop is open
 
     def reset_figures(self) -> None:
         """Restart the timing and the figures of the clocks."""
@@ -251,9 +255,9 @@ class Session:
         """
         for mover in list(self.views.movers):
             mover.check()
-        error = self.faults.error(flags, enabling=enabling)
         if flags & CYCLE_CLOCKS:
-            self.announce_clocks()
+            self.announce_clocks()  # before the queries, which take time and can fail
+        error = self.faults.error(flags, enabling=enabling)
         if error is not None:
             raise error
 
@@ -354,7 +358,7 @@ class Session:
             self.main.leave()
         except LinkError:
             if any(self.watch.requires(sub.position) for sub in self.main.subs):
-                raise  # otherwise only optional devices are missing, as before
+                raise  # otherwise only optional devices do not answer
 
 
 def _no_background() -> None:

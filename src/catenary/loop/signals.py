@@ -2,7 +2,7 @@
 
 Handlers are only installed in the main thread, where Python delivers signals. While the loop is
 not being left, Ctrl-C keeps its former effect. SIGTERM and SIGHUP (the terminal or the ssh
-connection closed) raise SystemExit unless the application handles them. All of them end in the
+connection closed) raise SystemExit unless the application handles them. These exceptions reach the
 loop's `__exit__`. While the loop is being left, a signal raises nothing and only shortens the
 waits. A signal that is ignored remains ignored: `nohup` ignores SIGHUP.
 """
@@ -22,7 +22,7 @@ SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 
 class SignalGuard:
-    """Owns the handlers of SIGINT, SIGTERM and SIGHUP while a loop is open.
+    """Handlers of SIGINT, SIGTERM and SIGHUP while a loop is open.
 
     `leaving`: code objects of the functions that leave a loop. If one of them is on the stack, a
     signal only sets `hurry`. (A flag set by these functions would leave a gap at their first line.)

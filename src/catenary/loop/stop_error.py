@@ -41,7 +41,7 @@ ADVICE: dict[StopReason, str] = {
         "update torques more often than that from a thread, use a law (loop.start), change to "
         "CSP, or give StopPolicy(command_timeout=...) a longer time [s]"
     ),
-    StopReason.NOT_ENABLED: "check its main supply, safe torque off and the enable input",
+    StopReason.NOT_ENABLED: "check main supply, safe torque off and enable input of the drive",
 }
 CONTINUE = (
     'StopPolicy(on_axis_stopped="event") keeps the loop running; '

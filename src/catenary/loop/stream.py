@@ -15,10 +15,10 @@ class Stream:
     """Set-points written ahead, one row per cycle. The cycle thread consumes them in order.
 
     From the first row until `close`, the stream sets the targets. A law that runs at the same time
-    reads the row in its targets. An empty stream is an underrun: the axes fall back, and are
-    stopped after the late limit. During an underrun, `cycle.dry` is True and `dry` counts the
-    cycles. The next row ends it. Any thread may write, but only one at a time. An axis that is
-    enabled later follows the rows written after that.
+    reads the row in its targets. An empty stream is an underrun: the axes decelerate (in CST, they
+    keep their torque), and are stopped after the late limit. During an underrun, `cycle.dry` is
+    True and `dry` counts the cycles. The next row ends it. Any thread may write, but only one at a
+    time. An axis that is enabled later follows only the rows that are written after it was enabled.
     """
 
     def __init__(self, engine: core.Engine, views: Views, capacity: int) -> None:
@@ -38,7 +38,7 @@ class Stream:
         """Write rows of set-points, each (k, n), or (n,) for one row.
 
         Args:
-            position: Positions [rad]; None: the commanded ones.
+            position: Positions [rad]; None: the present target positions.
             velocity: Velocities [rad/s]; None: zero.
             torque: Torques [N·m]; None: zero.
 

@@ -8,10 +8,10 @@ from collections.abc import Iterator, Mapping
 from catenary import notebook
 from catenary.figures import FIGURES, heading
 
-NAME, FIGURE = 14, 11  # widths of a table
+NAME, FIGURE = 16, 11  # widths of a table
 COUNTED = ("late", "uncommitted", "underrun", "lost")
-BUSY_SHARE = 0.5  # of the switch interval: a longer wait indicates a second busy thread
-LATE_SHARE = 0.1  # of the period: a later wake-up is reported
+BUSY_SHARE = 0.5  # share of the switch interval; a longer wait indicates a second busy thread
+LATE_SHARE = 0.1  # share of the period; a later wake-up is reported
 VIRTUAL = "virtual time: the segment's own clock, not this machine's"
 
 
@@ -27,7 +27,7 @@ class Timing(Mapping[str, Mapping[str, float]]):
     - send: wake-up (inline: end of the body) → last frame passed to the kernel.
     - in_controller: sum of receive, process and send.
     - post_processing: work after the frames, until the next wait.
-    - round_trip: of the last frame.
+    - round_trip: frames passed to the kernel → last frame received (threaded).
     - output_delay: cycle start → last cyclic frame passed to the kernel.
     - input_age: frames passed to the kernel → body or law begins with their inputs.
     - interpreter: wake-up → this thread has the interpreter.

@@ -42,8 +42,8 @@ def open_ports(dl_status: int) -> Ports:
 def tree(ports: Sequence[Ports]) -> tuple[Place, ...]:
     """Return the place of each device in the tree.
 
-    If there are more devices than open ports, the registers do not describe a tree. The devices for
-    which no port is left then have no parent.
+    If there are more devices than open ports, the registers do not describe a tree. In
+    this case, devices for which no open port remains have no parent.
     """
     places: list[Place] = []
     unfilled: list[tuple[int, int]] = []  # (position, port); the last one is next
@@ -92,7 +92,7 @@ class Topology:
         )
 
     def children(self, position: int) -> tuple[Cable, ...]:
-        """Return the cables from a device to its children, in the order of the frame."""
+        """Return the cables from a device to its children, in the order a frame passes them."""
         return tuple(cable for cable in self.cables if cable.upper == position)
 
     def cable_at(self, position: int, port: int) -> Cable | None:
@@ -148,9 +148,9 @@ def make_topology(ports: Sequence[Ports], *, ring: bool = False) -> Topology:
         *_entered_elsewhere(ports),
         *_without_a_place(places, unanswered),
         *(
-            f"device {position} port {port} is open, but no device answers behind it: it leads to "
-            "something that is not an EtherCAT device, to a device without firmware, or to the "
-            "MainDevice's second port (a ring)"
+            f"device {position} port {port} is open, but no device answers behind it: it is "
+            "connected to a non-EtherCAT device, to a device without firmware, or to the "
+            "MainDevice's second interface (a ring)"
             for position, port in unanswered
             if ports[position][0] and (position == 0 or places[position].parent is not None)
         ),

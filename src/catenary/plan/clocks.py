@@ -31,11 +31,11 @@ BURST = 15_000  # frames: ESC data sheet I §9.1.5; KickCAT uses 15 000, ethercr
 START_DELAY_NS = 100_000_000  # until the first SYNC pulse, as in SOEM (`SyncDelay`) and IgH
 HOP_NS = 1000  # delay of a device and its cable: 0.3 µs by E-bus, up to 1 µs by Ethernet PHYs
 # Share of the period between the cycle start and the frames. Threaded: it covers a late wake-up.
-# Inline or with a law: it also covers the calculation, which precedes the frames.
+# Inline: it also covers the body, which precedes the frames.
 ALLOWANCE: dict[ExecutionMode, float] = {"threaded": 0.2, "inline": 0.5}
 
-# Phase controller (docs/how_to/clocks.md): a critically damped loop with this time constant. Its
-# bandwidth starts higher and decreases. Its change of the period is limited.
+# Phase controller (docs/explanation/distributed_clocks.md): a critically damped loop with this time
+# constant. Its bandwidth starts higher and decreases. Its change of the period is limited.
 TIME_CONSTANT = 0.1  # [s]
 CYCLES_MIN = 16  # shortest time constant [cycles]; the response takes one or two cycles
 RATE_LIMIT = 1e-3  # of the period; small enough for the interpolation of a servo

@@ -187,7 +187,9 @@ class AxisPlan:
 
 @dataclass(frozen=True, slots=True)
 class ClockPlan:
-    """Synchronisation of the cycle and the distributed clocks (docs/how_to/clocks.md).
+    """Synchronisation of the cycle and the distributed clocks.
+
+    docs/explanation/distributed_clocks.md explains it.
 
     `follow`: "reference": the cycle starts follow the reference clock; "main": the reference clock
     follows the link's clock.

@@ -79,10 +79,10 @@ def _column_of_axis(
     requests: Sequence[ProcessDataRequest], axis: Owned, column: Owned
 ) -> ConfigurationError:
     return ConfigurationError(
-        f"{requests[axis.request]!r}: column {column.what!r} is the {axis.what} that the axis "
-        "itself writes",
-        hint="write arm.target.position, velocity, torque or mode; they are limited and enabled "
-        "without a jump",
+        f"{requests[axis.request]!r}: column {column.what!r} would overwrite {axis.what}, which "
+        "Catenary writes for the axis",
+        hint="write target.position, velocity, torque or mode instead; these respect the limits "
+        "and the enabling sequence",
     )
 
 

@@ -87,6 +87,8 @@ class DistributedClock:
     assign_activate: int | None = None
 
     def __post_init__(self) -> None:
+        if self.op_mode is not None and not isinstance(self.op_mode, str):
+            raise TypeError(f"op_mode={self.op_mode!r}: must be the name of an OpMode, or None")
         if self.sync0 is not None and not 1e-9 <= self.sync0 < SYNC_TIME_END:
             raise ValueError(f"sync0={self.sync0} s: must be 1 ns to {SYNC_TIME_END} s")
         if self.sync1 is not None and not 0 <= self.sync1 < SYNC_TIME_END:

@@ -210,7 +210,10 @@ def _no_reference(device: DeviceDescription) -> ClockError:
 
 
 def distribute(device: DeviceDescription) -> Request:
-    """Return the FRMW request for the low half of the system time, which time loops compare."""
+    """Return the FRMW request that distributes the low half of the system time.
+
+    The time loop of each clock compares it with its own system time.
+    """
     request = read(EcatCommand.FRMW, device.station_address, SYSTEM_TIME_LOW)
     return request._replace(repeatable=False, alone=True)
 

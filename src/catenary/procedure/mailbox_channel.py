@@ -14,7 +14,7 @@ from catenary.wire.mailbox import Mailbox
 
 EMERGENCIES_KEPT = 64
 ANSWER_DELAY_FIRST_NS = 100_000
-THINKS_MAX_NS = 20_000_000
+ANSWER_DELAY_MAX_NS = 20_000_000
 
 
 class ReceivedEmergency(NamedTuple):
@@ -92,7 +92,7 @@ class MailboxChannel:
         elif self.posted_ns is not None:
             # A single slow answer must not delay all further polls.
             limit_ns = max(2 * self.answer_delay_ns, ANSWER_DELAY_FIRST_NS)
-            self.answer_delay_ns = min(empty_ns - self.posted_ns, limit_ns, THINKS_MAX_NS)
+            self.answer_delay_ns = min(empty_ns - self.posted_ns, limit_ns, ANSWER_DELAY_MAX_NS)
         self.posted_ns = None
 
     def listen(self, listener: Listener) -> None:

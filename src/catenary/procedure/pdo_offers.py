@@ -1,7 +1,7 @@
 """PDOs that a device offers, read before planning. Nothing is written to the device.
 
-The results contain differences from the SII, the contents of PDOs that are not assigned, and lists
-and entries that cannot be changed.
+The returned descriptions note differences from the SII, include the PDOs that are not assigned,
+and mark the PDOs and assignments that cannot be changed.
 """
 
 from __future__ import annotations

@@ -126,9 +126,10 @@ def bring_to_safe_op(
     plan: DevicePlan,
     clock: Procedure[None] | None = None,
 ) -> Procedure[None]:
-    """Write the start-up list and the process data, and bring a device from PRE-OP to SAFE-OP.
+    """Write the start-up list and the process-data configuration, and request SAFE-OP.
 
-    The mapping is read first, because the power-up may have changed it.
+    The device must be in PRE-OP. The mapping is read first, because the power-up may have
+    changed it.
 
     Args:
         station: The device.

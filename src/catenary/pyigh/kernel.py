@@ -61,7 +61,7 @@ class BitsCell:
 
 
 class KernelSteps:
-    """Owns an activated master whose cycle the program runs itself."""
+    """Activated kernel master, with one method per step of the program's own cycle."""
 
     def __init__(
         self,

@@ -58,7 +58,7 @@ class Steps(Protocol):
 
 
 class MasterBase:
-    """Owns a master for a program that runs a cycle call by call.
+    """Master for a program that calls each step of the cycle itself.
 
     Use it as a context manager, or call `close`.
 

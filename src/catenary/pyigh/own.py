@@ -26,7 +26,7 @@ class ArrayCell(NamedTuple):
 
 
 class OwnSteps:
-    """Owns the inline loop of a program.
+    """Inline loop, with one method per step of the program's own cycle.
 
     `receive` sends the outputs, waits for the cycle start and reads the inputs. A cycle of the loop
     therefore starts where a cycle of the program ends.

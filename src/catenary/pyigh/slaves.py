@@ -46,7 +46,7 @@ class RawObject:
 
 
 class SlaveBase:
-    """Owns the process data of one slave as raw integers: `read(0x6041)`, `write(0x6040, 15)`.
+    """Process data of one slave as raw integers: `read(0x6041)`, `write(0x6040, 15)`.
 
     Args:
         position: Position of the slave, from 0.
@@ -131,7 +131,7 @@ class SlaveBase:
 
 
 class SlaveServo(SlaveBase):
-    """Owns a CiA 402 axis in the drive's own units.
+    """CiA 402 axis in the drive's own units.
 
     Args:
         position: Position of the slave, from 0.
@@ -244,7 +244,7 @@ SERVO_OBJECTS = (
 
 
 class SlaveIO(SlaveBase):
-    """Owns the channels of a terminal, in the order of its process data.
+    """Channels of a terminal, in the order of its process data.
 
     Entries of one bit are digital channels, wider entries are analogue channels.
 

@@ -105,7 +105,7 @@ class VirtualClock:
 
     @property
     def capsule(self) -> object:
-        """C table of native/clock.h of the thread that created the clock."""
+        """Capsule with the clock table (`native/clock.h`) of the thread that created the clock."""
         return self.home.capsule
 
     def wait_until(self, deadline_ns: int) -> bool:

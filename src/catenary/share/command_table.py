@@ -111,7 +111,10 @@ def memory_aligned(offset: int) -> int:
 
 
 class Desk:
-    """View of the desk of a loop, in the loop or in a client."""
+    """View of a loop's desk (the shared-memory command table).
+
+    The loop and its clients use it.
+    """
 
     def __init__(self, memory: mmap.mmap, layout: ShareLayout, *, fresh: bool = False) -> None:
         axes = len(layout.axes)

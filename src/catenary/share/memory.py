@@ -82,7 +82,7 @@ def create(folder: Path, size: int, mode: int) -> Segment:
         if error.errno != errno.ENOSPC:
             raise
         raise ShareError(
-            f"{folder} has not enough space for {size / 2**20:.1f} MiB",
+            f"not enough space in {folder}: {size / 2**20:.1f} MiB needed",
             hint="reduce history=, or enlarge the file system with `mount -o remount,size=...` (in "
             "a container: --shm-size)",
         ) from error

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from catenary import bus
+from catenary.errors import ConfigurationError
 from catenary.link import LinkSource, Ring
 from catenary.target.parse import parse
 
@@ -34,7 +35,23 @@ class MainDevice(bus.MainDevice):
         force: bool = False,
     ) -> None:
         source = source_of(target)
-        super().__init__(source if second is None else Ring(source, source_of(second)), force=force)
+        super().__init__(source if second is None else _ring(source, second), force=force)
+
+
+def _ring(first: LinkSource, second: str | LinkSource) -> Ring:
+    """Return the ring between two ports.
+
+    Raises:
+        ConfigurationError: A port is a whole virtual segment, which has a clock of its own.
+    """
+    ring = Ring(first, source_of(second))
+    if any(hasattr(end, "open_end") for end in (ring.first, ring.second)):
+        raise ConfigurationError(
+            "a whole virtual segment is not one end of a ring",
+            hint="create Segment([...], ring=True), and open MainDevice(segment.first, "
+            "segment.second)",
+        )
+    return ring
 
 
 def source_of(target: str | LinkSource) -> LinkSource:

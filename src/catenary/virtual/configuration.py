@@ -239,7 +239,7 @@ class SegmentFile(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
 
 OUT_OF_RANGE = (ArithmeticError, LookupError, ValueError, struct.error)
 HINT = (
-    "docs/explanation/virtual_segment.md lists the fields of devices and plants, "
+    "docs/reference/segment_file.md lists the fields of devices and plants, "
     "docs/how_to/faults.md those of faults"
 )
 

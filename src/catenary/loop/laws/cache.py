@@ -58,9 +58,9 @@ def cache_folder() -> Path:
 def private_folder(folder: Path) -> Path:
     """Create a folder that only this user can write, with mode 0700, and return its real path.
 
-    The folders above it, up to the home, are also checked, as in OpenSSH's StrictModes (misc.c,
-    safe_path). Each is checked before anything below it is created or changed, because root can
-    have the HOME of another user (sudo).
+    The folders above it, up to the home folder, are also checked, as in OpenSSH's StrictModes
+    (misc.c, safe_path). Each is checked before anything below it is created or changed, because
+    root can have the HOME of another user (sudo).
 
     Raises:
         OSError: The folder cannot be created, or another user could replace it or a file in it.
@@ -82,10 +82,10 @@ def private_folder(folder: Path) -> Path:
     if status.st_uid != os.geteuid():
         raise PermissionError(f"{folder} belongs to user {status.st_uid}")
     if folder.is_symlink():
-        raise PermissionError(f"{folder} is a link")
+        raise PermissionError(f"{folder} is a symbolic link")
     if stat.S_IMODE(status.st_mode) != 0o700:
         real.chmod(0o700)
-    for path in real.glob("*.nb[ci]"):  # they may be older than the mode of the folder
+    for path in real.glob("*.nb[ci]"):  # they may have been created before the folder was private
         found = path.lstat()
         if found.st_uid != os.geteuid() or found.st_mode & OTHERS_WRITE:
             raise PermissionError(f"other users can write {path}")
@@ -130,7 +130,7 @@ def _cache_class(folder: Path) -> Any:
             )
 
     class LawCache(caching.FunctionCache):  # type: ignore[misc]
-        """Cache of one law. Unreadable entries are compiled again."""
+        """Cache of one law. If an entry is unreadable, the law is compiled again."""
 
         _impl_class = Files
 

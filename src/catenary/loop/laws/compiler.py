@@ -47,7 +47,7 @@ def shell(actual_at, target_at, memory_at, memory_count, parameters_at, paramete
 
 @dataclass(frozen=True, slots=True)
 class CompiledLaw:
-    """Owns the machine code of a law. Keep the object while the address is in use."""
+    """Machine code of a law. Keep the object while the address is in use."""
 
     address: int
     code: object
@@ -86,7 +86,7 @@ def compile_law(law: Law, layout: LawLayout) -> CompiledLaw:
 
 @contextmanager
 def counted_allocations() -> Iterator[Callable[[], int]]:
-    """Yield a function that returns the number of arrays that compiled laws allocated so far."""
+    """Yield a function that returns the number of arrays that laws have allocated in the block."""
     runtime: Any = import_module("numba.core.runtime")
     runtime._nrt_python.memsys_enable_stats()
     try:

@@ -26,7 +26,7 @@ def dependencies(function: Callable[..., Any]) -> tuple[str, ...]:
     waiting, seen = [function], {id(function)}
     while waiting:
         for name, value in _named(waiting.pop()):
-            inner = getattr(value, "py_func", value)  # Numba's own functions
+            inner = getattr(value, "py_func", value)  # the Python function of a compiled one
             if isinstance(value, ModuleType):
                 found.update(_stamps(value))
             elif isinstance(value, CONSTANTS):

@@ -1,4 +1,4 @@
-"""Control laws: Python functions marked with `@cat.law`, compiled on the controlling machine."""
+"""Control laws: Python functions marked with `@cat.law`, compiled before their first use."""
 
 from __future__ import annotations
 
@@ -60,7 +60,8 @@ def arguments_of(function: LawFunction) -> tuple[str, ...]:
 
     Raises:
         TypeError: The object is not a plain function.
-        LawError: An argument has another name than those in `ARGUMENTS`, or a wrong kind.
+        LawError: The name of an argument is not in `ARGUMENTS`, or the argument is not an ordinary
+            positional one.
     """
     if not inspect.isfunction(function):
         raise TypeError(f"a law must be a plain function, not {function!r}")

@@ -65,6 +65,8 @@ def named(
 ) -> dict[str, tuple[int, str, int | None]]:
     """Return every column as a field: a group as an array, a single column as a number.
 
+    Names that occur several times are omitted.
+
     Args:
         fields: Fields of the block by name: (offset, format, count).
         columns: Columns of each request.

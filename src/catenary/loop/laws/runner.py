@@ -25,7 +25,7 @@ BUDGET_SHARE = 0.4  # of the period: the frames need the remainder
 
 
 class LawRunner:
-    """Owns the compiled laws of a loop and the running law."""
+    """Compiled laws of a loop, and the running law."""
 
     def __init__(self, engine: core.Engine, plan: Plan) -> None:
         self._engine = engine
@@ -118,7 +118,7 @@ class LawRunner:
             raise failure
 
     def failure(self, log: Log | None) -> LawError | None:
-        """Return the error of the law if it has failed, once.
+        """Return the error of a failed law. Return None without a failure, and on later calls.
 
         Args:
             log: The last cycles.

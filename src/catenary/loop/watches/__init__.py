@@ -1,1 +1,1 @@
-"""Watches: the checks of a session in every cycle, one module for each kind of fault."""
+"""Watches: checks that run while a loop is open, one module for each kind of fault."""

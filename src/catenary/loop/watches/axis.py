@@ -22,7 +22,7 @@ class StoppedAxis(NamedTuple):
     axis: int  # number in the plan
     name: str
     device: int
-    mode: int  # mode of operation that the drive shows
+    mode: int  # mode of operation that the drive reports
     reason: StopReason
     cycle: int
     requested: bool  # True if the application or the loop requested it
@@ -65,7 +65,7 @@ class RefusedMode(NamedTuple):
 
 
 class AxisWatch:
-    """Owns the stops and refused modes that were already reported."""
+    """Watch of the axes. It remembers the stops and refused modes already returned."""
 
     def __init__(self, views: Views, axes: Sequence[AxisPlan]) -> None:
         self._views = views
@@ -85,8 +85,8 @@ class AxisWatch:
         """Return the mode changes that were refused since the last call.
 
         Args:
-            explained: True if a new stop is the reason of the call. False: flags that were already
-                reported are new again, because the application repeated the request.
+            explained: False if only a refused mode can have caused the call. If no refusal is new,
+                the application has then repeated a request, and all refusals are returned again.
         """
         flagged = (self._views.axis_flags & AXIS_MODE_REFUSED) != 0
         new = flagged & ~self._refused

@@ -1,7 +1,7 @@
 """Watch of the devices of a running loop: it tracks lost, faulted and returning devices.
 
-The watch is one endless procedure in the acyclic queue. While the cycle finds all devices in OP, it
-only reads a flag of the core. Otherwise it queries all devices, reports changes as events, and
+The watch is one endless procedure in the acyclic queue. While all devices are in OP, the watch only
+reads a flag of the core. Otherwise it queries all devices, reports changes as events, and
 brings optional devices back to OP. The failure of a required device ends the loop; the watch only
 reports it (docs/explanation/safety.md).
 """
@@ -59,14 +59,14 @@ class Standing(Enum):
 
     RUNNING = "running"
     LOST = "lost"  # does not answer
-    ASTRAY = "astray"  # answers, out of OP, its station address kept
+    ASTRAY = "astray"  # answers to its station address, but is out of OP
     RETURNING = "returning"  # a procedure brings it back to OP
     HELD = "held"  # waits for `release`
 
 
 @dataclass(slots=True)
 class Charge:
-    """Owns the state of one device in the watch."""
+    """State of one device in the watch."""
 
     sub: SubDevice
     plan: DevicePlan
@@ -82,7 +82,7 @@ class Charge:
 def required_positions(plan: Plan) -> frozenset[int]:
     """Return the positions of the required devices.
 
-    None is required if all exchanged devices are optional, not even a coupler before them.
+    If all exchanged devices are optional, no device is required, not even a coupler before them.
     """
     units = plan.cycle.sync_units
     if units and all(unit.optional for unit in units):
@@ -92,7 +92,7 @@ def required_positions(plan: Plan) -> frozenset[int]:
 
 
 class Watch:
-    """Owns the state of every device of one network."""
+    """Watch of the devices of one network, with the state of each device."""
 
     def __init__(
         self,
@@ -153,7 +153,7 @@ class Watch:
         )
 
     def requires(self, position: int) -> bool:
-        """Return True if the loop ends without this device."""
+        """Return True if the loss of this device ends the loop."""
         return self._charges[position].required
 
     def release(self, sub: SubDevice) -> None:
@@ -183,7 +183,7 @@ class Watch:
         """Update the state of a device from one answer.
 
         Args:
-            charge: Device.
+            charge: State of the device.
             answer: Its answer to a read of the AL status.
         """
         task = charge.task

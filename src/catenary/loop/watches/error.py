@@ -1,7 +1,7 @@
 """Watch of the error counters of the devices, which are read once per second.
 
-It is an endless procedure in the acyclic queue, and sends one frame per second for 46 devices.
-A finding about a cable, a device or its supply becomes an event, at most once per minute.
+It is an endless procedure in the acyclic queue. For up to 46 devices, it sends one frame per
+second. A finding about a cable, a device or its supply becomes an event, at most once per minute.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ SILENCE = 60.0  # [s] before the same place is reported again
 
 
 class ErrorWatch:
-    """Owns the last reading of the counters and the times of the reported findings."""
+    """Watch of the error counters. It keeps their last reading and the times of the reports."""
 
     def __init__(self, main: MainDevice, now: Callable[[], float]) -> None:
         self._subs = main.subs
@@ -45,7 +45,7 @@ class ErrorWatch:
             yield after(PERIOD)
 
     def look(self) -> Procedure[Sequence[Finding]]:
-        """Return the findings since the last reading; none after the first reading.
+        """Return the findings since the previous reading. The first call returns none.
 
         `main.diagnose()` covers the counts from before the loop.
         """

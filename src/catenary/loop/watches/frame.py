@@ -18,7 +18,7 @@ SILENCE = 60.0  # [s] between two events
 
 
 class FrameWatch:
-    """Owns the last reading of the counters and the time of the last event."""
+    """Watch of duplicate frames. It keeps the last count and the time of the last event."""
 
     def __init__(
         self,

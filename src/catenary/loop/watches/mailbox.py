@@ -16,13 +16,13 @@ from catenary.procedure.exchange import Procedure
 from catenary.procedure.mailbox import MailboxChannel, drain, exclusively
 
 POLL_NS = 10_000_000  # between two polls if a device has no bit in the cyclic data
-SLOW_POLL_NS = 100_000_000  # between two polls if all devices have one
+SLOW_POLL_NS = 100_000_000  # between two polls if all devices have such a bit
 
 NEVER_NS = 1 << 62
 
 
 class MailboxWatch:
-    """Owns the state of the mailbox checks. The thread that steps the queue calls `look`.
+    """State of the mailbox checks. The thread that steps the queue calls `look`.
 
     `words`: last integers of the loop's private input buffer, with one bit per device. Each
     iteration updates them.
@@ -58,7 +58,7 @@ class MailboxWatch:
         """Start reading every full mailbox, except those that other procedures are using.
 
         Args:
-            now_ns: Time of the link's clock.
+            now_ns: Time of the link's clock [ns].
             cycle: Number of the cycle.
         """
         if self._reading:

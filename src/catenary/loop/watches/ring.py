@@ -9,7 +9,7 @@ from catenary.bus.ring import Cuts, Ends, HasState, find_cuts, named
 
 
 class RingWatch:
-    """Owns the cables of a ring that were reported as cut.
+    """Watch of a ring's cables. It keeps those that were reported as cut.
 
     A change is reported when two consecutive checks find it. While a cable is being pulled, the
     counters of the copies belong to different times.

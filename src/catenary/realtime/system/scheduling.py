@@ -62,10 +62,11 @@ def request_scheduling(
     Args:
         priority: SCHED_FIFO priority, 1..99.
         lock_memory: lock all pages of the process in memory.
-        cpu: processor to bind the thread to; None for any.
+        cpu: CPU to bind the thread to; None keeps its current affinity.
 
     Returns:
-        The resulting scheduling. Its `refusals` lists refused requests; they are not raised.
+        The resulting scheduling. Its `refusals` lists the requests that the kernel refused; they
+        do not raise an exception.
 
     Raises:
         ValueError: `priority` is out of range.
