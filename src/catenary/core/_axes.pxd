@@ -68,7 +68,7 @@ cdef struct axis_t:
     double demand_position
     double demand_torque
     # requested
-    uint32_t request           # number of the last request taken over
+    uint32_t request           # number of the last request that was processed
     uint8_t requested_state    # requested state in force
     uint16_t command           # command bits of the last controlword sent
     int8_t mode                # mode in force: the drive follows set-points of this mode
@@ -80,7 +80,7 @@ cdef struct axis_t:
     uint8_t clear_reset        # keep bit 7 clear for one cycle, to create an edge
     uint8_t followed
     uint8_t worked             # was followed since OPERATION_ENABLED or since a mode change
-    uint8_t shows_following    # bit 12 was seen: the drive implements it
+    uint8_t shows_following    # the drive has shown bit 12, so it implements the bit
     uint8_t followed_at_stop   # bit 12 was set when the stop began
     uint8_t flags
     uint8_t stop_reason

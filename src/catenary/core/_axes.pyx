@@ -477,7 +477,9 @@ cdef class Axes:
         for axis in plan.axes:
             self.make_axis(axis, plan)
             if axis.mode == CST and self.c.late_limit_torque == 0:
-                raise ValueError("late_limit_torque_ns: 0 would keep a stale torque without limit")
+                raise ValueError(
+                    "late_limit_torque_ns: must not be 0, which would keep a stale torque forever"
+                )
         self.c.input_count = self.make_columns(plan.input_columns, plan.input_size, True)
         self.c.output_count = self.make_columns(plan.output_columns, plan.output_size, False)
         self.c.input_area_count = self.make_areas(plan.input_areas, plan.input_size, True)

@@ -301,7 +301,7 @@ cdef class Engine:
     def start(self, int64_t origin_ns=0):
         cdef int rc
         if self.running:
-            raise RuntimeError("the engine is running")
+            raise RuntimeError("the engine is already running")
         if self.forgotten:
             raise self.not_running()
         if self.frames is not None:

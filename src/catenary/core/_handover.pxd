@@ -72,7 +72,7 @@ cdef struct actual_t:           # a header and the arrays of ACTUAL (_handover.p
 
 cdef struct target_header_t:
     uint64_t seen              # newest cycle of which the application had read the actual values
-    uint64_t stamp             # number of the cycle that the set-points are meant for
+    uint64_t stamp             # number of the cycle for which the set-points were computed
     int64_t process_ns         # duration of the body; -1: unknown
     int64_t input_age_ns       # age of its inputs when the body began; -1: unknown
     uint64_t updated           # background: number of the cycle of the last update; 0: none is valid

@@ -6,7 +6,7 @@ from catenary.core._memory cimport cat_memory
 from catenary.core._native cimport cat_law_monitor, cat_law_numbers, cat_law_step, cat_triple
 
 cdef enum:  # state of a law
-    WAITING = 0                # not taken over by the cycle yet
+    WAITING = 0                # the cycle has not started the law yet
     RUNNING = 1
     FINISHED = 2
     STOPPED_BY_APPLICATION = 3

@@ -52,7 +52,10 @@ class Fault:
         if not 0.0 <= self.probability <= 1.0:
             raise ValueError(f"probability {self.probability} is outside 0 to 1")
         if (self.kind == "delay") != (self.delay > 0.0):
-            raise ValueError(f"kind {self.kind!r} cannot have a delay of {self.delay} s")
+            raise ValueError(
+                f"kind {self.kind!r} with a delay of {self.delay} s: only kind 'delay' has a delay, "
+                "which must be above 0 s"
+            )
         if self.offset is not None and (self.kind != "corrupt" or self.offset < 0):
             raise ValueError(f"kind {self.kind!r} cannot have offset {self.offset}")
         if self.frames is not None and (self.frames.step < 1 or self.frames.start < 0):
