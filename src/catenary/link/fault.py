@@ -53,7 +53,7 @@ class Fault:
             raise ValueError(f"probability {self.probability} is outside 0 to 1")
         if (self.kind == "delay") != (self.delay > 0.0):
             raise ValueError(
-                f"kind {self.kind!r} with a delay of {self.delay} s: only kind 'delay' has a delay, "
+                f"kind {self.kind!r} with a delay of {self.delay} s: only kind 'delay' has one, "
                 "which must be above 0 s"
             )
         if self.offset is not None and (self.kind != "corrupt" or self.offset < 0):
