@@ -55,7 +55,7 @@ def test_a_number_next_to_an_area_is_unchanged() -> None:
 @pytest.mark.parametrize("place", [(0, SIZE + 1), (SIZE, 1), (-1, 1), (0, -1)])
 def test_an_area_outside_of_the_image_is_refused(place: tuple[int, int]) -> None:
     wrong = ImageArea("x", *place, 0, 0)
-    with pytest.raises(ValueError, match=r"area x: bytes .* leave the image"):
+    with pytest.raises(ValueError, match=r"area x: bytes .* exceed the image"):
         Echo(replace(make_plan([], units=1), output_areas=(wrong,)))
 
 

@@ -50,7 +50,7 @@ def echo(link: Link, count: int) -> None:
 
 
 def test_receive_path_describes_how_frames_are_received(pair):
-    assert pair[0].receive_path in ("mapped ring", "recv (as asked)")
+    assert pair[0].receive_path in ("mapped ring", "recv (requested)")
 
 
 def test_is_a_link_and_its_own_source(pair):

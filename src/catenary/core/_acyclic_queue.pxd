@@ -8,9 +8,9 @@ cdef struct acyclic_queue_t:
     cat_packet_ring *back      # frames that have returned
     int64_t wire_time          # maximum wire time of acyclic frames per cycle [ns]
     uint32_t arrived           # futex word: number of arrivals
-    uint32_t waiting           # 1: the service thread sleeps on `arrived` or is about to sleep
-    uint32_t under_way         # cycle only: frames of the last cycle that have not returned yet
-    uint64_t sent              # cycle only, like the next two
+    uint32_t waiting           # 1: the service thread sleeps on `arrived` or is about to
+    uint32_t under_way         # frames of the last cycle that have not returned; used by the cycle
+    uint64_t sent              # number of frames; only the cycle changes this and the next two
     uint64_t received
     uint64_t dropped           # frames that returned to a full ring or could not be sent
 

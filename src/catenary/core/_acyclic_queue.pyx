@@ -6,7 +6,7 @@ Theory of operation
     rings for one producer and one consumer (native/packet_ring.h). After each cycle `acyclic_send`
     sends at most four frames. Their wire time must fit into the part of the period that the plan
     reserves for them (plan/frames.py), less the time that has passed. The first frame is always
-    sent, so that a conversation never starves. Frames with an index of 0x80 or above return through
+    sent, so that no procedure starves. Frames with an index of 0x80 or above return through
     `acyclic_received`. The cycle never waits for the service thread.
 
 Waking
@@ -45,7 +45,7 @@ cdef enum:
 
 
 cdef inline int64_t wire_time(uint32_t length) noexcept nogil:
-    """Return how long a frame occupies a cable of 100 Mbit/s, as wire/frame.py does [ns]."""
+    """Return the time for which a frame occupies a cable of 100 Mbit/s [ns] (as wire/frame.py)."""
     return <int64_t>(max(length, CAT_FRAME_MIN) + FRAME_OVERHEAD) * NS_PER_BYTE
 
 
@@ -91,7 +91,7 @@ cdef class AcyclicQueue:
     def __cinit__(self, int64_t wire_time_ns):
         """`wire_time_ns`: maximum wire time of acyclic frames per cycle."""
         if wire_time_ns < 0:
-            raise ValueError(f"acyclic_ns: {wire_time_ns}, must not be negative")
+            raise ValueError(f"acyclic_ns: {wire_time_ns} ns, must not be negative")
         cdef size_t size = sizeof(cat_packet_ring)
         self.c.out = <cat_packet_ring *>memory_take(&self.memory, 1, size)
         self.c.back = <cat_packet_ring *>memory_take(&self.memory, 1, size)
@@ -100,7 +100,8 @@ cdef class AcyclicQueue:
     def push(self, bytes frame not None):
         if not CAT_FRAME_MIN <= len(frame) <= CAT_FRAME_MAX:
             raise ValueError(
-                f"acyclic queue: a frame of {len(frame)} bytes, must be {CAT_FRAME_MIN} to {CAT_FRAME_MAX}"
+                f"acyclic queue: frame size {len(frame)} bytes, must be {CAT_FRAME_MIN} to"
+                f" {CAT_FRAME_MAX}"
             )
         if frame[12:14] != b"\x88\xa4":
             raise ValueError("acyclic queue: EtherType is not 0x88A4")
@@ -117,7 +118,10 @@ cdef class AcyclicQueue:
         return frame
 
     def wait(self, int64_t timeout_ns):
-        """Wait once for a returned frame. A signal or a spurious wake-up ends the wait early."""
+        """Wait for a returned frame; return True if there is one.
+
+        A signal or a spurious wake-up ends the wait early.
+        """
         cdef uint32_t seen = cat_load_acquire32(&self.c.arrived)
         if cat_ring_peek(self.c.back) != NULL:
             return True

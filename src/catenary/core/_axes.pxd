@@ -44,7 +44,7 @@ cdef struct axis_t:
     double position_max
     double velocity_limit
     double torque_limit
-    double step_limit          # [rad] per cycle in CSP; 0: from velocity limit and time
+    double step_limit          # [rad] maximum step in CSP; 0: computed from velocity limit and time
     double step_floor          # [rad] smallest default step limit
     double acceleration        # [rad/s²] while the command returns to the set-points
     double deceleration        # [rad/s²] in a fallback
@@ -52,7 +52,7 @@ cdef struct axis_t:
     double standstill          # [rad/s] maximum velocity at rest
     uint8_t on_loss
     # observed
-    uint8_t known              # its inputs were valid once
+    uint8_t known              # its inputs were valid at least once
     uint8_t lost               # its unit was invalid lost_limit times in a row
     uint8_t state
     int8_t mode_shown
@@ -68,19 +68,19 @@ cdef struct axis_t:
     double demand_position
     double demand_torque
     # requested
-    uint32_t request           # number of the last request taken over
+    uint32_t request           # number of the last request that was processed
     uint8_t requested_state    # requested state in force
     uint16_t command           # command bits of the last controlword sent
-    int8_t mode                # in force: the drive follows set-points of this mode
+    int8_t mode                # mode in force: the drive follows set-points of this mode
     int8_t mode_wanted         # requested mode, sent in 0x6060
-    int8_t mode_refused        # refused by the drive, until another mode is requested
+    int8_t mode_refused        # mode that was refused; kept until another mode is requested
     uint8_t armed              # the application has committed targets since the request
     uint8_t stopping           # stopped by the core: quick stop instead of disable operation
     uint8_t holding            # stopped by the core and held in CSP (on_loss)
     uint8_t clear_reset        # keep bit 7 clear for one cycle, to create an edge
     uint8_t followed
     uint8_t worked             # was followed since OPERATION_ENABLED or since a mode change
-    uint8_t shows_following    # bit 12 was seen: the drive implements it
+    uint8_t shows_following    # the drive has shown bit 12, so it implements the bit
     uint8_t followed_at_stop   # bit 12 was set when the stop began
     uint8_t flags
     uint8_t stop_reason
@@ -93,14 +93,14 @@ cdef struct axis_t:
     uint32_t stop_cycles       # cycles under power since the stop
     uint32_t late_cycles       # cycles in a row without an accepted set-point, hand-overs excluded
     uint32_t refused_cycles    # those of late_cycles with a refused target
-    uint32_t beyond_cycles     # cycles in a row outside a position limit and leaving
-    # set-points: the last accepted one of CSP, and the return to the set-points
+    uint32_t beyond_cycles     # cycles in a row outside a position limit, moving further away
+    # set-points: the last accepted one of CSP, and the return of the command to them
     double setpoint            # [rad]
-    double setpoint_velocity   # [rad/s] between the last two
-    double previous_velocity   # [rad/s] between the two before these
+    double setpoint_velocity   # [rad/s] velocity between the last two set-points
+    double previous_velocity   # [rad/s] previous value of setpoint_velocity
     double ghost               # [rad] set-point of this cycle; extrapolated by the core in a fallback
     double ghost_velocity      # [rad/s]
-    uint64_t setpoint_stamp    # number of the cycle it was meant for
+    uint64_t setpoint_stamp    # number of the cycle for which it was computed
     uint32_t fallback_cycles   # cycles in a row without a set-point
     uint8_t accepted           # number of set-points accepted since followed, at most 2
     uint8_t returning          # the command is returning to the set-points

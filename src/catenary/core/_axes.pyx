@@ -239,7 +239,7 @@ cdef inline void write_axis(axis_t *a, uint8_t *outputs, uint16_t controlword) n
 
 
 cdef inline void lead_axis(axes_t *x, axis_t *a, uint16_t bits) noexcept nogil:
-    """Send the controlword towards the requested state, and the commanded set-points."""
+    """Write the commanded set-points and the controlword that leads to the requested state."""
     write_axis(a, x.image.outputs, guard_controlword(x, a, bits))
 
 
@@ -282,7 +282,8 @@ cdef inline void write_areas(axes_t *x, const target_t *t) noexcept nogil:
 cdef void write_velocity_offsets(axes_t *x) noexcept nogil:
     """Write 0x60B1 after the columns.
 
-    While an axis does not follow its set-points, 0x60B1 is the velocity of its command.
+    While an axis does not follow its set-points, 0x60B1 is the velocity of its command in CSP. In
+    other modes it is 0.
     """
     cdef axis_t *a
     cdef uint32_t i
@@ -353,7 +354,7 @@ cdef bint axes_apply_late(axes_t *x, const target_t *target, bint fresh) noexcep
 
     These are stops and, if the targets are fresh, requested states that remove power and the control
     bits of axes that work. Requests that enable or reset an axis take effect at the next write,
-    together with their set-points. Return True if outputs may differ.
+    together with their set-points. Return True if the outputs may have changed.
     """
     cdef axis_t *a
     cdef uint32_t i
@@ -413,7 +414,7 @@ cdef inline void follow_update(const axes_t *x, const actual_t *actual, target_t
 
 
 cdef void axes_follow(const axes_t *x, const actual_t *actual, target_t *target) noexcept nogil:
-    """Adapt the application's targets to the newest actual values that it has."""
+    """Adapt the application's targets to its newest actual values."""
     cdef uint32_t i
     cdef double position, velocity, torque
     for i in range(x.axis_count):
@@ -476,7 +477,9 @@ cdef class Axes:
         for axis in plan.axes:
             self.make_axis(axis, plan)
             if axis.mode == CST and self.c.late_limit_torque == 0:
-                raise ValueError("late_limit_torque_ns: 0 would keep a stale torque without limit")
+                raise ValueError(
+                    "late_limit_torque_ns: must not be 0, which would keep a stale torque forever"
+                )
         self.c.input_count = self.make_columns(plan.input_columns, plan.input_size, True)
         self.c.output_count = self.make_columns(plan.output_columns, plan.output_size, False)
         self.c.input_area_count = self.make_areas(plan.input_areas, plan.input_size, True)
@@ -518,7 +521,9 @@ cdef class Axes:
         if plan.target_position is not None and plan.actual_position is None:
             raise ValueError(f"{name}: a position target without an actual position cannot be held")
         if not 0 <= plan.sync_unit < len(cycle.sync_units):
-            raise ValueError(f"{name}: sync unit {plan.sync_unit} of {len(cycle.sync_units)}")
+            raise ValueError(
+                f"{name}: no sync unit {plan.sync_unit}, the plan has {len(cycle.sync_units)}"
+            )
         if not -128 <= plan.mode <= 127:
             raise ValueError(f"{name}: mode {plan.mode}, must be -128 to 127")
         outputs, inputs = cycle.output_size, cycle.input_size
@@ -551,9 +556,11 @@ cdef class Axes:
         a.position_min = finite_or(limits.position_min, -INFINITY, f"{name} position_min", positive=False)
         a.position_max = finite_or(limits.position_max, INFINITY, f"{name} position_max", positive=False)
         if a.position_min >= a.position_max:
-            raise ValueError(f"{name}: position limits {a.position_min} to {a.position_max}")
+            raise ValueError(
+                f"{name}: position_min {a.position_min} is not below position_max {a.position_max}"
+            )
         if plan.actual_position is None and (limits.position_min, limits.position_max) != (None, None):
-            raise ValueError(f"{name}: position limits without an actual position")
+            raise ValueError(f"{name}: position limits need an actual position")
         a.velocity_limit = finite_or(limits.velocity, INFINITY, f"{name} velocity limit")
         a.torque_limit = finite_or(limits.torque, INFINITY, f"{name} torque limit")
         a.step_limit = finite_or(limits.step, 0.0, f"{name} step limit")
@@ -571,7 +578,9 @@ cdef class Axes:
         ranks = [0, 0, 0]
         for k, column in enumerate(columns):
             if column.bank not in (BANK_REAL, BANK_INTEGER, BANK_BIT) or column.number is None:
-                raise ValueError(f"column {column.name}: bank {column.bank}")
+                raise ValueError(
+                    f"column {column.name}: bank {column.bank} is unknown, or no number is set"
+                )
             if column.number.kind == REAL_KIND and column.bank != BANK_REAL:
                 raise ValueError(f"column {column.name}: a real number belongs in the real bank")
             make_number(&c[k].number, column.number, image_size, f"column {column.name}")
@@ -587,7 +596,7 @@ cdef class Axes:
             if area.size < 0 or not 0 <= area.image_offset <= image_size - area.size:
                 raise ValueError(
                     f"area {area.name}: bytes {area.image_offset} to"
-                    f" {area.image_offset + area.size - 1} leave the image of {image_size} bytes"
+                    f" {area.image_offset + area.size - 1} exceed the image of {image_size} bytes"
                 )
             a[k].image_offset = area.image_offset
             a[k].place = place

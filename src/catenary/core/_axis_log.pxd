@@ -2,7 +2,7 @@ from libc.stdint cimport int8_t, uint8_t, uint16_t, uint32_t, uint64_t
 
 from catenary.core._handover cimport actual_t, target_t
 
-cdef struct axis_record_t:     # as AXIS_FIELDS
+cdef struct axis_record_t:     # the fields of AXIS_FIELDS
     double actual_position
     double actual_velocity
     double actual_torque

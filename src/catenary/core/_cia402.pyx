@@ -60,7 +60,10 @@ def state_of(int statusword):
 
 def controlword_towards(int state, int requested_state, int previous):
     if not 0 <= requested_state <= RESET:
-        raise ValueError(f"requested state {requested_state}: 0 disabled, 1 enabled, 2 quick stop, 3 reset")
+        raise ValueError(
+            f"requested state {requested_state}, must be 0 (disabled), 1 (enabled), 2 (quick stop) or 3"
+            " (reset)"
+        )
     return cia402_command(<uint8_t>(state & 0xFF), <uint8_t>requested_state, <uint16_t>(previous & 0xFFFF))
 
 

@@ -7,9 +7,9 @@ cdef enum:
     FOLLOWING = 1              # the cycle starts are kept in phase
 
 cdef struct phase_t:
-    double bandwidth           # present value [1 / cycle]
+    double bandwidth           # present bandwidth [1 / cycle]
     double bandwidth_end
-    double drift               # lasting difference of the periods [ns]
+    double drift               # estimated lasting correction of each period [ns]
     double drift_limit
     double rate_limit
     double residue             # fraction of the correction below one nanosecond
@@ -24,7 +24,7 @@ cdef struct phase_t:
 
 cdef struct follower_t:
     uint16_t station
-    uint8_t outside            # beyond the bound, or never read
+    uint8_t outside            # 1: beyond the bound, or never read
     int32_t last               # last difference, local minus received [ns]
     double mean
     int32_t worst              # largest magnitude since the figures were reset
@@ -47,13 +47,13 @@ cdef struct clock_t:
     uint8_t *main_header       # header of the FPWR; NULL: none
     uint8_t *watch_header      # header of the FPRD; NULL: none
     int64_t scheduled          # cycle start of the cycle that sends
-    int64_t sent               # when the last frame left
+    int64_t sent               # time at which the last frame was sent
     int64_t sent_scheduled     # cycle start of that frame
     uint32_t payload           # time in that frame, for devices without a reference before them
     int64_t time               # last time of the reference
-    int64_t time_sent          # when the frame that read it left
+    int64_t time_sent          # time at which the frame that read it was sent
     uint32_t asked             # follower being read; PROBED: the reference's time
-    uint8_t awaited            # the last frame sent was not evaluated yet
+    uint8_t awaited            # the last frame sent has not been evaluated yet
     uint8_t sampled            # the reference answered in this cycle
     uint8_t holding            # the reference is lost: the core continues its time
     uint8_t locked

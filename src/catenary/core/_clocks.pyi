@@ -4,20 +4,20 @@
 """
 
 class PhaseController:
-    """Phase controller: phase errors in, corrections of the cycle start out."""
+    """Controller that computes corrections of the cycle start from phase errors."""
 
     def __init__(self, plan: object, period_ns: int) -> None: ...
     def step(self, error_ns: int | None) -> int:
         """Return the shift of the next cycle start [ns].
 
         Args:
-            error_ns: Phase error of the last cycle start [ns], within half a period of 0; positive:
-                late. None: no answer in this cycle.
+            error_ns: Phase error of the last cycle start [ns], at most half a period; positive if
+                the start was late. None if the reference did not answer in this cycle.
         """
 
     @property
     def drift(self) -> float:
-        """Lasting difference between the periods [ns]."""
+        """Estimated lasting correction of each period [ns]."""
     @property
     def bandwidth(self) -> float: ...
     @property
@@ -29,24 +29,29 @@ class Clock:
 
     def __init__(self, plan: object, period_ns: int) -> None: ...
     def figures(self) -> dict[str, float]:
-        """Return the figures of the clocks; times in ns.
+        """Return the figures of the clocks; all times in ns.
 
-        locked; bound (in force); following (True: in phase). time: last system time of the
-        reference; time_sent: when the frame that read it left, on the link's clock. error,
-        mean_error, worst_error: phase error of the cycle starts, or of the reference if it follows.
-        rate: of the reference relative to the link's clock, as a ratio. samples. missed, silent:
-        cycles without the reference, in total and in a row. holding: the core continues its time.
-        ignored: samples larger than any drift. jumps.
+        - locked: True if all clocks are within the bound. bound: the bound in force.
+        - following: True if the cycle starts are in phase.
+        - time: last system time of the reference clock.
+        - time_sent: link time at which the frame that read it was sent.
+        - error, mean_error, worst_error: phase error of the cycle starts. If the reference clock
+          follows the MainDevice, this is the error of the reference clock.
+        - rate: deviation of the reference clock's rate from the link clock's, as a ratio.
+        - samples: number of times that the reference clock was read.
+        - missed, silent: number of cycles without its answer, in total and in a row.
+        - holding: True while the core continues the time of a lost reference clock.
+        - ignored: number of samples rejected as outliers. jumps: number of jumps of the clock.
         """
 
     def differences(self) -> list[tuple[float, int, int, int]]:
-        """Return (mean, last, largest magnitude, reads) of each follower [ns].
+        """Return (mean, last, largest magnitude, number of reads) for each follower.
 
-        The difference is 0x092C, local minus reference.
+        The difference is 0x092C, local minus reference time [ns].
         """
 
     def reset_figures(self) -> None:
-        """Reset the largest magnitudes."""
+        """Reset the largest phase error and the largest differences."""
 
     def keep_within(self, bound_ns: int) -> None:
         """Set the bound for clock differences and phase error [ns]."""

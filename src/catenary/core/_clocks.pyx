@@ -1,11 +1,12 @@
 # cython: boundscheck=False, wraparound=False, cdivision=True
 """Distributed clocks in the cycle: time in the frames, phase of the cycle starts, supervision.
 
-Every frame is stamped when it leaves. The time that the reference clock put into it gives the phase
-of its cycle start. A PI controller with decreasing bandwidth corrects phase errors by longer or
-shorter periods. docs/explanation/distributed_clocks.md explains its gains; plan/clocks.py has the
-numbers. If the clocks follow the MainDevice, the cycle starts are set into phase once and stay on
-their grid. Its twin in Python: tests/core/phase_twin.py. Budget: 60 ns per cycle.
+The send time of every frame is recorded. The time that the reference clock wrote into it gives the
+phase of its cycle start. A PI controller with decreasing bandwidth corrects phase errors by longer
+or shorter periods. docs/explanation/distributed_clocks.md explains its gains; plan/clocks.py
+contains the numbers. If the clocks follow the MainDevice, the cycle starts are set in phase once
+and stay on their grid. tests/core/phase_twin.py is a Python model of the controller. Budget: 60 ns
+per cycle.
 
 A reference that does not answer is no longer read in each frame. A device that was switched off
 returns with a different time, which must not reach the other clocks. All other clocks then follow
@@ -65,12 +66,12 @@ cdef int64_t moved(phase_t *p, double by) noexcept nogil:
 
 
 cdef int64_t phase_coast(phase_t *p) noexcept nogil:
-    """Continue the drift found so far in a cycle without an answer."""
+    """Return the shift for a cycle without an answer: the drift found so far."""
     return moved(p, p.drift) if p.state == FOLLOWING else 0
 
 
 cdef int64_t phase_seek(phase_t *p, int64_t error) noexcept nogil:
-    """Set the cycle starts in phase at once, only by delays, so that none is early."""
+    """Return the delay that sets the cycle starts in phase at once. No cycle starts early."""
     p.state = FOLLOWING
     p.hold = HOLD
     p.rejected = 0
@@ -189,8 +190,8 @@ cdef void take_probe(clock_t *k, uint32_t low) noexcept nogil:
 
 
 cdef void take_difference(clock_t *k, const uint8_t *data, uint16_t counter) noexcept nogil:
-    """Store a difference. 0x092C is sign-magnitude. A device that does not answer keeps its last
-    one: its process data reports the loss.
+    """Store a difference. 0x092C is a sign-magnitude number. If a device does not answer, its last
+    difference is kept; its process data reports the loss.
     """
     cdef follower_t *f
     cdef uint32_t raw = word32(data)
@@ -321,7 +322,7 @@ cdef set_phase(phase_t *p, plan, int64_t period_ns):
 
 
 cdef class PhaseController:
-    """Phase controller: phase errors in, corrections of the cycle start out."""
+    """Controller that computes corrections of the cycle start from phase errors."""
     cdef phase_t c
 
     def __cinit__(self, plan, int64_t period_ns):
@@ -331,8 +332,8 @@ cdef class PhaseController:
         """Return the shift of the next cycle start [ns].
 
         Args:
-            error_ns: Phase error of the last cycle start [ns], within half a period of 0; positive:
-                late. None: no answer in this cycle.
+            error_ns: Phase error of the last cycle start [ns], at most half a period; positive if
+                the start was late. None if the reference did not answer in this cycle.
         """
         return phase_coast(&self.c) if error_ns is None else phase_step(&self.c, error_ns)
 
@@ -355,7 +356,10 @@ cdef class Clock:
         if plan.follow not in ("reference", "main"):
             raise ValueError(f"clock: follow {plan.follow!r}, must be 'reference' or 'main'")
         if len(plan.stations) > 0xFFFF or not 0 <= plan.phase_ns < period_ns:
-            raise ValueError(f"clock: {len(plan.stations)} followers, phase {plan.phase_ns}")
+            raise ValueError(
+                f"clock: {len(plan.stations)} followers (at most 65535), phase {plan.phase_ns} ns"
+                f" (must be 0 to {period_ns - 1})"
+            )
         self.c.follows_main = plan.follow == "main"
         self.c.reference = plan.reference_station
         self.c.target = plan.phase_ns
@@ -371,14 +375,19 @@ cdef class Clock:
         self.c.outside = self.c.follower_count
 
     def figures(self):
-        """Return the figures of the clocks; times in ns.
+        """Return the figures of the clocks; all times in ns.
 
-        locked; bound (in force); following (True: in phase). time: last system time of the
-        reference; time_sent: when the frame that read it left, on the link's clock. error,
-        mean_error, worst_error: phase error of the cycle starts, or of the reference if it follows.
-        rate: of the reference relative to the link's clock, as a ratio. samples. missed, silent:
-        cycles without the reference, in total and in a row. holding: the core continues its time.
-        ignored: samples larger than any drift. jumps.
+        - locked: True if all clocks are within the bound. bound: the bound in force.
+        - following: True if the cycle starts are in phase.
+        - time: last system time of the reference clock.
+        - time_sent: link time at which the frame that read it was sent.
+        - error, mean_error, worst_error: phase error of the cycle starts. If the reference clock
+          follows the MainDevice, this is the error of the reference clock.
+        - rate: deviation of the reference clock's rate from the link clock's, as a ratio.
+        - samples: number of times that the reference clock was read.
+        - missed, silent: number of cycles without its answer, in total and in a row.
+        - holding: True while the core continues the time of a lost reference clock.
+        - ignored: number of samples rejected as outliers. jumps: number of jumps of the clock.
         """
         cdef clock_t *k = &self.c
         return {
@@ -400,9 +409,9 @@ cdef class Clock:
         }
 
     def differences(self):
-        """Return (mean, last, largest magnitude, reads) of each follower [ns].
+        """Return (mean, last, largest magnitude, number of reads) for each follower.
 
-        The difference is 0x092C, local minus reference.
+        The difference is 0x092C, local minus reference time [ns].
         """
         cdef uint32_t i
         return [

@@ -25,7 +25,7 @@ cdef enum:  # phases
     IN_CONTROLLER = 7
     OUTPUT_DELAY = 8
     INPUT_AGE = 9
-    INTERPRETER = 10           # written by the thread of Python
+    INTERPRETER = 10           # written by Python's thread
     PHASES = 11
 
 cdef enum:
@@ -61,7 +61,7 @@ cdef struct cycle_t:
     clock_t *clock             # NULL: no distributed clocks
     law_t *law                 # NULL: no law runs
     cat_law_monitor monitor    # monitor of all laws of this cycle
-    cat_pointer law_request    # law_t; CAT_POINTER_NONE: stop the law. Claimed: `law`
+    cat_pointer law_request    # law_t to start; CAT_POINTER_NONE: stop. `law` is the claimed one
     cat_pointer stream         # stream_t; none: the application or the law sets the set-points
     const cat_sink *sink       # NULL: none
     int execution
@@ -78,8 +78,8 @@ cdef struct cycle_t:
     int64_t wake
     int64_t interval           # time since the last cycle start; -1: none
     int64_t usable             # time at which the inputs were available to Python; 0: unknown
-    int64_t sent               # when the last cyclic frame was handed to the kernel
-    int64_t turnaround         # wake-up → last frame seen, of the last complete cycle
+    int64_t sent               # time at which the last cyclic frame was handed to the kernel
+    int64_t turnaround         # wake-up → last frame received, in the last complete cycle
     int64_t process            # of this cycle; -1: no application
     int64_t input_age          # of this cycle; -1: unknown
     uint64_t number

@@ -5,10 +5,10 @@ from typing import Final
 # Flags that `next` and `run` return, and that `flags` keeps.
 CYCLE_OK: Final[int]  # every required sync unit answered in this cycle
 CYCLE_LATE: Final[int]  # cycles were skipped before this one, or Python missed cycles
-CYCLE_LIMITED: Final[int]  # the last set-points sent were limited on some axis
+CYCLE_LIMITED: Final[int]  # a set-point or an output column was limited
 CYCLE_WORKING_COUNTER: Final[int]  # lost_limit cycles in a row were not ok
 CYCLE_DROPPED: Final[int]  # the core stopped an axis, or a drive refused a mode
-CYCLE_REFUSED: Final[int]  # a target was refused (NaN, infinite, beyond the step limit)
+CYCLE_REFUSED: Final[int]  # a target or a column was refused (NaN, infinite, beyond the step limit)
 CYCLE_UNCOMMITTED: Final[int]  # threaded: no new targets were committed for this cycle
 CYCLE_LAW_DONE: Final[int]  # the law returned "finished"
 CYCLE_LAW_FAILED: Final[int]  # the law failed: the drives are stopped

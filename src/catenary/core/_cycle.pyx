@@ -15,18 +15,22 @@ are sent in the cycle after its last step. Requests of the application during a 
 later, except for stops, requested states that remove power, and control bits (`axes_apply_late`).
 
 In virtual time all modes run in the caller's thread. Cycle starts are origin + k·period. A cycle
-that begins late is sent if its frames can return before the next cycle start (`turnaround`), with a
-law before its reserve. Otherwise it is skipped and counted; cycles are never sent in bursts to
-catch up. Inline, a body that ends after the next cycle start skips that one: its frames cannot
-return in time. With clocks, frames that leave later than the margin before SYNC0 are sent and
-counted (`missed_sync`).
+that begins late is sent if its frames can return before the next cycle start (`turnaround`). With a
+law, they must return before the law's reserve begins. Otherwise the cycle is skipped and counted.
+Cycles are never sent in bursts to catch up. Inline, a body that ends after the next cycle start
+skips that cycle, because its frames cannot return in time. With clocks, frames that leave later
+than the margin before SYNC0 are sent and counted (`missed_sync`).
 
-Phases. receive: inputs usable, from the wake-up (inline) or from the last frame (threaded).
-process: the body of the application, or the law. send: wake-up → last cyclic frame handed to the
-kernel (inline: end of the body →). in_controller: their sum. post_processing: work until the next
-wait. round_trip: sent → last frame seen (threaded). output_delay: cycle start → last cyclic frame
-handed to the kernel. input_age: frames handed to the kernel → law or body begins with their inputs.
-interpreter: Python's thread awake → it has the interpreter (added by the engine).
+Phases, from → to:
+    receive         wake-up (inline) or last frame (threaded) → inputs usable
+    process         begin → end of the application's body, or of the law's step
+    send            wake-up (inline: end of the body) → last cyclic frame handed to the kernel
+    in_controller   receive + process + send
+    post_processing last cyclic frame handed to the kernel (threaded: publication) → next wait
+    round_trip      last cyclic frame handed to the kernel → last frame received (threaded)
+    output_delay    cycle start → last cyclic frame handed to the kernel
+    input_age       frames handed to the kernel → law or body begins with their inputs
+    interpreter     Python's thread awake → it has the interpreter (added by the engine)
 Budget: 1 us for three drives, without the link.
 """
 
@@ -172,9 +176,9 @@ cdef inline int32_t short_ns(int64_t value) noexcept nogil:
 # ---- cycle starts
 
 cdef bint skip_missed(cycle_t *c, int64_t present) noexcept nogil:
-    """Skip the cycles that cannot be collected before their next cycle start. Inline, also skip the
-    cycle that would begin before its frames can return. Return True if the remaining one lies
-    ahead.
+    """Skip the cycles whose frames cannot be collected before the following cycle start. Inline,
+    also skip a cycle that starts before the last frames were sent. Return True if cycles were
+    skipped and the next cycle start is in the future.
     """
     cdef int64_t late = present - c.next
     cdef int64_t reserve = c.law_reserve if c.law != NULL else 0
@@ -197,8 +201,8 @@ cdef bint skip_missed(cycle_t *c, int64_t present) noexcept nogil:
 
 
 cdef int cycle_wait(cycle_t *c) noexcept nogil:
-    """Wait for the next cycle start and begin its cycle. Return 0; -EINTR: call again; or
-    -errno."""
+    """Wait for the next cycle start and begin its cycle. Return 0 or -errno; after -EINTR, call it
+    again."""
     cdef int64_t present
     cdef int rc
     skip_missed(c, now(c))
@@ -218,8 +222,8 @@ cdef int cycle_wait(cycle_t *c) noexcept nogil:
 
 
 cdef void cycle_await_acyclic(cycle_t *c, int64_t until) noexcept nogil:
-    """threaded: take acyclic frames as they arrive, so that the next request leaves with the next
-    cycle. An inline loop collects them at the next cycle start.
+    """Receive acyclic frames as they arrive (threaded), so that the next request is sent in the
+    next cycle. An inline loop receives them at the next cycle start.
     """
     if c.execution != THREADED:
         return
@@ -253,10 +257,10 @@ cdef void begin(cycle_t *c, int64_t wake) noexcept nogil:
     c.skipped = 0
 
 
-# ---- halves
+# ---- receive and send
 
 cdef void collect(cycle_t *c, actual_t *actual, int64_t deadline) noexcept nogil:
-    """Run the half of a cycle after the wire: frames → images → actual values."""
+    """Collect the frames of a cycle and decode them: frames → images → actual values."""
     cdef int rc = c.image.collect(c.image.self, deadline)
     c.missing = rc if rc >= 0 else -1
     c.outstanding = 0
@@ -336,7 +340,7 @@ cdef void send(cycle_t *c) noexcept nogil:
 
 cdef bint take_streamed(cycle_t *c, target_t *target, bint fresh, uint64_t number) noexcept nogil:
     """Take the next row of the stream for the outputs of cycle `number`. Return True for fresh
-    set-points. An empty stream is an underrun; a closed one hands over.
+    set-points. An empty stream is an underrun. After the stream was removed, a hand-over begins.
     """
     cdef stream_t *stream
     if not cat_pointer_is_offered(&c.stream):
@@ -365,7 +369,7 @@ cdef int64_t give(cycle_t *c, record_t *record, int64_t since, const actual_t *a
                   const target_t *target) noexcept nogil:
     """Pass the cycle to the sink; return the duration of the post-processing with the sink.
 
-    The sink receives the duration without itself.
+    The record that the sink receives contains the duration without the sink.
     """
     record.post_processing_ns = short_ns(now(c) - since)
     c.sink.put(c.sink.self, c.number, record, actual.header, target.header)
@@ -410,15 +414,15 @@ cdef void post_process(cycle_t *c, int64_t since, const actual_t *actual,
 # ---- laws
 
 cdef int64_t cycle_law_reserve(const cycle_t *c, int64_t budget) noexcept nogil:
-    """Return the part of the period reserved for a law and the post-processing; 0: the default
-    budget.
+    """Return the part of the period reserved for a law and the post-processing [ns]. A `budget` of
+    0 means the default, two fifths of the period.
     """
     return (budget if budget > 0 else c.period * 2 // 5) + c.period // 20
 
 
 cdef void end_law(cycle_t *c, uint32_t status) noexcept nogil:
-    """Hand over: targets committed before the law are no longer valid. With
-    `status` RUNNING, the law has ended by itself and its last targets are still to be sent.
+    """Begin the hand-over after a law: targets committed before it are no longer valid. A `status`
+    of RUNNING means that the law has ended by itself; `compute_next` then prepares the axes.
     """
     if c.law == NULL:
         return
@@ -438,7 +442,7 @@ cdef void forget_law(cycle_t *c) noexcept nogil:
 
 
 cdef void take_law(cycle_t *c, const target_t *orders) noexcept nogil:
-    """Start the requested law, or end the running one. It begins from the commanded values."""
+    """End the running law and start the requested one, if any, from the commanded values."""
     cdef target_t *target = &c.handover.target[OF_LAW]
     cdef void *requested
     cdef uint32_t i
@@ -460,7 +464,7 @@ cdef void take_law(cycle_t *c, const target_t *orders) noexcept nogil:
 
 
 cdef void take_orders(cycle_t *c, const target_t *committed) noexcept nogil:
-    """Copy the application's states, modes and control bits, and the bytes of areas.
+    """Copy the application's requested states, modes and control bits, and the bytes of areas.
 
     A law cannot access these.
     """
@@ -539,8 +543,7 @@ cdef void cycle_start(cycle_t *c, int64_t origin) noexcept nogil:
 
 
 cdef void write_committed(cycle_t *c, target_t *committed, bint fresh) noexcept nogil:
-    """Write the outputs of a cycle without a law: the targets that the application has
-    committed."""
+    """Write the outputs of a cycle without a law: the committed targets, or a row of the stream."""
     if fresh:
         c.process = committed.header.process_ns
         c.input_age = committed.header.input_age_ns
@@ -603,27 +606,29 @@ cdef void cycle_native(cycle_t *c) noexcept nogil:
 
 
 cdef bint cycle_wants_native(cycle_t *c) noexcept nogil:
-    """inline: return True if the next cycle runs a law."""
+    """Return True if the next cycle of an inline loop runs a law or sends its last outputs."""
     if c.law != NULL or c.computed:
         return True
     return cat_pointer_is_offered(&c.law_request)
 
 
 cdef void cycle_inputs(cycle_t *c, actual_t *actual) noexcept nogil:
-    """inline: read the inputs after the wait."""
+    """Read the inputs of an inline cycle after the wait."""
     collect(c, actual, 0)
     report(c, actual, &c.handover.target[PRIVATE])
 
 
 cdef void cycle_usable(cycle_t *c) noexcept nogil:
-    """inline: note that Python can use the inputs from here on."""
+    """Record the time from which Python can use the inputs of an inline cycle."""
     c.usable = now(c)
     c.input_age = c.usable - c.sent
     record_of(c).receive_ns = short_ns(c.usable - c.wake)
 
 
 cdef void cycle_outputs(cycle_t *c, target_t *target, bint application) noexcept nogil:
-    """inline: send after the body of Python; `application` False: a hand-over."""
+    """Send the outputs of an inline cycle after Python's body. With `application` False, the cycle
+    is part of a hand-over.
+    """
     cdef int64_t done = now(c)
     cdef actual_t *actual = &c.handover.actual[PRIVATE]
     target.header.seen = c.number

@@ -48,7 +48,7 @@ cdef class Engine:
     cdef uint64_t writing_since  # number of the cycle that this thread sees
     cdef bint emitted          # inline: the frames of this cycle were sent
     cdef object sink           # keeps the sink's capsule alive
-    cdef int64_t left          # when `next` returned [ns]; -1: no application since then
+    cdef int64_t left          # time at which `next` returned [ns]; -1: no application since then
     cdef int64_t input_age     # age of the inputs at that time [ns]
     cdef int64_t zero          # cycle start of the first iteration, on the link's clock; 0: none yet
 

@@ -24,7 +24,7 @@ class Engine:
     def __init__(self, plan: object, link: object, image: object = None) -> None: ...
     @property
     def buffers(self) -> dict[str, memoryview]:
-        """Return the private buffers, one per name of plan.request.Views.
+        """Private buffers, one per name of plan.request.Views.
 
         They are typed ("d", "q", "I", "H", "b", "B"), for `numpy.asarray`. Read-only:
         actual_position, actual_velocity, actual_torque, statusword, mode_actual, axis_state,
@@ -35,8 +35,9 @@ class Engine:
 
         A quantity that is not mapped reads NaN; a velocity is then estimated from the position. A
         requested state takes effect when `request` of its axis changes: requested_state[i] = 1;
-        request[i] += 1. Until an axis is followed, each `next` and `run` overwrites its targets with
-        the values sent to it: position (held if powered, otherwise actual), velocity and torque.
+        request[i] += 1. Until an axis is followed, each `next` and `run` overwrites its targets
+        with the values sent to it: position (held if powered, otherwise actual), velocity and
+        torque.
         """
 
     def start(self, origin_ns: int = 0) -> None:
@@ -64,7 +65,7 @@ class Engine:
         """
 
     def commit_targets(self) -> None:
-        """Commit the target buffers before `next`, if a native thread runs the cycles.
+        """Commit the target buffers before `next`; a no-op in the inline mode.
 
         With several engines, commit all of them before waiting for the first one.
         """
@@ -74,20 +75,21 @@ class Engine:
         """True if a law that has begun, or a stream, sets the targets."""
 
     def keep_targets(self) -> None:
-        """Skip the commit of the following `next`."""
+        """Skip the commit of the following `next`; a no-op in the inline mode."""
 
     background: bool
     """True if a thread repeats the targets of a program.
 
     CSP then has no late limit. After an update, set-points of CSV and CST are valid until the
-    command timeout; then their targets are the commanded values. Raises ValueError if inline.
+    command timeout; then their targets are the commanded values. In the inline mode, setting it
+    raises ValueError.
     """
 
     def begin_update(self) -> None:
         """Allow a thread other than the iterating one to write the target buffers.
 
-        Until `end_update`, `next` does not change them. Only one thread may use it at a time, and it
-        must prevent the iterating thread from committing.
+        Until `end_update`, `next` does not change them. Only one thread at a time may make an
+        update, and it must prevent the iterating thread from committing.
         """
 
     def end_update(self, commit: bool) -> None:
@@ -131,11 +133,11 @@ class Engine:
         """Run until every axis is disabled, in fault or lost.
 
         Returns:
-            False if `timeout_ns` passed first.
+            True if every axis is; False if `timeout_ns` passed or the cycles ended first.
         """
 
     def stop(self) -> None:
-        """End the native thread and release the link; a no-op if not running."""
+        """End the native thread; a no-op if the engine is not running."""
 
     def forget(self) -> None:
         """Release the parent's cycle in a forked child without touching it.
@@ -160,7 +162,7 @@ class Engine:
     # Properties of the cycle of the current actual values.
     @property
     def number(self) -> int:
-        """Number of cycles so far: 1 for the first."""
+        """Number of the cycle; 1 for the first one."""
     @property
     def time_ns(self) -> int:
         """Cycle start [ns] since the first one of `start`, on the link's clock.
@@ -186,7 +188,7 @@ class Engine:
 
     @property
     def disturbed(self) -> bool:
-        """True if a device did not answer at the last collect, or was not in OP without an error.
+        """True if a device did not answer in the last cycle, was not in OP, or reported an error.
 
         Any thread may read it.
         """
@@ -196,11 +198,14 @@ class Engine:
     def counters(self) -> dict[str, int]:
         """Counts since construction.
 
-        cycles; lost: cycles not ok; late: cycles skipped; uncommitted: cycles without new targets;
-        underrun: cycles that found the stream empty; missed_sync: frames that left later than the
-        margin before SYNC0; page_faults: of the native thread in runs that have ended; frames:
-        stale, alien, corrupt, duplicate, repeated, unprocessed; acyclic_sent, acyclic_received,
-        acyclic_dropped; send_errors, receive_errors.
+        - cycles; lost: cycles that were not ok; late: skipped cycles; uncommitted: cycles without
+          new targets; underrun: cycles that found the stream empty.
+        - missed_sync: cycles whose frames left later than the margin before SYNC0.
+        - page_faults: page faults of the native thread, in runs that have ended.
+        - stale, alien, corrupt, duplicate, repeated, unprocessed: frames that were received but not
+          used (core/_frames.pxd).
+        - acyclic_sent, acyclic_received, acyclic_dropped: frames of the acyclic queue.
+        - send_errors, receive_errors.
         """
 
     def histograms(self) -> dict[str, dict[str, float]]:
@@ -210,7 +215,7 @@ class Engine:
         """
 
     def histogram_counts(self, phase: str) -> list[tuple[float, float, int]]:
-        """Return (lower, upper, count) of every bucket of a phase that is not empty [s]."""
+        """Return (lower [s], upper [s], count) for every bucket of a phase that is not empty."""
 
     def reset_histograms(self) -> None:
         """Clear the histograms, for example after the start-up."""
@@ -219,8 +224,8 @@ class Engine:
         """Return the records (RECORD_FIELDS) of the last cycles, oldest first.
 
         With the plan's `log_axes`, each is followed by one record (AXIS_FIELDS) for each axis:
-        measured values, the targets of the frames that read them (for a law, the targets computed
-        from them) and the values sent.
+        measured values, the targets sent in the frames that read them (for a law, the targets
+        computed from them) and the values sent.
         """
 
     @property

@@ -4,13 +4,13 @@
 Theory of operation. In the threaded mode, `native` is set and a native thread runs the cycles.
 `step` commits the targets and waits for the newest cycle. Inline, and in virtual time, `step` runs
 the cycle in the caller's thread: `inline_outputs` and `inline_inputs`, or `lockstep` for a threaded
-cycle. `hold` runs cycles without an application: a hand-over. The GIL is released around waits only
-if another thread could need it (`alone`: not in virtual time). `law` and `stream` are the ones that
-compute the set-points; `laws` and `streams` keep every one that the cycle may still use.
+cycle. `hold` runs cycles without an application: a hand-over. Waits release the GIL, except if no
+other program shares the virtual time (`alone`). `law` and `stream` are the ones that compute the
+set-points; `laws` and `streams` keep every one that the cycle may still use.
 `committed` marks targets that were committed before `next`, `emitted` inline frames that were sent.
 `left` is the time at which the body began, and `input_age` the age of its inputs at that time.
 
-Budget of `next`, besides the link: 1 us for three drives.
+Budget of `next`, without the link: 1 us for three drives.
 """
 
 import os
@@ -301,7 +301,7 @@ cdef class Engine:
     def start(self, int64_t origin_ns=0):
         cdef int rc
         if self.running:
-            raise RuntimeError("the engine is running")
+            raise RuntimeError("the engine is already running")
         if self.forgotten:
             raise self.not_running()
         if self.frames is not None:
@@ -434,8 +434,8 @@ cdef class Engine:
         return header.flags
 
     cdef bint is_native_cycle(self, bint application) noexcept nogil:
-        """Return True if the next cycle of the caller's thread is a threaded one. Inline: only
-        while a law runs; it is taken over after Python's last outputs.
+        """Return True if the next cycle of the caller's thread is a threaded one. In the inline
+        mode, this is so only while a law runs. A law starts after Python's last outputs were sent.
         """
         cdef cycle_t *c = &self.e.cycle
         if c.execution != INLINE:
@@ -449,8 +449,8 @@ cdef class Engine:
     cdef void follow(self) noexcept:
         """Update Python's targets after new actual values.
 
-        These are the targets of axes that are not followed. While a law runs, and until Python has
-        received the cycle of its end, these are all targets.
+        Without a law, only the targets of axes that are not followed change. While a law runs, and
+        until Python has received the cycle in which it ended, all targets change.
         """
         cdef actual_t *actual = &self.h.actual[PRIVATE]
         if self.law is None and self.stream is None:
@@ -666,7 +666,7 @@ cdef class Engine:
         if rc == -EINTR:
             PyErr_CheckSignals()
             return 0
-        raise OSError(-rc, f"link: {os.strerror(-rc)}")
+        raise OSError(-rc, f"waiting on the link failed: {os.strerror(-rc)}")
 
     def spend(self, int64_t duration_ns):
         cdef cycle_t *c = &self.e.cycle
@@ -748,7 +748,7 @@ cdef class Engine:
         cat_memory_settle(&self.figures.log_memory)
 
     cdef memory_text(self):
-        """Return how much memory of the cycle is locked, laws and streams included."""
+        """Return a text about the locked memory of the cycle, its laws and its streams."""
         cdef cat_memory_state state = cat_memory_state(locked=0, touched=0, error=0)
         cdef Law law
         cdef Stream stream

@@ -7,7 +7,7 @@ from catenary.core._acyclic_queue cimport acyclic_queue_t
 
 cdef enum:
     FRAMES_MAX = 1024          # in a plan, all dividers and phases together
-    FRAMES_PER_CYCLE_MAX = 32  # without cycle numbers: an index is reused after four cycles at least
+    FRAMES_PER_CYCLE_MAX = 32  # without cycle numbers: no index is reused within four cycles
     INDEX_COUNT = 128          # 0x00 to 0x7F belong to the cycle, the others to the acyclic queue
 
 cdef enum:                     # receive modes

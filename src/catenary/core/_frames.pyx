@@ -10,8 +10,8 @@ Theory of operation
 
 Matching
     A received frame is accepted if source, EtherType, commands, addresses and lengths match the
-    template and its index was assigned in this cycle. An index is reused after 128 frames, so a
-    frame that is repeated exactly that much later is accepted as well. Frames with a cycle number
+    template and its index was assigned in this cycle. An index is reused after 128 frames, so an
+    old frame that returns exactly 128 frames later is accepted as well. Frames with a cycle number
     (a NOP datagram, `exact_matching` in the plan) are accepted only with the number of this cycle.
     Every other frame is counted by kind and dropped (`frame_counters_t`).
 
@@ -64,7 +64,7 @@ cdef enum:
     DATAGRAMS = CAT_ETHERNET_HEADER + CAT_ETHERCAT_HEADER
     HEADER = CAT_DATAGRAM_HEADER
     CYCLE_INDICES = 0x80       # indices from here on belong to the acyclic queue
-    DRAIN_MAX = 256            # frames taken in one collect: a flood cannot delay the cycle
+    DRAIN_MAX = 256            # maximum per collect, so that a flood of frames cannot delay the cycle
     DIVIDER_MAX = 10000
     MISSED_MAX = 1000000000
     NUMBER_SIZE = 4            # size of the data of a cycle number [bytes]
@@ -194,15 +194,16 @@ cdef void forget_returns(frames_t *f) noexcept nogil:
 # ---- receive and match
 
 cdef inline bint is_ours(const uint8_t *ours, const uint8_t *bytes) noexcept nogil:
-    """Return True for our EtherType and source, except the bit set by controllers (bytes 6 to
-    13)."""
+    """Return True if source and EtherType (bytes 6 to 13) are ours. The source bit that controllers
+    set is ignored."""
     return ((eight_at(bytes + SOURCE) ^ eight_at(ours + SOURCE)) & ~<uint64_t>SOURCE_PROCESSED) == 0
 
 
 cdef inline bint is_shaped(const frames_t *f, const frame_t *frame, const uint8_t *bytes,
                            uint32_t length) noexcept nogil:
     """Return True if the datagrams match the template and all have the index of the frame.
-    Datagrams of clocks address another device in each cycle: a late frame is stale, not corrupt.
+    The addresses of clock datagrams change in each cycle. They are not compared, so that a late
+    frame counts as stale, not as corrupt.
     """
     cdef const datagram_t *d
     cdef const datagram_t *end
@@ -223,7 +224,7 @@ cdef inline bint is_shaped(const frames_t *f, const frame_t *frame, const uint8_
 
 
 cdef bint is_untouched(const frames_t *f, const frame_t *frame, const uint8_t *bytes) noexcept nogil:
-    """Return True for an echo: no controller has set its bit in the source address or counted."""
+    """Return True for an echo: the source bit is not set, and all working counters are 0."""
     cdef uint32_t k
     if bytes[SOURCE] != frame.template[SOURCE] or frame.template[SOURCE] & SOURCE_PROCESSED:
         return False
@@ -234,7 +235,7 @@ cdef bint is_untouched(const frames_t *f, const frame_t *frame, const uint8_t *b
 
 
 cdef inline int64_t stamp_of(frames_t *f) noexcept nogil:
-    """Return the time at which the frames being taken were seen."""
+    """Return the time at which the present frames were received."""
     if f.frame_stamp == 0:
         f.frame_stamp = f.link.now(f.link.self)
     return f.frame_stamp
@@ -250,8 +251,8 @@ cdef inline bint is_current(const frames_t *f, const frame_t *frame, const sent_
 
 cdef void count_stale(frames_t *f, const frame_t *frame, sent_t *sent,
                       const uint8_t *bytes) noexcept nogil:
-    """Count a late frame. If it had returned before, or belongs to an older use of the index, it is
-    repeated.
+    """Count a late frame. If it had returned before, or belongs to an older use of the index, it
+    also counts as repeated.
     """
     f.counters.stale += 1
     if sent.answered or (frame.number_offset and number_in(frame, bytes) != sent.serial):
@@ -405,7 +406,8 @@ cdef void copy_inputs(frames_t *f) noexcept nogil:
 cdef void judge(frames_t *f) noexcept nogil:
     """Evaluate a collect: frames, units, inputs.
 
-    If the units are settled and every datagram is right again, the units are unchanged.
+    The units are unchanged if all datagrams had the expected working counter, now and in the last
+    evaluation (`settled`).
     """
     cdef frame_t *frame = f.frames
     cdef const frame_t *last = frame + f.frame_count
@@ -454,7 +456,7 @@ cdef void frames_flush(frames_t *f) noexcept nogil:
             return
 
 
-# ---- construction: checks the plan once, so that the functions above need no checks
+# ---- construction: the plan is checked once, so that the functions above need no checks
 
 def check(condition, message):
     """Raise ValueError(message) unless the condition holds."""
@@ -463,8 +465,9 @@ def check(condition, message):
 
 
 def frames_per_cycle(frames):
-    """Return an upper bound of the frames due in one cycle: for each divider its fullest phase.
+    """Return an upper bound of the number of frames due in one cycle.
 
+    It is the sum, over all dividers, of the number of frames in the fullest phase.
     The plan uses the same bound (plan/frames.py).
     """
     counts = {}
@@ -485,7 +488,8 @@ cdef class Frames:
         self.c.link = <const cat_link *>PyCapsule_GetPointer(link, CAT_LINK_CAPSULE)
         check(self.c.link.version == CAT_LINK_VERSION,
               f"link: table version {self.c.link.version}, expected {CAT_LINK_VERSION}")
-        check(plan.receive_mode in RECEIVE_MODES, f"receive_mode: {plan.receive_mode!r}")
+        check(plan.receive_mode in RECEIVE_MODES,
+              f"receive_mode: {plan.receive_mode!r}, must be one of {', '.join(RECEIVE_MODES)}")
         self.c.receive_mode = RECEIVE_MODES[plan.receive_mode]
         if self.c.link.flags & CAT_LINK_VIRTUAL_TIME and self.c.receive_mode == BUSY:
             self.c.receive_mode = WAIT  # virtual time passes only in a wait
@@ -495,7 +499,8 @@ cdef class Frames:
 
     def make_images(self, plan):
         for name in ("output_size", "input_size"):
-            check(0 <= getattr(plan, name) < 1 << 20, f"{name}: {getattr(plan, name)}")
+            check(0 <= getattr(plan, name) < 1 << 20,
+                  f"{name}: {getattr(plan, name)} bytes, must be 0 to {(1 << 20) - 1}")
         units = plan.sync_units
         cdef cat_memory *memory = &self.memory
         self.c.image.output_size = plan.output_size
@@ -540,7 +545,8 @@ cdef class Frames:
         check(template[12:14] == b"\x88\xa4", f"frame {number}: EtherType is not 0x88A4")
         check(len(frame.datagrams) > 0, f"frame {number}: no datagrams")
         check(1 <= frame.divider <= DIVIDER_MAX and 0 <= frame.phase < frame.divider,
-              f"frame {number}: divider {frame.divider}, phase {frame.phase}")
+              f"frame {number}: divider {frame.divider} (must be 1 to {DIVIDER_MAX}), phase"
+              f" {frame.phase} (must be at least 0 and less than the divider)")
         check(number > 0 or frame.divider == 1, "frame 0: divider must be 1")
         payload = int.from_bytes(template[14:16], "little")
         end = DATAGRAMS + sum(HEADER + d.length + CAT_DATAGRAM_COUNTER for d in frame.datagrams)
@@ -566,19 +572,22 @@ cdef class Frames:
             self.c.datagrams[place - 1].offset + HEADER + self.c.datagrams[place - 1].length
             + CAT_DATAGRAM_COUNTER
         )
-        check(plan.offset == expected, f"{where}: expected at {expected}")
-        check(CAT_NOP <= plan.command <= CAT_FRMW, f"{where}: command {plan.command}")
+        check(plan.offset == expected, f"{where}: must be at {expected}")
+        check(CAT_NOP <= plan.command <= CAT_FRMW,
+              f"{where}: command {plan.command}, must be {CAT_NOP} to {CAT_FRMW}")
         header = frame.template[plan.offset : plan.offset + HEADER]
         check(header[0] == plan.command
               and int.from_bytes(header[6:8], "little") & 0x7FF == plan.length,
               f"{where}: command or length differs from the template")
-        check(0 <= plan.expected_counter <= 0xFFFF, f"{where}: counter {plan.expected_counter}")
+        check(0 <= plan.expected_counter <= 0xFFFF,
+              f"{where}: expected counter {plan.expected_counter}, must be 0 to 65535")
         check(-1 <= plan.sync_unit < <int>self.c.image.unit_count,
-              f"{where}: sync unit {plan.sync_unit} of {self.c.image.unit_count}")
+              f"{where}: no sync unit {plan.sync_unit}, the plan has {self.c.image.unit_count}")
         check(plan.kind in (PROCESS_DATA, AL_STATUS, CLOCK, CYCLE_NUMBER),
-              f"{where}: kind {plan.kind}")
-        check(plan.kind != AL_STATUS or plan.length >= 2, f"{where}: AL status has two bytes")
-        check(plan.kind == PROCESS_DATA or plan.sync_unit < 0, f"{where}: kind {plan.kind} in a unit")
+              f"{where}: unknown kind {plan.kind}")
+        check(plan.kind != AL_STATUS or plan.length >= 2, f"{where}: AL status needs two bytes")
+        check(plan.kind == PROCESS_DATA or plan.sync_unit < 0,
+              f"{where}: a datagram of kind {plan.kind} cannot belong to a sync unit")
         if plan.kind == CYCLE_NUMBER:
             self.place_number(where, plan, number)
         if plan.sync_unit >= 0:
@@ -610,15 +619,16 @@ cdef class Frames:
     def place_number(self, where, plan, uint32_t number):
         cdef frame_t *frame = &self.c.frames[number]
         check(plan.command == CAT_NOP and plan.length == NUMBER_SIZE and plan.expected_counter == 0,
-              f"{where}: a cycle number is a NOP of {NUMBER_SIZE} bytes")
-        check(frame.number_offset == 0, f"{where}: a second cycle number")
+              f"{where}: a cycle number must be a NOP of {NUMBER_SIZE} bytes with counter 0")
+        check(frame.number_offset == 0, f"{where}: the frame already has a cycle number")
         frame.number_offset = plan.offset + HEADER
 
     def kept(self, plan):
         """Return the mask of the bits in the first eight bytes of a header that return unchanged.
         The index, the circulating bit and the reserved bits of the length word are excluded.
         """
-        adp = plan.command not in ADDRESS_MOVES and plan.kind != CLOCK  # another one in each cycle
+        # The address of a clock datagram changes in each cycle.
+        adp = plan.command not in ADDRESS_MOVES and plan.kind != CLOCK
         ado = plan.kind != CLOCK
         return bytes((0xFF, 0, *[0xFF * adp] * 2, *[0xFF * ado] * 2, 0xFF, 0x87))
 
@@ -630,15 +640,15 @@ cdef class Frames:
             self.c.units[unit].frame = number
         first = &self.c.frames[self.c.units[unit].frame]
         check((first.divider, first.phase) == (self.c.frames[number].divider, self.c.frames[number].phase),
-              f"{where}: its sync unit is also in frames of other cycles")
+              f"{where}: all frames of its sync unit must have the same divider and phase")
 
     def make_copy(self, where, plan, copy, uint32_t image_size, uint32_t place):
         start = plan.offset + HEADER
         check(copy.size > 0 and start <= copy.frame_offset
               and copy.frame_offset + copy.size <= start + plan.length,
-              f"{where}: a copy of {copy.size} bytes at {copy.frame_offset} leaves its data")
+              f"{where}: a copy of {copy.size} bytes at {copy.frame_offset} exceeds the data")
         check(0 <= copy.image_offset and copy.image_offset + copy.size <= image_size,
-              f"{where}: a copy of {copy.size} bytes at {copy.image_offset} leaves the image")
+              f"{where}: a copy of {copy.size} bytes at {copy.image_offset} exceeds the image")
         cdef copy_t *c = &self.c.copies[place]
         c.frame_offset = copy.frame_offset
         c.image_offset = copy.image_offset
@@ -654,7 +664,8 @@ cdef class Frames:
             d = &self.c.datagrams[k]
             if d.kind != CLOCK:
                 continue
-            check(d.frame == 0 and d.length == 4, "clock: four bytes each, in the first frame")
+            check(d.frame == 0 and d.length == 4,
+                  "clock: its datagrams must have four bytes, in the first frame")
             header = self.c.frames[0].template + d.offset
             if d.command == CAT_FRMW:
                 clock.time_header = header
@@ -665,9 +676,9 @@ cdef class Frames:
                 clock.watch_header = header
         check(clock.time_header != NULL, "clock: no datagram reads the time of the reference")
         check((clock.main_header != NULL) == (clock.follows_main != 0),
-              "clock: our time is sent when the reference follows us, and only then")
+              "clock: a plan needs an FPWR datagram if the reference follows us, and only then")
         check((clock.watch_header != NULL) == (clock.follower_count > 0),
-              "clock: differences are read of followers, and only of them")
+              "clock: a plan needs an FPRD datagram if it has followers, and only then")
         self.c.clock = clock
 
     cdef make_table(self):
@@ -676,7 +687,7 @@ cdef class Frames:
         self.c.image.outputs = self.c.outputs
         self.c.image.inputs = self.c.inputs
         for unit in range(self.c.image.unit_count):
-            check(self.c.unit_valid[unit], f"sync unit {unit} is in no frame")
+            check(self.c.unit_valid[unit], f"no frame contains sync unit {unit}")
             self.c.unit_valid[unit] = 0
         self.c.image.unit_valid = self.c.unit_valid
         self.c.image.unit_fresh = self.c.unit_fresh

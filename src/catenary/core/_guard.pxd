@@ -72,8 +72,8 @@ cdef void prepare_other_mode(axis_t *a) noexcept nogil
 cdef void refuse_mode(axes_t *x, axis_t *a, int8_t mode) noexcept nogil
 
 cdef inline bint is_commanded(const axes_t *x, int8_t mode) noexcept nogil:
-    """Return True if set-points are valid. Velocities and torques of a background program time
-    out."""
+    """Return True if set-points of this mode are valid. Velocities and torques of a background
+    program time out."""
     cdef uint8_t quantity = quantity_of(mode)
     if not x.background:
         return True
@@ -93,7 +93,7 @@ cdef inline void guard_orders(axes_t *x, axis_t *a, const target_t *t, uint32_t 
         guard_take_orders(x, a, t, i)
 
 cdef inline bint guard_works(const axis_t *a) noexcept nogil:
-    """Return True if the axis follows its set-points and continues to."""
+    """Return True if the axis follows its set-points and is requested to be enabled."""
     return (a.followed and a.requested_state == ENABLED and a.state == OPERATION_ENABLED
             and not a.clear_reset)
 

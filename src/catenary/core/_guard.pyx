@@ -217,7 +217,7 @@ cdef void prepare_mode(axis_t *a, int8_t mode) noexcept nogil:
     """Set the target with which a powered axis enters another mode without a jump."""
     cdef uint8_t quantity = quantity_of(mode)
     if quantity == quantity_of(a.mode) and mode != CSP:
-        return  # same target; that of profile position may be far away
+        return  # same quantity: keep the target, except for that of PP, which may be far away
     if quantity == POSITION:
         a.commanded_position = a.position
     elif quantity == VELOCITY:
@@ -227,7 +227,7 @@ cdef void prepare_mode(axis_t *a, int8_t mode) noexcept nogil:
 
 
 cdef void prepare_other_mode(axis_t *a) noexcept nogil:
-    """Set the target of the requested or shown mode of a powered drive that is not in force."""
+    """Set the target of a powered drive for a mode that is requested or shown, but not in force."""
     cdef int8_t other = a.mode_wanted if a.mode_wanted != a.mode else a.mode_shown
     if other != a.mode:
         prepare_mode(a, other)
@@ -253,7 +253,7 @@ cdef void begin_setpoints(axis_t *a) noexcept nogil:
 
 
 cdef void enter_mode(axis_t *a) noexcept nogil:
-    """Put the requested mode in force: 0x6061 shows it."""
+    """Put the requested mode in force, because 0x6061 shows it."""
     prepare_mode(a, a.mode_wanted)
     a.mode = a.mode_wanted
     begin_setpoints(a)

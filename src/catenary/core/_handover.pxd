@@ -32,13 +32,13 @@ cdef struct counts_t:
     uint32_t output_bytes
 
 cdef struct actual_header_t:
-    uint64_t number            # number of cycles so far
+    uint64_t number            # number of the cycle; 1 for the first one
     int64_t time_ns            # cycle start, relative to the first one
-    int64_t sent_ns            # when the last cyclic frame was handed to the kernel, link's clock
+    int64_t sent_ns            # link time at which the last cyclic frame was handed to the kernel
     uint32_t flags
     uint32_t lost_in_row
     uint32_t skipped
-    uint32_t moving            # number of axes that are powered and not at rest
+    uint32_t moving            # number of axes that are under power and not lost; they may be at rest
     double period              # [s]
     uint32_t axis_count
     uint16_t missing_frames
@@ -72,7 +72,7 @@ cdef struct actual_t:           # a header and the arrays of ACTUAL (_handover.p
 
 cdef struct target_header_t:
     uint64_t seen              # newest cycle of which the application had read the actual values
-    uint64_t stamp             # number of the cycle that the set-points are meant for
+    uint64_t stamp             # number of the cycle for which the set-points were computed
     int64_t process_ns         # duration of the body; -1: unknown
     int64_t input_age_ns       # age of its inputs when the body began; -1: unknown
     uint64_t updated           # background: number of the cycle of the last update; 0: none is valid
@@ -103,13 +103,13 @@ cdef struct handover_t:
     actual_t actual[4]         # three to exchange; the last one is Python's own
     target_t target[6]         # as above, and the law's two
     uint32_t published         # futex word: number of publications
-    uint32_t waiting           # Python sleeps on it
+    uint32_t waiting           # 1: Python sleeps on `published`
     uint32_t sticky            # flags of cycles that Python has not read yet
 
 cdef enum:
     PRIVATE = 3
     OF_LAW = 4
-    BEFORE_LAW = 5             # targets before the law; restored if it fails
+    BEFORE_LAW = 5             # targets before the step of the law; restored if it fails
     TARGETS = 6
 
 cdef class Handover:

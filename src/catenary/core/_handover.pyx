@@ -92,32 +92,32 @@ cdef size_t lay(void **block, uint8_t *memory, size_t header_size, tuple table, 
 
 
 cdef void handover_commit(handover_t *h) noexcept nogil:
-    """Python: commit its targets for the next cycle start."""
+    """Commit Python's targets for the next cycle start."""
     memcpy(h.target[h.target_triple.back].header, h.target[PRIVATE].header, h.target_size)
     cat_triple_publish(&h.target_triple)
 
 
 cdef target_t *handover_latch(handover_t *h, bint *fresh) noexcept nogil:
-    """Cycle: return the newest committed targets; set `fresh` if they are new."""
+    """Return the newest committed targets to the cycle; set `fresh` if they are new."""
     fresh[0] = cat_triple_take(&h.target_triple) != 0
     return &h.target[h.target_triple.front]
 
 
 cdef void handover_publish(handover_t *h) noexcept nogil:
-    """Cycle: publish the actual values in the back slot."""
+    """Publish the cycle's actual values, which are in the back slot."""
     cat_triple_publish(&h.actual_triple)
     cat_add32(&h.published, 1)
 
 
 cdef void handover_wake(handover_t *h) noexcept nogil:
-    """Wake Python; a system call only if Python sleeps."""
+    """Wake Python. This is a system call only if Python sleeps."""
     cat_fence()  # publish before reading `waiting`; otherwise a sleeper may be missed
     if cat_load_acquire32(&h.waiting):
         cat_futex_wake(&h.published)
 
 
 cdef bint handover_swap(handover_t *h) noexcept nogil:
-    """Python: copy the newest actual values to its own; return True if they are new."""
+    """Copy the newest actual values to Python's own; return True if they are new."""
     if not cat_triple_take(&h.actual_triple):
         return False
     memcpy(h.actual[PRIVATE].header, h.actual[h.actual_triple.front].header, h.actual_size)

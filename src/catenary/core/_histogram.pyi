@@ -1,14 +1,14 @@
 """Histograms of times in fixed memory: buckets at most 0.4 % wide; exact mean, sd, min, max."""
 
 class Histogram:
-    """Owner of one histogram, for times measured outside the cycle."""
+    """Histogram of times that are measured outside the cycle."""
 
     def __init__(self) -> None: ...
     def add(self, value_ns: int) -> None:
         """Add a time [ns]; negative times count as 0."""
 
     def summary(self) -> dict[str, float]:
-        """Return count, mean, min, max, sd, p50, p99, p999 [s]; only count if empty."""
+        """Return count, and mean, min, max, sd, p50, p99, p999 [s]; only count if empty."""
 
     def counts(self) -> list[tuple[float, float, int]]:
-        """Return (lower, upper, count) of every bucket that is not empty [s]."""
+        """Return (lower [s], upper [s], count) for every bucket that is not empty."""

@@ -38,7 +38,7 @@ cdef list histogram_counts(const histogram_t *h):
 
 
 cdef class Histogram:
-    """Owner of one histogram, for times measured outside the cycle."""
+    """Histogram of times that are measured outside the cycle."""
     cdef histogram_t *c
 
     def __cinit__(self):

@@ -42,11 +42,11 @@ class Cycle:
 
     @property
     def limited(self) -> bool:
-        """True if the set-point of any axis was limited; see `Drives.limited`."""
+        """True if a set-point (see `Drives.limited`) or an output column was limited."""
 
     @property
     def refused(self) -> bool:
-        """True if a target was refused: NaN, infinite, or beyond the step limit."""
+        """True if a target or column was refused: NaN, infinite, or beyond the step limit."""
 
     @property
     def dry(self) -> bool:
@@ -57,7 +57,7 @@ class Cycle:
         """Cycle of each network of the loop; with one network, only this cycle."""
 
     def spend(self, seconds: float) -> None:
-        """Let virtual time pass as if the body took this long [s]. On a NIC, busy-wait."""
+        """Let virtual time pass as if the body took this long [s]. In real time, busy-wait."""
 
 class Mover(Protocol):
     """Source of targets that the loop steps before each commit."""
@@ -69,7 +69,7 @@ class Iteration:
 
     It calls `judge(flags)` if one of the CYCLE_* flags of `trouble` is set, or if the OR of the AL
     states differs from `al_status`. An exception of `judge` ends the iteration. The first step
-    commits nothing. `beside` is called before every step. Each of the list `movers` computes
+    commits nothing. `beside` is called before every step. Each mover of the list `movers` computes
     targets before every step that commits, with the time of the cycle [s]. With a `commit_lock`, a
     step that finds it taken commits nothing, because another thread is writing the targets.
     """

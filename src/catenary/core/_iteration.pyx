@@ -56,12 +56,12 @@ cdef class Cycle:
 
     @property
     def limited(self):
-        """True if the set-point of any axis was limited; see `Drives.limited`."""
+        """True if a set-point (see `Drives.limited`) or an output column was limited."""
         return (self.header.flags & LIMITED_SOME) != 0
 
     @property
     def refused(self):
-        """True if a target was refused: NaN, infinite, or beyond the step limit."""
+        """True if a target or column was refused: NaN, infinite, or beyond the step limit."""
         return (self.header.flags & REFUSED_SOME) != 0
 
     @property
@@ -75,7 +75,7 @@ cdef class Cycle:
         return (self,)
 
     def spend(self, double seconds):
-        """Let virtual time pass as if the body took this long [s]. On a NIC, busy-wait."""
+        """Let virtual time pass as if the body took this long [s]. In real time, busy-wait."""
         self.engine.spend(round(seconds * 1e9))
 
     def __repr__(self):

@@ -6,7 +6,7 @@ from catenary.core._memory cimport cat_memory
 from catenary.core._native cimport cat_law_monitor, cat_law_numbers, cat_law_step, cat_triple
 
 cdef enum:  # state of a law
-    WAITING = 0                # not taken over by the cycle yet
+    WAITING = 0                # the cycle has not started the law yet
     RUNNING = 1
     FINISHED = 2
     STOPPED_BY_APPLICATION = 3
@@ -42,7 +42,7 @@ cdef struct law_t:
     uint32_t given             # last request that was answered; futex word
 
 cdef class Law:
-    """A compiled function of native/law.h at `address`, with its numbers.
+    """Compiled function (native/law.h) with its memory and parameters.
 
     A step that computes for 20 ms (twice the budget, if that is more) is aborted by a monitor
     thread. The laws of an engine share this thread; the first one sets its priority. The caller

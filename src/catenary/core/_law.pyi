@@ -1,10 +1,10 @@
-"""A law in the cycle: its numbers, its budget, and its end."""
+"""Law in the cycle: its memory and parameters, its budget, and its end."""
 
 from collections.abc import Sequence
 from typing import Final
 
-# Values of `Law.status`; 0: the cycle has not started the law yet. After LAW_FINISHED and LAW_STOPPED
-# the axes hold; all other ends stop the drives.
+# Values of `Law.status`; 0: the cycle has not started the law yet. After LAW_FINISHED and
+# LAW_STOPPED the axes hold; all other ends stop the drives.
 LAW_RUNNING: Final[int]
 LAW_FINISHED: Final[int]  # the law returned "finished": the axes hold
 LAW_STOPPED: Final[int]  # stopped by `stop_law` or by another law: the axes hold
@@ -12,10 +12,10 @@ LAW_RAISED: Final[int]
 LAW_NEVER_RETURNED: Final[int]  # aborted by the monitor
 LAW_NOT_FINITE: Final[int]  # the set-point of `axis` was NaN or infinite
 LAW_OVERRUN: Final[int]  # `overrun_limit` steps in a row exceeded the budget
-LAW_ABORTED: Final[int]  # `Law.rehearse`: a step never returned
+LAW_ABORTED: Final[int]  # returned by `Law.rehearse`: the monitor aborted a step
 
 class Law:
-    """A compiled function of native/law.h at `address`, with its numbers.
+    """Compiled function (native/law.h) with its memory and parameters.
 
     A step that computes for 20 ms (twice the budget, if that is more) is aborted by a monitor
     thread. The laws of an engine share this thread; the first one sets its priority. The caller

@@ -1,5 +1,5 @@
 # cython: boundscheck=False, wraparound=False, cdivision=True
-"""A law in the cycle: its numbers, its budget, and its end.
+"""Law in the cycle: its memory and parameters, its budget, and its end.
 
 Theory of operation. The law is a function of native/law.h. Parameters and a new memory are passed
 through triple buffers and take effect together before a step. Its memory is copied for the
@@ -59,7 +59,7 @@ cdef enum:
     STUCK_NS = 20_000_000      # processor time in one call, after which it counts as stuck
     REHEARSALS = 3
     ANSWER_NS = 200_000_000    # longest wait for a copy of the memory
-    SLICE_NS = 10_000_000      # part of it between two checks for signals
+    SLICE_NS = 10_000_000      # longest wait between two checks for signals
 
 
 # ---- numbers that are replaced together
@@ -137,7 +137,7 @@ cdef bint law_run(law_t *law, cat_law_monitor *monitor, const axes_t *axes,
 
 
 cdef void law_report(law_t *law) noexcept nogil:
-    """Copy the memory of a law that continues, if the application has requested it."""
+    """Copy the memory of a law that continues: on request if `threaded`, otherwise each time."""
     cdef uint32_t wanted
     if not law.threaded:
         give(&law.memory_out, law.numbers.memory)
@@ -191,7 +191,10 @@ cdef class Law:
         if address == 0:
             raise ValueError("address: 0 is not the address of a function")
         if budget_ns < 0 or overrun_limit == 0:
-            raise ValueError(f"budget_ns: {budget_ns}, overrun_limit: {overrun_limit}")
+            raise ValueError(
+                f"budget_ns: {budget_ns} (must not be negative), overrun_limit: {overrun_limit}"
+                " (must be at least 1)"
+            )
         if max(len(memory), len(parameters)) > NUMBERS_MAX:
             raise ValueError(f"a law has at most {NUMBERS_MAX} numbers of memory or parameters")
         self.c.step = <cat_law_step><void *>address
@@ -255,7 +258,7 @@ cdef class Law:
     cdef int request_memory(self) except -1:
         """Wait until the cycle has copied the memory after its next step, or the law has ended.
 
-        Return after ANSWER_NS in any case; then the last copy is used.
+        The wait ends after ANSWER_NS in any case. Then the last copy is used.
         """
         cdef uint32_t wanted = self.c.wanted + 1
         cdef uint32_t given

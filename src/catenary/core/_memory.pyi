@@ -4,4 +4,4 @@ def amount(size: int) -> str:
     """Return a number of bytes as text: "1.2 MB"."""
 
 def reason(error: int) -> str:
-    """Return why memory is not locked, and what to do. `error`: errno of mlock."""
+    """Return the reason why memory is not locked, and a remedy. `error`: errno of mlock."""

@@ -20,7 +20,7 @@ def amount(size):
 
 
 def reason(error):
-    """Return why memory is not locked, and what to do. `error`: errno of mlock."""
+    """Return the reason why memory is not locked, and a remedy. `error`: errno of mlock."""
     limit, _ = resource.getrlimit(resource.RLIMIT_MEMLOCK)
     name = error_names.errorcode.get(error, str(error))
     if limit == resource.RLIM_INFINITY:

@@ -1,9 +1,9 @@
 # cython: cdivision=True
 """Numbers in a process image: any bit offset, 1 to 64 bits, inlined where they are used.
 
-Little endian hosts (x86-64, ARM64). Images are padded, so that whole words may be accessed. A number
-within one 64-bit word is shifted to the upper end and down again. Numbers that span nine bytes or
-exceed an int64 use the slow functions (_numbers.pyx).
+Hosts must be little-endian (x86-64, ARM64). Images are padded, so that whole words may be accessed.
+A number within one 64-bit word is shifted to the upper end and down again. Numbers that span nine
+bytes or exceed an int64 use the slow functions (_numbers.pyx).
 """
 
 from libc.stdint cimport int64_t, uint8_t, uint16_t, uint32_t, uint64_t
@@ -24,7 +24,7 @@ cdef struct number_t:
     uint8_t present
     uint8_t kind
     uint8_t bits
-    uint8_t shift              # of the lowest bit in its byte
+    uint8_t shift              # position of the lowest bit in its byte
     uint8_t split              # the number spans nine bytes
     uint8_t left               # shift to the upper end of the word
     uint8_t right              # shift down again
@@ -63,14 +63,14 @@ cdef inline void number_put_bits(const number_t *n, uint8_t *image, uint64_t raw
     memcpy(image + n.byte, &word, 8)
 
 cdef inline int64_t number_integer(const number_t *n, const uint8_t *image) noexcept nogil:
-    """Return the raw value; unsigned 64-bit values beyond 2^63 wrap."""
+    """Return the raw value; unsigned 64-bit values of 2^63 and above wrap."""
     cdef uint64_t word = number_word(n, image)
     if n.kind == SIGNED:
         return (<int64_t>word) >> n.right
     return <int64_t>(word >> n.right)
 
 cdef inline bint number_put_integer(const number_t *n, uint8_t *image, int64_t value) noexcept nogil:
-    """Write a raw value; return True if it was saturated. 64-bit types take every int64."""
+    """Write a raw value; return True if it was saturated. A 64-bit type is never saturated."""
     cdef int64_t kept = value
     if n.bits < 64:
         kept = min(max(value, n.lowest), n.highest)
@@ -101,7 +101,9 @@ cdef inline bint number_put_value(const number_t *n, uint8_t *image, double valu
     return kept != rounded
 
 cdef inline bint number_put_wrapped(const number_t *n, uint8_t *image, double value) noexcept nogil:
-    """Write like number_put_value, but wrap a counter beyond its range: keep its low bits."""
+    """Write like number_put_value, but keep the low bits of an integer beyond the type's range.
+    Beyond int64, write nothing and return True.
+    """
     cdef double raw
     if n.kind == REAL:
         return number_put_value(n, image, value)

@@ -74,14 +74,16 @@ cdef int make_number(number_t *n, object plan, object image_size, object where) 
     if plan.kind not in (UNSIGNED, SIGNED, REAL):
         raise ValueError(f"{where}: unknown kind {plan.kind}")
     if not 1 <= plan.bit_length <= 64 or (plan.kind == REAL and plan.bit_length not in (32, 64)):
-        raise ValueError(f"{where}: {plan.bit_length} bits")
+        raise ValueError(f"{where}: {plan.bit_length} bits, must be 1 to 64 (reals: 32 or 64)")
     if not 0 <= plan.bit_offset <= image_size * 8 - plan.bit_length:
         raise ValueError(
             f"{where}: bits {plan.bit_offset} to {plan.bit_offset + plan.bit_length - 1} exceed the"
             f" image of {image_size} bytes"
         )
     if not (isfinite(plan.scale) and plan.scale != 0 and isfinite(plan.offset)):
-        raise ValueError(f"{where}: scale {plan.scale}, offset {plan.offset}")
+        raise ValueError(
+            f"{where}: scale {plan.scale} and offset {plan.offset} must be finite, the scale not 0"
+        )
     n.kind = plan.kind
     n.bits = plan.bit_length
     n.byte = plan.bit_offset // 8

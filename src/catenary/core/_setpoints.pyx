@@ -4,10 +4,10 @@
 Theory of operation. A followed axis gets the committed set-point, within its limits. In six
 situations other values are sent:
 
-- not powered: target := actual; in SWITCHED_ON a committed torque is sent, so that it is present when
-  the brake opens;
-- waiting: powered and to be enabled, but not followed: before bit 12 is shown, during a mode change,
-  after bit 12 was lost (`waiting_cycles`);
+- not powered: actual position, zero velocity and torque; in SWITCHED_ON a committed torque is sent,
+  so that it is present when the brake opens;
+- waiting: powered and requested to be enabled, but not followed: before bit 12 is shown, during a
+  mode change, after bit 12 was lost (`waiting_cycles`);
 - hand-over (`x.handed_over`): a law or stream ended, or an internal call waits;
 - underrun: no set-point was committed, or that of this axis was refused (`late_cycles`);
 - background (`x.background`): a thread repeats the set-points of a program. CSP falls back without a
@@ -15,15 +15,15 @@ situations other values are sent:
   older than the command timeout; then CSV decelerates and CST is stopped (`is_timed_out`);
 - stopping: another state was requested, or the core stopped the axis.
 
-In the profile modes the drive makes the trajectory. In PP the command stays until another one is
+In the profile modes the drive computes the trajectory. In PP the command stays until another one is
 committed. Underruns do not count, because the drive completes its motion by itself. In PV the
-velocity stays in an underrun, and the late limit of CSV counts; in all other situations the target
-is 0. In all six situations CSP and CSV decelerate and hold, and CST keeps its torque; each is
-bounded in time (`judge_lateness`, _guard.pyx). In an underrun CSP first keeps the velocity of the
-last two set-points. `ghost` is the set-point of this cycle, which the core continues in a fallback
-(`fallback_cycles`). `setpoint` is the last one that the application has written; `accepted` counts
-them up to two. When set-points return, the command returns to them within acceleration,
-deceleration and torque slope (`returning`).
+velocity stays in an underrun, and the late limit of CSV applies; in the other situations the target
+is 0. In the situations with power, CSP and CSV decelerate and hold, and CST keeps its torque. Each
+is bounded in time (`judge_lateness`, _guard.pyx). In an underrun CSP first keeps the velocity of
+the last two set-points. `ghost` is the set-point of this cycle, which the core continues in a
+fallback (`fallback_cycles`). `setpoint` is the last one that the application has written;
+`accepted` counts them up to two. When set-points return, the command returns to them within
+acceleration, deceleration and torque slope (`returning`).
 
 Budget: 10 ns per axis that follows.
 """
@@ -82,7 +82,7 @@ cdef inline double approach(double value, double target, double step) noexcept n
 # ---- fallback: no valid set-point
 
 cdef void return_to(axes_t *x, axis_t *a, double target, double velocity) noexcept nogil:
-    """Move the command towards a moving set-point: velocity from the remaining distance."""
+    """Move the command towards a moving set-point, at a velocity from the remaining distance."""
     cdef double distance = target - a.commanded_position - velocity * x.period
     cdef double step = a.acceleration * x.period
     cdef double catch_up
@@ -96,10 +96,10 @@ cdef void return_to(axes_t *x, axis_t *a, double target, double velocity) noexce
 
 
 cdef void track(axes_t *x, axis_t *a, double target, double velocity) noexcept nogil:
-    """Command a set-point that moves at `velocity`: within the limits, or on the way back to it."""
+    """Command a moving set-point, within the limits. While `returning`, only approach it."""
     cdef double held = a.commanded_position
     cdef double step = a.velocity_limit * x.period
-    # An axis that is outside its limits may stay or return, but not leave further.
+    # An axis that is outside its limits may stay or return, but not move further away.
     target = clamp(a, target, fmin(a.position_min, held), fmax(a.position_max, held))
     if a.returning:
         return_to(x, a, target, velocity)
@@ -111,7 +111,7 @@ cdef void track(axes_t *x, axis_t *a, double target, double velocity) noexcept n
 
 
 cdef double towards_limits(const axis_t *a, double velocity) noexcept nogil:
-    """Return a velocity from which the set-points still stop before a position limit."""
+    """Return the velocity, reduced so that the set-points can stop before a position limit."""
     if a.position_max < INFINITY and velocity > 0:
         velocity = fmin(velocity, sqrt(2 * a.deceleration * fmax(a.position_max - a.ghost, 0.0)))
     if a.position_min > -INFINITY and velocity < 0:
@@ -142,7 +142,7 @@ cdef void fall_back_position(axes_t *x, axis_t *a, bint keep) noexcept nogil:
 
 
 cdef void fall_back(axes_t *x, axis_t *a, bint keep) noexcept nogil:
-    """Compute one cycle without a valid set-point. `keep`: CSP may keep its velocity."""
+    """Compute one cycle without a valid set-point. `keep`: CSP and PV may keep their velocity."""
     cdef uint8_t quantity = quantity_of(a.mode)
     if a.mode == PROFILE_POSITION:
         return
@@ -317,8 +317,8 @@ cdef void follow(axes_t *x, axis_t *a, const target_t *t, uint32_t i, bint fresh
 
 
 cdef inline bint is_timed_out(const axes_t *x, const axis_t *a) noexcept nogil:
-    """Return True if the last update of a program in the background is no longer valid. A hand-over
-    before it still has its own time.
+    """Return True if the last update of a program in the background is no longer valid. Within the
+    hand-over limit, counted from the begin of the last hand-over, return False.
     """
     return (x.handed_over == 0 and not is_commanded(x, a.mode)
             and x.number - x.handed_over_at > x.handover_limit)
@@ -375,7 +375,7 @@ cdef void stopping(axes_t *x, axis_t *a) noexcept nogil:
 
 
 cdef void wait_for_mode(axes_t *x, axis_t *a) noexcept nogil:
-    """Hand over in the mode in force while the drive shows another mode than the requested one."""
+    """Fall back in the mode in force until the drive shows the requested mode."""
     fall_back(x, a, False)
     prepare_other_mode(a)
     if quantity_of(a.mode) == TORQUE:
@@ -405,7 +405,7 @@ cdef void wait_for_bit_12(axes_t *x, axis_t *a) noexcept nogil:
 
 
 cdef void waiting(axes_t *x, axis_t *a, const target_t *t, uint32_t i, bint fresh) noexcept nogil:
-    """Handle an axis that is powered and to be enabled, but not followed (yet)."""
+    """Handle a powered axis that is requested to be enabled, but is not followed."""
     a.waiting_cycles += 1
     if a.mode_wanted != a.mode or (a.worked and not shows_mode(a)):
         wait_for_mode(x, a)

@@ -8,9 +8,9 @@ cdef struct stream_t:
     uint64_t *seen             # per row: newest cycle of which its writer had read the actual values
     uint32_t axes
     uint32_t capacity          # number of rows
-    uint64_t written           # number of rows written so far; the writer's
-    uint64_t taken             # number of rows taken so far; the cycle's
-    uint64_t dry               # cycle starts without a row, since the first one
+    uint64_t written           # number of rows written so far; only the writer changes it
+    uint64_t taken             # number of rows taken so far; only the cycle changes it
+    uint64_t dry               # number of cycles without a row, since the first row was taken
 
 cdef class Stream:
     """Ring of set-points: one row per cycle start. One thread writes.

@@ -15,7 +15,7 @@ class Stream:
 
     def __init__(self, axes: int, capacity: int) -> None: ...
     def write(self, rows: bytes, seen: int) -> int:
-        """Append rows; return the number of rows for which there was room.
+        """Append as many rows as there is room for; return their number.
 
         Args:
             rows: Rows of 3·axes float64.
@@ -34,4 +34,4 @@ class Stream:
     def capacity(self) -> int: ...
     @property
     def dry(self) -> int:
-        """Number of cycle starts without a row since the first one was taken."""
+        """Number of cycles without a row since the first row was taken."""

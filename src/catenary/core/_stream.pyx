@@ -49,7 +49,7 @@ cdef class Stream:
         self.c.seen = <uint64_t *>memory_take(&self.memory, capacity, sizeof(uint64_t))
 
     def write(self, bytes rows not None, uint64_t seen):
-        """Append rows; return the number of rows for which there was room.
+        """Append as many rows as there is room for; return their number.
 
         Args:
             rows: Rows of 3·axes float64.

@@ -28,10 +28,10 @@ cdef struct thread_t:
     void *argument
     int priority               # SCHED_FIFO priority; 0: unchanged
     int cpu                    # -1: unchanged
-    int priority_error         # errno of the request for priority and CPU
-    int cpu_error
+    int priority_error         # errno of the request for the priority; 0: granted
+    int cpu_error              # errno of the request for the CPU; 0: granted
     int policy                 # policy obtained
-    int obtained
+    int obtained               # priority obtained
     uint32_t started           # futex word
     uint32_t stop              # request to end
     uint32_t ended

@@ -100,7 +100,7 @@ cdef extern from *:
         pthread_setaffinity_np(pthread_self(), sizeof saved->cpus, &saved->cpus);
     }
 
-    /* The ordinary scheduler rounds waits up by 50 us by default. */
+    /* The ordinary scheduler delays the end of a wait by up to 50 us by default. */
     static void sharpen_timers(void) { prctl(PR_SET_TIMERSLACK, 1UL, 0UL, 0UL, 0UL); }
 
     /* Minor and major page faults of the calling thread. */

@@ -35,7 +35,7 @@ cdef enum:
     MAX_HELD = 64                     # frames in flight; further ones are lost and counted as lost
     TAKEN_AT_ONCE = 256               # frames per call, so that a flood cannot delay the cycle
     ETHERNET_HEADER = 14
-    FIRST_INDEX = 17                  # of the first datagram, in the frame
+    FIRST_INDEX = 17                  # offset of the first datagram's index in the frame
     FIRST_ACYCLIC_INDEX = 0x80
 
 cdef int64_t NEVER = 0x7FFFFFFFFFFFFFFF
@@ -61,7 +61,7 @@ ctypedef struct held_frame:
     int direction
     uint32_t length
     int64_t due
-    uint64_t order                    # among frames due at the same time
+    uint64_t order                    # order of frames that are due at the same time
     uint8_t bytes[CAT_FRAME_MAX]
 
 ctypedef struct verdict:
@@ -105,7 +105,7 @@ cdef bint hits(injector_state *injector, const rule *fault, const int64_t *numbe
 cdef verdict judge(
     injector_state *injector, int direction, const uint8_t *frame, uint32_t length
 ) noexcept nogil:
-    """Number the frame and select its fault."""
+    """Number the frame and select its faults."""
     cdef verdict result
     cdef int64_t numbers[3]
     cdef rule_table *table = &injector.tables[cat_load_acquire32(&injector.active) & 1]
@@ -193,7 +193,7 @@ cdef held_frame *earliest(injector_state *injector, int direction) noexcept nogi
 cdef int enter(
     injector_state *injector, int direction, const uint8_t *frame, uint32_t length
 ) noexcept nogil:
-    """Select the fault of a frame; send it, or store it until it is due."""
+    """Select the faults of a frame; send the frame, or store it until it is due."""
     cdef verdict result = judge(injector, direction, frame, length)
     cdef int64_t now
     cdef int copies = 2 if result.duplicate else 1
@@ -314,7 +314,7 @@ cdef class FaultInjector(WrapperLink):
     def inject(self, *faults):
         """Replace all faults, even during operation. Without arguments, remove all faults."""
         if len(faults) > MAX_RULES:
-            raise ValueError(f"{len(faults)} faults; at most {MAX_RULES}")
+            raise ValueError(f"cannot inject {len(faults)} faults, at most {MAX_RULES}")
         cdef uint32_t other = 1 - (self.injector.active & 1)
         cdef rule_table *table = &self.injector.tables[other]
         for i, fault in enumerate(faults):

@@ -83,7 +83,7 @@ ctypedef struct raw_state:
     uint32_t slot_size
     uint32_t slot_count
     uint32_t cursor                   # the slot to read next, < slot_count
-    tpacket2_hdr *held                # slot lent to the receiver; released first in the next call
+    tpacket2_hdr *held                # slot lent to the receiver; the next call releases it first
     uint8_t buffer[2048]
 
 

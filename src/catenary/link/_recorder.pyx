@@ -183,7 +183,7 @@ cdef int recorder_wait_until(void *self, int64_t deadline, int wake_on_frame) no
 
 
 cdef class Recorder(WrapperLink):
-    """Owner of a pcapng file with all frames of `link` and their timestamps in ns.
+    """Wrapper that records the frames of `link` in a pcapng file, with timestamps in ns.
 
     Timestamps are the time of day, or the virtual time of a link in virtual time. A frame is
     recorded after it was sent, so an answer may precede its question by the duration of the call.

@@ -1,8 +1,9 @@
 """Link that replays the answers of a recorded segment, deterministically and in virtual time.
 
-A sent frame is found by its datagrams with all indices set to 0 (FNV-1a hash, then comparison). The
-answers to the same question are returned in the recorded order; the last answer is repeated. An
-answer gets the indices of the sent frame and arrives after the recorded latency.
+A question is a sent frame. It is found in the recording by its datagrams with all indices set to 0
+(FNV-1a hash, then comparison). The answers to the same question are returned in the recorded order.
+The last answer is repeated. An answer gets the indices of the sent frame and arrives after the
+recorded latency.
 """
 
 from libc.errno cimport EINVAL, EMSGSIZE, ENOBUFS
@@ -177,7 +178,7 @@ cdef int replay_wait_until(void *self, int64_t deadline, int wake_on_frame) noex
 
 
 cdef class Replay(TableLink):
-    """Owner of the answers in a recording: a pcapng or pcap file, or pairs of (sent frame, answer).
+    """Replay of a recording: a pcapng or pcap file, or pairs of (sent frame, answer).
 
     `unmatched` counts frames that have no answer in the recording. The replay treats them like lost
     frames. `first_unmatched` is the first of them.
@@ -199,7 +200,7 @@ cdef class Replay(TableLink):
             self.name = "replay"
             exchanges = [Exchange(*pair) for pair in recording]
         if not exchanges:
-            raise self.refusal("no frame that came back")
+            raise self.refusal("the recording contains no frame that came back")
         self.fill(by_question(exchanges), len(exchanges))
         self.table.flags = CAT_LINK_VIRTUAL_TIME
         self.table.self = &self.replay
@@ -232,7 +233,9 @@ cdef class Replay(TableLink):
         slot.answer_count = <uint32_t> len(exchanges)
         for exchange in exchanges:
             if not 0 <= exchange.latency_ns <= LATENCY_MAX:
-                raise self.refusal(f"an answer after {exchange.latency_ns} ns: a wrong time")
+                raise self.refusal(
+                    f"an answer after {exchange.latency_ns} ns has a wrong time, must be 0 to 15 min"
+                )
             self.fill_answer(&self.replay.answers[used], exchange.sent, exchange.answer)
             self.replay.answers[used].latency_ns = exchange.latency_ns
             used += 1
@@ -245,9 +248,11 @@ cdef class Replay(TableLink):
 
     cdef int fill_answer(self, answer *place, bytes sent, bytes reply) except -1:
         if not HEADER_SIZE <= len(reply) <= CAT_FRAME_MAX:
-            raise self.refusal(f"an answer of {len(reply)} bytes")
+            raise self.refusal(
+                f"an answer has {len(reply)} bytes, must have {HEADER_SIZE} to {CAT_FRAME_MAX}"
+            )
         if sent[14:16] != reply[14:16]:
-            raise self.refusal("an answer of other datagrams than its question")
+            raise self.refusal("the datagrams of an answer differ from those of its question")
         place.bytes = reply
         place.length = <uint32_t> len(reply)
         return 0

@@ -68,8 +68,8 @@ cdef enum:
     SOURCE = 6
     PROCESSED = 0x02                  # bit of the first source address byte, set by a controller
     DATAGRAMS = CAT_ETHERNET_HEADER + CAT_ETHERCAT_HEADER
-    INDEX = DATAGRAMS + 1             # of the first datagram
-    HEADERS = DATAGRAMS + CAT_DATAGRAM_HEADER + CAT_DATAGRAM_COUNTER  # of the first datagram
+    INDEX = DATAGRAMS + 1             # offset of the first datagram's index
+    HEADERS = DATAGRAMS + CAT_DATAGRAM_HEADER + CAT_DATAGRAM_COUNTER  # smallest frame
     GIVEN_UP = 3                      # consecutive missing copies until a copy is given up
     BURST = 512                       # largest number of frames received per call
     SECOND_NS = 1_000_000_000
@@ -90,7 +90,7 @@ ctypedef struct slot_t:
 
 ctypedef struct ring_t:
     cat_link *links[2]
-    int route                         # FIRST, SECOND or BOTH
+    int route                         # links on which frames are sent: FIRST, SECOND or BOTH
     int64_t pair_wait
     uint32_t missed[2]                # consecutive missing copies
     uint32_t waiting                  # slots with a copy that is not delivered
@@ -223,7 +223,7 @@ cdef inline bint is_processed(const uint8_t *frame) noexcept nogil:
 
 
 cdef inline bint lacks_devices(ring_t *ring, const slot_t *slot, int side) noexcept nogil:
-    """Return True for a broadcast that reached fewer devices than the last one (cut ring)."""
+    """Return True for a broadcast that reached fewer devices than the previous one (cut ring)."""
     return slot.sent[16] == CAT_BRD and first_counter(slot.copies[side], slot.length) < ring.total
 
 

@@ -16,7 +16,7 @@ TRAFFICS: tuple[Traffic, ...] = ("all", "cyclic", "acyclic")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Fault:
-    """One fault that affects some frames.
+    """Fault that affects some of the frames of a link.
 
     Frames are counted from 0, separately for each `direction` and `traffic`. The first datagram of
     a cyclic frame has an index below 0x80. With one frame per cycle, `traffic="cyclic"` therefore
@@ -52,8 +52,11 @@ class Fault:
         if not 0.0 <= self.probability <= 1.0:
             raise ValueError(f"probability {self.probability} is outside 0 to 1")
         if (self.kind == "delay") != (self.delay > 0.0):
-            raise ValueError(f"kind {self.kind!r} cannot have a delay of {self.delay} s")
+            raise ValueError(
+                f"kind {self.kind!r} with a delay of {self.delay} s: only kind 'delay' has one, "
+                "which must be above 0 s"
+            )
         if self.offset is not None and (self.kind != "corrupt" or self.offset < 0):
             raise ValueError(f"kind {self.kind!r} cannot have offset {self.offset}")
         if self.frames is not None and (self.frames.step < 1 or self.frames.start < 0):
-            raise ValueError(f"frames {self.frames} do not count upwards from 0")
+            raise ValueError(f"frames {self.frames} must not start below 0 or count downwards")

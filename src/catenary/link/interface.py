@@ -52,11 +52,11 @@ class Interface:
         check(self.name)
         raw = open_socket(self.name)
         try:
-            size, receive_path = request_ring(raw) if self.mapped_ring else (0, "recv (as asked)")
+            size, receive_path = request_ring(raw) if self.mapped_ring else (0, "recv (requested)")
             raw.bind((self.name, ETHERTYPE))
         except OSError as error:
             raw.close()
-            raise LinkError(f"{self.name}: cannot be bound: {error.strerror}") from error
+            raise LinkError(f"cannot bind a socket to {self.name}: {error.strerror}") from error
         except BaseException:
             raw.close()
             raise
@@ -90,7 +90,7 @@ def check(name: str) -> None:
 
 
 def no_link(name: str, number: int) -> LinkError | None:
-    """Return the error for an interface without a carrier; None if the cause differs.
+    """Return the error for an interface without a carrier; None if there is another cause.
 
     Without a carrier, the kernel refuses frames with ENOBUFS ("No buffer space available").
     """

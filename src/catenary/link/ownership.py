@@ -27,9 +27,9 @@ from catenary.link.interface import ETHERTYPE
 from catenary.link.protocol import Link
 from catenary.wire.frame import is_alien
 
-NAME = "\0catenary/"  # of the lock, before the name of the interface; abstract, see unix(7)
+NAME = "\0catenary/"  # start of a lock's name, before that of the interface; abstract, see unix(7)
 WAITING = 4096  # backlog: programs that may query the owner of a lock; no connection is accepted
-SETTLE_NS = 20_000_000  # late answers to a master that has just ended
+SETTLE_NS = 20_000_000  # time within which late answers to a master that has just ended arrive
 WINDOW_NS, WINDOWS = 40_000_000, 2  # a live master sends frames in each
 FRAMES = 256  # read per window: more than a receive ring holds
 
@@ -39,7 +39,7 @@ HINT = (
     "each other, and a scan stops the devices of both"
 )
 OWN_HINT = (
-    "a MainDevice of this program has it: close() it first, as a with block does. In a "
+    "a MainDevice of this program has it open: call its close() first, as a with block does. In a "
     "notebook, close it before its cell runs again, or restart the kernel"
 )
 
@@ -51,7 +51,7 @@ class Ownership:
     """
 
     def __init__(self, link: Link, *, force: bool = False) -> None:
-        """Lock the interfaces of a link. Unless `force`, listen 0.1 s for frames of other masters.
+        """Lock the interfaces of a link. Unless `force`, listen for other masters for 0.1 s.
 
         Args:
             link: The link; a link without network interfaces needs no lock.
@@ -95,7 +95,7 @@ class Ownership:
         self.release()
 
     def release(self) -> None:
-        """Close this process's copies. Another process gets the lock when all copies are closed."""
+        """Close this process's copies of the locks. A lock is free after all copies are closed."""
         while self._locks:
             self._locks.pop().close()
 
@@ -168,7 +168,7 @@ def lasting_sockets(link: Link) -> tuple[str, ...]:
     """Describe the sockets of `other_sockets` that are still open after 20 ms.
 
     A MainDevice opens its socket before it takes the lock, and closes it at once if the lock is not
-    free. Without this wait, two that open at the same time could refuse each other.
+    free. Without this wait, two MainDevices that open at the same time could refuse each other.
     """
     if not any(_others(raw) for raw in raw_links(link)):
         return ()

@@ -32,7 +32,7 @@ class Ring:
     def __post_init__(self) -> None:
         if self.first == self.second:
             raise ConfigurationError(
-                f"{self.first}: the same port twice is not a ring",
+                f"a ring needs two different ports; both are {self.first}",
                 hint='give two different ports, MainDevice("eth0", "eth1"), or a single port',
             )
 

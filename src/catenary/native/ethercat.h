@@ -1,5 +1,5 @@
 /* Commands, sizes and masks of EtherCAT for C and Cython, one definition for all compiled modules.
- * Python has its own in `wire` (wire/datagram.py, wire/frame.py, wire/al.py);
+ * Python has its own definitions (wire/datagram.py, wire/frame.py, wire/al.py);
  * tests/core/test_ethercat.py compares the two. */
 #ifndef CATENARY_ETHERCAT_H
 #define CATENARY_ETHERCAT_H

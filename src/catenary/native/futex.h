@@ -22,7 +22,8 @@ static inline void cat_futex_wake(uint32_t *word) {
 }
 
 /* Like cat_futex_wait, for a word in memory that processes share. `deadline_ns` is absolute;
- * INT64_MAX waits without a timeout. As precise as clock_nanosleep, but it can be woken. */
+ * INT64_MAX waits without a timeout. The wait is as precise as clock_nanosleep, but can be ended
+ * early by a wake-up. */
 static inline int cat_futex_wait_shared(uint32_t *word, uint32_t value, int64_t deadline_ns) {
     struct timespec until = {deadline_ns / 1000000000, deadline_ns % 1000000000};
     struct timespec *timeout = deadline_ns == INT64_MAX ? 0 : &until;

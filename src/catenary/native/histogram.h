@@ -1,7 +1,7 @@
 /* Histogram of times [ns] or counts in fixed memory. It contains no pointers, so it can be placed in
  * memory that processes share. It has one writer. A reader may see a partly added value.
  *
- * Every number up to 512 has its own bucket. Above 512, each octave has 256 buckets, so the
+ * Every number below 512 has its own bucket. From 512 on, each octave has 256 buckets, so the
  * error of a percentile is at most 0.4 %. Adding a value takes a few nanoseconds and touches two
  * cache lines.
  */

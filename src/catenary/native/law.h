@@ -48,7 +48,8 @@ typedef struct cat_law_numbers {
     int64_t parameter_count;
 } cat_law_numbers;
 
-/* `time` [s] since the first step. Must not block. Returns CAT_LAW_GOES_ON, _FINISHED or _RAISED. */
+/* One step of a law. `time`: time since the first step [s]. The function must not block. It returns
+ * CAT_LAW_GOES_ON, CAT_LAW_FINISHED or CAT_LAW_RAISED. */
 typedef int (*cat_law_step)(const void *actual, void *target, double *memory, int64_t memory_count,
                             const double *parameters, int64_t parameter_count, double time);
 
@@ -173,7 +174,7 @@ static inline void cat_law_monitor_stop(cat_law_monitor *monitor) {
     monitor->started = 0;
 }
 
-/* Runner: start watching calls. It costs one system call, and the first call of a law another. */
+/* Runner: start watching calls. This takes one system call; the first call of a law takes another. */
 static inline void cat_law_monitor_activate(cat_law_monitor *monitor, int64_t limit) {
     monitor->guard.known = 0; /* a new thread may reuse the pthread_t of one that has ended */
     cat_store_release64(&monitor->guard.limit, (uint64_t)limit);

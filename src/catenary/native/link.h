@@ -28,7 +28,7 @@ typedef struct cat_link {
     uint32_t flags;
     void *self;
 
-    /* Sends one frame. Returns 0 or -errno, such as -ENOBUFS (the device's queue is full). */
+    /* Sends one frame. Returns 0 or -errno, such as -ENOBUFS (the NIC's queue is full). */
     int (*send)(void *self, const uint8_t *frame, uint32_t length);
 
     /* Takes the oldest received frame without waiting. Returns its length, 0 if there is no frame,

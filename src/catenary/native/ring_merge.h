@@ -4,11 +4,11 @@
  * the two, and its working counter their sum. In a closed ring no device processes the second copy,
  * so it adds nothing. In a broken ring each copy meets only the devices of its side (ETG.1000.4
  * §4.3). SOEM (nicdrv.c, `ecx_outframe_red` and `ecx_waitinframe_red`) instead sends an empty
- * broadcast on the second link. In a broken ring it then sends what returned on the first link
- * again on the second. This needs no merge and carries the time beyond the break, but a cycle takes
- * two round trips. A datagram that the second copy lacks is a NOP there; it is not merged. The
- * datagram of the time is not merged either: beyond a break, the second copy writes the time to the
- * devices instead of reading the reference clock.
+ * broadcast on the second link. In a broken ring it then sends the frame that returned on the first
+ * link again on the second link. This needs no merge and carries the time beyond the break, but a
+ * cycle takes two round trips. A datagram that the second copy lacks is a NOP there. It is not
+ * merged. The datagram that distributes the time is not merged either. Beyond a break, the second
+ * copy writes the time to the devices instead of reading the reference clock.
  */
 #ifndef CATENARY_RING_MERGE_H
 #define CATENARY_RING_MERGE_H

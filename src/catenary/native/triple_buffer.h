@@ -1,9 +1,9 @@
 /* Triple buffer: passes the latest value from one writer thread to one reader thread. Neither thread
  * waits, and the reader never sees a torn value.
  *
- * Three slots: the writer owns one, the reader owns one, the third is offered. To
- * publish or to take a value, a thread exchanges its own slot for the offered one. A value that the reader does not take in time
- * is overwritten by the next one.
+ * There are three slots: the writer owns one, the reader owns one, and the third is offered. To
+ * publish or to take a value, a thread exchanges its own slot for the offered one. A value that the
+ * reader does not take in time is overwritten by the next one.
  */
 #ifndef CATENARY_TRIPLE_BUFFER_H
 #define CATENARY_TRIPLE_BUFFER_H

@@ -66,7 +66,7 @@ cdef class CompiledPlant:
         if p != NULL:
             p.joints = <plant_joint *>calloc(joints, sizeof(plant_joint))
         if p == NULL or p.joints == NULL:
-            raise MemoryError("no memory for the plant")
+            raise MemoryError("cannot allocate memory for the plant")
         p.step = <void (*)(const void *, void *) noexcept nogil>step
         p.set_handler = <void (*)(void (*)(const mujoco_message *) noexcept nogil) noexcept nogil>set_handler
         p.model, p.data = <const void *>model, <void *>data
@@ -93,9 +93,9 @@ cdef class CompiledPlant:
             force: Address of its value in qfrc_applied.
             friction: Address of its value in dof_frictionloss.
             ratio: Motor angle per joint angle, signed.
-            zero: Joint position at which the motor angle is 0.
-            dry: Dry friction at the joint.
-            brake: Additional friction of the closed brake.
+            zero: Joint position at which the motor angle is 0 [rad or m].
+            dry: Dry friction at the joint [N·m or N].
+            brake: Additional friction of the closed brake [N·m or N].
             brake_delay_ns: Closing time of the brake [ns].
         """
         cdef plant_joint *j = self._joint(n)
@@ -130,7 +130,10 @@ cdef class CompiledPlant:
         unlock(self._core._segment)
 
     def run(self):
-        """Step the plant and do due work in real time, until `end` is called or a step fails."""
+        """Run the plant and the due work of the segment in real time.
+
+        The method returns after `end` was called, or after a step has failed.
+        """
         cdef cat_segment *s = self._core._segment
         cdef plant *p = self._plant
         cdef int64_t now, due
@@ -158,7 +161,7 @@ cdef class CompiledPlant:
 
     @property
     def wild(self) -> int:
-        """Number of the joint that exceeded the maximum velocity and stopped the plant; -1: none."""
+        """Number of the joint whose velocity exceeded the maximum and stopped the plant; -1: none."""
         return self._plant.wild - 1
 
     @property

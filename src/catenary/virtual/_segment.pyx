@@ -1,7 +1,7 @@
 """Compiled segment: controllers, clock, and access from the application side.
 
-The headers contain the frame path, with one file for each mechanism. It does not need the GIL.
-`_buffers.pyx` gives the application access to SyncManagers, and `_motors.pyx` to motors.
+The headers contain the frame path, with one file for each mechanism. The frame path does not need
+the GIL. `_buffers.pyx` gives the application access to SyncManagers, and `_motors.pyx` to motors.
 """
 
 from cpython.bytes cimport PyBytes_FromStringAndSize
@@ -62,7 +62,7 @@ cdef class Core:
             raise ValueError(f"a segment can have 0 to 65535 devices, not {count}")
         self._segment = segment_make(count, is_virtual, ring, detection_ns)
         if self._segment == NULL:
-            raise MemoryError("no memory for the segment")
+            raise MemoryError("cannot allocate memory for the segment")
         self.count = count
         self._segment.owner = <void *>self
         self._segment.service = _serve_application
@@ -118,7 +118,7 @@ cdef class Core:
         made = controller_make(c, ram, len(sii) // 2, slots, axes)
         unlock(self._segment)
         if not made:
-            raise MemoryError(f"no memory for the controller at position {position}")
+            raise MemoryError(f"cannot allocate memory for the controller at position {position}")
         for p in range(PORTS):
             c.ports[<int>p].exists = p in ports
         c.fmmu_count, c.sm_count, c.has_dc, c.no_lrw = fmmus, sync_managers, clock_bits, not lrw
@@ -194,7 +194,7 @@ cdef class Core:
             raise ValueError("clock.capsule is not a capsule of a clock")
         table = <const cat_clock *>PyCapsule_GetPointer(capsule, CAT_CLOCK_CAPSULE)
         if table.version != CAT_CLOCK_VERSION or not table.flags & CAT_CLOCK_VIRTUAL:
-            raise ValueError("the clock is not virtual, or has another version")
+            raise ValueError("the clock is not virtual, or its table has another version")
         self._clock = clock, capsule       # keeps the owner of the table alive
         self._segment.clock = table
         self._segment.now = self._segment.epoch = table.now(table.self)
@@ -230,7 +230,7 @@ cdef class Core:
             raise failure
 
     def advance(self):
-        """Do the compiled work up to now. A no-op in virtual time."""
+        """Execute the due compiled work of the segment. A no-op in virtual time."""
         if not self._segment.is_virtual:
             with nogil:
                 lock(self._segment)
@@ -428,7 +428,11 @@ cdef class Core:
         c.synchronous.limit = limit
 
     def synchronous(self, int position):
-        """Return (synchronised to pulses, pulses seen, missed, exceeded, shift too short, error)."""
+        """Return the state and counters of the synchronous mode.
+
+        The values are: synchronised to pulses, pulses seen, missed, exceeded, shift too short,
+        error.
+        """
         cdef synchronous_cycle *d = &self._at(position).synchronous
         return bool(d.active), bool(d.seen), d.missed, d.exceeded, d.shift_short, bool(d.error)
 

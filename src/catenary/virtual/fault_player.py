@@ -66,7 +66,7 @@ class FaultPlayer:
         self.wiring = wiring
         self._agenda = agenda
         self._replaced = replaced
-        self._waiting: list[f.Fault] = []  # until the first frame, in real time
+        self._waiting: list[f.Fault] = []  # faults that wait for the first frame, in real time
         self._planned = 0
         self._frame_faults: list[tuple[int, f.FrameFault]] = []
         self._losses_seen = 0
@@ -79,7 +79,7 @@ class FaultPlayer:
 
     @property
     def done(self) -> bool:
-        """True if no fault has yet to begin or to end."""
+        """True if no begin or end of a fault is pending."""
         left = any(self._wires.frame_fault_left(n) > 0 for n, _fault in self._frame_faults)
         return not (self._waiting or self._planned or left)
 

@@ -4,9 +4,9 @@
     segment.inject(cut(between=(4, 5)))          # without `at`: immediately
 
 Every fault has a start time `at` [s] on the clock of the segment; docs/how_to/faults.md defines its
-zero. Without `at`, the fault starts immediately. `for_` is its duration [s]; without it, the fault
-lasts. In TOML, the field `kind` names the fault, and `for_` and `with_` are written `for` and
-`with`.
+zero. Without `at`, the fault starts immediately. `for_` is its duration [s]. Without `for_`, the
+fault does not end by itself. In TOML, the field `kind` names the fault, and `for_` and `with_` are
+written `for` and `with`.
 """
 
 from __future__ import annotations
@@ -55,9 +55,10 @@ class _Lasting(_Fault, frozen=True, kw_only=True):
 
 
 class _OfFrames(_Lasting, frozen=True, kw_only=True):
-    """Fault of frames: of the first frame from `at` on, and of every `every`-th frame after it.
+    """Fault that affects the first frame from `at` on, and every `every`-th frame after it.
 
-    The fault affects `n` frames. Without `n`, it affects one frame, or all frames within `for_`.
+    It ends after `n` affected frames. Without `n` and `for_`, it affects one frame. With only
+    `for_`, it affects all these frames within that time.
     """
 
     every: int = 1

@@ -121,7 +121,8 @@ def _mesh(name: str, path: Path) -> Path:
                 return folder / Path(*parts[start:])
     raise ConfigurationError(
         f"{path}: the mesh {name} does not exist",
-        hint="or pass contacts=False (in TOML: contacts = false), which does not need meshes",
+        hint="correct the name, or pass contacts=False (in TOML: contacts = false), which does not "
+        "need meshes",
     )
 
 

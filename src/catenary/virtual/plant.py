@@ -1,4 +1,4 @@
-"""Simulated arm behind virtual servos, whose motors drive the joints of one MuJoCo model.
+"""Simulated mechanism: the motors of virtual servos drive the joints of one MuJoCo model.
 
     Segment(
         [Servo(axes=2, inertia=2e-5, rated_torque=0.6)],
@@ -49,8 +49,8 @@ class Joint(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         direction: 1 or -1.
         zero: Joint position at which the motor angle is 0 [rad or m].
         start: Initial position of the joint [rad or m]; None: the position in the model.
-        brake: Holding torque of the brake at the joint [N·m]; None: the motor's maximum torque, 0:
-            no brake.
+        brake: Holding torque of the brake at the joint [N·m]. 0: no brake. None: the maximum
+            torque of the motor at the joint.
         brake_delay: Closing time of the brake [s].
         axis: (position of the servo, axis number); None: the next axis on the line.
     """
@@ -93,8 +93,8 @@ class Plant:
 
     Args:
         path: Path of an MJCF or URDF file.
-        joints: Joints with motors, in the order of the axes on the line. None: all joints of the
-            model, in their order and without gears.
+        joints: Joints with motors, in the order of the axes on the line. None: all joints that are
+            not passive, in the order of the model and without gears.
         passive: Names of the joints without a motor.
         step: Time step of the simulation [s].
         contacts: False lets bodies pass through each other.

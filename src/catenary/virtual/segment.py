@@ -57,7 +57,7 @@ class SegmentEnd:
         return self._segment
 
     def open_link(self) -> SegmentLink:
-        """Open a link at this end of the segment. Only one link can be open at a time."""
+        """Open a link at this end of the segment. Only one link per end can be open."""
         return self._segment.open_end(second=self._second)
 
 
@@ -176,7 +176,7 @@ class Segment:
         return SegmentEnd(self, second=True)
 
     def open_link(self) -> SegmentLink:
-        """Open a link at the first end of the segment. Only one link can be open at a time."""
+        """Open a link at the first end of the segment. Only one link per end can be open."""
         return self.open_end(second=False)
 
     def open_end(self, *, second: bool) -> SegmentLink:
@@ -223,7 +223,7 @@ class Segment:
 
     @property
     def faults_done(self) -> bool:
-        """True if no fault has yet to begin or to end. Faults without an end are not counted."""
+        """True if no begin or end of a fault is pending. Active faults without end are ignored."""
         return self._faults.done
 
     @property

@@ -61,7 +61,9 @@ def _open_socket(interface: str) -> socket.socket:
         packet.bind((interface, ETHERCAT))
     except OSError as error:
         packet.close()
-        raise LinkError(f"{interface}: {os.strerror(error.errno or 0)}") from error
+        raise LinkError(
+            f"cannot open a socket on {interface}: {os.strerror(error.errno or 0)}"
+        ) from error
     return packet
 
 
@@ -168,7 +170,9 @@ class Server:
             )
             if result < 0:
                 hint = "the interface went down" if -result == errno.ENETDOWN else ""
-                raise LinkError(f"{self.interface}: {os.strerror(-result)}", hint=hint)
+                raise LinkError(
+                    f"the packet loop on {self.interface} failed: {os.strerror(-result)}", hint=hint
+                )
         except LinkError as failure:
             self.failure = failure
         finally:

@@ -4,7 +4,7 @@
  *
  * Profile position. A rising edge of controlword bit 4 accepts 0x607A as a new set-point. The drive
  * uses it immediately if bit 5 is set or if no set-point is active. Otherwise it stores the set-point
- * in a buffer for one. With bit 6, the set-point is relative to the last target. Statusword bit 12
+ * in a buffer for one set-point. With bit 6, it is relative to the last target. Statusword bit 12
  * acknowledges the set-point. It is cleared when controlword bit 4 is 0 and the buffer is free.
  * Statusword bit 10: the position was within 0x6067 of the target for the time 0x6068. Controlword
  * bit 9 (blending into the next set-point) is ignored.

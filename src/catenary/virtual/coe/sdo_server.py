@@ -52,7 +52,10 @@ def _aborted(index: int, subindex: int, code: int) -> bytes:
 
 
 class SdoServer:
-    """SDO server of a device, with its active transfer. `size`: mailbox size without header."""
+    """SDO server of a device, with its active transfer.
+
+    `size`: mailbox size without its header [bytes].
+    """
 
     def __init__(
         self, dictionary: Dictionary, *, size: int, quirks: MailboxQuirks = NO_MAILBOX_QUIRKS

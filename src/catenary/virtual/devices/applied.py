@@ -14,17 +14,17 @@ from catenary.virtual.sii_quirks import SiiQuirks
 
 @dataclass(frozen=True, slots=True)
 class MailboxOptions:
-    """Mailbox of a device. ValueError if a value is out of range."""
+    """Mailbox of a device. The constructor raises ValueError if a value is out of range."""
 
-    size: int = 128  # [bytes] of each direction
-    delay: float = 300e-6  # [s] until a request is answered
+    size: int = 128  # size of the mailbox in each direction [bytes]
+    delay: float = 300e-6  # time until a request is answered [s]
     quirks: MailboxQuirks = NO_MAILBOX_QUIRKS
 
     def __post_init__(self) -> None:
         if not 32 <= self.size <= 1024 or self.size % 2:
             raise ValueError(f"mailbox_bytes must be an even number, 32 to 1024, not {self.size}")
         if not 0 <= self.delay <= 10:
-            raise ValueError(f"mailbox_delay must be 0 to 10 s, not {self.delay}")
+            raise ValueError(f"mailbox_delay must be 0 to 10 s, not {self.delay} s")
 
 
 class AppliedDevice(Device):
@@ -114,7 +114,7 @@ class AppliedDevice(Device):
         self.application.mailbox.silence(silent)
 
     def delay_mailbox(self, seconds: float) -> None:
-        """Add `seconds` [s] to the response time of the mailbox. The sum is at least 0."""
+        """Add `seconds` [s] to the response time of the mailbox. A negative sum counts as 0."""
         self.application.mailbox.delay(round(seconds * 1e9))
 
     def send_emergency(self, code: int, data: bytes = b"") -> None:

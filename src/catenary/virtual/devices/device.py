@@ -173,7 +173,7 @@ class Device:
         self.core.freeze(self.position, frozen)
 
     def count_errors(self, port: int, *, invalid_frames: int = 0, lost_links: int = 0) -> None:
-        """Increase the error counters of one port, like a bad cable.
+        """Increase the error counters of one port, as a bad cable would.
 
         Args:
             port: Port number, 0 to 3.
@@ -193,5 +193,5 @@ class Device:
             self.core.poke(self.position, address, bytes([min(before + number, 255)]))
 
     def write_alias(self, alias: int) -> None:
-        """Set the alias register, like a rotary switch on the device."""
+        """Set the alias register, as a rotary switch on the device would."""
         self.core.poke(self.position, ALIAS, alias.to_bytes(2, "little"))

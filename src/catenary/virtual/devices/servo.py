@@ -49,7 +49,7 @@ from catenary.virtual.scheduler import Scheduler
 from catenary.virtual.sii_quirks import NO_SII_QUIRKS, SiiQuirks
 
 STEP_NS = 250_000
-MINIMUM_CYCLE_NS = 62_500  # of SYNC0
+MINIMUM_CYCLE_NS = 62_500  # shortest SYNC0 cycle
 COPY_NS = 20_000  # minimum time from the arrival of outputs to SYNC0
 BOOT_SECONDS = 0.02
 SUPPORTED_MODES = {0, 1, 3, 6, 8, 9, 10}
@@ -191,8 +191,8 @@ class Servo(AppliedDevice):
         self.sync_missed_limit = sync_missed_limit
         self.quirks = quirks
         self.mapping_quirks = mapping_quirks
-        self._inertias = [inertia] * axes  # for which the loops are tuned
         self._check_values()
+        self._inertias = [inertia] * axes  # for which the loops are tuned
 
     def _check_values(self) -> None:
         """Raise ValueError if a value is out of range."""

@@ -3,9 +3,9 @@
 0x1C32 describes outputs and 0x1C33 inputs. 0x10F1 limits the number of missed events. The module
 also checks the configuration of the SYNC unit.
 
-The supported types are 0 (free run) and 2 (DC Sync0, or with a quirk 3, DC Sync1). If 0x1C32:01 was
-not written, the SYNC unit determines the type: if its signal is active on entry to SAFE-OP, the
-device synchronises to the signal. Common device stacks behave in the same way.
+The supported types are 0 (free run) and 2 (DC Sync0). With a quirk, type 3 (DC Sync1) replaces type
+2. If 0x1C32:01 was not written, the SYNC unit determines the type: if its signal is active on entry
+to SAFE-OP, the device synchronises to the signal. Common device stacks behave in the same way.
 """
 
 from __future__ import annotations
@@ -124,7 +124,10 @@ class Synchronisation:
         return 0
 
     def begin(self) -> None:
-        """Enter SAFE-OP with the checked values, as frames may have changed the registers."""
+        """Begin the synchronisation on entry to SAFE-OP.
+
+        Use the checked values, because frames may have changed the registers in the meantime.
+        """
         if self._checked_ns:
             self._core.run_model_by_pulses(
                 self._position, self._pulses, self._checked_ns, self._step_ns
