@@ -114,7 +114,7 @@ class FaultReport:
         return silence_error(self._exchange.query_silence(suspects), suspects, lost, log)
 
     def drive_error(self, axes: Sequence[int], what: str) -> DriveError:
-        """Stop all axes, and return the error for some of them.
+        """Stop all axes, and return the error for the axes in trouble.
 
         Args:
             axes: Numbers of the axes in trouble.

@@ -172,9 +172,9 @@ class Loop:
             raise problems[0]
 
     def open(self) -> Loop:
-        """Enter without a `with` block, for a notebook or a server; return the loop.
+        """Enter the loop without a `with` block, for a notebook or a server; return the loop.
 
-        `close` leaves it. The end of the program and the MainDevice's `close` also leave it.
+        `close` leaves the loop. The end of the program and `close` of the MainDevice also leave it.
         """
         return self.__enter__()
 
@@ -406,7 +406,7 @@ class Loop:
 
     @property
     def timing(self) -> Timing:
-        """Timing of the cycles since the loop was opened; also available after its end."""
+        """Timing of the cycles since the loop was opened; also available after the loop has ended."""
         return self._networks[0].timing
 
     @property

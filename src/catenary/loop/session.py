@@ -136,7 +136,7 @@ class Session:
 
     @property
     def is_open(self) -> bool:
-        """True if the cycle runs, in this process."""
+        """True while the loop is open in this process."""
         return self._opened and not self._left and self._process == os.getpid()
 
     @property
