@@ -406,7 +406,7 @@ class Loop:
 
     @property
     def timing(self) -> Timing:
-        """Timing of the cycles since the loop was opened; also available after the loop has ended."""
+        """Timing of the cycles since the loop was opened; also available when it is closed."""
         return self._networks[0].timing
 
     @property
@@ -518,7 +518,7 @@ class Loop:
         """Stop every network, regardless of errors in the others; return the problems.
 
         If another thread is already leaving the loop, the call first waits for it, at most
-        `LEAVE_TIMEOUT`. The axes are then at rest when the call returns.
+        `LEAVE_TIMEOUT`.
         """
         is_ours = self._leaving.acquire(timeout=LEAVE_TIMEOUT)
         try:
@@ -553,8 +553,8 @@ def checked_quorum(quorum: int | None, count: int) -> int:
 def leave_open_loop(sessions: Sequence[Session], guard: SignalGuard) -> None:
     """Leave a loop that was deleted, or that is open at the end of the program, and warn.
 
-    There is no warning at the end of the program if the loop runs in the background. The warning
-    comes last, because it may be turned into an error.
+    There is no warning at the end of the program if the loop runs in the background and can be
+    left without problems. The warning comes last, because it may be turned into an error.
 
     Args:
         sessions: Sessions of the loop.
