@@ -506,7 +506,7 @@ class Loop:
             warnings.warn(f"while leaving the open loop: {problem}", RuntimeWarning, stacklevel=2)
 
     def _leave_at_exit(self, sessions: Sequence[Session]) -> None:
-        """Leave the loop when it is deleted or the program ends, if it is still open."""
+        """Ensure that an open loop is left when it is deleted, or when the program ends."""
         self._finalizer = weakref.finalize(self, leave_open_loop, sessions, self._guard)
 
     def _report_end(self, error: BaseException) -> None:
