@@ -269,6 +269,6 @@ def test_without_a_queue_procedures_are_refused_while_a_loop_runs() -> None:
         blocking = main.runner
         with (
             main.attached(AcyclicRunner(AcyclicQueue(main.link))),
-            pytest.raises(RuntimeError, match="a loop has the link"),
+            pytest.raises(RuntimeError, match="a loop uses the link"),
         ):
             blocking.run(_state(0x1001))

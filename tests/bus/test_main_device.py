@@ -360,7 +360,7 @@ def test_the_length_of_a_requested_object_is_checked() -> None:
     with MainDevice(demo_segment()) as main:
         main.scan()
         asked = Asking({2: DeviceRequest(inputs=(ObjectReference(0x60F4, 0, 16),))})
-        with pytest.raises(MappingError, match="has 32 bits, 16 were requested"):
+        with pytest.raises(MappingError, match="has 32 bits, but 16 were requested"):
             main.plan(asked)
 
 

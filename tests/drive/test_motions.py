@@ -130,7 +130,9 @@ def test_a_target_that_is_never_reached() -> None:
     rig.views.statusword[0] = ACKNOWLEDGED
     rig.run(steps, 5)
     rig.views.statusword[0] = 0
-    with pytest.raises(MoveError, match=r"did not report target reached \(statusword bit 10\)"):
+    with pytest.raises(
+        MoveError, match=r"did not report that it reached the target \(statusword bit 10\)"
+    ):
         rig.run(steps, 10_000)
     assert rig.bits == HALT
 

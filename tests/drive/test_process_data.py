@@ -254,7 +254,7 @@ def test_a_byte_that_two_requests_write(cell: Cell) -> None:
     lamp = Outputs(sub, channels={"lamp": (0x7010, 0, types.UINT)})
     with pytest.raises(
         ConfigurationError,
-        match=r"device 1 \(Force sensor\): byte 1 of its outputs is written by two requests: "
+        match=r"device 1 \(Force sensor\): two requests write byte 1 of its outputs: "
         r"Outputs\(1 Force sensor\) \(lamp\) and ProcessData\(1 Force sensor\)",
     ):
         cell.main.plan(lamp, ProcessData(sub))

@@ -94,7 +94,7 @@ def test_a_device_that_denies_pdo_assignment_gets_no_other_pdo_to_rewrite() -> N
     device = servo(0, fixed=True)
     free = Pdo(0x1A01, (), None)
     device = may(replace(device, input_pdos=(*device.input_pdos, free)), pdo_assign=False)
-    with pytest.raises(MappingError, match="are fixed, and no other one can be assigned"):
+    with pytest.raises(MappingError, match="are fixed, and no other PDO can be assigned"):
         make_mapping(device, Direction.INPUT, [FOLLOWING_ERROR])
 
 
@@ -194,7 +194,9 @@ def test_a_device_without_process_data_is_reported() -> None:
 
 
 def test_a_wrong_length_is_reported() -> None:
-    with pytest.raises(MappingError, match="is mapped with 32 bits, 16 were requested") as caught:
+    with pytest.raises(
+        MappingError, match="is mapped with 32 bits, but 16 were requested"
+    ) as caught:
         make_mapping(servo(0), Direction.INPUT, [ObjectReference(0x6064, 0, 16)])
     assert "0x6064:00 is already mapped with 32 bits" in caught.value.message
 
@@ -204,7 +206,7 @@ def test_a_wrong_length_is_reported() -> None:
     [
         (ObjectInformation(0x60F4, 0, 0), "does not exist"),
         (ObjectInformation(0x60F4, 0, 32, input_mappable=False), "cannot be mapped"),
-        (ObjectInformation(0x60F4, 0, 16), "has 16 bits, 32 were requested"),
+        (ObjectInformation(0x60F4, 0, 16), "has 16 bits, but 32 were requested"),
     ],
 )
 def test_the_dictionary_decides_on_a_mapping(known: ObjectInformation, match: str) -> None:

@@ -273,8 +273,8 @@ def test_a_device_that_exceeds_a_datagram_is_refused_with_both_numbers(
         )
     text = str(caught.value)
     assert f"701 bytes of outputs and {limit - 700} bytes of inputs" in text
-    assert f"{limit + 1} bytes of process data" in text
-    assert f"holds {limit} bytes" in text
+    assert f"{limit + 1} bytes; the process data of a device" in text
+    assert f"one datagram of {limit} bytes" in text
     assert "1 bytes less" in text
 
 
@@ -283,7 +283,7 @@ def test_more_frames_in_a_cycle_than_indices_are_refused_by_the_plan() -> None:
     assert len(make_plan(devices[:32], options=PlanOptions(period=5e-3)).cycle.frames) == 32
     with pytest.raises(ConfigurationError) as caught:
         make_plan(devices, options=PlanOptions(period=5e-3))
-    assert "33 frames in one cycle; the limit is 32" in str(caught.value)
+    assert "too many frames in one cycle: 33; the limit is 32" in str(caught.value)
     assert "exact_matching=True" in str(caught.value)
     exact = make_plan(devices, options=PlanOptions(period=5e-3, exact_matching=True))
     assert len(exact.cycle.frames) == 33
@@ -328,7 +328,7 @@ def test_acyclic_frames_get_the_remaining_wire_time() -> None:
 
 
 def test_a_request_for_a_missing_device() -> None:
-    with pytest.raises(ConfigurationError, match="device 9; the segment has 6"):
+    with pytest.raises(ConfigurationError, match="device 9, but the segment has 6"):
         make_plan(demo(), [asks(9)])
 
 

@@ -192,7 +192,9 @@ def assert_listed(main: cat.MainDevice, sub: cat.SubDevice) -> None:
 
 def assert_named(error: Exception | None) -> None:
     assert error is None or str(error).startswith(f"device {STRANGE}"), error
-    assert "its data cannot be used" not in str(error), error  # not an error of the decoder
+    assert "cannot use the data of the device" not in str(error), (
+        error
+    )  # not an error of the decoder
 
 
 @settings(max_examples=100)

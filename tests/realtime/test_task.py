@@ -96,7 +96,7 @@ def test_errors_before_the_start():
     tasks = Tasks(Task(idle, period=1e-3))
     with pytest.raises(RuntimeError, match="have not been started"):
         tasks.join()
-    with pytest.raises(KeyError, match="running tasks: none"):
+    with pytest.raises(KeyError, match="started tasks: none"):
         tasks["idle"]
     with pytest.raises(RuntimeError, match="no task was started with this signal"):
         Signal().set()

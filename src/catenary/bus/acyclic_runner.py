@@ -104,7 +104,7 @@ class AcyclicRunner:
         return pending
 
     def run(self, procedure: Procedure[T]) -> T:
-        """Run a procedure and return its result. Must not be called in the loop's thread.
+        """Run a procedure and return its result. Do not call this in the loop's thread.
 
         Raises:
             RuntimeError: The caller is the loop's thread, which would deadlock.
@@ -149,7 +149,7 @@ class AcyclicRunner:
         self._send(now)
 
     def close(self) -> None:
-        """End all procedures; their callers get LoopError."""
+        """End all procedures. Their callers get LoopError."""
         with self._lock:
             self._closed = True
             left = [*self._active, *self._submitted]

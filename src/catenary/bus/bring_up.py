@@ -1,4 +1,4 @@
-"""From PRE-OP to SAFE-OP: read mappings for a plan, and write the plan to the devices."""
+"""Steps from PRE-OP to SAFE-OP: read the mappings for a plan, and write the plan."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ def describe_mappings(
         runner: Runner of the procedures.
         subs: Devices of the segment.
         requests: Process-data requests.
-        period_ns: Period of the cycle.
+        period_ns: Period of the cycle [ns].
     """
     asked = gather_requests(requests, period_ns)
     with_coe = [sub for sub in subs if sub.description.coe]
@@ -80,7 +80,7 @@ def bring_to_safe_op(
         runner: Runner of the procedures.
         subs: Devices of the segment.
         plan: Plan to write.
-        epoch_ns: System time minus link time.
+        epoch_ns: System time minus link time [ns].
         ring: Ring link of the segment; None for a line.
 
     Returns:
@@ -119,7 +119,7 @@ def bring_to_safe_op(
 def _renewed(sub: SubDevice, request: DeviceRequest | None) -> Procedure[DeviceDescription]:
     """Return the current description of a device.
 
-    If a device without requests does not answer, return its description from the scan.
+    If a device without requests cannot be read, return its description from the scan.
     """
     reading = within(READ_TIMEOUT, sub.station, _describe(sub, request or DeviceRequest()))
     try:
@@ -156,7 +156,7 @@ def _with_objects(
     device: DeviceDescription,
     missing: Sequence[ObjectReference] | Sequence[StartUp],
 ) -> Procedure[DeviceDescription]:
-    """Return the description with the dictionary's entries of missing objects."""
+    """Return the description, with the dictionary entries of the missing objects added."""
     for reference in missing:
         if device.known_object(reference.index, reference.subindex) is None:
             found = yield from read_object(channel, device, reference.index, reference.subindex)

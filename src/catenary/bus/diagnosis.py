@@ -20,7 +20,7 @@ from catenary.wire.error_counters import ErrorCounters
 
 @dataclass(frozen=True, slots=True)
 class Diagnosis:
-    """Result of a diagnosis; `str()` describes it.
+    """Result of a diagnosis. `str()` returns it as text.
 
     `counters` holds the counts in the judged time span, by position; None for a silent device.
     `totals` holds the counts since power-up.
@@ -55,8 +55,8 @@ def diagnose(
 
     Args:
         subs: Devices to read.
-        since: Earlier diagnosis that starts the judged time span; None for power-up.
-        lost_frames: Number of frames lost or damaged in the same time span.
+        since: Earlier diagnosis to count from. None counts from the power-up of the devices.
+        lost_frames: Number of frames lost or damaged since then.
         ring: True if the segment is a ring.
     """
     stations = [sub.station for sub in subs]
@@ -86,7 +86,7 @@ def _wiring(topology: Topology) -> list[Finding]:
 
 
 def _state_errors(names: Names, answers: Sequence[Answer]) -> list[Finding]:
-    """Return a finding for each device in a state with an error."""
+    """Return a finding for each device whose AL status has the error flag."""
     found = []
     for answer in answers:
         if answer.word is None or not answer.word & ERROR_FLAG:

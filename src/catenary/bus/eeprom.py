@@ -16,7 +16,7 @@ from catenary.wire.sii import CHECKSUM_WORD, CONFIGURATION_WORDS
 T = TypeVar("T")
 Progress: TypeAlias = Callable[[int, int], None]  # words done, words in total
 
-WORDS_READ = 256  # between two reports
+WORDS_READ = 256  # words between two progress reports
 WORDS_WRITTEN = 16
 
 
@@ -44,7 +44,7 @@ def read_eeprom(
         main: MainDevice of the device.
         station: Device.
         size: Number of bytes.
-        progress: Called with (words done, words in total).
+        progress: Function to call with (words done, words in total).
     """
     total = size // 2
     data = b""
@@ -58,13 +58,13 @@ def read_eeprom(
 def write_eeprom(
     main: Conversing, station: Station, wanted: Sequence[Change], *, progress: Progress = silent
 ) -> None:
-    """Write words in order, and read each back.
+    """Write words in order, and read each word back.
 
     Args:
         main: MainDevice of the device.
         station: Device.
         wanted: Words to write.
-        progress: Called with (words done, words in total).
+        progress: Function to call with (words done, words in total).
 
     Raises:
         EepromError: A write failed. The message names the progress and the resulting state.
@@ -88,8 +88,8 @@ def aftermath(wanted: Sequence[Change], done: int, begun: int) -> str:
 
     Args:
         wanted: Words to write.
-        done: Number of words that are written.
-        begun: Number of words that may be written.
+        done: Number of words that are certainly written.
+        begun: Number of words whose write has begun.
     """
     touched = any(each.word < CONFIGURATION_WORDS for each in wanted[:begun])
     sealed = all(each.word != CHECKSUM_WORD for each in wanted[done:])
@@ -99,4 +99,4 @@ def aftermath(wanted: Sequence[Change], done: int, begun: int) -> str:
             f"{how}, and the checksum may be wrong: after the next power-up the controller may not "
             "load its configuration, but its EEPROM can still be written"
         )
-    return f"{how}: it starts as before, but its description is a mixture of old and new"
+    return f"{how}: the device starts as before, but its EEPROM is a mixture of old and new words"

@@ -17,7 +17,7 @@ from catenary.bus.thread_priority import step_behind
 if TYPE_CHECKING:
     import logging
 
-CAPACITY = 1000  # events that are kept until they are fetched
+CAPACITY = 1000  # largest number of events that wait to be fetched
 CLOSE_TIMEOUT = 1.0  # [s] for a running callback
 
 Callback = Callable[[Event], object]
@@ -35,7 +35,7 @@ class LoopClock:
         return replace(event, time=event.time - zero * 1e-9) if zero else event
 
     def freeze(self) -> None:
-        """Keep the zero, and release the loop."""
+        """Keep the current zero, and drop the reference to the loop."""
         zero = self._zero_ns()
         self._zero_ns = lambda: zero
 
@@ -92,7 +92,7 @@ class Events:
         while self._pending:
             try:
                 yield _stamped(*self._pending.popleft())
-            except IndexError:  # another thread was faster
+            except IndexError:  # another thread has fetched the last event
                 return
 
     def __len__(self) -> int:
@@ -102,12 +102,13 @@ class Events:
         """Count event times from the first iteration of a loop.
 
         Args:
-            zero_ns: Returns the cycle start of that iteration on the link's clock; 0 before it.
+            zero_ns: Function that returns the cycle start of that iteration [ns, link's clock]; 0
+                before it.
         """
         self._clock = LoopClock(zero_ns)
 
     def end_loop(self) -> None:
-        """Take event times from the link's clock again. Events of the loop keep its clock."""
+        """Use the link's clock for new events. Pending events of the loop keep its clock."""
         if self._clock is not None:
             self._clock.freeze()
             self._clock = None
@@ -138,8 +139,9 @@ def _stamped(event: Event, clock: LoopClock | None) -> Event:
 class Callbacks:
     """Callbacks of a MainDevice and, in real time, the thread that calls them.
 
-    In virtual time, `deliver` calls them in the thread that advances the time: the order is the
-    same in every run. An exception of a callback is logged; the other callbacks still run.
+    In virtual time, `deliver` calls them in the thread that advances the time. The order is
+    therefore the same in every run. An exception of a callback is logged. The other callbacks
+    still run.
     """
 
     def __init__(self, capacity: int = CAPACITY) -> None:
@@ -167,9 +169,9 @@ class Callbacks:
                 self._thread.start()
 
     def deliver(self) -> None:
-        """Call the callbacks with the pending events in virtual time; otherwise, a thread does.
+        """In virtual time, call the callbacks with the pending events.
 
-        No effect inside a callback.
+        In real time, a thread calls them. No effect inside a callback.
         """
         if not self._callbacks or self.in_thread or self._delivering:
             return
@@ -197,7 +199,7 @@ class Callbacks:
                 return
             except queue.Full:
                 self.dropped += 1
-                with contextlib.suppress(queue.Empty):  # the thread was faster
+                with contextlib.suppress(queue.Empty):  # the thread has fetched the event
                     self._pending.get_nowait()
 
     def _serve(self) -> None:
@@ -212,7 +214,9 @@ class Callbacks:
             try:
                 callback(event)
             except Exception:  # an error in one callback must not stop the others
-                _logger().exception("%r raised at the event %s", callback, event)
+                _logger().exception(
+                    "callback %r raised an exception for the event %s", callback, event
+                )
 
 
 def _logger() -> logging.Logger:

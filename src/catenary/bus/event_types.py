@@ -48,7 +48,7 @@ class Emergency(Event):
 
     @property
     def text(self) -> str:
-        """Meaning of the error code by IEC 61800-7-201 and CiA 301."""
+        """Meaning of the error code according to IEC 61800-7-201 and CiA 301."""
         return error_text(self.error_code)
 
 
@@ -127,7 +127,10 @@ class DuplicateFrames(Event):
 
 @dataclass(frozen=True, slots=True)
 class ClockUnlocked(Event):
-    """Distributed clocks that left their bound. `sub` is the device with the largest difference."""
+    """Loss of synchronisation: the difference of at least one clock exceeds the bound.
+
+    `sub` is the device with the largest difference.
+    """
 
     difference: float  # from the reference clock [s]
     bound: float  # [s]
@@ -135,7 +138,10 @@ class ClockUnlocked(Event):
 
 @dataclass(frozen=True, slots=True)
 class ClockLocked(Event):
-    """Distributed clocks that are all within their bound; `sub` is None."""
+    """Synchronisation reached: the differences of all clocks are within the bound.
+
+    `sub` is None.
+    """
 
     difference: float  # largest difference from the reference clock [s]
     bound: float  # [s]

@@ -1,4 +1,4 @@
-"""FrameMaster: state changes and configuration of devices by frames of our own."""
+"""FrameMaster: state changes and configuration of devices by frames that this process sends."""
 
 from __future__ import annotations
 
@@ -73,7 +73,11 @@ class FrameMaster:
     def _judge_running(
         self, runner: BlockingRunner, device_count: int, states: int
     ) -> tuple[str, ...]:
-        """Return a note on devices that another program has left in SAFE-OP or OP."""
+        """Return a note on devices that another program has left in SAFE-OP or OP.
+
+        Raises:
+            LinkError: Another master refreshes their outputs, unless `force`.
+        """
         if states & STATE_MASK <= AlState.BOOT:
             return ()
         running = runner.run(find_running(device_count))
@@ -131,7 +135,7 @@ class FrameMaster:
         return self._main.converse(diagnose(subs, since=since, lost_frames=lost_frames, ring=ring))
 
     def read_mappings(self, requests: Sequence[ProcessDataRequest], period_ns: int) -> None:
-        """Read the mappings, and the dictionary entries of requested objects not mapped."""
+        """Read the mappings, and the dictionary entries of requested, unmapped objects."""
         from catenary.bus.bring_up import describe_mappings
 
         describe_mappings(self._main.runner, self._main.subs, requests, period_ns)

@@ -42,7 +42,7 @@ if TYPE_CHECKING:  # plan imports NumPy, which a scan does not need
 T = TypeVar("T")
 
 EPOCH_2000_NS = 946_684_800_000_000_000  # 2000-01-01 in Unix time
-LEAVE_TIMEOUT = 0.5  # [s] for each state on the way down; short for a broken segment
+LEAVE_TIMEOUT = 0.5  # [s] for each state change; short, because the segment may be broken
 
 
 class MainDevice:
@@ -61,9 +61,9 @@ class MainDevice:
     def __init__(self, source: LinkSource, *, force: bool = False) -> None:
         self.subs = SubDevices()  # devices of the last scan
         self.notes: tuple[str, ...] = ()  # irregularities found by the last scan
-        self.clock_delays_ns: tuple[int | None, ...] = ()  # to the first clock, by position
+        self.clock_delays_ns: tuple[int | None, ...] = ()  # from the first clock, by position
         self.clock_epoch_ns = 0  # system time of the clocks minus link time
-        self.events = Events()  # iterate, or get(timeout=)
+        self.events = Events()  # iterate over it, or call get(timeout=)
         self._callbacks = callbacks = Callbacks()
         events = self.events
         events.listen(lambda each: callbacks.report(events.stamped(each)))
@@ -105,7 +105,7 @@ class MainDevice:
 
     @property
     def counts(self) -> FrameCounts:
-        """Frames sent and lost outside the loop."""
+        """Frame counts outside a loop. Raises RuntimeError while a loop runs."""
         return self.runner.counts
 
     def open(self) -> Self:
@@ -153,7 +153,7 @@ class MainDevice:
         if self._is_inherited:
             return RuntimeError(
                 f"the MainDevice was opened by process {self._process}: a forked child cannot use "
-                "it; read in the parent, or open a new MainDevice when the parent is done"
+                "it; use it in the parent, or open a new MainDevice after the parent has closed it"
             )
         return RuntimeError("the MainDevice is not open: use it in a with block")
 
@@ -169,7 +169,7 @@ class MainDevice:
         return self._ownership.others or other_sockets(self._link)
 
     def close(self) -> None:
-        """Bring all devices to INIT, best effort, and close the link.
+        """Bring the devices of the last `scan` to INIT, if possible, and close the link.
 
         No effect in a forked child.
         """
@@ -206,7 +206,7 @@ class MainDevice:
     def mark(self, message: str, *, time: float | None = None) -> None:
         """Put a `Marker` event, which is shared and recorded like all events.
 
-        Never waits; any thread may call it.
+        Any thread may call it. It never waits.
 
         Args:
             message: Text of the marker.
@@ -231,8 +231,8 @@ class MainDevice:
         """Find all devices and bring them to PRE-OP.
 
         Devices that are still there keep their handles. A device that cannot be read or brought to
-        PRE-OP does not affect the others. Devices that a killed program left in SAFE-OP or OP are
-        reset; `notes` names them.
+        PRE-OP does not affect the others. Devices that another program left in SAFE-OP or OP
+        are reset, and `notes` names them.
 
         Args:
             expected: By position, an identity or (vendor, product); None accepts any device.
@@ -266,7 +266,7 @@ class MainDevice:
         `subs` does not change, and `close` leaves these devices in their states.
 
         Args:
-            names: True to read the EEPROMs, too. Otherwise, devices have no name or identity.
+            names: True to also read the EEPROMs. If False, devices have no name or identity.
         """
         found = self.master.passive_scan(names=names)
         return SubDevices([SubDevice(self, each, None) for each in found])
@@ -328,7 +328,7 @@ class MainDevice:
             execution: "threaded" or "inline", as for `Loop`.
             receive_mode: "poll", "wait" or "busy", as `Scheduling.receive`.
             optional: Positions of devices that may be absent.
-            watchdog: Watchdog time as for `Loop` [s].
+            watchdog: Watchdog time [s], as for `Loop`.
 
         Raises:
             MappingError: A device cannot map an object.
@@ -354,7 +354,7 @@ class MainDevice:
             period: Period of the cycle [s].
 
         Raises:
-            CatenaryError: A device is not in PRE-OP; this is its error from the scan.
+            CatenaryError: A device did not reach PRE-OP in the scan. This is its error.
         """
         self._raise_errors()
         from catenary.plan.options import period_in_ns
@@ -461,7 +461,7 @@ class MainDevice:
         return self._blocking
 
     def _raise_errors(self) -> None:
-        """Raise the first error of the scan."""
+        """Raise the first error of the scan, if any."""
         for sub in self.subs:
             if sub.error is not None:
                 raise sub.error
@@ -472,9 +472,9 @@ class MainDevice:
             errors[0].add_note(f"also: {other}")
 
     def _epoch_ns(self) -> int:
-        """Return EtherCAT time, which counts from 2000 (ETG.1000.4 §6.8), minus link time.
+        """Return EtherCAT time minus link time [ns]. EtherCAT time counts from 2000.
 
-        In virtual time it is 0, so that runs are repeatable.
+        ETG.1000.4 §6.8. In virtual time, return 0, so that runs are repeatable.
         """
         if lives_in_virtual_time(self.link):
             return 0

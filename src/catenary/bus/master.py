@@ -38,7 +38,7 @@ class MasterOwner(DeviceOwner, Protocol):
 
 
 class Master(Protocol):
-    """Interface to our own frames (`bus.FrameMaster`) or the kernel master (`igh.KernelMaster`).
+    """Interface to `bus.FrameMaster`, which sends its own frames, or to `igh.KernelMaster`.
 
     `MainDevice` documents the calls. A call that a master does not support raises
     ConfigurationError.
@@ -46,7 +46,7 @@ class Master(Protocol):
 
     @property
     def carrier(self) -> Carrier | None:
-        """Configured master that exchanges the process images; None for our own frames."""
+        """Master that exchanges the process images; None if the loop sends its own frames."""
 
     def scan(self) -> tuple[Sequence[SubDevice], tuple[str, ...]]:
         """Return the handles of all devices, in PRE-OP, and notes."""
@@ -72,7 +72,7 @@ class Master(Protocol):
 
         Args:
             plan: Plan to write.
-            epoch_ns: System time of the clocks minus link time.
+            epoch_ns: System time of the clocks minus link time [ns].
 
         Returns:
             By position, the delay after the first clock [ns]; empty if delays were not measured.

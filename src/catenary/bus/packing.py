@@ -1,7 +1,7 @@
 """Packing of procedures' requests into few frames, and unpacking of the replies.
 
 Requests keep their order, so the requests of one procedure in a step are processed in that order.
-All datagrams of a frame carry the frame's index, from the half reserved for procedures.
+All datagrams of a frame carry the index of the frame, 0x80 to 0xFF.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ def indices() -> Iterator[int]:
 
 
 def batches(requests: Sequence[Request]) -> list[list[int]]:
-    """Return the ranks of the requests that share a frame, in order.
+    """Return the requests of each frame, as lists of ranks in order.
 
     Raises:
         ValueError: A request is too long for a frame.
@@ -75,7 +75,7 @@ def replies_of(parcel: Parcel, frame: Frame, time_ns: int) -> list[Reply] | None
     Args:
         parcel: Frame that was sent.
         frame: Frame that was received.
-        time_ns: Time of reception.
+        time_ns: Time of reception [ns].
     """
     if len(frame.datagrams) != len(parcel.requests):
         return None

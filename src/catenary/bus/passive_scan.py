@@ -27,7 +27,7 @@ def passive_scan(
     Args:
         runner: Runner of the procedures.
         ring: Ring link; None for a line.
-        names: True to read the EEPROMs too.
+        names: True to also read the EEPROMs.
     """
     runner.flush()
     device_count = runner.run(count()).devices

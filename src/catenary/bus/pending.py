@@ -62,11 +62,11 @@ class Pending(Generic[T]):
         self._cancelled = not self._finished.is_set()
 
     def wait(self) -> None:
-        """Wait for the end. Must not be called in the loop's thread."""
+        """Wait for the end. Do not call this in the loop's thread."""
         self._finished.wait()  # bounded by the procedure's deadlines and the runner's close()
 
     def finish(self, error: CatenaryError | None = None) -> None:
-        """Mark the procedure as ended, or end it with an error. Called by the runner."""
+        """Mark the procedure as ended, or end it with an error. The runner calls this."""
         if error is not None and not self.task.done:
             self.task.cancel()
             self.task.error = error

@@ -14,7 +14,7 @@ class Task(Generic[T]):
 
     def __init__(self, procedure: Procedure[T]) -> None:
         self._procedure = procedure
-        self.requests: list[Request] = []  # of this step; may be empty
+        self.requests: list[Request] = []  # requests of this step; may be empty
         self.wake_ns: int | None = None  # end of the pause; None: no pause
         self.done = False
         self.error: BaseException | None = None
@@ -25,11 +25,11 @@ class Task(Generic[T]):
         self._advance(None, now_ns)
 
     def resume(self, replies: list[Reply], now_ns: int) -> None:
-        """Pass the replies of the last step (none after a pause), and run to the next step.
+        """Pass the replies of the last step to the procedure, and run it to the next step.
 
         Args:
-            replies: Replies in the order of the requests.
-            now_ns: Time of the link's clock.
+            replies: Replies in the order of the requests; empty after a pause.
+            now_ns: Time of the link's clock [ns].
         """
         self._advance(replies, now_ns)
 

@@ -93,7 +93,7 @@ def check_direction(state: RingState) -> None:
 def assign_from_both_ends(
     runner: BlockingRunner, ring: RingLink, device_count: int
 ) -> Sequence[StationRegisters]:
-    """Give the devices their station addresses; return their registers by position.
+    """Give the devices their station addresses, and return their registers by position.
 
     In an open ring, the devices after the cut are reached from the second end. A frame from there
     passes them unprocessed, turns at the cut, and is processed on its way back. The device at the
@@ -129,9 +129,9 @@ def end_for_clocks(
         The port; None if the ring is already open at that port.
 
     Raises:
-        ClockError: The ring is cut elsewhere: its two parts have no common time.
+        ClockError: The ring is cut elsewhere, so its two parts cannot be synchronised.
     """
-    device_count = runner.run(count()).devices  # updates the state
+    device_count = runner.run(count()).devices  # this also updates `ring.state`
     topology = make_topology([device.open_ports for device in devices], ring=True)
     state = ring.state
     if state.shape is not Shape.CLOSED:

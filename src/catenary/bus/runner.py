@@ -50,7 +50,7 @@ class FrameCounts:
 
 
 class LinkLent(RuntimeError):
-    """Error while a loop has the link. Nothing was sent; use the loop's runner."""
+    """Error of a call while a loop uses the link. Nothing was sent. Use the loop's runner."""
 
 
 class BlockingRunner:
@@ -103,7 +103,7 @@ class BlockingRunner:
         return [task.result() for task in tasks]
 
     def lend(self) -> None:
-        """Give the link to a loop. Wait for running procedures, and refuse new ones."""
+        """Wait for running procedures, then give the link to a loop and refuse new procedures."""
         with self._lock:
             self._lent = True
 
@@ -115,7 +115,7 @@ class BlockingRunner:
     def _mine(self) -> Iterator[None]:
         with self._lock:
             if self._lent:
-                raise LinkLent("a loop has the link")
+                raise LinkLent("a loop uses the link: use the runner of the loop")
             yield
 
     def flush(self) -> None:
@@ -186,7 +186,7 @@ class BlockingRunner:
     ) -> None:
         """Receive the frames of one window, until a deadline."""
         deadline = self._link.now() + self._timeout_ns
-        while under_way and self._link.now() < deadline:  # bounded under a flood of alien frames
+        while under_way and self._link.now() < deadline:  # it also ends under a flood of frames
             raw = self._link.receive()
             if raw is not None:
                 self._take(raw, under_way, replies)

@@ -60,7 +60,7 @@ class Sdo:
     may call them. The iterating thread uses `request` and `request_write`, which do not wait.
 
     `type` is a type of `catenary.types`; without it, values are bytes. `complete` transfers all
-    subindices at once, from `subindex` 0 or 1 on; subindex 0 then has 16 bits. See `types.Array`
+    subindices at once, from `subindex` 0 or 1 on. Subindex 0 then has 16 bits. See `types.Array`
     and `types.Record`.
     """
 
@@ -104,13 +104,13 @@ class Sdo:
         Args:
             index: Index of the object.
             subindex: Subindex of the object.
-            type: Type of the value; None: bytes.
+            type: Type of the value; None returns bytes.
             complete: Read all subindices from `subindex` on.
-            limit: Largest size [bytes].
-            timeout: Deadline of a transfer in several segments [s].
+            limit: Largest accepted size [bytes].
+            timeout: Longest time of a transfer in several segments [s].
 
         Raises:
-            SdoAbort: The device refuses.
+            SdoAbort: The device refuses the transfer.
             DecodeError: The bytes are not a value of the type.
             MailboxError: The object is longer than `limit`, or takes longer than `timeout`.
         """
@@ -140,11 +140,11 @@ class Sdo:
             index: Index of the object.
             subindex: Subindex of the object.
             value: Bytes, or a value of the type.
-            type: Type of the value.
+            type: Type of the value; None if `value` is bytes.
             complete: Write all subindices from `subindex` on.
 
         Raises:
-            SdoAbort: The device refuses.
+            SdoAbort: The device refuses the transfer.
         """
         self._sub.main.converse(self._download(index, subindex, value, type, complete))
 
@@ -181,7 +181,7 @@ class Sdo:
     ) -> Pending[T] | Pending[bytes]:
         """Read an object without waiting: poll `done`, then call `result()`.
 
-        Arguments as for `read`. Without a loop, the answer is available at once.
+        The arguments are those of `read`. Without a loop, the answer is available at once.
         """
         asked = self._upload(index, subindex, complete, limit, timeout)
         if type is None:
@@ -207,12 +207,12 @@ class Sdo:
     ) -> Pending[None]:
         """Write an object without waiting: poll `done`, then call `result()`.
 
-        `result()` raises the error, if any. Arguments as for `write`.
+        `result()` raises the error, if any. The arguments are those of `write`.
         """
         return self._sub.main.request(self._download(index, subindex, value, type, complete))
 
     def list(self, kind: ListType = ListType.ALL) -> tuple[ObjectDescription, ...]:
-        """Read the objects of a kind, by index, as the device describes them (SDO information).
+        """Read the descriptions of all objects of a kind, by index (SDO information).
 
         The device is queried once per object. If the device lists an object without describing it,
         only the index is known, and `object_code` is 0. `notes` names these objects, and the
@@ -220,7 +220,7 @@ class Sdo:
 
         Raises:
             SdoAbort: The device refuses the list.
-            MailboxError: The device has no such service.
+            MailboxError: The device does not support SDO information.
         """
         self.notes = ()
         found, self.notes = self._sub.main.converse(list_objects(self._channel(), kind))
@@ -229,7 +229,7 @@ class Sdo:
     def describe(self, index: int) -> DescribedObject:
         """Read one object with its entries: types, lengths, access and names.
 
-        Notes name the entries that the device does not describe.
+        The `notes` of the result name the entries that the device does not describe.
         """
         return self._sub.main.converse(describe_object(self._channel(index), index))
 

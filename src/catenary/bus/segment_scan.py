@@ -51,7 +51,7 @@ def find(registers: StationRegisters) -> Procedure[ScannedDevice]:
 
 def _unreadable(station: Station, error: Exception) -> SegmentError:
     return SegmentError(
-        f"{station}: its data cannot be used: {error}",
+        f"{station}: cannot use the data of the device: {error}",
         hint="its EEPROM or its firmware is faulty; please report it",
     )
 
@@ -104,7 +104,7 @@ def described(registers: StationRegisters, image: bytes) -> DeviceDescription:
 
 
 def with_places(devices: Sequence[DeviceDescription]) -> tuple[DeviceDescription, ...]:
-    """Return the devices with their parents."""
+    """Return the descriptions, with the parent of each device."""
     places = tree([device.open_ports for device in devices])
     return tuple(
         replace(device, parent=place.parent, parent_port=place.parent_port)

@@ -56,7 +56,7 @@ def _below_safe_op(runner: BlockingRunner, chosen: Mapping[int, DeviceDescriptio
 def _configure(
     runner: BlockingRunner, devices: Sequence[DeviceDescription], positions: Iterable[int]
 ) -> dict[int, CatenaryError]:
-    """Bring devices to SAFE-OP, beginning at INIT; return the errors of failed ones."""
+    """Bring devices from INIT to SAFE-OP. Return the errors of those that failed."""
     started = {p: restart(_station(devices[p]), devices[p]) for p in positions}
     ready, failed = _parted(_run(runner, started))
     plan = make_plan([ready.get(device.position, device) for device in devices])

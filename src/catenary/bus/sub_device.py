@@ -47,8 +47,9 @@ class SubDevice:
         self.description = description
         self.channel = channel  # None if it has no mailbox
         self.state: AlState | None = None  # last known state; None if unknown
-        self.error: CatenaryError | None = None  # of the last scan, if it did not reach PRE-OP
-        self.sync_types: dict[int, bytes] = {}  # 0x1C32:01, 0x1C33:01 before a loop with clocks
+        self.error: CatenaryError | None = None  # of the last scan, if PRE-OP was not reached
+        # 0x1C32:01 and 0x1C33:01 before the first loop with clocks, to restore them
+        self.sync_types: dict[int, bytes] = {}
         self.sdo = Sdo(self)
 
     @property
@@ -58,7 +59,7 @@ class SubDevice:
 
     @property
     def name(self) -> str:
-        """Name in its SII, such as "EL2004"; empty if there is none."""
+        """Name in the SII, such as "EL2004"; empty if there is none."""
         return self.description.name
 
     @property
@@ -78,12 +79,12 @@ class SubDevice:
 
     @property
     def is_drive(self) -> bool:
-        """True if it has CiA 402 axes."""
+        """True if the device has CiA 402 axes."""
         return self.description.is_drive
 
     @property
     def slots(self) -> tuple[int, ...]:
-        """Slots of its CiA 402 axes. The objects of slot k are 0x800·k above those of slot 0."""
+        """Slots of the CiA 402 axes. The objects of slot k are 0x800·k above those of slot 0."""
         return self.description.slots
 
     @property
@@ -103,7 +104,7 @@ class SubDevice:
         return Station(self.position, self.description.station_address, self.name)
 
     def read_state(self) -> DeviceState:
-        """Read its EtherCAT state."""
+        """Read the EtherCAT state of the device."""
         found = self.main.converse(read_state(self.station))
         self.state = found.state
         return found

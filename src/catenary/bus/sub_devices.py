@@ -33,7 +33,7 @@ class SubDevices(Sequence[SubDevice]):
         """Return the device with this station alias.
 
         Raises:
-            SegmentError: No device has it, or several devices have it.
+            SegmentError: No device has the alias, or several devices have it.
             ValueError: The alias is not in the range 1 to 65535. 0 means that a device has no
                 alias.
         """

@@ -11,9 +11,9 @@ BEHIND = 1  # lowest SCHED_FIFO priority
 def step_behind() -> None:
     """Run the calling thread at the lowest SCHED_FIFO priority, if it inherited a real-time one.
 
-    A thread inherits the scheduling of its creator. In a real-time program that is the loop's
-    priority, which would delay cycle starts. The thread stays a real-time thread, because ordinary
-    programs must not preempt it while it holds the GIL, which an inline loop needs.
+    A thread inherits the scheduling of its creator. In a real-time program this is the priority of
+    the loop, and the thread would delay cycle starts. The thread stays a real-time thread, because
+    ordinary programs must not preempt it while it holds the GIL, which an inline loop needs.
     """
     policy = os.sched_getscheduler(0) & ~os.SCHED_RESET_ON_FORK
     if policy in (os.SCHED_FIFO, os.SCHED_RR):

@@ -2,12 +2,12 @@
 
 A block has two parts. A value holds its settings (`Cascade(...)`) and provides `.parameters` and
 `.memory` as flat rows of float64. A step function computes one step of one axis from these rows
-(`cascade(memory, parameters, i, ...)`). All state is in `memory`; fill it with zeros to reset the
+(`cascade(memory, parameters, i, ...)`). All state is in `memory`. Fill it with zeros to reset the
 block.
 """
 
-# Steps take their numbers one by one, up to ten parameters: laws call them compiled by numba, where
-# a frozen options class is not available.
+# Step functions have up to ten parameters, because laws call them in code compiled by Numba, which
+# does not support frozen options classes.
 from catenary.control.admittance import NaturalAdmittance, natural_admittance
 from catenary.control.cascade import Cascade, cascade
 from catenary.control.collision import Residual, Threshold, model_residual, residual, threshold

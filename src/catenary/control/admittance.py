@@ -1,4 +1,4 @@
-"""Natural admittance control: an axis yields to a measured torque with its natural inertia."""
+"""Natural admittance control: an axis yields to a measured torque with its physical inertia."""
 
 from __future__ import annotations
 
@@ -85,8 +85,8 @@ def natural_admittance(
     B (goal' - v) + G (v - velocity).
 
     Args:
-        memory: of a `NaturalAdmittance`.
-        parameters: of a `NaturalAdmittance`.
+        memory: `NaturalAdmittance.memory`.
+        parameters: `NaturalAdmittance.parameters`.
         i: number of the axis.
         goal: target position [rad].
         goal_velocity: velocity of the target [rad/s].
@@ -99,7 +99,7 @@ def natural_admittance(
         Torque [N·m].
 
     Raises:
-        ValueError: The parameters are those of another block.
+        ValueError: `parameters` belongs to a different block.
     """
     if parameters[0] != KIND:
         raise ValueError("natural_admittance: not the parameters of a NaturalAdmittance")

@@ -69,12 +69,12 @@ def cascade(
 ) -> float:
     """Compute one step of axis `i`.
 
-    The rate limits of the first step start from the measured velocity and from `feed_forward`. The
-    torque is therefore at its full gravity part when the brake opens.
+    The rate limits of the first step start from the measured velocity and from `feed_forward`. When
+    the brake opens, the torque therefore already balances gravity.
 
     Args:
-        memory: of a `Cascade`.
-        parameters: of a `Cascade`.
+        memory: `Cascade.memory`.
+        parameters: `Cascade.parameters`.
         i: number of the axis.
         goal: target position [rad].
         goal_velocity: velocity of the target [rad/s].
@@ -88,7 +88,7 @@ def cascade(
         Torque [N·m].
 
     Raises:
-        ValueError: The parameters are those of another block.
+        ValueError: `parameters` belongs to a different block.
     """
     if parameters[0] != KIND:
         raise ValueError("cascade: not the parameters of a Cascade")

@@ -27,14 +27,14 @@ class Residual:
     Args:
         axes: number of axes.
         gain: bandwidth of the observer [1/s].
-        inertia: inertia of each axis [kg·m²], for `residual`. `model_residual` uses that of its
-            model instead.
+        inertia: inertia of each axis [kg·m²], for `residual`. `model_residual` uses the inertia of
+            its model instead.
 
     Source: r = K (p - ∫ (τ + Cᵀ q̇ - g + r) dt) with p = M q̇. De Luca and Mattone, Sensorless robot
     collision detection and hybrid force/motion control, ICRA 2005; Haddadin, De Luca and
     Albu-Schäffer, Robot collisions: a survey, IEEE T-RO 33(6), 2017, §IV. This implementation
     replaces p and the integral of Ṁ q̇ by one sum, M(q_k) (q̇_k - q̇_k-1). Summation by parts shows
-    that both are equal; the sum needs one evaluation of the model.
+    that both are equal. The sum needs only one evaluation of the model.
     """
 
     axes: int
@@ -64,8 +64,8 @@ def residual(
     """Compute one step of axis `i`.
 
     Args:
-        memory: of a `Residual`.
-        parameters: of a `Residual`.
+        memory: `Residual.memory`.
+        parameters: `Residual.parameters`.
         i: number of the axis.
         torque: known torque on the axis [N·m]: motor torque minus gravity and friction.
         velocity: measured velocity [rad/s].
@@ -75,7 +75,7 @@ def residual(
         Estimate of the external torque [N·m].
 
     Raises:
-        ValueError: The parameters are those of another block.
+        ValueError: `parameters` belongs to a different block.
     """
     m = RESIDUAL_STATES * i
     moved = parameters[2 + RESIDUAL_GAINS * i] * (velocity - memory[m + 2])
@@ -96,9 +96,9 @@ def model_residual(
     """Compute one step of all axes, with the inertia and gravity of a model.
 
     Args:
-        memory: of a `Residual`.
-        parameters: of a `Residual`.
-        model: memory of a `Dynamics`.
+        memory: `Residual.memory`.
+        parameters: `Residual.parameters`.
+        model: `Dynamics.memory`.
         torque: motor torques (n,) [N·m], minus the friction that the model does not contain. The
             model contains the `damping` of its joints.
         position: measured positions (n,) [rad].
@@ -172,14 +172,14 @@ def threshold(memory: Row, parameters: Row, i: int, value: float, dt: float) -> 
     """Return True if a value has exceeded its limit for longer than the accepted time.
 
     Args:
-        memory: of a `Threshold`.
-        parameters: of a `Threshold`.
+        memory: `Threshold.memory`.
+        parameters: `Threshold.parameters`.
         i: number of the axis.
         value: quantity to compare; its sign does not matter.
         dt: time since the previous step [s].
 
     Raises:
-        ValueError: The parameters are those of another block.
+        ValueError: `parameters` belongs to a different block.
     """
     if parameters[0] != THRESHOLD:
         raise ValueError("threshold: not the parameters of a Threshold")

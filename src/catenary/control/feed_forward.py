@@ -14,12 +14,12 @@ FRICTION = 6.0
 
 @dataclass(frozen=True)
 class FeedForward:
-    """Settings of a feed-forward torque; the block has no memory.
+    """Settings of a feed-forward torque. The block has no memory.
 
     Args:
         axes: number of axes.
-        inertia: of each axis [kg·m²].
-        damping: of each axis [N·m·s/rad].
+        inertia: inertia of each axis [kg·m²].
+        damping: damping of each axis [N·m·s/rad].
     """
 
     axes: int
@@ -43,13 +43,13 @@ def feed_forward(parameters: Row, i: int, velocity: float, acceleration: float) 
     """Return the torque of axis `i` for a motion, J q̈ + b q̇ [N·m].
 
     Args:
-        parameters: of a `FeedForward`.
+        parameters: `FeedForward.parameters`.
         i: number of the axis.
         velocity: target velocity [rad/s].
         acceleration: target acceleration [rad/s²].
 
     Raises:
-        ValueError: The parameters are those of another block.
+        ValueError: `parameters` belongs to a different block.
     """
     if parameters[0] != FEED_FORWARD:
         raise ValueError("feed_forward: not the parameters of a FeedForward")
@@ -59,7 +59,7 @@ def feed_forward(parameters: Row, i: int, velocity: float, acceleration: float) 
 
 @dataclass(frozen=True)
 class Friction:
-    """Settings of a friction model; the block has no memory.
+    """Settings of a friction model. The block has no memory.
 
     Args:
         axes: number of axes.
@@ -94,13 +94,13 @@ def friction(parameters: Row, i: int, velocity: float) -> float:
     """Return the friction torque of axis `i` at a velocity, b q̇ + T_c tanh(q̇ / v_t) [N·m].
 
     Args:
-        parameters: of a `Friction`.
+        parameters: `Friction.parameters`.
         i: number of the axis.
         velocity: target velocity [rad/s]. With the measured velocity, an axis at rest would
             oscillate.
 
     Raises:
-        ValueError: The parameters are those of another block.
+        ValueError: `parameters` belongs to a different block.
     """
     if parameters[0] != FRICTION:
         raise ValueError("friction: not the parameters of a Friction")

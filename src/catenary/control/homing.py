@@ -1,4 +1,4 @@
-"""Homing of a gripper against its hard stops, which the commanded torque indicates."""
+"""Homing of a gripper against its hard stops, which are detected by the commanded torque."""
 
 from __future__ import annotations
 
@@ -23,8 +23,8 @@ FAILED = -1.0
 class Stops:
     """Results of homing for each axis, each with shape (n,).
 
-    `open` and `closed` are the positions of the stops, `meeting` is the position where the axes
-    meet [rad]; NaN while a result is not known. `failed` is True for an axis that found no stop
+    `open` and `closed` are the positions of the stops [rad]. `meeting` is the position where the
+    axes meet [rad]. An unknown result is NaN. `failed` is True for an axis that found no stop
     within its travel, or was blocked on its return.
     """
 
@@ -36,14 +36,14 @@ class Stops:
 
 @dataclass(frozen=True)
 class Homing:
-    """Settings of homing in three phases, as published for RDDA.
+    """Settings of homing in three phases, as published for the gripper RDDA.
 
     1. All axes open until each is at its open stop.
     2. One axis after the other closes to its closed stop and returns.
     3. All axes close until they meet.
 
-    Homing fails if an axis finds no stop within its travel, or is blocked on its return. Then all
-    axes stop. The torque limit of the velocity loop must be above `torque`; otherwise no stop is
+    Homing fails if an axis finds no stop within its travel, or is blocked on its return. All axes
+    then stop. The torque limit of the velocity loop must be above `torque`; otherwise no stop is
     ever detected.
 
     Args:
@@ -89,8 +89,8 @@ def homing(
     """Compute one step of axis `i`.
 
     Args:
-        memory: of a `Homing`.
-        parameters: of a `Homing`.
+        memory: `Homing.memory`.
+        parameters: `Homing.parameters`.
         i: number of the axis.
         position: measured position [rad].
         torque: torque that the velocity loop commanded in the previous step [N·m].
@@ -100,7 +100,7 @@ def homing(
         Velocity set-point [rad/s].
 
     Raises:
-        ValueError: The parameters are those of another block.
+        ValueError: `parameters` belongs to a different block.
     """
     if parameters[0] != KIND:
         raise ValueError("homing: not the parameters of a Homing")
@@ -125,7 +125,7 @@ def homed(memory: Row) -> bool:
 
 
 def stops(memory: Row) -> Stops:
-    """Return the results so far, from the memory of a `Homing`."""
+    """Return the results of a homing so far, from its memory."""
     rows = memory.reshape(-1, STATES)
     passed = [OPENING, CLOSING, MEETING]
     reached = np.where(rows[:, :1] == FAILED, rows[:, 1:2], rows[:, :1]) > passed

@@ -20,14 +20,14 @@ Vector = npt.NDArray[np.float64] | Sequence[float]
 
 @dataclass(frozen=True)
 class Chirp:
-    """Settings of a sine sweep whose frequency changes exponentially; the block has no memory.
+    """Settings of a sine sweep whose frequency changes exponentially. The block has no memory.
 
     Args:
         axes: number of axes.
-        amplitude: in the unit of the quantity that the sweep is added to.
+        amplitude: amplitude, in the unit of the quantity to which the sweep is added.
         first: frequency at the start [Hz].
         last: frequency at the end [Hz].
-        duration: of the sweep [s]. The value is zero afterwards.
+        duration: duration of the sweep [s]. The value is zero afterwards.
 
     Source: Farina, Simultaneous measurement of impulse response and distortion with a swept-sine
     technique, AES 108, 2000.
@@ -65,7 +65,7 @@ def chirp(parameters: Row, i: int, time: float) -> float:
     Args:
         parameters: `Chirp.parameters`.
         i: number of the axis.
-        time: since the start of the sweep [s].
+        time: time since the start of the sweep [s].
 
     Raises:
         ValueError: `parameters` belongs to a different block.
@@ -87,8 +87,8 @@ class FrequencyResponse:
     """Frequency response of one axis at k frequencies.
 
     `frequency` (k,) is in Hz. `response` (k,) is the complex ratio of output to input. `coherence`
-    (k,), 0 to 1, is the part of the output that depends linearly on the input: a response is
-    reliable where it is close to 1.
+    (k,), 0 to 1, is the part of the output that depends linearly on the input. The response is
+    reliable where the coherence is close to 1.
     """
 
     frequency: Row
@@ -117,7 +117,7 @@ def frequency_response(
         given: input (k,), in any unit.
         measured: output (k,), in any unit.
         period: time between two samples [s].
-        segment: samples per segment; the segments overlap by half and are averaged. None means an
+        segment: samples per segment. The segments overlap by half and are averaged. None means an
             eighth of the recording. The resolution is 1 / (segment · period) [Hz].
 
     Returns:

@@ -22,20 +22,19 @@ class Impedance:
 
     A spring and a damper pull each axis to its target. A disturbance observer compensates friction.
     The nominal plant is 1 / (m s + b). The disturbance is the torque on this plant other than the
-    commanded and the measured external torque; dry friction is part of it.
+    commanded and the measured external torque. It includes dry friction.
 
     Without a torque sensor, the observer cannot distinguish friction from a contact. Set
-    `compensation` to the size of the dry friction; the axis then yields to larger torques as the
-    spring does. With a sensor, pass `external` to the step; the observer then compensates the
-    friction completely.
+    `compensation` to the size of the dry friction. To larger torques, the axis then yields like the
+    spring. With a sensor, pass `external` to the step. The observer then compensates all friction.
 
     Args:
         axes: number of axes.
-        stiffness: of the spring [N·m/rad].
-        damping: of the damper [N·m·s/rad].
+        stiffness: stiffness of the spring [N·m/rad].
+        damping: damping of the damper [N·m·s/rad].
         inertia: m of the nominal plant [kg·m²].
         friction: b of the nominal plant [N·m·s/rad].
-        bandwidth: of the observer [rad/s]; 0 disables it.
+        bandwidth: bandwidth of the observer [rad/s]; 0 disables the observer.
         compensation: largest torque that the observer compensates [N·m].
         limit: largest torque, in both directions [N·m].
 
@@ -90,8 +89,8 @@ def impedance(
     """Compute one step of axis `i`.
 
     Args:
-        memory: of an `Impedance`.
-        parameters: of an `Impedance`.
+        memory: `Impedance.memory`.
+        parameters: `Impedance.parameters`.
         i: number of the axis.
         goal: target position [rad].
         goal_velocity: velocity of the target [rad/s].
@@ -105,7 +104,7 @@ def impedance(
         Torque [N·m].
 
     Raises:
-        ValueError: The parameters are those of another block.
+        ValueError: `parameters` belongs to a different block.
     """
     if parameters[0] != KIND:
         raise ValueError("impedance: not the parameters of an Impedance")

@@ -67,13 +67,13 @@ def low_pass(memory: Row, parameters: Row, i: int, value: float) -> float:
     """Return the next output of axis `i`, in the unit of `value`.
 
     Args:
-        memory: of a `LowPass`.
-        parameters: of a `LowPass`.
+        memory: `LowPass.memory`.
+        parameters: `LowPass.parameters`.
         i: number of the axis.
         value: input.
 
     Raises:
-        ValueError: The parameters are those of another block.
+        ValueError: `parameters` belongs to a different block.
     """
     if parameters[0] != KIND:
         raise ValueError("low_pass: not the parameters of a LowPass")

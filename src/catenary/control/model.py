@@ -49,7 +49,7 @@ def load_model(
         armature: inertia to add to each joint [kg·m²].
 
     Raises:
-        ConfigurationError: MuJoCo, the file or a joint is missing, or a joint is not usable.
+        ConfigurationError: MuJoCo, the file or a joint is missing, or an axis cannot move a joint.
     """
     mujoco = _mujoco()
     native = _native(mujoco, path)
@@ -112,12 +112,12 @@ def _chosen(
             raise ConfigurationError(
                 f"{path}: joint {name!r} is neither hinge nor slide, so a single axis cannot "
                 "move it",
-                hint=f"name the joints of the axes, Dynamics(..., joints=[...]); {known}",
+                hint=f"name the joints of the axes: Dynamics(..., joints=[...]); {known}",
             )
     if axes is not None and len(chosen) != axes:
         raise ConfigurationError(
             f"{path}: {len(chosen)} joints ({', '.join(chosen)}) for {axes} axes",
-            hint=f"name one joint per axis, in their order, Dynamics(..., joints=[...]); {known}",
+            hint=f"name one joint for each axis, in order: Dynamics(..., joints=[...]); {known}",
         )
     if not chosen:
         raise ConfigurationError(

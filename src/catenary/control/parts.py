@@ -14,7 +14,7 @@ PerAxis = float | Sequence[float] | npt.NDArray[np.float64]
 
 
 def join(*parts: Sequence[float] | Row) -> Row:
-    """Join several rows into one; `part(row, k)` returns part k. A part may be empty."""
+    """Join several rows into one. `part(row, k)` returns row k again. A row may be empty."""
     rows = [np.asarray(part, dtype=np.float64).ravel() for part in parts]
     first = len(rows) + 2  # count, start of each part, end
     begins = first + np.cumsum([0, *map(len, rows)])
@@ -64,10 +64,10 @@ def every(step: Callable[..., float], rows: Sequence[Row], *inputs: PerAxis) -> 
 def restart(memory: Row, i: int, n: int) -> None:
     """Reset the state of one axis. Use it while the axis is not enabled.
 
-    Integrators become zero; filters start at their next input.
+    Integrators become zero. Filters start again from their next input.
 
     Args:
-        memory: of one block.
+        memory: memory of one block.
         i: number of the axis.
         n: number of axes of the block.
     """
@@ -80,7 +80,7 @@ def checked(name: str, value: PerAxis, n: int, *, least: float = 0.0, above: boo
     """Return an option as one number per axis, after a check of its range.
 
     Args:
-        name: of the option, for messages.
+        name: name of the option, for messages.
         value: one number for all axes, or one per axis.
         n: number of axes.
         least: smallest valid value.

@@ -89,8 +89,8 @@ def pid(
     """Compute one step of axis `i`.
 
     Args:
-        memory: of a `Pid`.
-        parameters: of a `Pid`.
+        memory: `Pid.memory`.
+        parameters: `Pid.parameters`.
         i: number of the axis.
         reference: target value.
         measured: measured value.
@@ -101,7 +101,7 @@ def pid(
         Output.
 
     Raises:
-        ValueError: The parameters are those of another block.
+        ValueError: `parameters` belongs to a different block.
     """
     if parameters[0] != KIND:
         raise ValueError("pid: not the parameters of a Pid")
@@ -132,7 +132,7 @@ def pid_step(
 ) -> float:
     """Compute one step with the state that starts at `memory[m]` and the gains at `parameters[p]`.
 
-    `begin` is the output before the first step; the rate limit starts from it.
+    `begin` is the output before the first step. The rate limit of the first step starts from it.
     """
     # Python's own floats are several times faster than NumPy's; float() is free in compiled code.
     measured, limit = float(measured), float(parameters[p + 4])

@@ -53,9 +53,9 @@ class MotionState:
 class Trajectory:
     """Motion with one row per period. The last row is the goal, at rest.
 
-    `duration` [s] is that of the motion, which ends within the last period.
+    `duration` is the time of the motion [s]. The motion ends within the last period.
 
-    The first access to `position`, `velocity` or `acceleration` computes all rows; each row takes
+    The first access to `position`, `velocity` or `acceleration` computes all rows. Each row takes
     about 10 us. A task with a deadline calls `row` to compute one row at a time.
     """
 
@@ -72,7 +72,7 @@ class Trajectory:
         """Return position, velocity and acceleration of one row, shape (3, n).
 
         Args:
-            number: of the row, from 0.
+            number: number of the row, from 0.
 
         Raises:
             IndexError: The trajectory has no such row.
@@ -118,13 +118,13 @@ def trajectory(
     limits: MotionLimits,
     period: float,
 ) -> Trajectory:
-    """Return the fastest motion to rest at `goal`; all axes arrive together.
+    """Return the fastest motion to rest at `goal`. All axes arrive together.
 
-    Needs ruckig: pip install 'catenary[traj]'.
+    This function needs ruckig: pip install 'catenary[traj]'.
 
     Args:
         start: positions (n,) [rad] of axes at rest, or a `MotionState`.
-        goal: positions (n,) [rad]. Several goals (m, n) are reached in turn; the motion comes to
+        goal: positions (n,) [rad]. Several goals (m, n) are reached in turn. The motion comes to
             rest at each.
         limits: limits of the motion.
         period: time between two rows [s].
@@ -189,7 +189,7 @@ class _Bounds:
         return cls(velocity, acceleration, jerk, low, high)
 
     def check_start(self, q: Row, v: Row, a: Row) -> None:
-        """Raise ValueError if a motion within the limits cannot start from a state."""
+        """Raise ValueError if no motion within the limits can start from this state."""
         self._check_position("start", q)
         _raise_first("start velocity", v, abs(v) > self.velocity * (1 + SLACK), self.velocity)
         most = self.acceleration
@@ -266,7 +266,7 @@ def _piece(ruckig: Any, begin: tuple[Row, Row, Row], goal: Row, bounds: _Bounds)
     piece = ruckig.Trajectory(n)
     result = ruckig.Ruckig(n).calculate(task, piece)
     if result not in (ruckig.Result.Working, ruckig.Result.Finished):
-        raise ValueError(f"no motion from {q} to {goal}: ruckig returns {result}")
+        raise ValueError(f"cannot compute a motion from {q} to {goal}: ruckig returned {result}")
     extremes = piece.position_extrema
     bounds.check_path(
         np.array([axis.min for axis in extremes]), np.array([axis.max for axis in extremes])

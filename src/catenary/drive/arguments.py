@@ -121,7 +121,7 @@ def warn_of_default_velocity(axes: Sequence[Axis]) -> None:
 
 
 def clock_request(dc: DistributedClock | bool) -> DistributedClock | None:
-    """Return the clock request of the option `dc`; None without one."""
+    """Return the clock request of the option `dc`; None if it is False."""
     if isinstance(dc, bool):
         return DistributedClock() if dc else None
     return dc
@@ -272,7 +272,7 @@ def force_and_torque(
 
 
 def _axis_object(name: str, spec: ColumnSpec) -> AxisObject:
-    """Return the object of a column. It is an output if CiA 402 or the Channel says so."""
+    """Return the object of a column. It is an output if CiA 402 or the Channel defines it so."""
     if isinstance(spec, AxisObject):
         return spec
     channel = make_channel("columns", name, spec)

@@ -11,7 +11,7 @@ def unknown_attribute(owner: object, name: str, label: str = "") -> AttributeErr
     Args:
         owner: object without the attribute.
         name: name of the attribute.
-        label: name of the object for users; that of its class by default.
+        label: name of the object in the message; empty for the name of its class.
     """
     kind = type(owner)
     known = [each for each in dir(kind) if not each.startswith("_")]

@@ -46,7 +46,7 @@ class Axis:
     units: AxisUnits
     options: LimitOptions
     measured: tuple[str, ...] = tuple(MEASURED)
-    measured_required: bool = False  # if False, a quantity that the drive cannot map reads NaN
+    measured_required: bool = False  # True if the drive must map all of `measured`
     columns: Mapping[str, AxisObject] = field(default_factory=dict)
     divider: int = 1  # cycles between two exchanges
     required: bool = True  # if True, a cycle without its device is an error
@@ -269,7 +269,18 @@ def column_bank(wanted: AxisObject) -> Bank:
     return Bank.REAL if is_float else Bank.INTEGER
 
 
-EXPONENTS = (-3, -6, -4, -5, -2, -1, 0, -7, -8, -9)  # ms, us first: some drives need them
+EXPONENTS = (
+    -3,
+    -6,
+    -4,
+    -5,
+    -2,
+    -1,
+    0,
+    -7,
+    -8,
+    -9,
+)  # ms, us first: some drives need these
 
 
 def interpolation_time(period_ns: int) -> tuple[int, int] | None:

@@ -57,7 +57,7 @@ class AxisOptions:
     homing: PerAxis[HomingMethod | None]
 
     def each(self, name: str, n: int) -> tuple[Any, ...]:
-        """Return an option of each of n axes. ValueError if the number of values differs."""
+        """Return an option of each of n axes. Raises ValueError for a wrong number of values."""
         return per_axis(name, getattr(self, name), n)
 
     def units(self, n: int) -> list[AxisUnits]:
@@ -66,7 +66,7 @@ class AxisOptions:
         return [AxisUnits(**dict(zip(UNITS, row, strict=True))) for row in rows]
 
     def limits(self, n: int) -> list[LimitOptions]:
-        """Return the limits of n axes; the force of a linear axis is its torque limit."""
+        """Return the limits of n axes. The force limit of a linear axis is in `torque_limit`."""
         columns = {name: self.each(name, n) for name in LIMITS}
         columns["torque_limit"] = force_and_torque(
             self.each("force_limit", n), columns["torque_limit"], self.each("metres_per_turn", n)

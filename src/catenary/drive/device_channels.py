@@ -138,7 +138,7 @@ def number_entries(assignment: Assignment) -> list[tuple[Pdo, Entry]]:
 def unique_names(parts: list[tuple[str, str, str]]) -> list[str]:
     """Return a unique name for each (entry, PDO, position), as short as possible.
 
-    Many terminals name the entry of every channel "Output"; only the PDO names, such as
+    Many terminals name the entry of every channel "Output". Only the PDO names, such as
     "Channel 3", differ. Names that are still equal are numbered.
     """
     for spelling in (short_name, pdo_name, full_name):

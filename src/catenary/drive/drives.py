@@ -67,19 +67,19 @@ class Drives(Request):
       slot.
     - `other_modes`: modes to which the axes may change while the loop runs ("hm": see `home`).
     - `measured`: which of position, velocity and torque the drives must supply. By default, all
-      three are requested; a missing velocity is estimated, a missing torque reads NaN.
+      three are requested. A missing velocity is then estimated, and a missing torque reads NaN.
     - `columns`: additional objects, as names of `NAMED_COLUMNS` or as
       `{name: (index, subindex, type)}`, with the index for slot 0. Read a column as
       `arm.actual["following_error"]`; write it as `arm.target["torque_offset"] = 0.5`. Objects that
       CiA 402 does not define are inputs, except `Channel(index, subindex, type, output=True)`.
     - `required`: if False, the loop continues without a lost drive. Its axes keep their last
-      values; enable them again when they are `present`.
+      values. Enable them again when they are `present`.
     - `divider`: cycles of the loop between two exchanges.
-    - `dc`: distributed clocks. True uses the settings in the SII of each device; a
+    - `dc`: distributed clocks. True uses the settings in the SII of each device. A
       `DistributedClock` applies to all devices.
     - `pdos`: PDOs to assign on each device, `[0x1701, 0x1B01]`, or with their entries (index,
       subindex, bits), `{0x1600: [(0x6040, 0, 16), (0x607A, 0, 32)]}`. They are written even if the
-      SII declares them fixed. For a direction without PDOs here, suitable PDOs are searched.
+      SII declares them fixed. If a direction has no PDOs in this option, Catenary chooses them.
     - `start_up`: `StartUp` objects to write to each device before SAFE-OP.
 
     Options with one value for all axes, or a sequence with one value per axis:
@@ -91,8 +91,8 @@ class Drives(Request):
       axis are then m, m/s and N instead of rad, rad/s and N·m. None means a rotary axis.
     - `direction`: 1, or -1 if the joint turns opposite to the motor.
     - `offset` [rad]: position of the joint where the drive reads 0.
-    - `velocity_unit` [rad/s of the motor]: one raw velocity count. The default is one position
-      count per second.
+    - `velocity_unit` [rad/s of the motor]: value of one raw velocity count. The default is one
+      position count per second.
     - `rated_torque` [N·m of the motor]: by default, it is read from 0x6076.
     - `homing`: a `HomingMethod`.
 
@@ -103,16 +103,16 @@ class Drives(Request):
     - `velocity_limit` [rad/s]: required for CSV, CST and PV. For CSP and PP, the default is 2π
       rad/s (0.1 m/s), with a warning. `math.inf` means no limit.
     - `torque_limit` [N·m], or `force_limit` [N] for a linear axis.
-    - `step_limit` [rad]: largest difference between two CSP set-points; a larger step is refused.
-      The default is twice the distance at `velocity_limit`, and at least 0.1 rad (5 mm). It is
-      required if `velocity_limit` is infinite.
+    - `step_limit` [rad]: largest difference between two CSP set-points. A larger step is refused.
+      The default is twice the distance in one exchange at `velocity_limit`, and at least 0.1 rad
+      (5 mm). The option is required if `velocity_limit` is infinite.
 
     Reactions to a loss of set-points. They do not change the set-points that you write:
 
     - `deceleration_limit` [rad/s²]: the default is a plausible 0x6085 of the drive, otherwise
       `velocity_limit` / 0.25 s.
     - `acceleration_limit` [rad/s²]: the default is the deceleration. It also limits the moves,
-      whose default is this option, otherwise `velocity_limit` / 0.25 s.
+      which use `velocity_limit` / 0.25 s if this option is not given.
     - `torque_slope` [N·m/s]: slope of the torque in CST on the return to the set-points. By
       default, the torque returns at once.
     - `on_loss`: reaction when the core stops an axis: "quick_stop" (default), "disable", or
@@ -195,7 +195,7 @@ class Drives(Request):
         self._axes = make_axes(sources, options, common)
         warn_of_default_velocity(self._axes)
         self._period_ns = 0
-        self._is_read = False  # settings of the drives, since the last plan
+        self._is_read = False  # True if the settings were read for the next plan
         self._actual = AxisValues("actual")
         self._target = AxisValues("target")
         self._views: Views | None = None
@@ -326,7 +326,7 @@ class Drives(Request):
         """Start to move axes to a position, where they come to rest.
 
         Each axis moves as fast as its limits allow, so the axes do not arrive together. In CSP, the
-        loop computes the motion and writes `target.position`; the velocity profile is a trapezoid,
+        loop computes the motion and writes `target.position`. The velocity profile is a trapezoid,
         or has limited jerk. In PP, the drive computes the motion. If an axis is already moving, the
         new move replaces the present one and continues from its velocity.
 
@@ -444,7 +444,7 @@ class Drives(Request):
     def pdos(self, period_ns: int) -> Mapping[int, DeviceRequest]:
         """Return the process-data request of each device, by position.
 
-        Reads the drives by SDO (PRE-OP or later): rated torque, reactions, limits, mode and
+        It reads the drives by SDO (PRE-OP or later): rated torque, reactions, limits, mode and
         interpolation time.
         """
         self._period_ns = period_ns
@@ -501,7 +501,7 @@ class Drives(Request):
         )
 
     def bind(self, views: Views) -> None:
-        """Connect the request to the arrays of the loop that opens."""
+        """Connect the request to the arrays of a newly opened loop."""
         self._views = views
         self.actual.bind(
             views.actual_position,

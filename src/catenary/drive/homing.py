@@ -33,7 +33,7 @@ class HomingMethod:
         slow: speed during the search for zero (0x6099:02) [rad/s].
         acceleration: acceleration and deceleration (0x609A) [rad/s²].
         offset: distance from home to zero (0x607C) [rad]. By the standard, the axis reads -offset
-            at home; some drives read +offset.
+            at home. Some drives read +offset.
 
     Raises:
         ValueError: A value is out of range.
@@ -128,7 +128,7 @@ def stop_homing(port: AxisPort, mode: int) -> Steps:
 
 def _await_mode(port: AxisPort, mode: int) -> Steps:
     failure = Failure(
-        f"does not show mode {mode} (0x6061) within {MODE_TIMEOUT:g} s",
+        f"does not report mode {mode} (0x6061) within {MODE_TIMEOUT:g} s",
         "check that the drive supports this mode (0x6502, manual)",
     )
     yield from await_condition(port, mode_is(port, mode), MODE_TIMEOUT, failure)

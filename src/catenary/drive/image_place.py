@@ -16,7 +16,7 @@ class Place(NamedTuple):
 
     channel: Channel
     first: int  # first byte
-    end: int  # after the last byte
+    end: int  # index after the last byte
     shift: int  # position of the lowest bit in the first byte
 
     def read(self, image: memoryview | bytearray) -> float | int:

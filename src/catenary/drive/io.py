@@ -209,14 +209,14 @@ class Inputs(Channels):
     Args:
         *subs: devices.
         channels: objects of one device, `{name: Channel}` or `{name: (index, subindex, type[,
-            scale])}`; they are mapped if necessary. None for all mapped channels, with names from
+            scale])}`. They are mapped if necessary. None for all mapped channels, with names from
             the SII or the object dictionary.
-        scale: factor of each mapped channel by name; the channel is then a float.
+        scale: factor of each mapped channel by name. Such a channel is a float.
         required: if False, the loop continues without a lost device, and its channels keep their
-            last values; see `present`.
+            last values: see `present`.
         divider: cycles of the loop between two exchanges.
         dc: distributed clocks, as for `Drives`.
-        pdos: PDOs to assign instead of those that are assigned.
+        pdos: PDOs to assign instead of the present ones, as for `Drives`.
         start_up: objects to write to each device before SAFE-OP.
 
     Raises:
@@ -235,14 +235,19 @@ class Outputs(Channels):
     """Outputs of SubDevices as arrays: write `.bits[:]`, `.integers[:]` and `.reals[:]`.
 
     All outputs are 0 at the start. A channel is also accessible by name: `lamps["Output 1"] = 1`.
-    The options are those of `Inputs`. A value out of range is clamped; `cycle.limited` is then
+    The options are those of `Inputs`. A value out of range is clamped, and `cycle.limited` is then
     True.
     """
 
     direction = Direction.OUTPUT
 
     def __setitem__(self, name: str, value: float | int) -> None:
-        """Write a channel by name. Raises KeyError if the name is unknown."""
+        """Write a channel by name.
+
+        Raises:
+            KeyError: The name is unknown.
+            RuntimeError: No loop has been opened yet.
+        """
         array, place = self._place(name)
         array[place] = value
 

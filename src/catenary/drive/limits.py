@@ -31,7 +31,7 @@ INFINITE = ("velocity_limit", "torque_limit")  # options that may be infinite
 class LimitOptions:
     """Options of `Drives` for the limits and reactions of one axis; None if not given.
 
-    The units below are those of a rotary axis; a linear axis has m and N instead.
+    The units below are those of a rotary axis. A linear axis has m and N instead.
     """
 
     position_min: float | None = None  # [rad]
@@ -207,7 +207,7 @@ def _positions(options: LimitOptions, own: OwnLimits) -> tuple[Chosen, Chosen]:
 def _deceleration(
     name: str, options: LimitOptions, velocity: float | None, own: OwnLimits, units: AxisUnits
 ) -> Chosen:
-    """Return the deceleration from the option, from a plausible 0x6085, or for BRAKE_TIME."""
+    """Return the deceleration from the option, from a plausible 0x6085, or from BRAKE_TIME."""
     if options.deceleration_limit is not None:
         return _given(options.deceleration_limit)
     if own.deceleration is not None and _is_plausible(own.deceleration, velocity):

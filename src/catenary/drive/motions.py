@@ -26,7 +26,7 @@ LATE = 0.05  # [s] without iterations, after which a profile starts again (late 
 SETTLE = 0.02  # [s] at the goal in CSP, for the lag of the position loop of a drive
 ANSWER_TIMEOUT = 1.0  # [s] for an acknowledgement of the drive
 ANSWER_EXCHANGES = 4  # until the statusword reflects a new controlword
-STILL = 0.02  # [s] below the standstill velocity, until the axis is at rest
+STILL = 0.02  # [s] an axis below the standstill velocity for this time is at rest
 STOP_TIMEOUT = 5.0  # [s] from halt to standstill
 SLACK = (2.0, 5.0)  # timeout of a move: factor of the expected duration, and additional seconds
 CRUISE = 1 - 1e-9  # factor of the velocity, so that rounding does not exceed the limit
@@ -120,7 +120,7 @@ def move_profile(port: AxisPort, goal: float, rates: Rates) -> Steps:
 
 def _await_goal(port: AxisPort, goal: float, timeout: float) -> Steps:
     failure = Failure(
-        f"did not report target reached (statusword bit 10) within {timeout:.3g} s",
+        f"did not report that it reached the target (statusword bit 10) within {timeout:.3g} s",
         "check its position window 0x6067, its limits 0x607D and 0x607F, and its state",
         goal,
     )

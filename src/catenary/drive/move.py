@@ -128,7 +128,7 @@ class Moves:
             replaced = {axis: self._active[axis] for axis in parts if axis in self._active}
             if self not in self._movers:
                 self._movers.append(self)
-            # A single update: an interrupt must not leave a part of the move.
+            # A single update: after an interrupt, all axes of the move are active, or none.
             self._active.update({axis: (part, move) for axis, part in parts.items()})
             for part, old in replaced.values():
                 _replace(part, old)

@@ -39,7 +39,7 @@ class AxisFacts(NamedTuple):
     def standstill(self) -> float:
         """Largest velocity of an axis at rest.
 
-        An estimated velocity jumps by a count per exchange while the axis stands.
+        An estimated velocity changes by some counts per exchange although the axis is at rest.
         """
         jump = JUMPS * abs(self.units.position_scale) / self.exchange
         least = self.units.defaults.standstill
@@ -68,8 +68,8 @@ class AxisPort:
         self.write_object = write
         self.put_rate = put_rate
         self.now = 0.0  # [s] time of the cycle
-        self.motion: Motion | None = None  # last command of a profile of ours
-        self.handshake = False  # a set-point of PP is being handed over
+        self.motion: Motion | None = None  # last command of the present profile
+        self.handshake = False  # True while a set-point of PP is being handed over
         self.handed_over: float | None = None  # the last set-point that PP acknowledged
         self.written: dict[str, int] = {}  # profile objects that were written by SDO
 

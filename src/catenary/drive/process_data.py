@@ -58,9 +58,9 @@ class ProcessData(Request):
         outputs: the same for outputs. The request writes all output bytes of the device, except
             with `{}`: another request can then write them.
         pdos: PDOs to assign, `[0x1A01]`, or with their entries by name or as (index, subindex,
-            bits), `{0x1A00: ["force", "status"]}`. None to search suitable PDOs.
+            bits), `{0x1A00: ["force", "status"]}`. None to let Catenary choose them.
         safe: values of outputs by name, or the bytes of all outputs. The loop sends them when it
-            ends for any reason; outputs without a safe value become 0. The device then leaves OP
+            ends for any reason. Outputs without a safe value become 0. The device then leaves OP
             and determines its outputs itself.
         start_up: objects to write to the device before SAFE-OP.
         divider: cycles of the loop between two exchanges.
@@ -145,6 +145,7 @@ class ProcessData(Request):
 
         Raises:
             KeyError: The name is unknown.
+            RuntimeError: No loop has been opened yet.
         """
         direction, place = self._place(name)
         return place.read(self._image(direction))
@@ -204,7 +205,7 @@ class ProcessData(Request):
         )
 
     def bind(self, views: Views) -> None:
-        """Connect the request to the bytes of the loop that opens."""
+        """Connect the request to the bytes of a newly opened loop."""
         self._images = {
             Direction.INPUT: views.input_bytes.data,
             Direction.OUTPUT: views.output_bytes.data,
@@ -212,7 +213,7 @@ class ProcessData(Request):
         self._unit_valid = views.unit_valid
 
     def _check_safe(self) -> None:
-        """Raise ValueError for safe values that cannot be sent."""
+        """Raise ValueError or TypeError for safe values that cannot be sent."""
         if self._safe and not self._writes:
             raise ValueError("safe= is given, but this request writes no outputs (outputs={})")
         if isinstance(self._safe, bytes):

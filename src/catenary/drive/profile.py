@@ -172,7 +172,7 @@ def _jerk_limited(start: Motion, goal: float | None, rates: Rates) -> JerkLimite
     result = ruckig.Ruckig(1).calculate(task, trajectory)
     if result not in (ruckig.Result.Working, ruckig.Result.Finished):
         raise ConfigurationError(
-            f"no jerk-limited motion from {start} to {goal}: ruckig returned {result}",
+            f"cannot compute a motion from {start} to {goal}: ruckig returned {result}",
             hint="try another velocity, acceleration or jerk",
         )
     duration = float(trajectory.duration)

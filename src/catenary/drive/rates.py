@@ -42,7 +42,7 @@ class RateColumns:
         )
 
     def bind(self, target: AxisValues, reals: Reals) -> None:
-        """Connect the columns to the arrays of the loop that opens, and write the initial values.
+        """Connect the columns to the arrays of a new loop, and write the initial values.
 
         Args:
             target: columns by name.

@@ -34,7 +34,7 @@ class CycleNow(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class Stop:
-    """Reason for a stop, and the number and time [s] of the cycle that sent it."""
+    """Reason for a stop, and the number and time [s] of the cycle that requested it."""
 
     number: int
     time: float

@@ -25,7 +25,7 @@ def axis_report(
 
     Args:
         name: name of the axis.
-        modes: modes that the axis may use, starting with the one at the start.
+        modes: modes that the axis may use; the first one is the mode at the start.
         bounds: limits in force.
         settings: raw settings of the drive.
         exchange_ns: time between two exchanges of the device [ns].

@@ -1,6 +1,6 @@
 """CiA 402 state machine of the MainDevice in plain Python, IEC 61800-7-201 §6.
 
-`core/_cia402.pyx` is the compiled equivalent; the same tables test both. The state machine of the
+`core/_cia402.pyx` is the compiled equivalent. The same tables test both. The state machine of the
 virtual servo is separate code, so that each tests the other.
 """
 

@@ -44,7 +44,7 @@ class AxisDefaults(NamedTuple):
     """Default limits of an axis, in its units."""
 
     velocity_limit: float  # in CSP and PP
-    step_limit: float  # smallest default
+    step_limit: float  # smallest default step limit
     standstill: float  # velocity below which the axis is at rest
     deceleration: float  # for an axis without a velocity limit and without a cyclic mode
 
@@ -62,8 +62,8 @@ class AxisUnits:
         gear_ratio: motor turns per joint turn.
         direction: +1, or -1 if the joint turns opposite to the motor.
         offset: position of the joint where the drive reads 0 [rad], [m].
-        velocity_unit: one raw velocity count [rad/s of the motor]; None for one position count per
-            second.
+        velocity_unit: value of one raw velocity count [rad/s of the motor]; None for one position
+            count per second.
         rated_torque: rated torque of the motor [N·m]; None until it is read from 0x6076.
         metres_per_turn: travel per turn of the gear output [m]; None for a rotary axis.
 

@@ -49,7 +49,7 @@ class Service:
 
     @property
     def beside(self) -> Callable[[], None] | None:
-        """Work for the iterating thread before every cycle; None if the service thread does it."""
+        """Function to call before every iterated cycle; None if there is a service thread."""
         return self.step if self._thread is None else None
 
     def step_without_thread(self) -> None:

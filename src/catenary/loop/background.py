@@ -3,9 +3,9 @@
 Theory of operation. The thread commits the targets in every cycle under a lock. `update` takes the
 same lock, so nothing is committed while a program writes its targets. The thread never waits for
 the lock. The native core limits the time for which the targets of the last update are valid
-(core/_setpoints.pyx), so a program that blocks the interpreter cannot keep an axis moving. If the
-loop raises an error, the thread leaves the loop and ends. The next call of the program raises the
-error. In virtual time, the thread also keeps pace with the wall clock.
+(core/_setpoints.pyx). A program that blocks the interpreter therefore cannot keep an axis moving.
+If the loop raises an error, the thread leaves the loop and ends. The next call of the program
+raises the error. In virtual time, the thread also keeps pace with the wall clock.
 """
 
 from __future__ import annotations
@@ -60,7 +60,7 @@ class Background:
 
         Raises:
             ValueError: The loop is inline and exchanges its frames in the thread of the program.
-            LoopError: An axis is powered in CST; this call commits no torque set-points.
+            LoopError: An axis is powered in CST, and this call commits no torque set-points.
         """
         if self._sessions[0].plan.cycle.execution == "inline":
             raise ValueError(
@@ -123,7 +123,7 @@ class Background:
 
     @contextmanager
     def _written_targets(self) -> Iterator[None]:
-        """Commit the writes of the block; discard all of them if the block raises."""
+        """Commit the writes of the block. If the block raises, discard all of them."""
         engines = [session.engine for session in self._sessions]
         for engine in engines:
             engine.begin_update()

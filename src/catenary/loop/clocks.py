@@ -144,7 +144,7 @@ class Clocks:
             )
 
     def settle(self, check: Callable[[int], None]) -> None:
-        """Wait before OP until the clocks are locked; after SETTLE_TIMEOUT, continue without."""
+        """Wait until the clocks are locked, at most SETTLE_TIMEOUT. Do not raise after the timeout."""
         self._run_until_locked(SETTLE_TIMEOUT, check)
 
     def rejoin(self, position: int, plan: DevicePlan) -> Procedure[None]:

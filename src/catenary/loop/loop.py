@@ -54,8 +54,8 @@ class Loop:
 
     Requests on several MainDevices run as several networks in one schedule
     (docs/how_to/networks.md). Such a loop is threaded, with a thread for each network.
-    `cycle.networks[i]` and `loop.networks[i]` belong to one network; the properties of the loop
-    itself are those of the first.
+    `cycle.networks[i]` and `loop.networks[i]` belong to one network. The properties of the loop
+    itself are those of the first network.
 
     Args:
         requests: `Drives`, `Inputs`, `Outputs` and other process-data requests.
@@ -63,8 +63,8 @@ class Loop:
         execution: "threaded": a native thread exchanges the frames, and Python follows. "inline":
             the iterating thread exchanges the frames itself.
         enable: True to enable the drives on entry.
-        watchdog: Watchdog time of the devices' outputs [s]; 0: off; None: 0.1 s, in CST the longer
-            of 10 ms and five exchanges.
+        watchdog: Watchdog time of the devices' outputs [s]. 0 disables the watchdog. None: 0.1 s;
+            for devices in CST, the longer of 10 ms and five exchanges.
         cpu: CPU of the native thread, or one CPU for each network. None: any CPU of the process;
             for several networks the last CPUs, if there are more CPUs than networks.
         priority: SCHED_FIFO priority of the native thread; None: that of the process.
@@ -376,7 +376,7 @@ class Loop:
         """Return a `Stream`, which a slower thread can fill with set-points in advance.
 
         Args:
-            capacity: Number of rows that the stream can hold; one row is one cycle.
+            capacity: Number of rows that the stream can hold. One row is for one cycle.
         """
         self._only("a stream")
         return self._networks[0].stream(capacity)
@@ -446,7 +446,7 @@ class Loop:
 
         Raises:
             ClockError: The clocks are not locked after `timeout`.
-            LoopError: An axis is powered in CST; its torque would become stale during the wait.
+            LoopError: An axis is powered in CST. Its torque would become stale during the wait.
             RuntimeError: No request has `dc=`.
         """
         self._require_foreground()
@@ -551,7 +551,7 @@ def checked_quorum(quorum: int | None, count: int) -> int:
 
 
 def leave_open_loop(sessions: Sequence[Session], guard: SignalGuard) -> None:
-    """Leave a loop that was deleted, or that is open at the end of the program; then warn.
+    """Leave a loop that was deleted, or that is open at the end of the program, and warn.
 
     There is no warning at the end of the program if the loop runs in the background. The warning
     comes last, because it may be turned into an error.

@@ -101,8 +101,8 @@ class Scheduling:
         receive: Method of receiving frames. "poll": sleep until the deadline, then take the frames
             that have arrived. "wait": sleep until a frame arrives. "busy": check for frames without
             sleeping. None: "wait" when threaded, "poll" when inline.
-        busy_wait: Time of a busy-wait before each cycle start [s]; the rest of the wait is a sleep.
-            It costs this processor time per cycle.
+        busy_wait: Time of a busy-wait before each cycle start [s]. The thread sleeps until then.
+            The busy-wait costs this processor time in each cycle.
         switch_interval: Switch interval of the interpreter while an inline loop is open in real
             time [s]. None: unchanged; see `interpreter` in `Loop.timing`.
         collect_deadline: If threaded, share of the period in which frames may return. The budget of

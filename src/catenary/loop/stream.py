@@ -43,7 +43,7 @@ class Stream:
             torque: Torques [N·m]; None: zero.
 
         Returns:
-            Number of rows that were written; the remainder did not fit.
+            Number of rows that were written. The remaining rows did not fit.
 
         Raises:
             ValueError: The shapes differ, or a value is NaN or infinite.

@@ -12,7 +12,7 @@ V = TypeVar("V")
 class ByName(Mapping[str, V]):
     """Objects of a machine by their names in the file.
 
-    The mapping does not contain the objects of absent devices; the KeyError for such an object
+    The mapping does not contain the objects of absent devices. The KeyError for such an object
     names the absent device.
     """
 

@@ -107,7 +107,7 @@ def _entry(
     device: DeviceDescription,
     direction: Direction,
 ) -> Entry:
-    """Return the entry of the device with the type of the object; UNTYPED if the file has it."""
+    """Return the entry that has the type of the object; UNTYPED if the file gives the type."""
     if isinstance(spec, ChannelTable) and spec.type is not UNSET:
         return UNTYPED
     text = spec if isinstance(spec, str) else spec.object

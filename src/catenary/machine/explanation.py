@@ -22,9 +22,9 @@ _WORDS: Mapping[str, str] = {
     **{"object": "a table", "array": "a list", "str": "text", "int": "a whole number"},
     **{"float": "a number", "bool": "true or false"},
 }
-ROLES = ("drives", "process_data")  # tables of tables
+ROLES = ("drives", "process_data")  # tables that contain one table per name
 _HINTS: Mapping[str, str] = {
-    "identity": "identity = { vendor = 0x2, product = 0x44C2C52 }; `catenary init` writes it",
+    "identity": "write identity = { vendor = ..., product = ... }; `catenary init` reads both",
     "format": 'write format = "catenary-machine/1" at the top of the file',
     "counts_per_turn": "write the encoder counts per motor turn, from the manual of the drive; in "
     'a file of `catenary init`, remove the "#" from the lines marked FILL IN',

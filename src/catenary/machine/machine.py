@@ -37,13 +37,13 @@ class Machine:
             with machine.loop() as loop:
                 loop.wait(arm.move_to(0.0, velocity=0.5))
 
-    The `with` statement opens the link and compares the identities of the devices with the file,
-    without a change to any device. Only then does it bring the devices to PRE-OP. At the end, it
-    brings them to INIT.
+    The `with` statement opens the link and compares the identities of the devices with the file.
+    This does not change any device, except with the IgH master. It then brings the devices to
+    PRE-OP. At the end, it brings them to INIT.
 
     Args:
         path: the machine file.
-        target: overrides the `target` of the file: "eth0", "virtual:line.toml", or a `Segment`.
+        target: "eth0", "virtual:line.toml" or a `Segment`; None for the `target` of the file.
         force: open the link even if another master is active on the interface.
 
     Raises:
@@ -169,7 +169,7 @@ class Machine:
         return Loop(*self.requests, laws=laws, sink=sink, **options)
 
     def _file_options(self) -> dict[str, Any]:
-        """Return the options of the file for a loop. MachineFileError without any request."""
+        """Return the options of the file for a loop. Raises MachineFileError without requests."""
         if not self.drives and not self.process_data:
             raise self._file.error(
                 (),
@@ -186,7 +186,7 @@ class Machine:
         return self._found
 
     def _find(self) -> MachineParts:
-        """Check the identities without changing a device, then scan and make the requests."""
+        """Check the identities, scan the devices, and make the requests."""
         file = self._file
         if not self._has_own_master:  # the IgH master does not support a passive scan
             raise_differences(file, compare(file.tables.device, self._main.passive_scan()))

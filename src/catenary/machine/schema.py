@@ -46,7 +46,7 @@ Divider = Annotated[int, Meta(description="cycles of the loop between two exchan
 
 
 class Table(msgspec.Struct, forbid_unknown_fields=True, frozen=True, kw_only=True):
-    """A table of the file."""
+    """Table of a machine file."""
 
 
 class StopTable(Table, frozen=True, kw_only=True):
@@ -64,7 +64,7 @@ class StopTable(Table, frozen=True, kw_only=True):
 
 
 class SchedulingTable(Table, frozen=True, kw_only=True):
-    """[loop.scheduling]: waiting and receiving of the cycle (cat.Scheduling)."""
+    """[loop.scheduling]: sleeping, receiving frames and several networks (cat.Scheduling)."""
 
     receive: Optional[Literal["poll", "wait", "busy"]] = UNSET
     busy_wait: Optional[Time] = UNSET

@@ -1,8 +1,9 @@
 """Delay of a frame from one device to the next.
 
-It is computed from the times at which a broadcast write (0x0900) passed the ports. The time behind
-a port minus the time in the branches of the next device is the round trip between the two devices.
-The delay is half of it. As in `delays`, both directions are assumed to take the same time.
+It is computed from the times at which a broadcast write (0x0900) passed the ports. The time that
+the frame spent behind a port minus the time in the branches of the next device is the round trip
+between the two devices. The delay is half of it. As in `delays`, both directions are assumed to
+take the same time.
 """
 
 from __future__ import annotations
@@ -18,10 +19,10 @@ JITTER_NS = 200  # sum over four time stamps: one tick of 10 ns each, more with 
 def cable_delays_ns(
     topology: Topology, times: Sequence[PortTimes | None]
 ) -> tuple[int | None, ...]:
-    """Return the one-way delay from the previous device [ns], by position.
+    """Return the one-way delay from its parent to each device [ns], by position.
 
-    The delay includes cable and forwarding. It is None if one of the two devices has no clock, or
-    if there is no previous device.
+    The delay includes cable and forwarding. It is None if one of the two devices has no clock,
+    if there is no parent, or if the time stamps belong to different frames.
 
     Args:
         topology: The tree of the devices.

@@ -99,7 +99,7 @@ def _start(
     children: Sequence[Sequence[int]],
     delays: list[float | None],
 ) -> None:
-    """Set the delays of the clocks that no other clock precedes; the first one has delay 0.
+    """Set the delays of the clocks without a clock before them. The first one has delay 0.
 
     Further such clocks are in other branches of a device without a clock. The frame reaches them
     after the earlier branches; the unknown cable delays are ignored.
@@ -126,7 +126,7 @@ def _share(
 
     Args:
         places: All devices.
-        heads: The first clocks behind the port, in the order of the frame.
+        heads: The first clocks behind the port, in the order in which a frame reaches them.
         reached: Delay from the first clock when the frame leaves by the port [ns].
         away: Time until the frame returns to the port [ns].
         delays: The list to change.
@@ -164,14 +164,14 @@ def _children(places: Sequence[ClockPlace]) -> list[list[int]]:
     children: list[list[int]] = [[] for _ in places]
     for position, place in enumerate(places):
         if place.parent is not None:
-            children[place.parent].append(position)  # positions follow the order of the frame
+            children[place.parent].append(position)  # in the order in which a frame passes them
     return children
 
 
 def _first_clocks(
     places: Sequence[ClockPlace], children: Sequence[Sequence[int]], start: int
 ) -> Iterator[_Head]:
-    """Yield the clocks of a branch that no other clock of the branch precedes."""
+    """Yield the first clocks of a branch: those without another clock of the branch before them."""
     waiting = [_Head(start, 0)]
     while waiting:
         head = waiting.pop()

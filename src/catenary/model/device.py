@@ -185,7 +185,7 @@ class ObjectValue:
 
 @dataclass(frozen=True, slots=True)
 class DeviceDescription:
-    """One SubDevice at its position in the segment."""
+    """Description of one SubDevice at its position in the segment."""
 
     position: int
     station_address: int
@@ -216,7 +216,7 @@ class DeviceDescription:
 
     @property
     def profile(self) -> int | None:
-        """Device profile number: 402 for drives, 5001 for modular devices."""
+        """Device profile number, such as 402 for drives; None if 0x1000 was not read."""
         return None if self.device_type is None else self.device_type & 0xFFFF
 
     @property
@@ -281,7 +281,7 @@ class DeviceDescription:
         return None
 
     def known_value(self, index: int, subindex: int) -> bytes | None:
-        """Return the value of a dictionary entry; None if it was not read.
+        """Return the value of a dictionary entry; None if it was not or could not be read.
 
         Args:
             index: The index of the object.

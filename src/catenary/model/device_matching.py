@@ -8,11 +8,13 @@ from collections.abc import Sequence
 def vacancies(found: Sequence[int], known: Sequence[int]) -> dict[int, tuple[int, ...]]:
     """Return the free positions to which each unmatched device may belong.
 
-    A device matches if its address is known and in the order of the wiring. The largest possible
-    number of devices is matched, so that a moved device does not count as a neighbour.
+    A device matches if its address is known and the matches are in the order of the wiring. The
+    largest possible number of devices is matched, so that a moved device does not count as a
+    neighbour.
 
     Args:
-        found: Station addresses in the order of the frame; a device that was powered up has 0.
+        found: Station addresses in the order in which a frame passes the devices. A device has 0
+            after a power-up.
         known: Station addresses of the known devices, by position.
 
     Returns:

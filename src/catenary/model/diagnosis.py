@@ -232,8 +232,8 @@ def _stray_ports(seen: Observation) -> Iterator[Finding]:
 def _forwarded(seen: Observation) -> Iterator[Finding]:
     """Yield the cause of frames that are marked as broken, but that no device counted as invalid.
 
-    The device that marked them may lack the counter. The fault is on its input side: it is the
-    device before the first one that counts forwarded errors. Cases 13 to 15.
+    The device before the first one that counts forwarded errors has marked them. It may lack the
+    counter of invalid frames. The fault is on its input side. Cases 13 to 15.
     """
     path = seen.topology.path()
     first = next((at for at in path if seen.port(*at).forwarded), None)

@@ -24,7 +24,7 @@ Ports = tuple[bool, bool, bool, bool]
 class Place:
     """Place of one device in the tree."""
 
-    parent: int | None  # position; None if the device is wired to the MainDevice
+    parent: int | None  # position; None if wired to the MainDevice, or without a place
     parent_port: int | None
 
 
@@ -42,8 +42,8 @@ def open_ports(dl_status: int) -> Ports:
 def tree(ports: Sequence[Ports]) -> tuple[Place, ...]:
     """Return the place of each device in the tree.
 
-    If there are more devices than open ports, the registers do not describe a tree. In
-    this case, devices for which no open port remains have no parent.
+    If there are more devices than open ports, the registers do not describe a tree. In this case,
+    devices for which no open port remains have no parent.
     """
     places: list[Place] = []
     unfilled: list[tuple[int, int]] = []  # (position, port); the last one is next
@@ -69,7 +69,7 @@ class Cable(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Topology:
-    """The tree of a segment. All tuples are indexed by position.
+    """The tree of a segment. `ports` and `places` are indexed by position.
 
     In a ring, `second_end` is the (position, port) wired to the MainDevice's second interface.
     """

@@ -1,6 +1,6 @@
-"""Pure arithmetic: device descriptions and process-data requests → the tables of a cycle.
+"""Computation of a cycle's tables from device descriptions and process-data requests. No I/O.
 
-Names load when they are used: a scan needs parts of the plan, but not NumPy.
+Each name is imported at its first use, because a scan needs parts of the plan, but not NumPy.
 """
 
 from __future__ import annotations

@@ -11,9 +11,9 @@ from catenary.plan.pdo_search import pdo_names, place_names
 
 
 class Change(NamedTuple):
-    """Object of a device that gets another value. `old`: empty if it is not known.
+    """Change of an object of a device. `old` is empty if the old value is not known.
 
-    `what`: "0x1C13" or "0x1A00" for a list of PDOs or entries, "0x6060:00" for a value.
+    `what` is "0x1C13" or "0x1A00" for a list of PDOs or entries, "0x6060:00" for a value.
     """
 
     what: str

@@ -86,7 +86,7 @@ class ClockChoice:
 
     reference: DeviceDescription
     followers: tuple[DeviceDescription, ...]  # with a SYNC signal, without the reference
-    listeners: int  # devices that answer a broadcast of the time, with the reference
+    listeners: int  # number of devices that answer a broadcast of the time, reference included
     follow: FollowedClock
 
 
@@ -168,14 +168,17 @@ def make_clock_plan(
         device_count: Number of devices on the segment.
         period_ns: Period of the cycle [ns].
         execution: Execution mode of the loop.
-        margin: Time between the cycle start and the frames [s]; None: by the execution mode.
+        margin: Time between the cycle start and the frames [s]; None: a share of the period that
+            depends on the execution mode.
         burst: Number of frames for static drift compensation.
 
     Raises:
         ConfigurationError: The frames do not fit into the period.
     """
     if burst < 0:
-        raise ConfigurationError(f"a burst of {burst} frames", hint="use 0 or more frames")
+        raise ConfigurationError(
+            f"burst={burst}: must be 0 or more frames", hint="omit burst= for the default"
+        )
     wire_ns = sum(wire_time_ns(len(frame.template)) for frame in frames) + HOP_NS * device_count
     allowance_ns = round(ALLOWANCE[execution] * period_ns if margin is None else margin * 1e9)
     if allowance_ns < 0 or wire_ns + allowance_ns > period_ns:
@@ -206,7 +209,7 @@ def make_clock_plan(
 def start_time_ns(now_ns: int, syncs: Sequence[SyncPlan]) -> int:
     """Return the first SYNC0 time.
 
-    All devices can be configured before this time. All SYNC signals coincide at it.
+    All devices can be configured before this time. Apart from shifts, all SYNC signals start at it.
 
     Args:
         now_ns: Present time of the reference clock [ns].
@@ -231,7 +234,7 @@ def _check_follower(device: DeviceDescription, reference: DeviceDescription | No
     if reference is not None and device.position < reference.position:
         raise ConfigurationError(
             f"{device} precedes {reference}, the reference clock: frames pass it before they "
-            "carry the time",
+            "contain the time",
             hint="choose a reference clock before all devices with dc=",
         )
 
@@ -273,7 +276,7 @@ def _check_sync(
 ) -> None:
     """Raise ConfigurationError for impossible values.
 
-    A value of the EEPROM is reported as such, because it is not visible in the program.
+    The error names the EEPROM if a value comes from it, because the program does not show it.
     """
     eeprom = f"{device}: its EEPROM (OpMode {plan.op_mode!r})"
     if not _starts_sync(plan.assign_activate):
@@ -317,7 +320,7 @@ def _in_ns(seconds: float | None, default_ns: int) -> int:
 
 
 def _starts_sync0(assign_activate: int) -> bool:
-    """Return True if SYNC0 runs. Shifts are meaningless otherwise (pollen_Orbita2d.bin: 1.9 s)."""
+    """Return True if SYNC0 runs. Otherwise, shifts are meaningless (pollen_Orbita2d.bin: 1.9 s)."""
     return assign_activate & SYNC_BY_ECAT == SYNC_BY_ECAT
 
 
@@ -338,11 +341,11 @@ def _multiple(period_ns: int, factor: int) -> int:
 def _sync1_ns(mode: OpMode, cycle_ns: int, period_ns: int) -> int:
     """Return register 0x09A4: the time from SYNC0 to the SYNC1 that follows it.
 
-    ETG.2000, Dc/OpMode/CycleTimeSync1@Factor: the cycle of SYNC1 in SYNC0 cycles; if
-    negative, in periods. It is the SYNC0 cycle plus the register (Beckhoff, ESC data sheet I
-    §9.2.3.5; also SOEM's `ecx_dcsync01` and IgH's master/fsm_slave_config.c). An EL3702 with
-    four-fold oversampling has the factors -4 and -1: 250 us and 750 us at 1 ms (ecmc's notes on DC
-    clocks).
+    ETG.2000, Dc/OpMode/CycleTimeSync1@Factor: the cycle of SYNC1 in SYNC0 cycles, or in
+    periods if the factor is negative. This cycle is the SYNC0 cycle plus the register (Beckhoff,
+    ESC data sheet I §9.2.3.5; also SOEM's `ecx_dcsync01` and IgH's master/fsm_slave_config.c). An
+    EL3702 with four-fold oversampling has the factors -4 and -1: 250 us and 750 us at 1 ms (ecmc's
+    notes on DC clocks).
     """
     span_ns = -mode.sync1_factor * period_ns
     if mode.sync1_factor >= 0:

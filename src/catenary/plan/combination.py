@@ -56,7 +56,7 @@ def _one_clock(
 def _one_mapping(
     position: int, first: tuple[WrittenPdo, ...], second: tuple[WrittenPdo, ...]
 ) -> tuple[WrittenPdo, ...]:
-    """Return the PDOs that two requests specify. They must not contradict each other."""
+    """Return the PDOs that two requests specify. Raise ConfigurationError if they contradict."""
     directions = {pdo.direction for pdo in first} & {pdo.direction for pdo in second}
     for direction in directions:
         if [p for p in first if p.direction is direction] != [
@@ -72,7 +72,7 @@ def _one_mapping(
 def _one_start_up(
     position: int, first: tuple[StartUp, ...], second: tuple[StartUp, ...]
 ) -> tuple[StartUp, ...]:
-    """Return the start-up objects of two requests. They must not contradict each other."""
+    """Return the start-up objects of two requests. Raise ConfigurationError if they contradict."""
     values = {(each.index, each.subindex): each for each in first}
     for each in second:
         other = values.get((each.index, each.subindex))

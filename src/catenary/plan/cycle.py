@@ -59,15 +59,15 @@ class Column:
     bank: Bank
     device: int  # position on the segment
     sync_unit: int
-    group: str = ""  # neighbours in a bank with the same group are one array of this name
+    group: str = ""  # adjacent columns of a bank with the same group form one array of this name
 
 
 @dataclass(frozen=True, slots=True)
 class ImageArea:
     """Bytes of an image that an application reads or writes unchanged.
 
-    Their place among the private bytes follows from the sizes of the areas before it in the plan.
-    `safe`: for outputs, the bytes that are sent when the loop ends. It has the size of the area.
+    Their place among the private bytes follows from the sizes of the preceding areas in the plan.
+    For outputs, `safe` holds the bytes that are sent when the loop ends; it is as long as the area.
     """
 
     name: str
@@ -83,13 +83,13 @@ class DatagramKind(IntEnum):
 
     PROCESS_DATA = 0
     AL_STATUS = 1  # the BRD of every cycle
-    CLOCK = 2  # FPWR of our time, FRMW of the reference clock's time, or FPRD of a difference
+    CLOCK = 2  # FPWR of link time, FRMW of the reference clock's time, or FPRD of a difference
     CYCLE_NUMBER = 3  # a NOP, which no device changes; it identifies the frame exactly
 
 
 @dataclass(frozen=True, slots=True)
 class Copy:
-    """Bytes that move between a frame and an image; `frame_offset` is from the frame's start."""
+    """Bytes to copy between a frame and an image. `frame_offset` counts from the frame's start."""
 
     frame_offset: int
     image_offset: int
@@ -106,8 +106,8 @@ class DatagramPlan:
     length: int  # of its data
     expected_counter: int
     sync_unit: int  # -1: none
-    outputs: tuple[Copy, ...] = ()  # image → frame, before the send
-    inputs: tuple[Copy, ...] = ()  # frame → image, after a valid return
+    outputs: tuple[Copy, ...] = ()  # image → frame, before the frame is sent
+    inputs: tuple[Copy, ...] = ()  # frame → image, after it returned with the expected counter
 
 
 @dataclass(frozen=True, slots=True)
@@ -130,7 +130,7 @@ class SyncUnit:
 
     name: str
     devices: tuple[int, ...]  # positions
-    optional: bool = False  # its loss does not make the cycle bad
+    optional: bool = False  # True if its loss does not make the cycle bad
     divider: int = 1  # cycles between two exchanges
 
 
@@ -151,8 +151,8 @@ class AxisLimits:
 class AxisPlan:
     """One CiA 402 axis: slot k of a device (objects + 0x800·k), and the places of its quantities.
 
-    A quantity that is not exchanged is None. A linear axis has m, m/s and N where rad, rad/s and
-    N·m are given here.
+    A quantity that is not exchanged is None. For a linear axis, read rad, rad/s and N·m below as m,
+    m/s and N.
     """
 
     name: str
@@ -172,13 +172,13 @@ class AxisPlan:
     actual_torque: Number | None = None  # 0x6077
     position_demand: Number | None = None  # 0x6062
     torque_demand: Number | None = None  # 0x6074
-    velocity_offset: Number | None = None  # 0x60B1, where the application writes it as a column
+    velocity_offset: Number | None = None  # 0x60B1, if the application writes it as a column
     limits: AxisLimits = AxisLimits()
-    # Shape of fallback and return, never of the application's set-points:
+    # Used only for the fallback and the return from it, never for the application's set-points:
     # docs/explanation/safety.md
     acceleration: float = 25.0  # [rad/s²] on return to the set-points
     deceleration: float = 25.0  # [rad/s²] to standstill, and before a position limit in CSV
-    linear: bool = False  # True: m, m/s and N instead
+    linear: bool = False  # True for m, m/s and N
     standstill: float = 0.05  # [rad/s] largest velocity of an axis at rest
     step_floor: float = 0.1  # [rad] smallest default of the step limit
     torque_slope: float | None = None  # [N·m/s] on return to the set-points in CST; None: at once
@@ -191,23 +191,23 @@ class ClockPlan:
 
     docs/explanation/distributed_clocks.md explains it.
 
-    `follow`: "reference": the cycle starts follow the reference clock; "main": the reference clock
-    follows the link's clock.
+    If `follow` is "reference", the cycle starts follow the reference clock. If it is "main", the
+    reference clock follows the link's clock.
     """
 
     follow: FollowedClock
     reference: int  # position
     reference_station: int
     followers: tuple[int, ...]  # positions of devices with SYNC signals, without the reference
-    stations: tuple[int, ...]  # the same, by station address
-    phase_ns: int  # of the cycle starts in the reference's time, modulo the period
+    stations: tuple[int, ...]  # station addresses of the followers
+    phase_ns: int  # of the cycle starts in the reference clock's time, modulo the period
     wire_ns: int  # wire time of the frames, and the delay of all devices
     allowance_ns: int  # longest time from the cycle start to the frames
     bandwidth: float  # final bandwidth of the phase controller [1 / cycle]
     rate_limit_ns: float  # largest total change of a period
-    drift_limit_ns: float  # permanent part of it
+    drift_limit_ns: float  # largest permanent change of a period
     step_ns: int  # a larger phase error is a step, not drift
-    bound_ns: int  # of the differences to the reference, and of the phase
+    bound_ns: int  # for the differences from the reference, and for the phase error
     burst: int = 15_000  # frames that carry the time before the cycle begins
 
 
@@ -230,20 +230,20 @@ class CyclePlan:
     output_areas: tuple[ImageArea, ...] = ()
     input_areas: tuple[ImageArea, ...] = ()
     lost_limit: int = 3  # consecutive bad cycles before WorkingCounterError
-    # Time without fresh set-points (at least 3 cycles) before a quick stop. 0: never; not in CST
+    # Time without fresh set-points (at least 3 cycles) before a quick stop; 0: never (not in CST)
     late_limit_position_ns: int = 50_000_000  # CSP
     late_limit_velocity_ns: int = 50_000_000  # CSV
     late_limit_torque_ns: int = 10_000_000  # CST
     handover_ns: int = 20_000_000  # time for which CST keeps its torque after a law or stream ended
     # Time for which the set-points of a background program are valid after an update
-    command_timeout_velocity_ns: int = 200_000_000  # CSV; afterwards it decelerates
-    command_timeout_torque_ns: int = 20_000_000  # CST; afterwards quick stop
+    command_timeout_velocity_ns: int = 200_000_000  # CSV; then the axis decelerates
+    command_timeout_torque_ns: int = 20_000_000  # CST; then the axis makes a quick stop
     stop_deadline_ns: int = 2_000_000_000  # longest time from quick stop to standstill
     wire_ns: int = 0  # wire time of the cyclic frames in the busiest cycle
-    acyclic_ns: int = 0  # wire time per cycle for acyclic frames; one frame is always sent
-    busy_wait_ns: int = 0  # busy-wait before each cycle start; it costs this processor time
+    acyclic_ns: int = 0  # wire time per cycle for acyclic frames; one frame is always allowed
+    busy_wait_ns: int = 0  # busy-wait before each cycle start
     log_cycles: int = 1000  # number of cycles in the log
     log_axes: bool = False  # True if the log also has the values of the axes
-    cpu: int | None = None  # of the native thread
+    cpu: int | None = None  # CPU of the native thread; None: unchanged
     priority: int | None = 80  # SCHED_FIFO; None: unchanged
     clock: ClockPlan | None = None  # None: no distributed clocks

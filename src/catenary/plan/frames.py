@@ -1,10 +1,10 @@
-"""Frames of a cycle from its units, with templates and expected counters. ETG.1000.4 §5.4.
+"""Frames of a cycle, made from its units, with templates and expected counters. ETG.1000.4 §5.4.
 
 A device adds to a logical datagram's working counter: LRD 1, LWR 1, LRW 1 for a read and 2 for
 a write (ETG.1000.4 table 14), once per datagram, regardless of its number of FMMUs.
 
 Frames are matched by an index of 7 bits (core/_frames.pyx). An index is used again after 128
-frames, so that at most 32 frames may be sent in one cycle. With `exact_matching` each frame also
+frames. At most 32 frames may therefore be sent in one cycle. With `exact_matching` each frame also
 carries the cycle number, and 128 frames are possible.
 """
 
@@ -33,7 +33,7 @@ CYCLE_NUMBER_SIZE = OVERHEAD + 4  # bytes of a datagram with a number of 32 bits
 FRAMES_PER_CYCLE_MAX = 32  # an index is used again after at least four cycles
 EXACT_FRAMES_MAX = 128  # all indices, 0x00 to 0x7F
 FRAMES_MAX = 1024  # of all dividers and phases together
-ACYCLIC_GUARD = 0.1  # of the period: free of acyclic frames, so that the next cycle is not delayed
+ACYCLIC_GUARD = 0.1  # share of the period without acyclic frames: keeps the next cycle punctual
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,7 +53,7 @@ class _Piece:
 
     @property
     def turn(self) -> tuple[int, int]:
-        """Divider and phase of the cycles in which it is sent."""
+        """Divider and phase of the cycles in which the datagram is sent."""
         return self.divider, self.phase
 
     @property
@@ -71,12 +71,12 @@ def make_frames(
 ) -> tuple[FramePlan, ...]:
     """Return the frames of one cycle, in the order they are sent.
 
-    Frame 0 begins with the BRD of AL status, which every device answers, and carries the time.
+    Frame 0 begins with the BRD of AL status, which every device answers. It also carries the time.
     Units with a divider have their own frames, so that the other cycles do not carry them.
 
     Args:
-        units: Units of the layout, in its order.
-        device_count: Devices on the segment.
+        units: Units of the layout, in order.
+        device_count: Number of devices on the segment.
         clocks: Distributed clocks; None if no device uses them.
         mailboxes: Mailbox bits; None if they are not exchanged.
         exact_matching: True if every frame carries the cycle number.
@@ -155,12 +155,14 @@ def _check_count(frames: Sequence[FramePlan], exact_matching: bool) -> None:
         return
     if busiest <= limit:
         raise ConfigurationError(
-            f"{len(frames)} frames for all dividers and phases; the limit is {FRAMES_MAX}",
+            f"too many frames for all dividers and phases: {len(frames)}; the limit is "
+            f"{FRAMES_MAX}",
             hint="exchange fewer devices with dividers (divider=...)",
         )
     more = "" if exact_matching else f"; Scheduling(exact_matching=True) allows {EXACT_FRAMES_MAX}"
     raise ConfigurationError(
-        f"{busiest} frames in one cycle; the limit is {limit}, because an index has 7 bits{more}",
+        f"too many frames in one cycle: {busiest}; the limit is {limit}, because an index has 7 "
+        f"bits{more}",
         hint="map fewer objects, or exchange some devices less often (divider=...)",
     )
 
@@ -189,8 +191,9 @@ def _al_status(device_count: int) -> _Piece:
 def _of_clocks(clocks: ClockChoice | None) -> list[_Piece]:
     """Return the datagrams of the clocks.
 
-    They carry our time to the reference clock if it follows us, the reference's time to all other
-    clocks, and the difference of one device, which changes in each cycle.
+    They carry the link's time to the reference clock if it follows the link, and the reference's
+    time to all other clocks. They also read the difference of one device, another one in each
+    cycle.
 
     Times have four bytes: the loop of a controller compares four, IgH sends four, and a 32-bit
     clock would refuse eight. A broadcast read of all differences would OR sign-magnitude numbers.
@@ -217,7 +220,7 @@ def _clock_piece(
 
 
 def _of_mailboxes(area: MailboxArea | None) -> list[_Piece]:
-    """Return the datagram of the mailboxes. It has no sync unit: a cycle without it is good."""
+    """Return the datagram of the mailboxes. It has no sync unit, so a cycle without it is good."""
     if area is None or not area.devices:
         return []
     inputs = (Copy(0, area.input_offset, area.size),)
@@ -269,7 +272,7 @@ def _of_unit(unit: UnitLayout, number: int) -> list[_Piece]:
 
 
 def _batches(pieces: Sequence[_Piece], room: int) -> list[list[_Piece]]:
-    """Return the datagrams by frame: each in the first frame of its cycles with enough room.
+    """Return the datagrams of each frame. Each is in the first frame of its cycles that has room.
 
     Args:
         pieces: Datagrams in order.

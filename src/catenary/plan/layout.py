@@ -1,4 +1,4 @@
-"""Places of the process data: images, logical addresses, FMMUs, sync units. ETG.1000.4 §6.6.
+"""Layout of the process data: images, logical addresses, FMMUs, sync units. ETG.1000.4 §6.6.
 
 - A unit is the content of one datagram (LRW; or LRD and LWR if a device has no LRW). A device is
   never split over units or datagrams (docs/reference/deviations.md): after the loss of one of two
@@ -8,8 +8,9 @@
   short.
 - Inside a unit: the outputs of its devices, then their inputs, both by position.
 - Every device starts at a new byte and fills whole bytes, even a terminal of four bits. Bit-wise
-  FMMUs would save some bytes. However, a write would need the neighbour's bits, not every ESC has
-  bit-wise FMMUs, and mismatches as in SOEM#958 would occur. IgH also uses whole bytes.
+  FMMUs would save some bytes. However, a write would have to contain the neighbour's bits, not
+  every ESC has bit-wise FMMUs, and mismatches as in SOEM#958 would occur. IgH also uses whole
+  bytes.
 - SyncManagers with adjacent memory share an FMMU, because terminals have few FMMUs.
 - The control byte comes from the SII, except for the watchdog trigger of outputs. That bit is set
   if and only if the watchdog is on. Some SIIs have it clear, and Beckhoff's slave stack code
@@ -28,7 +29,7 @@ from catenary.plan.numbers import ANY, MappedNumber, Which, find_number, numbers
 from catenary.wire.sync_manager import WATCHDOG_TRIGGER
 
 LOGICAL_BASE = 0x0001_0000
-LOGICAL_STRIDE = 0x0000_0800  # units start at its multiples, so that no two share an FMMU's range
+LOGICAL_STRIDE = 0x0000_0800  # units start at multiples of it; no two share an FMMU's range
 UNIT_MAX = 1472  # bytes of a unit: 1486 of a frame minus 14 of the AL status datagram
 EXACT_UNIT_MAX = UNIT_MAX - 16  # with a cycle number in each frame
 
@@ -62,10 +63,10 @@ class FmmuPlan:
 
 @dataclass(frozen=True, slots=True)
 class MailboxFmmu:
-    """FMMU of the device's mailbox-full bit: see mailboxes.py."""
+    """FMMU that maps the mailbox-full bit of a device (mailboxes.py)."""
 
     index: int
-    logical_bit: int  # from logical address 0
+    logical_bit: int  # bits from logical address 0
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,7 +112,7 @@ class DeviceData:
     inputs: tuple[Assignment, ...]
     divider: int = 1  # cycles between two exchanges
     optional: bool = False
-    watchdog_ns: int = 0  # of process data; 0: off
+    watchdog_ns: int = 0  # watchdog time of process data; 0: off
 
     @property
     def position(self) -> int:
@@ -159,14 +160,14 @@ class Layout:
 
 
 def make_layout(devices: Sequence[DeviceData], unit_max: int = UNIT_MAX) -> Layout:
-    """Return the places of all devices.
+    """Return the layout of the process data of all devices.
 
     Args:
         devices: All devices, in the order of their positions.
-        unit_max: Limit of a unit [bytes].
+        unit_max: Largest size of a unit [bytes].
 
     Raises:
-        MappingError: The process data of a device exceed a unit.
+        MappingError: The process data of a device does not fit into one unit.
     """
     units: list[UnitLayout] = []
     places: dict[int, DeviceLayout] = {}
@@ -199,7 +200,7 @@ def make_layout(devices: Sequence[DeviceData], unit_max: int = UNIT_MAX) -> Layo
 
 
 def _grouped(devices: Sequence[DeviceData], unit_max: int) -> list[list[DeviceData]]:
-    """Return the devices by unit, in the order of their first member."""
+    """Return the devices of each unit. Units are in the order of their first devices."""
     groups: list[list[DeviceData]] = []
     room: dict[
         tuple[bool, int], int
@@ -210,8 +211,8 @@ def _grouped(devices: Sequence[DeviceData], unit_max: int) -> list[list[DeviceDa
         if data.size > unit_max:
             raise MappingError(
                 f"{data.description}: {data.output_size} bytes of outputs and {data.input_size} "
-                f"bytes of inputs are {data.size} bytes of process data; a device is exchanged in "
-                f"one datagram, which holds {unit_max} bytes",
+                f"bytes of inputs are {data.size} bytes; the process data of a device must fit "
+                f"into one datagram of {unit_max} bytes",
                 hint=f"map fewer objects, at least {data.size - unit_max} bytes less",
             )
         if data.optional:
@@ -313,7 +314,7 @@ def _managers(data: DeviceData, direction: Direction) -> tuple[SyncManagerPlan, 
 
 
 def _control(byte: int, direction: Direction, watchdog_ns: int) -> int:
-    """Return the control byte: the trigger bit of outputs agrees with the watchdog time."""
+    """Return the control byte. For outputs, the trigger bit is set only if the watchdog is on."""
     if direction is Direction.INPUT:
         return byte
     return byte | WATCHDOG_TRIGGER if watchdog_ns else byte & ~WATCHDOG_TRIGGER
@@ -350,7 +351,7 @@ def _fmmus(
         )
     if len(plans) > device.controller.fmmu_count:
         raise ConfigurationError(
-            f"{device}: its process data needs {len(plans)} FMMUs, its controller has "
+            f"{device}: its process data needs {len(plans)} FMMUs, but its controller has "
             f"{device.controller.fmmu_count}",
             hint="use fewer SyncManagers",
         )

@@ -1,11 +1,11 @@
 """Mailbox-full bits of the devices in the cyclic data.
 
 One bit per device is mapped by a spare FMMU: "mailbox full" in the status of SyncManager 1 (0x080D
-bit 3). SOEM maps the whole byte into the group's inputs (ec_config.c), KickCAT a bit (bus.cc),
-TwinCAT uses its "SyncM status" FMMU; IgH and others poll the register.
+bit 3). SOEM maps the whole byte into the group's inputs (ec_config.c). KickCAT maps a bit (bus.cc).
+TwinCAT uses its "SyncM status" FMMU. IgH and others poll the register.
 
 The bits have their own datagram. A register answers in every state. In the datagram of the process
-data, its answer would count like inputs and could hide missing ones.
+data, its answer would increment the working counter and could hide missing inputs.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ WORD = 32  # bits of a column
 
 @dataclass(frozen=True, slots=True)
 class MailboxArea:
-    """Mailbox bits in the image of inputs: bit k belongs to `devices[k]`, by position."""
+    """Mailbox bits in the image of inputs. Bit k belongs to the device at position `devices[k]`."""
 
     devices: tuple[int, ...]
     input_offset: int  # bytes
@@ -37,7 +37,7 @@ class MailboxArea:
 
     @property
     def columns(self) -> tuple[Column, ...]:
-        """Integer columns of 32 devices each, in their order."""
+        """Integer columns, each with the bits of up to 32 devices, in the order of `devices`."""
         return tuple(
             Column(
                 "mailboxes",
@@ -57,7 +57,7 @@ class MailboxArea:
 def with_mailboxes(
     layout: Layout, devices: Sequence[DeviceDescription]
 ) -> tuple[Layout, MailboxArea]:
-    """Return the layout with another FMMU for each device with a mailbox and a spare FMMU.
+    """Return the layout with the mailbox bit of each device that has a mailbox and a spare FMMU.
 
     Args:
         layout: Layout of the process data.

@@ -1,6 +1,6 @@
 """Choice of PDOs for the requested objects, ETG.1000.6 §5.6.7.4 (0x1C12, 0x1C13 and PDOs).
 
-The order of preference:
+Order of preference:
 
 1. The present assignment: nothing is written. Optional objects that are not mapped are left out.
 2. Another combination of the PDOs that the device offers (`pdo_search.py`): 0x1C1x is written. The
@@ -8,10 +8,10 @@ The order of preference:
 3. A PDO that is not fixed also gets the missing required objects (`pdo_rewrite.py`), if the SII
    allows it.
 
-An optional object never causes a write: the device may refuse it although its SII allows it, and
-the bring-up would fail for an object that is not needed. A mapping that the application specifies
-is tried regardless of the SII, because the permission bits of SIIs are often wrong. IgH (fsm_pdo.c)
-also honours both bits, but warns and continues.
+An optional object alone never causes a write. The device may refuse it although its SII allows it,
+and the bring-up would fail for an object that is not needed. A mapping that the application
+specifies is tried regardless of the SII, because the permission bits of SIIs are often wrong. IgH
+(fsm_pdo.c) also honours both bits, but warns and continues.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ from catenary.plan.pdo_search import (
 if TYPE_CHECKING:  # request.py imports NumPy, which a scan does not need
     from catenary.plan.request import ObjectReference, WrittenPdo
 
-BITS_MAX = 1486 * 8  # a device's data must fit one datagram of one frame
+BITS_MAX = 1486 * 8  # the data of a device must fit into one datagram
 OFFERS_SHOWN = 12
 
 
@@ -56,8 +56,8 @@ def make_mapping(
     Args:
         device: The device, with its present mapping.
         direction: Outputs or inputs.
-        requested: Objects. Optional ones that would need a rewrite are left out.
-        written: PDOs of this direction that the application specified; empty: search.
+        requested: Requested objects. Optional ones that would need a rewrite are left out.
+        written: PDOs of this direction that the application specified; empty to search for PDOs.
 
     Raises:
         MappingError: No mapping is possible. The error names each alternative and its obstacle.
@@ -113,9 +113,9 @@ def _assign(
 def _assign_most(
     device: DeviceDescription, direction: Direction, requested: Sequence[ObjectReference]
 ) -> Mapping | None:
-    """Return a combination with all required objects and as many optional ones as possible.
+    """Return a combination with all required objects and, if possible, the optional ones.
 
-    None if no combination carries the required objects.
+    Return None if no combination carries the required objects.
     """
     kept = [each for each in requested if each.required]
     found = _assign(device, direction, kept)
@@ -134,7 +134,7 @@ def _as_now(current: Mapping, requested: Sequence[ObjectReference]) -> str:
     reasons = []
     for each in _missing(current, requested):
         bits = lengths.get((each.index, each.subindex))
-        other = f"is mapped with {bits} bits, {each.bit_length} were requested"
+        other = f"is mapped with {bits} bits, but {each.bit_length} were requested"
         reasons.append(f"{object_names([each])} {'is not mapped' if bits is None else other}")
     return f"as assigned now ({pdo_names(current.pdos)}): {'; '.join(reasons)}"
 
@@ -168,7 +168,7 @@ def _check_size(device: DeviceDescription, direction: Direction, mapping: Mappin
         if assignment.bit_length > BITS_MAX:
             raise MappingError(
                 f"{device}: {assignment.byte_length} bytes of {direction.noun} in SyncManager "
-                f"{assignment.sync_manager} do not fit a datagram of {BITS_MAX // 8} bytes",
+                f"{assignment.sync_manager} do not fit into a datagram of {BITS_MAX // 8} bytes",
                 hint="request fewer objects",
             )
 

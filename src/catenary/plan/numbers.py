@@ -12,11 +12,11 @@ from catenary.types import Integer, Real, by_index
 
 
 class Which(NamedTuple):
-    """Selection of one place of an object that is mapped several times. 0: any."""
+    """Selection of one place of an object that is mapped several times. 0 in a field means any."""
 
     pdo: int = 0
     bit_length: int = 0
-    rank: int = 0  # among equal places
+    rank: int = 0  # number of the place among equal ones, from 0
 
 
 ANY = Which()
@@ -31,7 +31,7 @@ class EntryPlace(NamedTuple):
 
 
 def entry_places(assignments: Sequence[Assignment], offset: int) -> Iterator[EntryPlace]:
-    """Yield all entries of a device, with gaps. Every SyncManager begins at a new byte.
+    """Yield all entries of a device, gaps included. Every SyncManager begins at a new byte.
 
     Args:
         assignments: SyncManagers and their PDOs.
@@ -73,7 +73,10 @@ def numbers(assignments: Sequence[Assignment], offset: int) -> tuple[MappedNumbe
 def find_number(
     mapped: Sequence[MappedNumber], index: int, subindex: int, which: Which
 ) -> Number | None:
-    """Return the place of an object: the one that `which` selects, otherwise the first."""
+    """Return the place of an object; None if it is not mapped.
+
+    If no place agrees with `which`, return the first one.
+    """
     found = [each for each in mapped if (each.index, each.subindex) == (index, subindex)]
     if not found:
         return None

@@ -25,27 +25,30 @@ class PlanOptions:
         period: Period of the cycle [s].
         execution: "threaded" or "inline".
         receive_mode: "poll", "wait" or "busy".
-        optional: Positions without which the cycle is good, in addition to the devices of optional
-            requests. Devices without a request are required if any other one is.
-        watchdog: Watchdog time of process data [s]; 0: off; None: 0.1 s, for devices in CST the
-            longer of 10 ms and five exchanges.
-        collect_share: If threaded, share of the period in which frames may return.
+        optional: Positions of devices whose loss does not make a cycle bad, in addition to the
+            devices of optional requests. A device without a request is required if any requested
+            device is.
+        watchdog: Watchdog time of process data [s]; 0: off. None: 0.1 s, or the longer of 10 ms and
+            five exchanges for devices in CST.
+        collect_share: If threaded, share of the period, from the wake-up on, in which frames may
+            return.
         lost_limit: Number of consecutive bad cycles before WorkingCounterError.
-        late_limit_position: Late limit in CSP [s].
-        late_limit_velocity: Late limit in CSV [s].
-        late_limit_torque: Late limit in CST [s].
+        late_limit_position: Longest time without fresh set-points in CSP [s]; 0: unlimited.
+        late_limit_velocity: The same in CSV [s].
+        late_limit_torque: The same in CST [s]; 0 is refused.
         handover: Time for which CST keeps its torque after a law or stream ended [s].
-        command_timeout_velocity: Validity of an update in the background in CSV [s].
-        command_timeout_torque: Validity of an update in the background in CST [s].
+        command_timeout_velocity: Time for which an update of a background loop is valid in CSV [s].
+        command_timeout_torque: Time for which an update of a background loop is valid in CST [s].
         stop_deadline: Longest time from quick stop to standstill [s].
         busy_wait: Time of a busy-wait before each cycle start [s].
         log: Number of cycles in the log.
-        log_axes: True to log the values of the axes too.
+        log_axes: True to also log the values of the axes.
         cpu: CPU of the native thread; None: unchanged.
         priority: SCHED_FIFO priority of the native thread; None: unchanged.
-        clock: Clock that the others follow.
+        clock: Clock that the others follow: "reference", or "main" for the link's clock.
         reference: Position of the reference clock; None: the first device with a clock.
-        margin: Time between the cycle start and the frames [s]; None: by the execution mode.
+        margin: Time between the cycle start and the frames [s]; None: a share of the period that
+            depends on the execution mode.
         burst: Number of frames that synchronise the clocks before the cycle begins.
         exact_matching: True if every frame carries the cycle number (plan/frames.py).
     """
@@ -77,7 +80,7 @@ class PlanOptions:
 
     @property
     def period_ns(self) -> int:
-        """Period [ns]. ValueError unless it is between 1 us and 1000 s."""
+        """Period [ns]. Raises ValueError unless it is between 1 us and 1000 s."""
         return period_in_ns(self.period)
 
     @property
@@ -87,7 +90,7 @@ class PlanOptions:
 
 
 def period_in_ns(period: float) -> int:
-    """Return a period in [ns]. ValueError unless it is between 1 us and 1000 s."""
+    """Return a period [ns]. Raise ValueError unless it is between 1 us and 1000 s."""
     if not PERIOD_MIN <= period <= PERIOD_MAX:
         raise ValueError(f"period={period} s: must be {PERIOD_MIN:g} to {PERIOD_MAX:g} s")
     return round(period * 1e9)

@@ -1,7 +1,7 @@
 """Owners of the output bytes: each byte belongs to one request.
 
 Two requests that write the same byte are an error. An object that the core writes for an axis
-cannot be a column too: it would bypass enabling and all limits.
+cannot also be a column, because the column would bypass enabling and all limits.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ SHARED = "velocity_offset"  # a column of the application; the core writes it du
 class Owned(NamedTuple):
     """Bytes of the image of outputs that a request writes."""
 
-    request: int  # its rank
+    request: int  # rank of the request
     what: str
     bytes: range
     by_axis: bool = False  # True if the core writes them for an axis
@@ -105,6 +105,6 @@ def _conflict(
         for owned in (first, second)
     )
     return ConfigurationError(
-        f"{device}: byte {byte - start} of its outputs is written by two requests: {writers}",
+        f"{device}: two requests write byte {byte - start} of its outputs: {writers}",
         hint="let one of them write it; ProcessData(sub, outputs={}) only reads",
     )

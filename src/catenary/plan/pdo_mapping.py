@@ -32,7 +32,7 @@ class Mapping:
 
     @property
     def pdos(self) -> tuple[Pdo, ...]:
-        """PDOs of all its assignments, in their order."""
+        """PDOs of all assignments, in order."""
         return mapped_pdos(self.assignments)
 
 
@@ -40,12 +40,12 @@ class AvailablePdos(NamedTuple):
     """PDOs of a device in one direction, by their assignment."""
 
     assigned: tuple[Pdo, ...]  # to the SyncManager of process data
-    offered: tuple[Pdo, ...]  # all that can be assigned to it, `assigned` included
+    offered: tuple[Pdo, ...]  # all that can be assigned to this SyncManager, `assigned` included
     elsewhere: tuple[Pdo, ...]  # assigned to other SyncManagers
 
 
 def process_data_channel(device: DeviceDescription, direction: Direction) -> int | None:
-    """Return the SyncManager of the process data of a direction; None if it does not exist."""
+    """Return the index of the SyncManager for the process data of a direction; None if absent."""
     for assignment in device.assignments(direction):
         return assignment.sync_manager
     for channel in device.sync_managers:
@@ -55,10 +55,10 @@ def process_data_channel(device: DeviceDescription, direction: Direction) -> int
 
 
 def check_channel(device: DeviceDescription, direction: Direction) -> int:
-    """Return the SyncManager of the process data of a direction.
+    """Return the index of the SyncManager for the process data of a direction.
 
     Raises:
-        MappingError: It does not exist.
+        MappingError: The device has no such SyncManager.
     """
     channel = process_data_channel(device, direction)
     if channel is None:
@@ -83,7 +83,7 @@ def available_pdos(device: DeviceDescription, direction: Direction) -> Available
 
 
 def assignment_refusal(device: DeviceDescription, direction: Direction) -> str:
-    """Return the reason why the assignment cannot be changed; empty if it can.
+    """Return the reason why the assignment cannot be changed; empty if it can be changed.
 
     Raises:
         MappingError: The device has a CoE mailbox, but no SyncManager for the direction.
@@ -100,7 +100,7 @@ def assignment_refusal(device: DeviceDescription, direction: Direction) -> str:
 
 
 def with_pdos(device: DeviceDescription, direction: Direction, pdos: Sequence[Pdo]) -> Mapping:
-    """Return the mapping with these PDOs on the SyncManager of process data.
+    """Return the mapping with these PDOs on the SyncManager for process data.
 
     Differences from the device's own mapping are marked as rewritten or reassigned.
     """

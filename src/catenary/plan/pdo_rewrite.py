@@ -20,7 +20,7 @@ ENTRIES_MAX = 254  # subindices of a mapping object, ETG.1000.6 table 75
 def rewrite_refusal(
     device: DeviceDescription, direction: Direction, missing: Sequence[ObjectReference]
 ) -> str:
-    """Return the reason why the missing objects cannot be added to a PDO; empty if they can."""
+    """Return the reason why the missing objects cannot be added to a PDO; empty if possible."""
     if device.mailbox is None or not device.coe:
         return "it has no CoE mailbox to change its mapping"
     for reference in missing:
@@ -34,7 +34,7 @@ def rewrite_refusal(
     if _changeable(device, direction) is None:
         pdos = device.pdos(direction)
         if not all(pdo.fixed for pdo in pdos):
-            return "its assigned PDOs are fixed, and no other one can be assigned"
+            return "its assigned PDOs are fixed, and no other PDO can be assigned"
         return f"all its PDOs are fixed: {pdo_names(pdos)}" if pdos else "its PDOs are not known"
     return ""
 
@@ -89,7 +89,7 @@ def write_down(
 
 
 def _changeable(device: DeviceDescription, direction: Direction) -> Pdo | None:
-    """Return the first assigned PDO that is not fixed, otherwise one that can be assigned."""
+    """Return the first PDO that is not fixed: an assigned one, otherwise an assignable one."""
     assigned, offered, _ = available_pdos(device, direction)
     if assignment_refusal(device, direction):
         offered = ()
@@ -103,7 +103,8 @@ def _not_mappable(
 ) -> str:
     """Return the reason in the dictionary why an object cannot be mapped; empty if there is none.
 
-    An object that was not read is accepted. If necessary, the device refuses it before SAFE-OP.
+    An object that was not read is accepted. If it cannot be mapped, the device refuses it before
+    SAFE-OP.
     """
     known = device.known_object(reference.index, reference.subindex)
     if known is None:
@@ -114,7 +115,7 @@ def _not_mappable(
     if not mappable:
         return "exists but cannot be mapped"
     if known.bit_length != reference.bit_length:
-        return f"has {known.bit_length} bits, {reference.bit_length} were requested"
+        return f"has {known.bit_length} bits, but {reference.bit_length} were requested"
     return ""
 
 
@@ -130,7 +131,7 @@ def _other_length(
 
 
 def _entry(device: DeviceDescription, reference: ObjectReference) -> Entry:
-    """Return the entry, with the name and type of the dictionary or of the device's PDOs."""
+    """Return the entry, with its name and type if the dictionary or a PDO contains them."""
     known = device.known_object(reference.index, reference.subindex)
     if known is not None:
         return Entry(*reference.place, known.name, known.data_type)

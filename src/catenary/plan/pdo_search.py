@@ -1,11 +1,11 @@
 """Search for a combination of unchanged PDOs of a device that carries the requested objects.
 
 Two PDOs cannot be assigned together if one excludes the other (`Exclude` of an ESI), or if both
-carry the same object. The second rule is our own: an SII does not list exclusions, and
-alternatives on real devices carry the same objects. Beckhoff's EL30xx has a standard and a compact
-PDO per channel (0x1A00 and 0x1A01). Kollmorgen's AKD has fixed PDOs 0x1701 to 0x1725, each with the
-controlword.
-PDOs that are assigned together now may stay together: the EL3632 maps one object twice.
+carry the same object. The second rule is not in the standard. It is needed because
+an SII does not list exclusions, and alternative PDOs on real devices carry the same objects.
+Beckhoff's EL30xx has a standard and a compact PDO per channel (0x1A00 and 0x1A01). Kollmorgen's AKD
+has fixed PDOs 0x1701 to 0x1725, each with the controlword.
+PDOs that are assigned together now may stay together, because the EL3632 maps one object twice.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ class Combination(NamedTuple):
 
 
 class _Offer(NamedTuple):
-    """A PDO, with its objects as sets: the search compares them often."""
+    """A PDO, with its objects as sets, because the search compares them often."""
 
     pdo: Pdo
     entries: frozenset[tuple[int, int, int]]  # index, subindex, length
@@ -49,9 +49,9 @@ class _State(NamedTuple):
 def find_combination(
     assigned: Sequence[Pdo], offered: Sequence[Pdo], requested: Sequence[ObjectReference]
 ) -> Combination | None:
-    """Return the combination that carries all objects and changes least; None if there is none.
+    """Return the combination that carries all objects and changes least; None if none was found.
 
-    It prefers the fewest removed PDOs, then the fewest added ones, then the device's order.
+    It prefers the fewest removed PDOs, then the fewest added ones, then the order of the device.
     Mandatory PDOs stay.
 
     Args:
@@ -128,7 +128,7 @@ def place_names(places: Iterable[tuple[int, int, int]], *, empty: str) -> str:
 def _steps(
     state: _State, known: dict[int, _Offer], missing: tuple[int, int, int]
 ) -> Iterator[_State]:
-    """Yield a state for each PDO with the missing object; it replaces the PDOs in conflict."""
+    """Yield a state for each PDO with the missing object. This PDO replaces those in conflict."""
     for index, offer in known.items():
         if index in state.chosen or missing not in offer.entries:
             continue

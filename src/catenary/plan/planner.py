@@ -41,7 +41,7 @@ from catenary.wire.cia402 import Mode
 
 @dataclass(frozen=True, slots=True)
 class Plan:
-    """Complete configuration of one network: `print(plan)` shows it. Plans compare by value.
+    """Complete configuration of one network. `print(plan)` shows it. Plans compare by value.
 
     `tables[k]` has the axes and columns of the k-th request. `cycle` has those of all requests in
     order, followed by the columns of the `mailboxes`.
@@ -71,7 +71,7 @@ def make_plan(
     Args:
         devices: Descriptions of all devices of the segment, by position.
         requests: Process-data requests.
-        options: Period, limits, clocks and threads.
+        options: Options that do not belong to a single request, such as the period.
 
     Raises:
         ConfigurationError: An object cannot be mapped, requests contradict each other, or the
@@ -168,7 +168,7 @@ def _check_positions(
     for position in combined:
         if position not in range(len(devices)):
             raise ConfigurationError(
-                f"a request names device {position}; the segment has {len(devices)} devices",
+                f"a request names device {position}, but the segment has {len(devices)} devices",
                 hint="scan again, or correct the position",
             )
 
@@ -225,7 +225,7 @@ def _make_clock(choice: ClockChoice, cycle: CyclePlan, options: PlanOptions) -> 
 
 
 def _with_options(cycle: CyclePlan, options: PlanOptions) -> CyclePlan:
-    """Return the cycle with the limits, the log and the thread of the options."""
+    """Return the cycle with the limits, the log and the thread settings of the options."""
     return replace(
         cycle,
         lost_limit=options.lost_limit,

@@ -33,7 +33,7 @@ def report(
         cycle: Plan of the cycle.
         devices: Plans of the devices.
         layout: Places of the process data.
-        axes: Reports of all axes, in their order.
+        axes: Reports of all axes, in order.
     """
     clocks = [] if cycle.clock is None else _clocks(cycle.clock, cycle.period_ns, devices)
     return "\n".join(
@@ -110,7 +110,7 @@ def _start_up(devices: Sequence[DevicePlan]) -> Iterator[str]:
 
 
 def _download(owner: str, download: Download, old: Mapping[str, str]) -> str:
-    """Return one download as text. `old`: values of the objects that change, by place."""
+    """Return one download as text. `old` holds the old values of changed objects, by place."""
     before = old.get(download.place)
     value = download.text or download.data.hex(" ")
     unverified = ", not verified" if download.text and not download.verify else ""
@@ -198,7 +198,7 @@ def _wire_time(cycle: CyclePlan) -> str:
 
 
 def _exact_matching(frames: Sequence[FramePlan]) -> Iterator[str]:
-    """Yield the cost of the cycle numbers. Some may be free, in the padding of short frames."""
+    """Yield the cost of the cycle numbers. In the padding of short frames, they cost nothing."""
     sizes = [
         (HEADER_SIZE + sum(OVERHEAD + d.length for d in frame.datagrams), OVERHEAD + number.length)
         for frame in frames

@@ -1,6 +1,6 @@
 """Process-data requests (`ProcessDataRequest`): objects to exchange, before their places are known.
 
-`loop` and `drive` share this interface: a Loop accepts requests of any kind.
+`loop` and `drive` share this interface, so that a Loop accepts requests of any kind.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ Modes = npt.NDArray[np.int8]
 Cycles = npt.NDArray[np.uint64]
 
 TX_PDOS = 0x1A00  # indices of TxPDOs begin here (inputs); RxPDOs from 0x1600 (outputs)
-SYNC_TIME_END = 4.29  # [s] the registers 0x09A0 and 0x09A4 have 32 bits [ns]
+SYNC_TIME_END = 4.29  # [s]; the registers 0x09A0 and 0x09A4 hold 32 bits [ns]
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,7 +51,7 @@ class ObjectReference:
 
 @dataclass(frozen=True, slots=True)
 class WrittenPdo:
-    """PDO that the application specified. `entries`: None to keep the entries of the device."""
+    """PDO that the application specified. If `entries` is None, the device keeps its entries."""
 
     index: int
     entries: tuple[ObjectReference, ...] | None = None
@@ -65,16 +65,17 @@ class WrittenPdo:
 class DistributedClock:
     """Distributed clocks of a device: SYNC signals, in phase with those of all other devices.
 
-    Values of None come from an OpMode of the device's SII: the one named `op_mode`, otherwise the
-    first one that starts SYNC0 or, if there is none, SYNC1. Without any OpMode: SYNC0 every period,
-    no shift, no SYNC1, AssignActivate 0x0300.
+    Values of None come from an OpMode of the device's SII. It is the one named `op_mode`, otherwise
+    the first one that starts SYNC0 or, if there is none, SYNC1. Without such an OpMode, SYNC0 fires
+    every period, without shift and SYNC1 (AssignActivate 0x0300).
 
     Args:
         op_mode: Name of the OpMode, as in the ESI file; case is ignored.
         sync0: Period of SYNC0 [s], a multiple or an integer fraction of the loop's period.
         sync1: Time from SYNC0 to SYNC1 [s].
-        shift: Time of SYNC0 after the common SYNC0 time [s], less than a cycle; negative: before.
-        assign_activate: Registers 0x0980 and 0x0981, as in the ESI file; 0x0500: SYNC1 alone.
+        shift: Time of SYNC0 after the common SYNC0 time [s], less than a cycle. It may be negative.
+        assign_activate: Registers 0x0980 and 0x0981, as in the ESI file. 0x0500 starts
+            SYNC1 alone.
 
     Raises:
         ValueError: A time is impossible.
@@ -119,9 +120,9 @@ class DistributedClock:
 class DeviceRequest:
     """Objects that one device must exchange cyclically.
 
-    An existing mapping is only changed if a requested object is missing, or by `pdos`. Several
-    requests may name one device. Its divider is then the greatest common divisor of theirs, and it
-    is required if any of them requires it.
+    An existing mapping is only changed if a requested object is missing or `pdos` requires it.
+    Several requests may name one device. Its divider is then the greatest common divisor of their
+    dividers, and it is required if any of them requires it.
     """
 
     outputs: tuple[ObjectReference, ...] = ()  # MainDevice → device (RxPDO)
@@ -130,7 +131,7 @@ class DeviceRequest:
     clock: DistributedClock | None = None
     divider: int = 1  # cycles between two exchanges
     required: bool = True  # True if a cycle without it is bad
-    pdos: tuple[WrittenPdo, ...] = ()  # instead of a search, in their directions
+    pdos: tuple[WrittenPdo, ...] = ()  # PDOs to use in their directions, without a search
     objects: tuple[StartUp, ...] = ()  # start-up objects of the application, in their order
 
     def written(self, direction: Direction) -> tuple[WrittenPdo, ...]:
@@ -139,7 +140,7 @@ class DeviceRequest:
 
 
 class ImageLayout(Protocol):
-    """Places of the mapped objects: `which` selects one of several places of an object."""
+    """Places of the mapped objects. `which` selects one of several places of an object."""
 
     def output(
         self, device: int, index: int, subindex: int, which: Which = ANY
@@ -168,7 +169,7 @@ class Mover(Protocol):
     """Source of targets while the loop is iterated, such as the moves of some drives."""
 
     def step(self, now: float, /) -> None:
-        """Write the targets of the next commit. `now`: time of the cycle [s]."""
+        """Write the targets of the next commit. `now` is the time of the cycle [s]."""
 
     def check(self) -> None:
         """End the motions of stopped axes, after a bad cycle."""
@@ -179,10 +180,10 @@ class Mover(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class Views:
-    """Views of the part of the loop's private buffers that belongs to one request; no copies.
+    """Views, without copies, of one request's part of the loop's private buffers.
 
-    Arrays have n axes, or the columns of a bank. Only `next(loop)` changes `actual_*` and reads
-    `target_*`.
+    An array has one element for each of the n axes, or for each column of a bank. Only `next(loop)`
+    changes `actual_*` and reads `target_*`.
     """
 
     actual_position: Reals  # (n,) [rad]
@@ -218,7 +219,7 @@ class Views:
     output_bytes: Bytes
     unit_valid: Bytes  # (units of the whole plan,) 1 if the unit's last exchange was valid
     movers: list[Mover] = field(default_factory=list)  # of the whole loop, during their motion
-    # Returns True while the loop runs. Afterwards, requests have no effect.
+    # Returns True while the loop runs. After the loop, requests have no effect.
     is_open: Callable[[], bool] = lambda: True
     # Returns True while a law or a stream sets the targets
     is_led: Callable[[], bool] = lambda: False

@@ -1,6 +1,6 @@
 """Sink: interface to a receiver of every cycle of a loop.
 
-`loop` and `share` share this interface: a Loop does not depend on the use of the data.
+`loop` and `share` have this interface in common. A Loop does not depend on the use of the data.
 """
 
 from __future__ import annotations
@@ -19,9 +19,9 @@ class SinkField:
     name: str
     block: Block
     offset: int  # bytes, in its block
-    format: str  # NumPy's, of one number: "<f8"
+    format: str  # NumPy format of one number, such as "<f8"
     count: int | None = None  # None: a single number
-    unit: str = ""  # "rad", "ns"; "": a count, a code, or a unit of the device
+    unit: str = ""  # such as "rad"; empty for a count, a code, or a unit of the device
     per_axis: bool = False  # one number for each axis, in their order
 
 
@@ -30,7 +30,7 @@ class SinkLayout:
     """Layout of the data that a loop publishes in every cycle."""
 
     period: float  # [s]
-    axes: tuple[str, ...]  # names, in the order of the arrays that are per axis
+    axes: tuple[str, ...]  # names, in the order of arrays with one number per axis
     fields: tuple[SinkField, ...]
     record_size: int  # bytes of the blocks
     actual_size: int
@@ -54,7 +54,7 @@ class Sink(Protocol):
     """Receiver of every cycle of a loop."""
 
     def open(self, layout: SinkLayout) -> object:
-        """Return a capsule of native/sink.h for the layout, once a loop has its plan."""
+        """Return a capsule of native/sink.h for the layout. A loop calls this after planning."""
 
     def report(self, incident: Incident) -> None:
         """Receive an incident. Any thread except the cycle thread may call this."""

@@ -1,10 +1,10 @@
 """Data that is written to one device between PRE-OP and SAFE-OP: SDOs, then registers.
 
-The order of the SDOs: start-up objects of the application with `before_mapping`, the mapping, our
-own objects, the other start-up objects of the application.
+The SDOs are written in this order: start-up objects of the application with `before_mapping`, the
+mapping, the objects of Catenary, and the other start-up objects of the application.
 
-The order inside a changed mapping is the one of ETG.1020 §"PDO mapping": empty the assignment,
-empty and fill the mapping, fill the assignment. Only differences are written. An assignment that
+A changed mapping is written in the order of ETG.1020 §"PDO mapping": empty the assignment, empty
+and fill the mapping, fill the assignment. Only differences are written. An assignment that
 cannot be changed is not emptied.
 """
 
@@ -43,15 +43,15 @@ WATCHDOG_UNIT_NS = watchdog_unit_ns(WATCHDOG_DIVIDER)  # 100 µs
 
 @dataclass(frozen=True, slots=True)
 class Download:
-    """One SDO download. `entry`: the entry that it maps, if any, for error messages."""
+    """One SDO download. `entry` is the entry that it maps, if any, for error messages."""
 
     index: int
     subindex: int
     data: bytes
     entry: Entry | None = None
-    optional: bool = False  # skipped if the object does not exist or is read-only
+    optional: bool = False  # True to ignore that the object is absent, read-only or refuses this
     verify: bool = False  # read back and compared, unless it is write-only
-    text: str = ""  # value as the application gave it; empty for our own objects
+    text: str = ""  # value as the application gave it; empty for objects of Catenary
 
     @property
     def place(self) -> str:
@@ -72,11 +72,11 @@ class DevicePlan:
     layout: DeviceLayout
     before_mapping: tuple[Download, ...]  # start-up objects of the application
     mapping: tuple[Download, ...]  # empty: unchanged
-    start_up: tuple[Download, ...]  # our objects, then those of the application
+    start_up: tuple[Download, ...]  # objects of Catenary, then those of the application
     mapping_changed: bool
-    watchdog_ns: int  # of process data; 0: off
+    watchdog_ns: int  # watchdog time of process data; 0: off
     sync: SyncPlan | None = None  # None: no SYNC signals
-    changes: tuple[Change, ...] = ()  # what the downloads change, with old and new values
+    changes: tuple[Change, ...] = ()  # changes by the downloads, with old and new values
     rejected: tuple[str, ...] = ()  # mappings that change less, and their obstacles
     left_out: tuple[str, ...] = ()  # optional objects that are not exchanged
 
@@ -107,15 +107,15 @@ def make_device_plan(
 
     Args:
         device: Description of the device.
-        request: Its combined request, with the objects to write.
+        request: Combined request for the device, with the objects to write.
         outputs: Mapping of the outputs.
         inputs: Mapping of the inputs.
-        layout: Place of its process data.
-        watchdog_ns: Watchdog time of the process data; 0: off.
+        layout: Place of the device's process data.
+        watchdog_ns: Watchdog time of the process data [ns]; 0: off.
         sync: Settings of the SYNC unit; None: no SYNC signals.
 
     Raises:
-        ConfigurationError: The device cannot have a start-up object, or its type is unknown.
+        ConfigurationError: The device cannot have start-up objects, or the type of one is unknown.
     """
     before, after = object_downloads(device, request.objects)
     of_sync = sync.objects if sync is not None and device.coe else ()
@@ -153,7 +153,7 @@ def make_device_plan(
 def object_downloads(
     device: DeviceDescription, objects: Sequence[StartUp]
 ) -> tuple[tuple[Download, ...], tuple[Download, ...]]:
-    """Return the downloads of start-up objects: before the mapping, and after it.
+    """Return the downloads of start-up objects before the mapping, and those after it.
 
     Raises:
         ConfigurationError: The device has no CoE mailbox, or the type of an object is unknown.
@@ -222,11 +222,11 @@ def restoring_downloads(device: DeviceDescription, plan: DevicePlan) -> tuple[Do
 
 
 def renewed(plan: DevicePlan, device: DeviceDescription) -> DevicePlan:
-    """Return the plan for a device that restarts, with only the necessary mapping changes.
+    """Return the plan for a restarted device, with only the necessary mapping changes.
 
     Args:
         plan: Plan of the device.
-        device: Description with its present mapping.
+        device: Description with the present mapping of the device.
     """
     mappings = [_difference(device, each, plan.assignments(each)) for each in Direction]
     written = tuple(step for mapping in mappings for step in mapping_downloads(mapping))

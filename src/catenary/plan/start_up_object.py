@@ -13,17 +13,17 @@ MAPPING_OBJECTS = (range(0x1600, 0x1800), range(0x1A00, 0x1C00), range(0x1C10, 0
 
 @dataclass(frozen=True, slots=True)
 class StartUp:
-    """Value of an object that is written to a device in PRE-OP, each time the loop starts it.
+    """Value of an object that a loop writes to a device in PRE-OP, each time the loop starts.
 
-    It is written again when the device returns after a loss.
+    The loop writes it again when the device returns after a loss.
 
     Args:
         index: Index of the object, 0 to 0xFFFF.
         subindex: Subindex, 0 to 0xFF.
         value: Value in the unit of the device. Bytes are sent unchanged.
-        type: A type of `catenary.types`. None: from the device's object dictionary.
-        before_mapping: True to write it before the PDO mapping; False: after it.
-        verify: True to read it back and compare. Write-only objects are not read.
+        type: A type of `catenary.types`. None uses the type in the device's object dictionary.
+        before_mapping: True to write the value before the PDO mapping; False to write it after.
+        verify: True to read the value back and compare it. Write-only objects are not read.
 
     Raises:
         ValueError: The index, the subindex or the value is out of range, or the object belongs to
@@ -48,7 +48,7 @@ class StartUp:
         if not 0 <= self.index <= 0xFFFF or not 0 <= self.subindex <= 0xFF:
             raise ValueError(f"start-up object {self.place}: an index has 16 bits, a subindex 8")
         if any(self.index in objects for objects in MAPPING_OBJECTS):
-            # The plan would not know this mapping: wrong bytes would reach controlword and targets.
+            # Unknown to the plan, this mapping would let wrong bytes reach controlword and targets.
             raise ValueError(
                 f"start-up object {self.place} is part of the PDO mapping; write the mapping with "
                 "pdos= of the request"
@@ -69,11 +69,11 @@ class StartUp:
 
     @property
     def needs_type(self) -> bool:
-        """True if the type must come from the dictionary."""
+        """True if the type must come from the object dictionary."""
         return self.type is None and not isinstance(self.value, bytes)
 
     def encode(self, kind: Scalar | None) -> bytes:
-        """Return the bytes to send. `kind`: type of the value; None for bytes without a type."""
+        """Return the bytes to send. `kind` is the type of the value; None for untyped bytes."""
         if kind is None or (self.type is None and isinstance(self.value, bytes)):
             if not isinstance(self.value, bytes):
                 raise TypeError(f"start-up object {self.place}: {self.value!r} needs a type")

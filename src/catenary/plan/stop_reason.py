@@ -6,7 +6,7 @@ from enum import IntEnum
 
 
 class StopReason(IntEnum):
-    """Reason for which an axis was stopped. The numbers are the core's."""
+    """Reason for which an axis was stopped. The core uses the same numbers."""
 
     NONE = 0
     UNDERRUN = 1
@@ -24,7 +24,7 @@ class StopReason(IntEnum):
 
     @property
     def text(self) -> str:
-        """Plain description, to follow the name of an axis."""
+        """Description of the reason, to follow the name of an axis in a message."""
         return TEXTS[self]
 
 

@@ -1,7 +1,8 @@
 """Time of each device's process-data watchdog, ETG.1000.4 §6.3 (registers 0x0400, 0x0420).
 
 After a crash of the MainDevice a drive uses its last outputs until the watchdog expires. In CSP and
-CSV its own loops hold it until then. In CST it applies a stale torque, so the default is short.
+CSV its own control loops hold the axis until then. In CST it applies a stale torque, so the default
+is short.
 """
 
 from __future__ import annotations
@@ -27,7 +28,7 @@ def choose_watchdog(
 
     Args:
         device: Device, for error messages.
-        request: Its process-data request; a required target torque means CST.
+        request: Process-data request of the device. A required target torque means CST.
         seconds: Time that the application requests [s]; 0: off; None: the default.
         period_ns: Period of the cycle [ns].
 
@@ -47,7 +48,11 @@ def choose_watchdog(
 
 
 def _rounded(seconds: float) -> int:
-    """Return a multiple of the register's unit [ns]; 0 only for 0 s."""
+    """Return the nearest multiple of the register's unit [ns].
+
+    Raises:
+        ValueError: The register cannot hold the time.
+    """
     count = round(seconds * 1e9 / WATCHDOG_UNIT_NS)
     if seconds != 0 and not 0 < count <= COUNT_MAX:
         raise ValueError(_range(seconds))
@@ -73,11 +78,11 @@ def _check(
     seconds, period = watchdog_ns * 1e-9, period_ns * 1e-9
     if watchdog_ns < LEAST_EXCHANGES * period_ns:
         raise ValueError(
-            f"watchdog of {seconds:.4f} s would expire after less than {LEAST_EXCHANGES} periods "
+            f"watchdog of {seconds:.4f} s would expire after fewer than {LEAST_EXCHANGES} periods "
             f"of {period} s; use a longer Loop(watchdog=...)"
         )
     raise ValueError(
-        f"{device}: exchanged every {request.divider} cycles of {period} s, less than "
+        f"{device}: exchanged every {request.divider} cycles of {period} s, fewer than "
         f"{LEAST_EXCHANGES} times within the watchdog of {seconds:.4f} s; use a smaller divider, "
         "or a longer Loop(watchdog=...)"
     )

@@ -106,7 +106,7 @@ def acknowledge(station: Station, pending: DeviceState) -> Procedure[DeviceState
 
     Args:
         station: The device.
-        pending: Its state with the error.
+        pending: State of the device, with the error.
 
     Raises:
         StateError: The error remains.

@@ -1,6 +1,6 @@
-"""AL status of all devices in one frame, ETG.1000.4 §6.1, §6.4.
+"""AL status of all devices, read in shared frames, ETG.1000.4 §6.1, §6.4.
 
-Unlike in `al_state.read_state`, a missing reply is a result, not an error.
+Unlike in `al_state.read_state`, a missing reply is not an error.
 """
 
 from __future__ import annotations

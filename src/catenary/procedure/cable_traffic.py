@@ -13,7 +13,7 @@ LOST_IN_A_ROW_MAX = 50  # lost or damaged frames
 
 
 def exercise(seconds: float) -> Procedure[tuple[int, int]]:
-    """Send a long frame every millisecond.
+    """Send long frames, with pauses of one millisecond.
 
     Args:
         seconds: The duration [s].

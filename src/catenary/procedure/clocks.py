@@ -51,13 +51,13 @@ RingEnd = tuple[int, int]  # position and port wired to the second interface
 class ClockMeasurement:
     """Result of one measurement of the clocks of a segment. Tuples are indexed by position."""
 
-    delays_ns: tuple[int | None, ...]  # from the first clock; None without a clock
+    delays_ns: tuple[int | None, ...]  # delay from the first clock; None without a clock
     local_times_ns: tuple[int | None, ...]  # at the last latch; None without a system time
-    latched_ns: int  # the same time on the link's clock, within half a round trip
+    latched_ns: int  # last latch on the link's clock; error: up to half a round trip
 
     @property
     def first(self) -> int | None:
-        """Position of the default reference, the first device with a system time; else None."""
+        """Position of the default reference, the first device with a system time, or None."""
         for position, local in enumerate(self.local_times_ns):
             if local is not None:
                 return position
@@ -78,7 +78,7 @@ def measure(
 
     Args:
         devices: All devices, by position.
-        second_end: In a ring, the port to close during the measurement: in an intact ring, frames
+        second_end: In a ring, the port to close during the measurement. In an intact ring, frames
             do not return through the ports. None for a line.
         latches: The number of latches.
     """
@@ -117,7 +117,7 @@ def align(
     reference: int,
     epoch_ns: int,
 ) -> Procedure[None]:
-    """Write offsets and delays of the devices from the reference on, and reset all filters.
+    """Write offset and delay of the reference and of all devices after it, and reset all filters.
 
     The system time of the reference is then the link's time + `epoch_ns`. The devices after it have
     the system time of the reference.
@@ -173,8 +173,8 @@ def compensate(device: DeviceDescription, count: int = BURST) -> Procedure[None]
 def lead(device: DeviceDescription, count: int, epoch_ns: int) -> Procedure[None]:
     """Run the static drift compensation for a reference that follows the MainDevice.
 
-    Each frame first writes the MainDevice's time at the last answer to the reference. With a real
-    NIC, the reference then has the MainDevice's rate and lags about 10 us behind. The cycle
+    Each frame writes a time to the reference: the MainDevice's time at the previous answer. With a
+    real NIC, the reference then runs at the MainDevice's rate and lags by about 10 us. The cycle
     corrects the phase.
 
     Args:
@@ -235,7 +235,7 @@ def alignment(device: DeviceDescription, offset: int, delay: int) -> tuple[Reque
 
 
 def filters(station: int | None = None) -> tuple[Request, ...]:
-    """Return the requests that reset the time loop of one device, or of all devices (None).
+    """Return the requests that reset the time loop of a device; None for all devices.
 
     Filter depths are written first, because some controllers apply them when the loop is reset.
     """
@@ -264,7 +264,7 @@ def no_system_time(device: DeviceDescription) -> ClockError:
 
 
 def _latch(clocks: Sequence[DeviceDescription]) -> Procedure[int]:
-    """Latch the receive times of all ports by broadcast; return the time [ns, the link's clock]."""
+    """Latch the receive times of all ports by broadcast, and return the time [ns, link's clock]."""
     [before] = yield [read(EcatCommand.FPRD, clocks[0].station_address, RECEIVE_TIME_LATCH)]
     [reply] = yield [write(EcatCommand.BWR, 0, RECEIVE_TIME_LATCH, 0)]
     if reply.lost or reply.working_counter < len(clocks):
@@ -277,7 +277,7 @@ def _latch(clocks: Sequence[DeviceDescription]) -> Procedure[int]:
 
 
 def _time_reads(device: DeviceDescription) -> tuple[Request, Request]:
-    """Return the reads of port times and local time. A 32-bit clock uses the time of port 0."""
+    """Return the requests for port times and local time. A 32-bit clock uses the time of port 0."""
     station = device.station_address
     if device.clock_bits == 64:
         unit = read(EcatCommand.FPRD, station, RECEIVE_TIME_PROCESSING_UNIT)

@@ -29,7 +29,7 @@ from catenary.wire.sync_manager import (
 
 
 def configure_mailbox(channel: MailboxChannel) -> Procedure[None]:
-    """Write SyncManagers 0 and 1 and reset the counters. The device must be in INIT."""
+    """Write SyncManagers 0 and 1, and reset the mailbox state. The device must be in INIT."""
     layout = channel.layout
     yield from configure_mailbox_areas(
         channel.station,
@@ -65,7 +65,7 @@ def configure_process_data(
 ) -> Procedure[None]:
     """Write the SyncManagers and FMMUs of the process data, and the watchdog.
 
-    The device must be in PRE-OP. SyncManagers of an earlier plan are disabled first, because an
+    The device must be in PRE-OP. All process-data SyncManagers are disabled first, because an
     enabled SyncManager keeps its length.
 
     Args:

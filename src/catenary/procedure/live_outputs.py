@@ -29,7 +29,7 @@ from catenary.wire.sync_manager import SIZE, Activation, Direction, decode_sync_
 RUNNING = (AlState.SAFE_OP, AlState.OP)
 ACTIVE = 0x01  # 0x0440: the watchdog has not expired or is disabled
 POLL = 0.010  # [s] between two checks
-LONGEST_NS = 5_000_000_000  # maximum wait, which is twice the watchdog time
+LONGEST_NS = 5_000_000_000  # longest wait, twice a watchdog time; longer watchdogs are not checked
 
 
 class Running(NamedTuple):
@@ -70,8 +70,8 @@ def find_refreshed(running: Sequence[Running]) -> Procedure[list[int]]:
     """Return the positions of devices in OP whose outputs a master refreshes. Nothing is written.
 
     This takes at most twice the longest watchdog time. Only devices whose outputs trigger an
-    enabled watchdog are checked. Devices in SAFE-OP are not: a watchdog that was never triggered
-    looks active.
+    enabled watchdog are checked. Devices in SAFE-OP are not checked, because a watchdog that was
+    never triggered looks active.
     """
     watched = {}
     for device in running:
@@ -97,7 +97,7 @@ def find_refreshed(running: Sequence[Running]) -> Procedure[list[int]]:
 
 
 def _watchdog_time(device: Running) -> Procedure[int]:
-    """Return the watchdog time of a device [ns]; 0 if its outputs do not trigger a watchdog."""
+    """Return the watchdog time of a device [ns]; 0 if it is too long or no output triggers it."""
     count = min(device.sync_managers, SYNC_MANAGER_COUNT)
     replies = yield [
         read(EcatCommand.APRD, -device.position, WATCHDOG_DIVIDER),

@@ -95,7 +95,7 @@ def converse(
         data: The data of the message.
         accept: Function that converts the answer. It returns None for any other message, such as
             a late answer to another request.
-        timeout: Deadline of the answer [s].
+        timeout: Longest time until the answer arrives [s].
 
     Raises:
         ResponseTimeout: No answer within `timeout`, or too many frames were lost.
@@ -135,7 +135,7 @@ def further(
     Args:
         channel: The mailbox of the device.
         accept: Function that converts a message. It returns None for an unexpected message.
-        timeout: Deadline of the part [s].
+        timeout: Longest time until the part arrives [s].
 
     Raises:
         ResponseTimeout: No answer within `timeout`.

@@ -29,7 +29,7 @@ Listener: TypeAlias = Callable[[ReceivedEmergency], None]
 
 @dataclass(slots=True)
 class MailboxChannel:
-    """Owner of the state of one SubDevice's mailbox: counters, repeat toggle, emergencies.
+    """State of one SubDevice's mailbox: counters, repeat toggle, emergencies.
 
     Emergencies arrive between the answers to requests. `listener` is called for each of them, in
     any conversation. `listen` also reports those that arrived before there was a listener.
@@ -40,7 +40,7 @@ class MailboxChannel:
     counter: int = 0  # of the last written message
     received: Mailbox | None = None  # last accepted message
     counts: bool = False  # the last counter differed from the previous one and from 0
-    repetitions: int = 0  # requested from the device, but not yet read
+    repetitions: int = 0  # repetitions requested from the device, but not yet read
     received_ns: int = 0  # time at which the last message was read
     repeat_requested: bool = False  # state of the toggle bit
     emergencies: deque[ReceivedEmergency] = field(
@@ -48,14 +48,14 @@ class MailboxChannel:
     )
     listener: Listener | None = None
     dropped: int = 0  # unexpected messages and duplicates
-    # Active and waiting conversations; the first one has the mailbox.
+    # Active and waiting conversations; the first one uses the mailbox.
     turns: deque[object] = field(default_factory=deque)
     posted_ns: int | None = None  # time of the last request, until its answer arrives
     answer_delay_ns: int = 0  # expected time until the device answers
     unsure_ns: int | None = None  # time of a lost frame that may have emptied the mailbox
     owed: bool = False  # a request timed out; its answer may still arrive
     undescribed: int = 0  # number of missing or malformed SDO information answers in a row
-    emptied: bool = False  # configured again since the request, which gets no answer
+    emptied: bool = False  # configured again since the request, so no answer will arrive
 
     def reset(self) -> None:
         """Reset the state after the SyncManagers were configured again."""

@@ -2,7 +2,7 @@
 
 They complete the SII, which may contain neither names nor types. An entry without a data type would
 be read as an unsigned integer. SOEM's slaveinfo.c also reads the dictionary (SDO information,
-ETG.1000.6 §5.6.3). Names are optional: no answer of the device is treated as an error.
+ETG.1000.6 §5.6.3). Names are optional, so a missing or negative answer is not an error.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ TIMEOUT = 5.0  # [s] for all names of one device
 def name_entries(
     channel: MailboxChannel, device: DeviceDescription
 ) -> Procedure[DeviceDescription]:
-    """Return the description with the names of assigned entries and PDOs that are known.
+    """Return the description, with the names of the assigned entries and PDOs as far as known.
 
     Args:
         channel: The mailbox of the device.
@@ -48,7 +48,7 @@ def name_entries(
 
 
 class _Names:
-    """Owner of the object descriptions of one dictionary. Each is read only once."""
+    """Object descriptions of one dictionary. Each is read at most once."""
 
     def __init__(self, channel: MailboxChannel) -> None:
         self._channel = channel

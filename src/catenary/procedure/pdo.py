@@ -112,7 +112,7 @@ def restore_mapping(
 ) -> Procedure[None]:
     """Write the old mapping back, as far as the device allows.
 
-    SOEM and IgH leave the device without a mapping. The next scan then finds no process data.
+    SOEM and IgH leave the device without a mapping, so that the next scan finds no process data.
 
     Args:
         channel: The mailbox of the device.
@@ -137,7 +137,7 @@ def _refused_mapping(
     alternatives = "".join(f"\n    {each}" for each in plan.rejected)
     return MappingError(
         f"{channel.station}: {what}: {refusal}"
-        + (f"\n  tried because:{alternatives}" if alternatives else ""),
+        + (f"\n  alternatives that change less:{alternatives}" if alternatives else ""),
         hint="its SII allows the change, but the device does not; request only objects that it "
         "maps, or choose other PDOs with pdos= (`catenary scan` shows the mapping)",
     )
@@ -204,7 +204,7 @@ def _read_pdo(
     if words is None:
         if known is None:
             raise MappingError(
-                f"{channel.station}: assigns PDO 0x{index:04X}, which is in neither its dictionary "
+                f"{channel.station} assigns PDO 0x{index:04X}, which is in neither its dictionary "
                 "nor its SII",
                 hint="write 0x1C12 and 0x1C13 again, or restore its defaults (0x1011)",
             )

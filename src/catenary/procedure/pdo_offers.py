@@ -31,7 +31,7 @@ def read_first_mapping(
 ) -> Procedure[DeviceDescription]:
     """Return the description with the mapping that the device reports.
 
-    Notes contain differences from the SII, or the reason why the mapping of the SII is used.
+    Notes name the differences from the SII, or the reason why the mapping of the SII is used.
 
     Args:
         channel: The mailbox of the device.
@@ -124,7 +124,7 @@ def _is_read_only(
 def _differences(
     described: DeviceDescription, found: DeviceDescription, direction: Direction
 ) -> Iterator[str]:
-    """Yield the differences between the SII and the dictionary. An SII without PDOs has none."""
+    """Yield the differences between the SII and the dictionary; none for an SII without PDOs."""
     if not described.pdos(direction):
         return
     before = {each.sync_manager: each.pdos for each in described.assignments(direction)}

@@ -31,7 +31,7 @@ WRITABLE = Access.WRITE_PRE_OP | Access.WRITE_SAFE_OP | Access.WRITE_OP
 def read_profile(
     channel: MailboxChannel, device: DeviceDescription
 ) -> Procedure[DeviceDescription]:
-    """Read the device type and the slots of drives, and return the description with them.
+    """Read the device type and the slots of CiA 402 axes. Return the description with them.
 
     Args:
         channel: The mailbox of the device.

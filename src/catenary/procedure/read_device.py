@@ -24,7 +24,7 @@ def visit(device_count: int) -> Procedure[tuple[StationRegisters, ...]]:
 
 
 def read_addresses(device_count: int) -> Procedure[tuple[int, ...]]:
-    """Read the station addresses of the devices, in the order of the frame."""
+    """Read the station addresses of the devices, in the order in which a frame passes them."""
     replies = yield [read(EcatCommand.APRD, -rank, STATION_ADDRESS) for rank in range(device_count)]
     return tuple(
         STATION_ADDRESS.unpack(answered(reply, Station(rank, 0), "station address"))
@@ -36,7 +36,7 @@ def give_addresses(found: Sequence[int], wanted: Sequence[int]) -> Procedure[Non
     """Write the station addresses that differ.
 
     Args:
-        found: The present addresses, in the order of the frame.
+        found: The present addresses, in the order in which a frame passes the devices.
         wanted: The new addresses, in the same order.
     """
     missing = [rank for rank in range(len(found)) if wanted[rank] != found[rank]]

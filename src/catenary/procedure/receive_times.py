@@ -18,7 +18,7 @@ from catenary.wire.register import RECEIVE_TIME_LATCH, RECEIVE_TIMES
 def read_receive_times(
     devices: Sequence[DeviceDescription],
 ) -> Procedure[tuple[PortTimes | None, ...]]:
-    """Latch and read the receive times, by position; None without a clock or an answer."""
+    """Latch and read the receive times of each device; None without a clock or an answer."""
     clocks = [device for device in devices if device.controller.supports_clocks]
     if not clocks:
         return (None,) * len(devices)

@@ -1,6 +1,6 @@
 """Return of one device to a running network: find, identify and configure it again.
 
-A device that was switched off has lost its station address, SyncManagers, FMMUs and mapping; only
+A device that was switched off has lost its station address, SyncManagers, FMMUs and mapping. Only
 its EEPROM remains. As in IgH and TwinCAT, it is brought to INIT and configured completely.
 """
 
@@ -34,7 +34,7 @@ from catenary.wire.sii_interface import CONFIGURATION_FORCE
 class Presence(NamedTuple):
     """One device that is present."""
 
-    rank: int  # in the order of the frame
+    rank: int  # from 0, in the order in which a frame passes the devices
     station_address: int  # 0 if the device was powered up and has no address yet
     alias: int
 
@@ -42,7 +42,7 @@ class Presence(NamedTuple):
 def find_devices(at_most: int) -> Procedure[list[Presence]]:
     """Return the present devices, by position.
 
-    The result is empty if devices appear or disappear at the same time; try again later. In a cut
+    The result is empty if devices appear or disappear at the same time. Try again later. In a cut
     ring, the devices after the cut are counted but have no position.
 
     Args:
@@ -136,7 +136,7 @@ def bring_to_safe_op(
         channel: Its mailbox; None if it has none.
         device: Its description.
         plan: Its plan.
-        clock: The procedure that sets its clock, run last; None without a clock.
+        clock: The procedure that sets its clock, run before the request; None without a clock.
     """
     if channel is not None and device.coe:
         found = yield from read_mapping(channel, device)

@@ -60,10 +60,10 @@ def upload(
         subindex: The subindex of the entry.
         complete_access: True to read all subindices from `subindex` on.
         limit: Maximum size [bytes].
-        timeout: Deadline of the whole transfer [s]. Each message also has its own deadline.
+        timeout: Longest time of the whole transfer [s]. Each message also has its own deadline.
 
     Raises:
-        SdoAbort: The device refuses.
+        SdoAbort: The device refuses the transfer.
         MailboxError: The device announces more than `limit` bytes, sends more than announced, or
             takes longer than `timeout`.
     """
@@ -79,7 +79,7 @@ def upload_small(channel: MailboxChannel, index: int, subindex: int) -> Procedur
         subindex: The subindex of the entry.
 
     Raises:
-        SdoAbort: The device refuses.
+        SdoAbort: The device refuses the transfer.
         MailboxError: The object has more than `SMALL_LIMIT` bytes, or takes longer than
             `SMALL_TIMEOUT`.
     """
@@ -167,7 +167,7 @@ def download(
         complete_access: True to write all subindices from `subindex` on.
 
     Raises:
-        SdoAbort: The device refuses.
+        SdoAbort: The device refuses the transfer.
     """
     return exclusively(channel, _download(channel, index, subindex, data, complete_access))
 
@@ -208,13 +208,13 @@ def _ask(
     place: tuple[int, int],
     matches: Callable[[T], bool] = lambda _: True,
 ) -> Procedure[T]:
-    """Send one SDO request and return its answer. Raises SdoAbort if the device refuses."""
+    """Send one SDO request and return its answer. Raise SdoAbort if the device refuses it."""
 
     def accept(mailbox: Mailbox) -> T | Abort | None:
         message = decoded(channel, mailbox)
         if isinstance(message, Abort):
-            # Do not compare the object: some devices send none, or another one. Only one service
-            # runs at a time. SOEM (ecx_SDOread) and IgH (fsm_coe.c) do not compare it either.
+            # Do not compare the object: some devices return no index, or a different one. Only one
+            # service runs at a time. SOEM (ecx_SDOread) and IgH (fsm_coe.c) also do not compare it.
             return message
         return message if isinstance(message, expected) and matches(message) else None
 

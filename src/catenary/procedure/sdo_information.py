@@ -38,13 +38,13 @@ T = TypeVar("T")
 ABOUT = {Opcode.LIST_RESPONSE: 2, Opcode.OBJECT_RESPONSE: 2, Opcode.ENTRY_RESPONSE: 3}  # bytes
 ANSWER_MAX = 2 + 2 * 0x1_0000  # bytes: a list of all possible indices
 ANSWER_TIMEOUT = 20.0  # [s] for all fragments of one answer
-FAILURES_MAX = 3  # missing or malformed answers in a row after which requests end
+FAILURES_MAX = 3  # missing or malformed answers in a row before requests end
 PLACES_SHOWN = 8  # number of places that a note lists per reason
 FAILURES = (SdoAbort, MailboxError, ResponseTimeout)
 
 
 class ObjectIndices(NamedTuple):
-    """The indices of a list, and a note about its faults; empty if it is complete."""
+    """The indices of a list. `note` reports its faults; it is empty if the list is complete."""
 
     indices: tuple[int, ...]
     note: str = ""
@@ -91,7 +91,7 @@ def read_object_list(
         kind: The kind of list.
 
     Raises:
-        SdoAbort: The device refuses.
+        SdoAbort: The device refuses the request.
     """
     data, cut = yield from _ask(channel, list_request(kind), Opcode.LIST_RESPONSE, (0, 0))
     indices = _understood(channel, decode_object_list, data).indices
@@ -114,7 +114,7 @@ def read_object_description(channel: MailboxChannel, index: int) -> Procedure[Ob
         index: The index of the object.
 
     Raises:
-        SdoAbort: The device refuses.
+        SdoAbort: The device refuses the request.
     """
     data, _ = yield from _ask(channel, object_request(index), Opcode.OBJECT_RESPONSE, (index, 0))
     return _understood(channel, decode_object_description, data)
@@ -132,7 +132,7 @@ def read_entry_description(
         info: Optional fields to read.
 
     Raises:
-        SdoAbort: The device refuses.
+        SdoAbort: The device refuses the request.
     """
     request = entry_request(index, subindex, info)
     data, _ = yield from _ask(channel, request, Opcode.ENTRY_RESPONSE, (index, subindex))
@@ -227,7 +227,7 @@ def list_objects(
 
 
 class _Failures:
-    """Owner of the places that the device did not describe, by reason."""
+    """Places that the device did not describe, by reason."""
 
     def __init__(self, channel: MailboxChannel, note: str = "") -> None:
         self._first = (note,) if note else ()
@@ -247,7 +247,7 @@ class _Failures:
 
     @property
     def are_too_many(self) -> bool:
-        """True if no further request should be sent: each one may take seconds."""
+        """True if no further request should be sent, because each one may take seconds."""
         return self._in_a_row >= FAILURES_MAX
 
     def forget(self) -> None:
@@ -273,7 +273,7 @@ def _is_absent(error: CatenaryError) -> bool:
 
 
 def _count_objects(channel: MailboxChannel) -> Procedure[int]:
-    """Return the number of objects that the device reports; 0 if it does not report it.
+    """Return the number of objects that the device reports; 0 if it does not report a number.
 
     KickCAT (lib/src/CoE/mailbox/response.cc, fillList) computes the number of fragments from the
     mailbox size and ignores the headers. The end of a list may therefore be missing without notice.

@@ -1,6 +1,7 @@
 """Read access to the SII, ETG.1000.4 §6.4 (interface) and ETG.1000.6 §5.4 (content).
 
-Only the used words of the header and the requested categories are read, and no word is read twice.
+Only the used words of the header and the requested categories are read. Known words are not read
+again.
 If an EEPROM is ready by the next frame, the frame that fetches a word also contains the read
 command for the next one.
 """
@@ -45,8 +46,8 @@ _EIGHT_BYTES = ControlStatus(eight_bytes=True).word
 def read_image(station: Station, *, wanted: Collection[int] = WANTED) -> Procedure[bytes]:
     """Read the image up to the end mark.
 
-    Unread words of the header are zero; other categories are omitted. If there is no end mark, as
-    in an unprogrammed EEPROM, the categories are truncated.
+    Unread words of the header are zero. Categories that are not wanted are omitted. If
+    there is no end mark, as in an unprogrammed EEPROM, the categories are truncated.
 
     Args:
         station: The device.
@@ -86,10 +87,10 @@ def read_identity(station: Station) -> Procedure[Identity]:
 
 
 class _Reader:
-    """Owner of the bytes of the last read, and of the typical read time.
+    """Reader of an EEPROM. It keeps the bytes of the last read and the typical read time.
 
     A read returns two or four words, so the next words may already be known. The read time
-    determines when the EEPROM is polled first.
+    determines when the EEPROM is first polled.
     """
 
     def __init__(self, station: Station) -> None:

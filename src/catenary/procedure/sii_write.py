@@ -34,7 +34,7 @@ class Change(NamedTuple):
 
 
 def changes(old: bytes, new: bytes) -> tuple[Change, ...]:
-    """Return the words in which two images differ, the configuration with its checksum last.
+    """Return the words in which two images differ. The configuration and its checksum come last.
 
     While the configuration is only partly written, its checksum is wrong. The controller can
     therefore detect an interrupted write.
@@ -66,7 +66,7 @@ def write_words(station: Station, wanted: Sequence[Change]) -> Procedure[None]:
         wanted: The words to write.
 
     Raises:
-        EepromError: A word could not be written. The message names the first one.
+        EepromError: A word could not be written. The message names the first such word.
     """
     for each in wanted:
         yield from write_word(station, each)

@@ -68,7 +68,7 @@ def climb(
         target: The final state.
 
     Returns:
-        Its mailbox if it was configured on the way, else None.
+        The mailbox of the device if it was configured, otherwise None.
     """
     channel = None
     before = (yield from read_state(station)).state
@@ -86,7 +86,7 @@ def climb(
 def restart(station: Station, device: DeviceDescription) -> Procedure[DeviceDescription]:
     """Bring a device through INIT to PRE-OP, and return the description with its mapping.
 
-    INIT is necessary even if the device is in PRE-OP: it restarts the mailbox counters.
+    INIT is necessary even if the device is in PRE-OP, because it restarts the mailbox counters.
 
     Args:
         station: The device.

@@ -26,7 +26,7 @@ from catenary.wire.register import (
 from catenary.wire.sii_interface import CONFIGURATION_FORCE
 
 RESET_TIMEOUT = 2.0  # [s]; afterwards, devices that are not in INIT get separate requests
-STATION_BASE = 0x1001  # of position 0; 0 is not an address, and small numbers are often aliases
+STATION_BASE = 0x1001  # for position 0; 0 is not an address, and small numbers are often aliases
 FMMU_BLOCK = (0x0600, 256)  # all 16 FMMUs
 SYNC_MANAGER_BLOCK = (0x0800, 128)  # all 16 SyncManagers
 
@@ -40,7 +40,7 @@ class StationRegisters:
     alias: int
     dl_status: int
     information: bytes  # 0x0000 to 0x0009
-    system_time: bool = False  # it has register 0x0910; some clocks only stamp receive times
+    system_time: bool = False  # True if it has register 0x0910; some clocks only stamp times
 
 
 class Counted(NamedTuple):
@@ -67,9 +67,10 @@ def count() -> Procedure[Counted]:
 
 
 def reset(device_count: int) -> Procedure[None]:
-    """Bring all devices to INIT, and clear their FMMUs, SyncManagers and SYNC signals.
+    """Request INIT from all devices, and clear their FMMUs, SyncManagers and SYNC signals.
 
-    Errors are acknowledged, and all EEPROMs are assigned to the MainDevice.
+    Errors are acknowledged, and all EEPROMs are assigned to the MainDevice. It is not an error if a
+    device does not reach INIT.
 
     Raises:
         SegmentError: The number of devices differs from `device_count`.
@@ -98,7 +99,7 @@ def bring_all_down(stations: Sequence[Station], state: AlState, timeout: float) 
     Args:
         stations: The devices.
         state: The requested state.
-        timeout: Time for all devices [s].
+        timeout: Longest time for all devices together [s].
 
     Raises:
         StateError: A device stays in a higher state. The message names the first one.
@@ -154,7 +155,7 @@ def assign(places: Sequence[int]) -> Procedure[tuple[StationRegisters, ...]]:
     """Set the station addresses of all devices, then read their registers.
 
     Args:
-        places: Positions of the devices, in the order of the frame.
+        places: Positions of the devices, in the order in which a frame passes them.
     """
     addresses = [STATION_BASE + place for place in places]
     replies = yield [

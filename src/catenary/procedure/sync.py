@@ -2,7 +2,8 @@
 
 SYNC signals are started in PRE-OP, because devices check them on the way to SAFE-OP. All devices
 receive the same start time, which must be in the future when the last device receives it. This is
-verified: a 32-bit clock reaches a past start time again after 4 s, a 64-bit clock never does.
+verified, because a 32-bit clock reaches a past start time again only after 4 s, and a 64-bit clock
+never does.
 """
 
 from __future__ import annotations
@@ -96,7 +97,7 @@ def rejoin(
 
     Args:
         devices: All devices, by position.
-        position: The device.
+        position: Position of the device.
         sync: Its SYNC signals; None if it has none.
         peers: Positions of devices with running clocks, the reference first.
         delay_ns: Its delay from the reference, as measured earlier [ns].
@@ -142,7 +143,7 @@ def start(
         epoch_ns: System time minus the link's time [ns].
 
     Returns:
-        The SYNC0 time at which they start, without shifts [ns, system time].
+        The common SYNC0 time, without the shifts of the devices [ns, system time].
 
     Raises:
         ClockError: The start time passed before all devices had received it.

@@ -104,7 +104,7 @@ cdef class Timer:
 
 
 cdef class MachineTimer(Timer):
-    """Timer on CLOCK_MONOTONIC. Its memory starts as zeros; all threads that wake it share it."""
+    """Timer on CLOCK_MONOTONIC. All threads that wake it share its memory, which starts as zeros."""
 
     def __init__(self, memory, size_t offset=0):
         self.memory = Memory(memory)

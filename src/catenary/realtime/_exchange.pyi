@@ -15,7 +15,7 @@ def queue_size(size: int, length: int) -> int:
     """Return the memory size [bytes] for a queue of `length` records of `size` bytes."""
 
 class ValueCore:
-    """Value in shared memory that starts as zeros. Raises ValueError if the size differs."""
+    """Value in shared memory that starts as zeros. Raises ValueError for data of a wrong size."""
 
     writer: int
     def __init__(self, memory: Buffer, size: int) -> None: ...
@@ -26,7 +26,7 @@ class ValueCore:
         """Copy the value. Return its number, or -1 if a write interfered with every attempt."""
 
 class QueueCore:
-    """Queue in shared memory that starts as zeros. Raises ValueError if the size differs."""
+    """Queue in shared memory that starts as zeros. Raises ValueError for data of a wrong size."""
 
     producer: int
     consumer: int

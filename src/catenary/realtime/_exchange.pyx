@@ -41,7 +41,7 @@ cdef int check_size(Py_buffer *view, uint32_t size) except -1:
 
 
 cdef class ValueCore:
-    """Value in shared memory that starts as zeros. Raises ValueError if the size differs."""
+    """Value in shared memory that starts as zeros. Raises ValueError for data of a wrong size."""
     cdef Memory memory
     cdef latest_value *c
 
@@ -82,7 +82,7 @@ cdef class ValueCore:
 
 
 cdef class QueueCore:
-    """Queue in shared memory that starts as zeros. Raises ValueError if the size differs."""
+    """Queue in shared memory that starts as zeros. Raises ValueError for data of a wrong size."""
     cdef Memory memory
     cdef record_queue *c
 

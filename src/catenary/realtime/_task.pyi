@@ -12,7 +12,7 @@ BLOCK_SIZE: int
 FIGURE_NAMES: tuple[str, ...]
 
 class Block:
-    """One task's memory.
+    """Memory of one task.
 
     The task's thread writes the job and the figures. Other threads request a stop, change the
     period and set signals.
@@ -35,7 +35,7 @@ class Block:
         """Skip all releases that have passed, after a restart."""
 
     def wait_while(self, state: int, deadline_ns: int) -> None:
-        """Wait while the state is `state`, until the deadline (CLOCK_MONOTONIC) or earlier."""
+        """Wait for another state until the deadline (CLOCK_MONOTONIC). It may return early."""
 
     state: int
     process: int
@@ -76,7 +76,7 @@ class Block:
         """Return (lower edge, upper edge, count) of every bucket that is not empty."""
 
 class Releases:
-    """The releases of one task, in its own thread."""
+    """Releases of one task. Only the thread of the task uses this object."""
 
     def __init__(self, block: Block, timer: Timer) -> None: ...
     def wait(self) -> bool:

@@ -66,7 +66,7 @@ cdef void write_text(char *text, str value, size_t size):
 
 
 cdef class Block:
-    """One task's memory.
+    """Memory of one task.
 
     The task's thread writes the job and the figures. Other threads request a stop, change the
     period and set signals.
@@ -236,7 +236,7 @@ cdef class Block:
 
 
 cdef class Releases:
-    """The releases of one task, in its own thread."""
+    """Releases of one task. Only the thread of the task uses this object."""
     cdef Block block
     cdef Timer timer
 

@@ -132,8 +132,9 @@ class Load:
 def analyse(demands: Sequence[Demand]) -> Verdict:
     """Analyse tasks that share one processor or are each bound to one of several.
 
-    Raises ValueError if there are no tasks, if two tasks have the same name, or if only some of
-    them have a priority or a processor.
+    Raises:
+        ValueError: There are no tasks, two tasks have the same name, or only some tasks have a
+            priority or a processor.
     """
     check(demands)
     ranked = sorted(with_priorities(demands), key=lambda demand: -rank(demand))

@@ -1,7 +1,8 @@
 """Child processes that end with this process.
 
-Each child has its own session, so a Ctrl-C in the terminal does not reach it. This process ends it
-after everything that depends on it. If this process dies, the kernel sends SIGTERM to the child.
+Each child has its own session, so a Ctrl-C in the terminal does not reach it. This process can
+therefore first end everything that depends on the child, and then the child. If this process dies,
+the kernel sends SIGTERM to the child.
 """
 
 from __future__ import annotations

@@ -22,7 +22,7 @@ FIRST = 100  # above all priorities of tasks, 0 (ordinary scheduling) to 99
 
 
 class Participant:
-    """Owner of one slot of a virtual clock; one thread of one process uses it."""
+    """Owner of one slot of a virtual clock. One thread of one process uses it."""
 
     def __init__(self, memory: SharedMemory, slot: int) -> None:
         self._memory = memory
@@ -39,7 +39,7 @@ class Participant:
 
     @property
     def capsule(self) -> object:
-        """C table of native/clock.h; valid while this object exists."""
+        """Capsule with the clock table (`native/clock.h`); valid while this object exists."""
         return self.timer.capsule
 
     def wait_until(self, deadline_ns: int) -> bool:
@@ -90,7 +90,7 @@ class VirtualClock:
 
         Args:
             priority: fixed priority on the simulated processor; greater is higher.
-            cpu: simulated processor, shared by priority; None for its own.
+            cpu: simulated processor, which participants share by priority; None for its own.
 
         Raises:
             ValueError: the clock already has 64 participants.

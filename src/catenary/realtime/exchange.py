@@ -69,7 +69,7 @@ class Value:
     """
 
     def __init__(self, dtype: npt.DTypeLike = "f8", shape: int | tuple[int, ...] = ()) -> None:
-        """Allocate the value; it reads as zeros until the first write.
+        """Allocate the value. It reads as zeros until the first write.
 
         Args:
             dtype: NumPy type; may be structured.
@@ -197,7 +197,7 @@ class Queue:
         return self._core.lost
 
     def put(self, record: npt.ArrayLike) -> bool:
-        """Append a record. Return False if the queue is full; the refused record is counted.
+        """Append a record. Return False if the queue is full and refuses the record.
 
         Raises:
             ValueError: the shape differs.

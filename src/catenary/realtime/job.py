@@ -21,17 +21,17 @@ class Job:
 
     @property
     def time(self) -> float:
-        """Time of its release [s], since the first release of all tasks."""
+        """Time of the release since the first release of all tasks [s]."""
         return (self._releases.release_ns - self._origin_ns) * 1e-9
 
     @property
     def release_ns(self) -> int:
-        """Time of its release [ns] on the task's clock."""
+        """Time of the release on the task's clock [ns]."""
         return self._releases.release_ns
 
     @property
     def jitter(self) -> float:
-        """Time from its release to its start [s]."""
+        """Time from the release to the start of the job [s]."""
         return (self._releases.start_ns - self._releases.release_ns) * 1e-9
 
     def __repr__(self) -> str:

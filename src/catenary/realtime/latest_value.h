@@ -20,7 +20,7 @@
 typedef struct latest_value {
     uint64_t number;                  /* values published; the last is in slot number % SLOTS */
     uint64_t sequence[VALUE_SLOTS];
-    int32_t writer;                   /* id of its thread; 0 if none yet */
+    int32_t writer;                   /* thread id of the writer; 0 if there is none yet */
     uint32_t size;
     uint8_t slots[] __attribute__((aligned(64)));
 } latest_value;

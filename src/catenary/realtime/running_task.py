@@ -33,7 +33,7 @@ class Running:
 
     @property
     def period(self) -> float:
-        """Time between releases [s]. Set it to change the period from this release on."""
+        """Time between releases [s]. Set it to change the period from the present release on."""
         return self._block.period_ns * 1e-9
 
     @period.setter

@@ -84,7 +84,7 @@ def measured_demand(task: Task, statistics: Statistics) -> Demand:
 
 
 def as_table(all_statistics: Iterable[Statistics]) -> str:
-    """Format a table with one line per task; times are mean/max/min/sd, as in published tables."""
+    """Return a table with one line per task. Times are mean, max, min and standard deviation."""
     lines = [
         f"{'task':14}{'jobs':>8}{'missed':>8}"
         + "".join(f"{name + ' [ms]: mean/max/min/sd':>36}" for name in ("period", "response"))

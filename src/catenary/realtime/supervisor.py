@@ -18,7 +18,7 @@ from catenary.realtime.handle import Handle
 from catenary.realtime.worker import ProcessWorker, Worker
 
 RESTARTS = 3  # maximum for each task; the next failure stops all tasks
-KILL_SECONDS = 2.0  # from SIGTERM to SIGKILL, and from SIGKILL to the end
+KILL_SECONDS = 2.0  # longest wait after SIGTERM, and after SIGKILL
 
 
 class Supervisor:
@@ -66,7 +66,7 @@ class Supervisor:
             self._start(name)
 
     def wait(self, seconds: float | None) -> bool:
-        """Wait until all tasks have ended. Return False if they have not after `seconds`."""
+        """Wait until all tasks have ended. Return False after a timeout of `seconds`."""
         return self._all_ended.wait(seconds)
 
     def raise_failure(self) -> None:

@@ -53,7 +53,10 @@ def run_in_process(work: Work, session: Session | None, parent: int) -> None:
 
 
 def end_now(number: int, frame: object) -> None:
-    """Exit on SIGTERM, sent when the parent ends or its timeout expires. `finally` blocks run."""
+    """Exit on SIGTERM, so that `finally` blocks run.
+
+    SIGTERM is sent when the parent ends or `Tasks.stop` times out.
+    """
     sys.exit(128 + number)
 
 

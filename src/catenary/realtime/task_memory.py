@@ -15,7 +15,7 @@ class Place:
     participant: Participant | None  # None on the machine's clock
 
     def open_timer(self) -> Timer:
-        """Return the task's timer; any process can use it to wake the task."""
+        """Return the task's timer. Any process can use it to wake the task."""
         if self.participant is not None:
             return self.participant.timer
         return MachineTimer(self.memory.buffer)

@@ -39,14 +39,15 @@ class Tasks:
     """A set of tasks that run together.
 
     `with Tasks(a, b) as tasks:` starts them together, and stops them at the end of the block.
-    `tasks["a"]` is the handle of one task; `print(tasks)` shows the statistics of all jobs.
+    `tasks["a"]` is the handle of one task. `print(tasks)` shows the statistics of all jobs.
 
     Args:
         tasks: Tasks to run.
         workers: "processes" or "threads"; None selects processes for more than one task.
         clock: VirtualClock that simulates the tasks by priority and processor. A `cpu` of None
-            counts as 0.
-        session: `realtime.session()` to enter in each process; for threads, in this process.
+            counts as 0. None for real time.
+        session: `realtime.session()` to enter in each process; for threads, in this process. None
+            to change no settings of the process.
         best_effort: True to continue without refused priorities and processors.
     """
 
@@ -73,7 +74,7 @@ class Tasks:
     def __getitem__(self, name: str) -> Handle:
         if name not in self._handles:
             known = ", ".join(self._handles) or "none"
-            raise KeyError(f"unknown task {name!r}; running tasks: {known}")
+            raise KeyError(f"unknown task {name!r}; started tasks: {known}")
         return self._handles[name]
 
     def __iter__(self) -> Iterator[Handle]:
@@ -177,7 +178,7 @@ class Tasks:
         because a thread cannot be killed.
 
         Args:
-            function: the function to run; its exceptions propagate.
+            function: the function to run. Its exceptions propagate.
             arguments: further arguments of the function.
             priority: priority on the virtual clock.
             cpu: simulated processor on the virtual clock; None for its own.
@@ -317,7 +318,7 @@ def check_set(tasks: tuple[Task, ...], workers: Workers | None) -> None:
 
 
 def make_handles(tasks: tuple[Task, ...], clock: VirtualClock | None) -> dict[str, Handle]:
-    """Create the handles. If one fails, remove all, because a virtual clock would wait for them."""
+    """Create the handles. If one fails, remove the others: a virtual clock would wait for them."""
     handles: dict[str, Handle] = {}
     try:
         for task in tasks:

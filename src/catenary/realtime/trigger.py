@@ -30,7 +30,7 @@ class Signal:
     def set(self) -> bool:
         """Release the task once, as soon as its period allows. This never blocks.
 
-        Return False if 64 releases are already pending; this one is dropped and counted.
+        Return False if 64 releases are already pending. This one is then dropped and counted.
         Raises RuntimeError if no task has this trigger.
         """
         if self._ends is None:

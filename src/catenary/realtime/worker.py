@@ -64,7 +64,7 @@ class ProcessWorker:
 
 
 class ThreadWorker:
-    """Worker in a thread of this process; the interpreter runs one thread at a time."""
+    """Worker in a thread of this process. The interpreter runs one thread at a time."""
 
     def __init__(self, work: Work, ended: Callable[[str], None]) -> None:
         self._work = work

@@ -19,8 +19,8 @@ CONSTANTS = (bool, int, float, complex, str, bytes, tuple)
 def dependencies(function: Callable[..., Any]) -> tuple[str, ...]:
     """Return everything that the machine code of a law depends on, as comparable texts.
 
-    These are the values of the globals that the law and its callees use, and the time stamps and
-    sizes of the files of these callees and of used modules.
+    These are the values of the globals that the law and its callees use. In addition, they are the
+    time stamps and sizes of the files of these callees and of the modules used.
     """
     found: set[str] = set()
     waiting, seen = [function], {id(function)}

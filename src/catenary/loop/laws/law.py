@@ -23,7 +23,7 @@ class Law:
         actual: n, ok, dt [s], and per axis position [rad], velocity [rad/s], torque [N·m], enabled.
         target: position, velocity and torque per axis, which the law writes.
         memory: State of the law, float64. It is kept from cycle to cycle.
-        parameters: Values from the application, float64; they may change while the law runs.
+        parameters: Values from the application, float64. They may change while the law runs.
         time: Time since the first cycle of the law [s].
         enabled, dt, ok, n: The same as in `actual`.
 

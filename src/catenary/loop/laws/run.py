@@ -18,7 +18,7 @@ Numbers = npt.NDArray[np.float64]
 
 
 class LawRun:
-    """Law that runs natively in the cycle; the result of `Loop.start`."""
+    """Law that runs natively in the cycle. `Loop.start` returns this object."""
 
     def __init__(
         self,

@@ -110,7 +110,7 @@ class LawRunner:
         Args:
             run: Handle of the running law.
             trouble: Cycle flags that end a wait.
-            judge: Called with the flags; raises the error of a bad cycle or a failed law.
+            judge: Function that gets the flags. It raises the error of a bad cycle or a failed law.
         """
         while run.running:
             judge(self._engine.run_law(SLICE_NS, trouble))

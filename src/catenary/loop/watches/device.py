@@ -2,7 +2,7 @@
 
 The watch is one endless procedure in the acyclic queue. While all devices are in OP, the watch only
 reads a flag of the core. Otherwise it queries all devices, reports changes as events, and
-brings optional devices back to OP. The failure of a required device ends the loop; the watch only
+brings optional devices back to OP. The failure of a required device ends the loop. The watch only
 reports it (docs/explanation/safety.md).
 """
 
@@ -272,7 +272,7 @@ class Watch:
     def _recognise(
         self, presence: restore.Presence, lost: Sequence[Charge]
     ) -> Procedure[Charge | None]:
-        """Give a returned device the address of its place; return None if it has no place here."""
+        """Give a returned device the address of its place. Return None if it has no place here."""
         found: Identity | None = None
         for charge in lost:
             if charge.sub.alias and charge.sub.alias != presence.alias:

@@ -113,10 +113,10 @@ def session(
     Args:
         heap_size: heap to pre-fault and keep [bytes].
         switch_interval: longest time for which a Python thread may hold the interpreter lock [s].
-        best_effort: list refused settings in `refusals` instead of raising.
+        best_effort: True to list refused settings in `refusals` instead of raising an exception.
 
     Raises:
-        RealtimeError: at the start of the block, if a setting is refused; the hint names a remedy.
+        RealtimeError: at the start of the block, if a setting is refused. The hint names a remedy.
         ValueError: `heap_size` or `switch_interval` is out of range.
     """
     return Session(heap_size, switch_interval, best_effort)

@@ -191,8 +191,8 @@ class Servo(AppliedDevice):
         self.sync_missed_limit = sync_missed_limit
         self.quirks = quirks
         self.mapping_quirks = mapping_quirks
-        self._inertias = [inertia] * axes  # for which the loops are tuned
         self._check_values()
+        self._inertias = [inertia] * axes  # for which the loops are tuned
 
     def _check_values(self) -> None:
         """Raise ValueError if a value is out of range."""
