@@ -18,7 +18,7 @@ CYCLE_STOPPED: Final[int]  # the native thread has ended (stop, or an error of t
 CYCLE_NONE: Final[int]  # no new cycle within timeout_ns: the actual values are unchanged
 
 EXECUTION_MODES: Final[dict[str, int]]
-PHASE_NAMES: Final[dict[str, int]]  # in the order of a report
+PHASE_NAMES: Final[dict[str, int]]  # phases in the order of a report
 RECORD_FIELDS: Final[list[tuple[str, str]]]
 """The fields of one record of `log()`, for `numpy.dtype(RECORD_FIELDS)`; no padding.
 
