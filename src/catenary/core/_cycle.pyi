@@ -23,5 +23,5 @@ RECORD_FIELDS: Final[list[tuple[str, str]]]
 """The fields of one record of `log()`, for `numpy.dtype(RECORD_FIELDS)`; no padding.
 
 number u8 · scheduled_ns, wake_ns i8 (the link's clock) · period_ns, lateness_ns, receive_ns,
-process_ns, send_ns, post_processing_ns, round_trip_ns, output_delay_ns, input_age_ns i4 · flags u4 ·
+process_ns, send_ns, post_processing_ns, round_trip_ns, output_delay_ns, input_age_ns i4 · flags,
 lost_in_row, skipped u4 · missing_frames, al_counter u2 · al_status u1 ..."""
