@@ -43,7 +43,7 @@ LINEAR = UnitNames("m", "m/s", "m/s²", "N", "force_limit")
 class AxisDefaults(NamedTuple):
     """Default limits of an axis, in its units."""
 
-    velocity_limit: float  # in CSP and PP
+    velocity_limit: float  # default in CSP and PP
     step_limit: float  # smallest default step limit
     standstill: float  # velocity below which the axis is at rest
     deceleration: float  # for an axis without a velocity limit and without a cyclic mode

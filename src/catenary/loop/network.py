@@ -74,7 +74,7 @@ class Settings:
         command_velocity, command_torque = self.stop.command_timeouts
         reference = self.clocks.reference
         if reference is not None and reference.main is not main:
-            reference = None  # a device of another network of the loop
+            reference = None  # it is a device of another network of the loop
         by_execution: ReceiveMode = "poll" if self.execution == "inline" else "wait"
         return PlanOptions(
             period=self.period,

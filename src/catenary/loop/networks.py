@@ -185,8 +185,8 @@ def refuse_for_several(settings: Settings) -> None:
     """Raise ValueError for options that only one network can have."""
     if settings.execution != "threaded":
         raise ValueError(
-            'several networks need execution="threaded": a thread that iterates can only keep the '
-            "cycle starts of one"
+            'several networks need execution="threaded": an iterating thread can keep the cycle '
+            "starts of only one network"
         )
     if settings.laws:
         raise ValueError("laws work on one network: make a separate Loop for that network")

@@ -76,7 +76,7 @@ class Session:
         self.service = Service(main, self.engine, plan)
         self.exchange.attend()
         self.watch = self.exchange.watch
-        self.switch_interval: float | None = None  # [s] of the interpreter, inline
+        self.switch_interval: float | None = None  # [s] of the interpreter; used by an inline loop
         self._attached = ExitStack()
         self._opened = self._left = False
         self._abandon = abandon  # leaves the loop if the MainDevice is closed first

@@ -46,7 +46,7 @@ class Timing(Mapping[str, Mapping[str, float]]):
         self._phases = {name: figures for name, figures in phases.items() if figures["count"]}
         self.counters = dict(counters)  # since the loop was entered: cycles, late, lost, ...
         self.period = period  # [s]
-        self.scheduling = scheduling  # of the cycle thread; "virtual time"
+        self.scheduling = scheduling  # of the cycle thread as text, or "virtual time"
 
     def __getitem__(self, phase: str) -> Mapping[str, float]:
         if phase not in self._phases:

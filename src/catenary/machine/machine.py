@@ -173,7 +173,7 @@ class Machine:
         if not self.drives and not self.process_data:
             raise self._file.error(
                 (),
-                "no drives and no process data",
+                "the machine has no drives and no process data",
                 hint="add a [drives.NAME] table: docs/reference/machine_file.md",
             )
         reference = self._file.tables.clocks.reference

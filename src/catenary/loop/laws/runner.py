@@ -21,7 +21,7 @@ from catenary.plan.planner import Plan
 SLICE_NS = 10_000_000  # between checks for signals while a law runs
 GUARD_ABOVE = 1  # priority of the guard thread above that of the cycle thread
 PRIORITY_MAX = 99
-BUDGET_SHARE = 0.4  # of the period: the frames need the remainder
+BUDGET_SHARE = 0.4  # share of the period; the frames need the remainder
 
 
 class LawRunner:
@@ -134,7 +134,7 @@ class LawRunner:
         try:
             time = (run.steps - 1) * self._period_ns * 1e-9
             self._step(run.law, run.memory, run.parameters, time, copies=True)
-        except Exception as error:  # any error of the law
+        except Exception as error:  # a law can raise any exception
             line = traceback.extract_tb(error.__traceback__)[-1].lineno
             return f" ({type(error).__name__}: {error}, line {line})"
         return ""
