@@ -9,8 +9,8 @@ force, `mode_wanted` the mode requested in 0x6060. The set-points of the applica
 while the axis is *followed*: requested state enabled, OPERATION_ENABLED, the mode shown is the one
 in force, statusword bit 12 if the mode defines it, and its unit answers. `worked` is set once the
 axis was followed since OPERATION_ENABLED or since a mode change; `shows_following` once its drive
-has shown bit 12. `gap_cycles` counts since bit 12 was lost, `mute_cycles` while it was never shown,
-`climbing_cycles` since the request.
+has shown bit 12. `gap_cycles` counts the cycles since bit 12 was lost, `mute_cycles` those in which
+it was never shown, and `climbing_cycles` those since the request.
 
 A stop (`stop_axis`) needs a new request afterwards; `stop_reason` and `stop_cycle` keep its cause.
 It sends quick stop, then disable operation, then disable voltage (`stop_command`, `stop_cycles`).
