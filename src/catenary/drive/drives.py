@@ -444,8 +444,8 @@ class Drives(Request):
     def pdos(self, period_ns: int) -> Mapping[int, DeviceRequest]:
         """Return the process-data request of each device, by position.
 
-        The call reads the drives by SDO (PRE-OP or later): rated torque, reactions, limits, mode and
-        interpolation time.
+        The call reads the drives by SDO (PRE-OP or later): rated torque, reactions, limits, mode
+        and interpolation time.
         """
         self._period_ns = period_ns
         self._read_drives()
