@@ -23,7 +23,7 @@ PROCESS_RAM = 0x1000  # start of the memory for mailboxes and process data
 # No slots: `Register[int](...)` of a frozen class with slots fails in Python 3.11 (cpython#105332).
 @dataclass(frozen=True)
 class Register(Generic[T]):
-    """One register: its address, its name, and its format, a `struct` format of a single value.
+    """One register: its address, its name, and the `struct` format of its value.
 
     A register with several fields is a `Register[bytes]`. A separate module converts its fields.
     """
