@@ -1,5 +1,7 @@
-"""All errors of the package. A message gives the device, the request, the reply, the likely cause
-and the next step. The numbers are attributes.
+"""All errors of the package.
+
+A message gives the device, the request, the reply, the likely cause and the next step. The numbers
+are attributes.
 
 A caller's mistake raises ValueError or TypeError before anything is sent. The errors here report
 faults of a device, the network or the machine.
@@ -162,8 +164,8 @@ class DriveError(LoopError):
 class MoveError(DriveError):
     """A move that ended before its target.
 
-    `axis` is the name of the axis. `remaining` is the target minus the actual position [rad], for
-    a linear axis [m]; NaN in homing.
+    `axis` is the name of the axis. `remaining` is the target minus the actual position [rad] or,
+    for a linear axis, [m]. It is NaN during homing.
     """
 
     def __init__(
@@ -175,7 +177,7 @@ class MoveError(DriveError):
 
 
 class RealtimeError(CatenaryError):
-    """The machine does not meet a real-time requirement. The hint says how to meet it."""
+    """The machine does not meet a real-time requirement. The hint shows how to meet it."""
 
 
 class TaskError(RealtimeError):
