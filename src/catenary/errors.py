@@ -88,7 +88,7 @@ class IdentityError(CatenaryError):
 
 
 class RegisterError(CatenaryError):
-    """A device answers, but rejects this access to its registers or memory."""
+    """An access to the registers or the memory of a device failed or was rejected."""
 
 
 class EepromError(CatenaryError):
@@ -96,7 +96,8 @@ class EepromError(CatenaryError):
 
 
 class MailboxError(CatenaryError):
-    """A device answered a mailbox service with a mailbox error or violated the protocol."""
+    """A mailbox service failed: a device does not support it, did not answer, answered with a
+    mailbox error, or violated the protocol."""
 
 
 class SdoAbort(CatenaryError):

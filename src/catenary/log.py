@@ -24,8 +24,8 @@ CHUNK = 4096  # rows per write
 class Log:
     """The last cycles of a loop, oldest first: `log["lateness_ns"]`, `log[-1]`, `log[-100:]`.
 
-    `numpy.asarray(log)` returns a structured array, shape (cycles,). `time` [s] has the same zero as
-    `cycle.time`, so it is negative before the first iteration. With `Loop(log_axes=True)`, each
+    `numpy.asarray(log)` returns a structured array, shape (cycles,). `time` [s] has the same zero
+    as `cycle.time`, so it is negative before the first iteration. With `Loop(log_axes=True)`, each
     axis has its own fields, such as `shoulder.actual.position`. docs/how_to/recording.md lists all
     fields.
     """

@@ -86,7 +86,8 @@ class Frame:
         )
         if len(payload) + len(self.padding) > MAXIMUM_PAYLOAD:
             raise ValueError(
-                f"datagrams of {len(payload)} bytes exceed a frame, at most {MAXIMUM_PAYLOAD} fit"
+                f"datagrams of {len(payload)} bytes and their padding exceed the {MAXIMUM_PAYLOAD} "
+                "bytes of a frame"
             )
         if not 0 <= self.counted_padding <= len(self.padding):
             raise ValueError(

@@ -99,7 +99,8 @@ def encode_packet(packet: Packet) -> bytes:
         raise ValueError(f"pcapng: time {packet.time_ns} ns is out of range; use 0 to 2**64 - 1")
     if packet.interface or not len(packet.data) <= original < 1 << 32:
         raise ValueError(
-            f"pcapng: invalid interface {packet.interface} or original length {original}"
+            f"pcapng: interface {packet.interface} is not 0, or original length {original} is out "
+            "of range"
         )
     high, low = packet.time_ns >> 32, packet.time_ns & 0xFFFF_FFFF
     body = struct.pack("<IIIII", 0, high, low, len(packet.data), original) + _pad(packet.data)

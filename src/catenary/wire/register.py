@@ -259,5 +259,5 @@ def receive_time(port: int) -> Register[int]:
 
 def _checked(number: int, count: int) -> int:
     if not 0 <= number < count:
-        raise ValueError(f"number {number} is out of range; use 0 to {count - 1}")
+        raise ValueError(f"register index {number} is out of range; use 0 to {count - 1}")
     return number
