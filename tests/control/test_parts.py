@@ -19,7 +19,7 @@ def test_parts_are_views_of_the_joined_row() -> None:
 
 @pytest.mark.parametrize("k", [-1, 2])
 def test_a_missing_part_is_refused(k: int) -> None:
-    with pytest.raises(IndexError, match="no part of this number"):
+    with pytest.raises(IndexError, match="no part with this number"):
         control.part(control.join([1.0], [2.0]), k)
 
 

@@ -104,7 +104,7 @@ def _chosen(
     known = f"the model has the joints {', '.join(existing)}" if existing else "it has no joints"
     for name in chosen:
         if name not in existing:
-            raise ConfigurationError(f"{path}: no joint {name!r}", hint=known)
+            raise ConfigurationError(f"{path}: the model has no joint {name!r}", hint=known)
         if chosen.count(name) > 1:
             raise ConfigurationError(f"{path}: joint {name!r} is given twice", hint=known)
         kind = int(native.joint(name).type[0])
@@ -132,7 +132,7 @@ def _address(mujoco: Any) -> int:
     libraries = sorted(folder.glob("libmujoco.so*")) + sorted(folder.glob("libmujoco*.dylib"))
     if not libraries:
         raise ConfigurationError(
-            f"{folder}: no libmujoco next to the Python module of MuJoCo",
+            f"cannot find libmujoco in {folder}, next to the Python module of MuJoCo",
             hint="pip install --force-reinstall mujoco",
         )
     library = ctypes.CDLL(str(libraries[0]))

@@ -33,7 +33,7 @@ def part(row: Row, k: int) -> Row:
         IndexError: The row has no part `k`.
     """
     if k < 0 or k >= row[0]:
-        raise IndexError("the row has no part of this number; see control.join")
+        raise IndexError("the row has no part with this number; see control.join")
     return row[int(row[1 + k]) : int(row[2 + k])]
 
 

@@ -24,7 +24,7 @@ cdef struct put_t:             # a set-point as encoded in the output image
     uint8_t cut                # saturated: the type could not hold the value
 
 cdef struct axis_t:
-    # from the plan
+    # constants from the plan
     number_t controlword
     number_t statusword
     number_t mode_target

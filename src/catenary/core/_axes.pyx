@@ -352,9 +352,9 @@ cdef inline bint removes_power(const target_t *target, uint32_t i) noexcept nogi
 cdef bint axes_apply_late(axes_t *x, const target_t *target, bint fresh) noexcept nogil:
     """Apply late stop requests to outputs that a law has computed.
 
-    These are stops and, if the targets are fresh, requested states that remove power and the control
-    bits of axes that work. Requests that enable or reset an axis take effect at the next write,
-    together with their set-points. Return True if the outputs may have changed.
+    Stop requests take effect at once. With fresh targets, so do requested states that remove power,
+    and the control bits of axes that work. Requests that enable or reset an axis take effect at the
+    next write, together with their set-points. Return True if the outputs may have changed.
     """
     cdef axis_t *a
     cdef uint32_t i

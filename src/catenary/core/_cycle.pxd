@@ -80,8 +80,8 @@ cdef struct cycle_t:
     int64_t usable             # time at which the inputs were available to Python; 0: unknown
     int64_t sent               # time at which the last cyclic frame was handed to the kernel
     int64_t turnaround         # wake-up → last frame received, in the last complete cycle
-    int64_t process            # of this cycle; -1: no application
-    int64_t input_age          # of this cycle; -1: unknown
+    int64_t process            # duration of the body or law in this cycle; -1: none
+    int64_t input_age          # age of the inputs used in this cycle; -1: unknown
     uint64_t number
     uint32_t skipped           # number of cycle starts skipped before this cycle
     uint32_t lost_in_row

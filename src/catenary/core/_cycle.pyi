@@ -18,10 +18,10 @@ CYCLE_STOPPED: Final[int]  # the native thread has ended (stop, or an error of t
 CYCLE_NONE: Final[int]  # no new cycle within timeout_ns: the actual values are unchanged
 
 EXECUTION_MODES: Final[dict[str, int]]
-PHASE_NAMES: Final[dict[str, int]]  # in the order of a report
+PHASE_NAMES: Final[dict[str, int]]  # phases in the order of a report
 RECORD_FIELDS: Final[list[tuple[str, str]]]
 """The fields of one record of `log()`, for `numpy.dtype(RECORD_FIELDS)`; no padding.
 
 number u8 · scheduled_ns, wake_ns i8 (the link's clock) · period_ns, lateness_ns, receive_ns,
-process_ns, send_ns, post_processing_ns, round_trip_ns, output_delay_ns, input_age_ns i4 · flags u4 ·
+process_ns, send_ns, post_processing_ns, round_trip_ns, output_delay_ns, input_age_ns i4 · flags,
 lost_in_row, skipped u4 · missing_frames, al_counter u2 · al_status u1 ..."""

@@ -531,7 +531,7 @@ cdef void cycle_start(cycle_t *c, int64_t origin) noexcept nogil:
     c.next = c.origin
     if present >= c.origin:
         c.next += ((present - c.origin) // c.period + 1) * c.period
-    c.scheduled = c.next - c.period  # of frames that leave before the first cycle
+    c.scheduled = c.next - c.period  # start for frames that leave before the first cycle
     c.skipped = 0
     c.usable = 0
     c.begun = 0

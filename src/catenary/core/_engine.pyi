@@ -103,7 +103,7 @@ class Engine:
         """
 
     def take_turns(self) -> None:
-        """Allow late cycle starts within the period, for several engines in one thread."""
+        """Allow a cycle to begin at any time in its period, for several engines in one thread."""
 
     def run(self, cycles: int) -> int:
         """Run cycles without an application (a hand-over), for start-up and shutdown.
@@ -140,9 +140,9 @@ class Engine:
         """End the native thread; a no-op if the engine is not running."""
 
     def forget(self) -> None:
-        """Release the parent's cycle in a forked child without touching it.
+        """Release the parent's cycle in a forked child, without an effect on the parent.
 
-        The calling thread gets its scheduling back. Every later call that needs cycles raises
+        The scheduling of the calling thread is restored. Every later call that needs cycles raises
         RuntimeError.
         """
 
@@ -311,9 +311,9 @@ class Engine:
         """Start a compiled law, which computes the set-points in the cycle thread.
 
         From the next cycle on, it also computes the output columns. It begins with the commanded
-        values and replaces a running law. Requested states, modes and control bits stay with the
-        application. While the law runs, `next` overwrites the target buffers with the commanded
-        values.
+        values and replaces a running law. The application still sets the requested states, modes
+        and control bits. While the law runs, `next` overwrites the target buffers with the
+        commanded values.
 
         Raises:
             ValueError: The budget leaves too little of the period for the frames.

@@ -778,7 +778,7 @@ cdef class Engine:
             self.law.supersede()
         if not self.virtual:
             cat_memory_settle(&law.memory_block)
-        self.laws = [*self.laws, law]  # before the offer, to keep the law alive while the cycle uses it
+        self.laws = [*self.laws, law]  # keeps the law alive; must precede the offer to the cycle
         self.law = law
         law.c.threaded = self.native
         self.h.target[PRIVATE].header.updated = 0  # not valid after the law
@@ -846,7 +846,7 @@ cdef class Engine:
         if stream is not None:
             if not self.virtual:
                 cat_memory_settle(&stream.memory)
-            self.streams = [*self.streams, stream]  # before the offer, as with laws
+            self.streams = [*self.streams, stream]  # as with laws, must precede the offer
         self.stream = stream
         self.h.target[PRIVATE].header.updated = 0  # not valid after the stream
         cat_pointer_offer(&self.e.cycle.stream, NULL if stream is None else &stream.c)

@@ -6,7 +6,7 @@ from catenary.core._native cimport cat_image, cat_link
 from catenary.core._acyclic_queue cimport acyclic_queue_t
 
 cdef enum:
-    FRAMES_MAX = 1024          # in a plan, all dividers and phases together
+    FRAMES_MAX = 1024          # maximum number of frames in a plan, for all dividers and phases
     FRAMES_PER_CYCLE_MAX = 32  # without cycle numbers: no index is reused within four cycles
     INDEX_COUNT = 128          # 0x00 to 0x7F belong to the cycle, the others to the acyclic queue
 
@@ -111,14 +111,14 @@ cdef struct frames_t:
     uint8_t filled             # the templates have the outputs of the next emit
     uint8_t settled            # the last evaluation found every datagram of all frames right
     uint32_t next_index
-    sent_t sent[128]           # by index
+    sent_t sent[128]           # last use of each index
     frame_counters_t counters
 
 cdef class Frames:
     """Owner of the templates, images and tables of one cyclic exchange."""
     cdef frames_t c
     cdef object link_owner
-    cdef cat_memory memory     # of all tables and images
+    cdef cat_memory memory     # memory of all tables and images
     cdef make_table(self)
     cdef carry_time(self, clock_t *clock)
 

@@ -9,8 +9,8 @@ force, `mode_wanted` the mode requested in 0x6060. The set-points of the applica
 while the axis is *followed*: requested state enabled, OPERATION_ENABLED, the mode shown is the one
 in force, statusword bit 12 if the mode defines it, and its unit answers. `worked` is set once the
 axis was followed since OPERATION_ENABLED or since a mode change; `shows_following` once its drive
-has shown bit 12. `gap_cycles` counts since bit 12 was lost, `mute_cycles` while it was never shown,
-`climbing_cycles` since the request.
+has shown bit 12. `gap_cycles` counts the cycles since bit 12 was lost, `mute_cycles` those in which
+it was never shown, and `climbing_cycles` those since the request.
 
 A stop (`stop_axis`) needs a new request afterwards; `stop_reason` and `stop_cycle` keep its cause.
 It sends quick stop, then disable operation, then disable voltage (`stop_command`, `stop_cycles`).
@@ -117,7 +117,8 @@ cdef void take_request(axes_t *x, axis_t *a, const target_t *t, uint32_t i) noex
         if a.requested_state == ENABLED and requested_state != ENABLED:
             begin_stop(a)
         a.requested_state = requested_state
-        a.clear_reset = a.state == FAULT
+        # Only an edge resets: a request in every cycle must not keep bit 7 clear for ever.
+        a.clear_reset = a.state == FAULT and a.command & FAULT_RESET != 0
         a.flags &= ~(DROPPED | MODE_REFUSED)
         a.stop_reason = STOP_NONE
         a.mode_refused = NO_MODE

@@ -77,7 +77,7 @@ ctypedef struct injector_state:
     uint64_t order
     uint32_t active                   # index of the valid table; the other one is being written
     rule_table tables[2]
-    int64_t seen[2][3]                # by direction and traffic
+    int64_t seen[2][3]                # number of frames, by direction and traffic
     uint64_t injected[KIND_COUNT]
     held_frame held[MAX_HELD]
     uint8_t out[CAT_FRAME_MAX]

@@ -78,7 +78,7 @@ ctypedef struct recorder_state:
     uint64_t tail                     # total bytes written to the file; written by the writer
     uint64_t recorded                 # frames
     uint64_t dropped                  # frames
-    int64_t stamp_offset              # from the link's clock to the clock of the file
+    int64_t stamp_offset              # clock of the file minus the link's clock [ns]
     uint32_t stop
     uint32_t write_error              # errno; after an error, all frames are dropped
     int fd

@@ -5,8 +5,8 @@ No device processes the other copy. In a cut ring, both copies turn back at the 
 link on which they were sent. In both cases, the receiver gets one frame (native/ring_merge.h).
 
 After one copy has arrived, the ring waits `pair_wait` for the other. It does not wait if the other
-copy was missing several times in a row and the first copy has reached all devices. The cost is a copy
-of each frame and two system calls per send.
+copy was missing several times in a row and the copy that has arrived passed all devices. The cost is
+a copy of each frame and two system calls per send.
 """
 
 from libc.errno cimport EINTR, EMSGSIZE, errno

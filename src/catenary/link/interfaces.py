@@ -1,4 +1,4 @@
-"""The network interfaces of this machine that can carry EtherCAT frames."""
+"""Ethernet interfaces of this machine."""
 
 from __future__ import annotations
 

@@ -33,7 +33,7 @@ SETTLE_NS = 20_000_000  # time within which late answers to a master that has ju
 WINDOW_NS, WINDOWS = 40_000_000, 2  # a live master sends frames in each
 FRAMES = 256  # read per window: more than a receive ring holds
 
-PACKETS = Path("/proc/thread-self/net/packet")  # of this thread's namespace, see packet(7)
+PACKETS = Path("/proc/thread-self/net/packet")  # sockets of this thread's namespace, packet(7)
 HINT = (
     "end it first. force=True (--force) opens the interface anyway: two masters then disturb "
     "each other, and a scan stops the devices of both"

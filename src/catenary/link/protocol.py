@@ -43,7 +43,7 @@ class Link(Protocol):
             wake_on_frame: True to return early when a frame arrives.
 
         Returns:
-            True if a frame arrived before the deadline.
+            True if a frame has arrived; always False without `wake_on_frame`.
         """
         ...
 

@@ -16,7 +16,7 @@ from catenary.procedure.exchange import Procedure
 from catenary.procedure.sync import rejoin
 
 NS = 1e-9
-SETTLE_TIMEOUT = 2.0  # [s] longest wait for locked clocks before OP; drives check them there
+SETTLE_TIMEOUT = 2.0  # [s] longest wait for locked clocks; drives check them on the way to OP
 SILENT = 16  # consecutive cycles without the reference clock: too many for lost frames
 
 
@@ -38,7 +38,7 @@ class Clocks:
         self._engine = engine
         self._clock = clock
         self._plan = plan
-        self._cycle = cycle  # runs one cycle of all networks, without an application
+        self._cycle = cycle  # runs one cycle of all networks, without the application
         self._ring = ring_of(main.link)
         self._announced = False
         self._announcing = threading.Lock()  # for the iterating thread and the ring watch
@@ -144,7 +144,7 @@ class Clocks:
             )
 
     def settle(self, check: Callable[[int], None]) -> None:
-        """Wait until the clocks are locked, at most SETTLE_TIMEOUT. Do not raise after the timeout."""
+        """Wait until the clocks are locked, at most SETTLE_TIMEOUT. A timeout raises nothing."""
         self._run_until_locked(SETTLE_TIMEOUT, check)
 
     def rejoin(self, position: int, plan: DevicePlan) -> Procedure[None]:

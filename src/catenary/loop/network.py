@@ -74,7 +74,7 @@ class Settings:
         command_velocity, command_torque = self.stop.command_timeouts
         reference = self.clocks.reference
         if reference is not None and reference.main is not main:
-            reference = None  # a device of another network of the loop
+            reference = None  # it is a device of another network of the loop
         by_execution: ReceiveMode = "poll" if self.execution == "inline" else "wait"
         return PlanOptions(
             period=self.period,
@@ -129,7 +129,7 @@ class Network:
 
     @property
     def timing(self) -> Timing:
-        """Timing of the cycles since the loop was opened; also available after its end."""
+        """Timing of the cycles since the loop was opened; also available when it is closed."""
         return self.session.timing()
 
     @property

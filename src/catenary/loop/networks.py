@@ -122,7 +122,7 @@ class NetworksIteration:
                 mover.step(its.time)
 
     def _judge(self, cycle: NetworksCycle, flags: Sequence[int]) -> None:
-        """Raise the error that ends the loop: too few networks, or a fault in a live one."""
+        """Raise the error that ends the loop: too few networks are alive, or one has a fault."""
         alive = [self._lives(one, mine) for one, mine in zip(self._sessions, flags, strict=True)]
         cycle.alive = tuple(alive)
         for one, mine, lives in zip(self._sessions, flags, alive, strict=True):
@@ -185,8 +185,8 @@ def refuse_for_several(settings: Settings) -> None:
     """Raise ValueError for options that only one network can have."""
     if settings.execution != "threaded":
         raise ValueError(
-            'several networks need execution="threaded": a thread that iterates can only keep the '
-            "cycle starts of one"
+            'several networks need execution="threaded": an iterating thread can keep the cycle '
+            "starts of only one network"
         )
     if settings.laws:
         raise ValueError("laws work on one network: make a separate Loop for that network")

@@ -12,7 +12,7 @@ from catenary.loop.signals import SignalGuard
 from catenary.plan.cycle import CyclePlan
 from catenary.plan.request import Views
 
-# Wait for an exchange with safe outputs: the longer of these.
+# Longest wait for an exchange with safe outputs: the longer of these two times.
 TIMEOUT_NS = 100_000_000
 EXCHANGES = 5
 

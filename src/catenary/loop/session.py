@@ -76,7 +76,7 @@ class Session:
         self.service = Service(main, self.engine, plan)
         self.exchange.attend()
         self.watch = self.exchange.watch
-        self.switch_interval: float | None = None  # [s] of the interpreter, inline
+        self.switch_interval: float | None = None  # [s] of the interpreter; used by an inline loop
         self._attached = ExitStack()
         self._opened = self._left = False
         self._abandon = abandon  # leaves the loop if the MainDevice is closed first
@@ -136,7 +136,7 @@ class Session:
 
     @property
     def is_open(self) -> bool:
-        """True if the cycle runs, in this process."""
+        """True while the loop is open in this process."""
         return self._opened and not self._left and self._process == os.getpid()
 
     @property
@@ -366,7 +366,7 @@ def _no_background() -> None:
 
 
 def take_down(main: MainDevice) -> list[Exception]:
-    """Bring down the devices of a loop that never ran a cycle; return the problems."""
+    """Bring the devices of a loop that never ran a cycle to PRE-OP; return the problems."""
     try:
         main.leave()
     except CatenaryError as problem:

@@ -46,7 +46,7 @@ class Timing(Mapping[str, Mapping[str, float]]):
         self._phases = {name: figures for name, figures in phases.items() if figures["count"]}
         self.counters = dict(counters)  # since the loop was entered: cycles, late, lost, ...
         self.period = period  # [s]
-        self.scheduling = scheduling  # of the cycle thread; "virtual time"
+        self.scheduling = scheduling  # of the cycle thread as text, or "virtual time"
 
     def __getitem__(self, phase: str) -> Mapping[str, float]:
         if phase not in self._phases:
@@ -95,7 +95,7 @@ def counts(counters: Mapping[str, int]) -> str:
 
 
 def verdict(timing: Timing) -> Iterator[str]:
-    """Yield one line for each kind of problem, or one line if there is none."""
+    """Yield one line for each kind of problem, or a line that states that there is none."""
     if timing.is_virtual:
         yield VIRTUAL
     lines = [*_late(timing), *_uncommitted(timing), *_underrun(timing), *_lost(timing)]

@@ -169,11 +169,15 @@ class Machine:
         return Loop(*self.requests, laws=laws, sink=sink, **options)
 
     def _file_options(self) -> dict[str, Any]:
-        """Return the options of the file for a loop. Raises MachineFileError without requests."""
+        """Return the options of the file for a loop.
+
+        Raises:
+            MachineFileError: There are neither drives nor process data.
+        """
         if not self.drives and not self.process_data:
             raise self._file.error(
                 (),
-                "no drives and no process data",
+                "the machine has no drives and no process data",
                 hint="add a [drives.NAME] table: docs/reference/machine_file.md",
             )
         reference = self._file.tables.clocks.reference

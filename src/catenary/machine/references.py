@@ -16,7 +16,8 @@ from catenary.types import ALL, DataType, Value, by_name
 
 SLOTS_END = 8  # ETG.6010 §5.1: 0x6000 + 0x800 · slot, at most 0x9FFF
 _OBJECT = re.compile(r"0x([0-9A-Fa-f]{4}):([0-9A-Fa-f]{1,2})")
-WHOLE_LISTS = ("other_modes", "measured", "columns", "pdos", "axes")  # not one per axis
+# Lists that do not have one value per axis.
+WHOLE_LISTS = ("other_modes", "measured", "columns", "pdos", "axes")
 
 
 class AxisAddress(NamedTuple):

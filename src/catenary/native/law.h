@@ -91,7 +91,7 @@ static void cat_law_give_up(int number, siginfo_t *info, void *context) {
 
 /* Return the processor time of a thread of this process [ns]; -1 if the thread has ended. The clock
  * is selected by the thread ID (linux/posix-timers.h), which stays safe to use after the thread has
- * ended. A pthread_t does not. */
+ * ended. A pthread_t is not safe then. */
 static inline int64_t cat_law_time_used(uint32_t task) {
     struct timespec used;
     clockid_t clock = (clockid_t)((~(unsigned)task << 3) | 6u);

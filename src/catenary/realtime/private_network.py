@@ -21,7 +21,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-VARIABLE = "CATENARY_PRIVATE_NETWORK"  # in the environment of a program run by `enter`
+VARIABLE = "CATENARY_PRIVATE_NETWORK"  # environment variable that `enter` sets for the program
 INSIDE = "inside"
 MODULE = "catenary.realtime.private_network"
 PROBE_SECONDS = 30.0  # generous, because a busy machine is slow

@@ -17,7 +17,7 @@ OnFailure: TypeAlias = Literal["stop", "restart", "continue"]
 SHORTEST_PERIOD = 20e-6  # [s] a wake-up alone takes several microseconds
 LONGEST_PERIOD = 1e6
 PRIORITIES = range(1, 100)  # SCHED_FIFO on Linux, sched(7)
-SMALLEST_STACK = 32 * 1024  # threading.stack_size
+SMALLEST_STACK = 32 * 1024  # minimum of threading.stack_size
 PAGE = 4096
 
 

@@ -24,7 +24,7 @@ from catenary.realtime.system.scheduling import Scheduling, current_scheduling, 
 from catenary.realtime.task import Task
 from catenary.realtime.task_memory import Place
 
-START_SECONDS = 60.0  # maximum from the start of one task to the start of all
+START_SECONDS = 60.0  # longest time from the start of one task to the start of all
 STACK_LEFT = 32 * 1024  # [bytes] not pre-faulted, because it is already in use
 
 
@@ -119,7 +119,11 @@ def prepare(work: Work) -> str:
 
 
 def schedule(task: Task, best_effort: bool) -> Scheduling:
-    """Set priority and processor of this thread. Raises RealtimeError unless `best_effort`."""
+    """Set priority and processor of this thread.
+
+    Raises:
+        RealtimeError: The kernel refuses one of them, and `best_effort` is False.
+    """
     refusals = []
     if task.cpu is not None:
         cpus = {task.cpu}

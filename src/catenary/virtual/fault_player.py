@@ -35,7 +35,7 @@ End: TypeAlias = Callable[[], None]
 class FaultEvent(NamedTuple):
     """Entry of the fault log."""
 
-    time: float  # on the segment's clock [s]
+    time: float  # time on the segment's clock [s]
     fault: f.Fault
     what: Literal["begins", "ends", "misses"]  # "misses": the target no longer exists
 

@@ -247,7 +247,7 @@ class Freeze(_LastingOfDevice, tag="freeze", frozen=True):
 
 
 class DriveFault(_LastingOfDevice, tag="drive_fault", frozen=True):
-    """Fault of a servo axis with this error code (0x603F). The cause ends after `for_`."""
+    """Fault of a servo axis with the error code `code` (0x603F). Its cause ends after `for_`."""
 
     device: int
     code: int = 0x2310

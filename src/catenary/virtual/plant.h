@@ -85,8 +85,8 @@ static void plant_show(plant *p) {
 
 static __thread plant *plant_stepped;  /* the plant that this thread is stepping */
 
-/* Handle a message of MuJoCo. After an error, MuJoCo would end the process. Therefore leave the step
- * with longjmp; its state is not used again. */
+/* Handle a message of MuJoCo. After an error, MuJoCo would end the process. Therefore the handler
+ * leaves the step with longjmp. The state of the step is not used again. */
 static void plant_message(const mujoco_message *m) {
     plant *p = plant_stepped;
     if (m->level < MUJOCO_WARNING)

@@ -32,11 +32,11 @@ def make_cache(function: Callable[..., Any]) -> Any | None:
     Return None if the source is not a file. Warn and return None if no private folder is possible.
     """
     source = inspect.getfile(function)
-    if not os.path.exists(source):  # typed at a prompt, or in a zip
+    if not os.path.exists(source):  # the source was typed at a prompt, or is in a zip file
         return None
     try:
         folder = private_folder(cache_folder())
-    except (OSError, RuntimeError) as error:  # RuntimeError: no home
+    except (OSError, RuntimeError) as error:  # RuntimeError: there is no home folder
         warnings.warn(
             f"compiled laws are not cached, so every start compiles them again: {error}. Only you "
             "and root may own or write the folders of the cache; set $XDG_CACHE_HOME to another "
@@ -96,7 +96,7 @@ def _create(place: Path) -> None:
     """Create a folder if it is missing; refuse one that another user has created."""
     if not os.path.lexists(place):
         place.mkdir(0o700, exist_ok=True)
-    _refuse_foreign(place, place.lstat())  # of the link itself, if it is one
+    _refuse_foreign(place, place.lstat())  # of a symbolic link itself, not of its target
 
 
 def _refuse_writable(place: Path) -> None:

@@ -50,7 +50,7 @@ def _named(function: Callable[..., Any]) -> Iterator[tuple[str, Any]]:
         yield name, value
         if isinstance(value, ModuleType):
             modules.append(value)
-    for module in modules:  # the list grows by submodules
+    for module in modules:  # the loop appends submodules to the list
         for name in names:
             value = getattr(module, name, None)
             if isinstance(value, ModuleType) and value not in modules:
@@ -77,5 +77,5 @@ def _stamp(path: Path) -> str:
     try:
         status = path.stat()
     except OSError:
-        return f"{path}: missing"  # source typed at a prompt or in a zip
+        return f"{path}: missing"  # the source was typed at a prompt, or is in a zip file
     return f"{path}: {status.st_mtime_ns} {status.st_size}"

@@ -21,7 +21,7 @@ from catenary.plan.planner import Plan
 SLICE_NS = 10_000_000  # between checks for signals while a law runs
 GUARD_ABOVE = 1  # priority of the guard thread above that of the cycle thread
 PRIORITY_MAX = 99
-BUDGET_SHARE = 0.4  # of the period: the frames need the remainder
+BUDGET_SHARE = 0.4  # share of the period; the frames need the remainder
 
 
 class LawRunner:
@@ -87,7 +87,7 @@ class LawRunner:
     def _try(self, law: Law, native: core.Law) -> None:
         """Run steps on copies of the present values.
 
-        This maps the law's pages before its first cycle, and finds errors that occur in every step.
+        This loads the code of the law before its first cycle, and finds errors of every step.
         """
         actual, target = self._engine.blocks()
         with counted_allocations() as allocated:
@@ -134,7 +134,7 @@ class LawRunner:
         try:
             time = (run.steps - 1) * self._period_ns * 1e-9
             self._step(run.law, run.memory, run.parameters, time, copies=True)
-        except Exception as error:  # any error of the law
+        except Exception as error:  # a law can raise any exception
             line = traceback.extract_tb(error.__traceback__)[-1].lineno
             return f" ({type(error).__name__}: {error}, line {line})"
         return ""

@@ -129,7 +129,7 @@ class Watch:
         self._strangers: set[tuple[int, Identity]] = set()
 
     def run(self) -> Procedure[None]:
-        """Watch until cancelled."""
+        """Watch the devices until cancelled."""
         while True:
             if self._ring is not None:
                 self._ring.look()
@@ -195,7 +195,7 @@ class Watch:
             self._set_lost(charge)
         elif answer.word & (STATE_MASK | ERROR_FLAG) == AlState.OP:
             if charge.standing is Standing.LOST and not self._may_return(charge):
-                self._handle_return(charge)  # to hold it: it has never left OP
+                self._handle_return(charge)  # it will be held, although it has never left OP
             elif charge.standing is not Standing.HELD:
                 self._set_running(charge)
         elif charge.standing is Standing.RUNNING:
@@ -285,7 +285,7 @@ class Watch:
                 elif found.same_kind(charge.plan.identity):
                     yield from restore.give_address(presence, station)
             except CatenaryError as error:
-                # It is lost again, or unreadable: it must not answer in place of the former one.
+                # It is lost again, or unreadable. It must not keep the address of the former one.
                 yield from restore.forget_address(presence)
                 self._note_unread(charge, error)
                 return None

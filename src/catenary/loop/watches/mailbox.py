@@ -42,7 +42,7 @@ class MailboxWatch:
         self._next = 0
         self._due_ns = 0
         self._reading: dict[int, Pending[None]] = {}
-        self._read_in: dict[int, int] = {}  # position → cycle
+        self._read_in: dict[int, int] = {}  # position → cycle in which its mailbox was read
 
     @property
     def sees_mail(self) -> bool:

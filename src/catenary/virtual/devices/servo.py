@@ -192,7 +192,7 @@ class Servo(AppliedDevice):
         self.quirks = quirks
         self.mapping_quirks = mapping_quirks
         self._check_values()
-        self._inertias = [inertia] * axes  # for which the loops are tuned
+        self._inertias = [inertia] * axes  # inertias for which the loops are tuned
 
     def _check_values(self) -> None:
         """Raise ValueError if a value is out of range."""
