@@ -51,3 +51,10 @@ def test_code_and_plain_sentences_pass(tmp_path: Path, name: str, text: str) -> 
     path.write_text(text)
     done = check(path)
     assert done.returncode == 0, done.stdout
+
+
+def test_no_conflict_is_committed() -> None:
+    root = WORDS.parent.parent
+    marks = ("<" * 7 + " ", ">" * 7 + " ")
+    for path in [*root.glob("docs/**/*.md"), *root.glob("src/**/*.p*[yxd]"), *root.glob("*.md")]:
+        assert not any(line.startswith(marks) for line in path.read_text().splitlines()), path

@@ -22,7 +22,7 @@ COLOURS = {  # see _extensions/drawings.py
     "round trip": "#eeeeee",
     "receive, body or law": "#0000aa",
 }
-END = 185  # [us] of the axis; the rest of the period is idle
+END = 205  # [us] of the axis; the rest of the period is idle
 HEIGHT = 0.4
 
 

@@ -287,6 +287,17 @@ def test_a_fault_is_reset_by_a_new_request_only() -> None:
     assert followed(b)
 
 
+@pytest.mark.parametrize("requested_state", [REQUEST_ENABLED, REQUEST_RESET])
+def test_a_request_in_every_cycle_resets_a_fault(requested_state: int) -> None:
+    b = driving(CSP)
+    b.drives[0].state = FAULT
+    b.steps(2)
+    for _ in range(10):
+        b.ask(requested_state)
+        b.steps(1)
+    assert b.drives[0].state != FAULT
+
+
 def test_a_reset_acknowledges_without_enabling() -> None:
     b = bench(axis(0), drives=[ScriptedDrive(state=FAULT)])
     b.engine.run(2)

@@ -117,7 +117,8 @@ cdef void take_request(axes_t *x, axis_t *a, const target_t *t, uint32_t i) noex
         if a.requested_state == ENABLED and requested_state != ENABLED:
             begin_stop(a)
         a.requested_state = requested_state
-        a.clear_reset = a.state == FAULT
+        # Only an edge resets: a request in every cycle must not keep bit 7 clear for ever.
+        a.clear_reset = a.state == FAULT and a.command & FAULT_RESET != 0
         a.flags &= ~(DROPPED | MODE_REFUSED)
         a.stop_reason = STOP_NONE
         a.mode_refused = NO_MODE

@@ -66,7 +66,7 @@ class Axis:
 
     @property
     def needs_torque(self) -> bool:
-        """True if the axis requires its torque in N·m."""
+        """True if the axis needs the rated torque, which is the scale of its torques."""
         return (
             ("torque" in self.measured and self.measured_required)
             or Mode.CST in self.modes

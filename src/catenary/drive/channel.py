@@ -165,7 +165,9 @@ def make_channels(option: str, specs: Mapping[str, ChannelSpec]) -> dict[str, Ch
 
 
 def channel_of(entry: Entry, scale: float | None = None) -> Channel:
-    """Return the channel of a mapped entry. An entry of unknown type becomes an unsigned integer.
+    """Return the channel of a mapped entry.
+
+    An entry of unknown type becomes BOOL if it has one bit, otherwise an unsigned integer.
 
     Args:
         entry: mapped entry.

@@ -331,11 +331,11 @@ class Drives(Request):
         new move replaces the present one and continues from its velocity.
 
         Args:
-            position: goal [rad], [m]; one value, or one for each of `axes`.
-            velocity: largest velocity [rad/s], [m/s]; None for `velocity_limit`.
-            acceleration: acceleration and deceleration [rad/s²], [m/s²]; None for
+            position: goal [rad or m]; one value, or one for each of `axes`.
+            velocity: largest velocity [rad/s or m/s]; None for `velocity_limit`.
+            acceleration: acceleration and deceleration [rad/s² or m/s²]; None for
                 `acceleration_limit`, otherwise `velocity_limit` / 0.25 s.
-            jerk: largest jerk [rad/s³], [m/s³]; None for a trapezoid. A value needs
+            jerk: largest jerk [rad/s³ or m/s³]; None for a trapezoid. A value needs
                 `pip install 'catenary[traj]'`.
             axes: numbers of the axes.
 
@@ -365,7 +365,7 @@ class Drives(Request):
         An axis at rest starts from its target.
 
         Args:
-            distance: distance [rad], [m]; one value, or one for each of `axes`.
+            distance: distance [rad or m]; one value, or one for each of `axes`.
             velocity: largest velocity, as for `move_to`.
             acceleration: acceleration and deceleration, as for `move_to`.
             jerk: largest jerk, as for `move_to`.
@@ -444,8 +444,8 @@ class Drives(Request):
     def pdos(self, period_ns: int) -> Mapping[int, DeviceRequest]:
         """Return the process-data request of each device, by position.
 
-        It reads the drives by SDO (PRE-OP or later): rated torque, reactions, limits, mode and
-        interpolation time.
+        The call reads the drives by SDO (PRE-OP or later): rated torque, reactions, limits, mode
+        and interpolation time.
         """
         self._period_ns = period_ns
         self._read_drives()

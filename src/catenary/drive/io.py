@@ -227,7 +227,7 @@ class Inputs(Channels):
     direction = Direction.INPUT
 
     def bind(self, views: Views) -> None:
-        """Receive the arrays of the loop that opens."""
+        """Connect the request to the arrays of a newly opened loop."""
         self._bind(views.input_reals, views.input_integers, views.input_bits, views.unit_valid)
 
 
@@ -252,5 +252,5 @@ class Outputs(Channels):
         array[place] = value
 
     def bind(self, views: Views) -> None:
-        """Receive the arrays of the loop that opens."""
+        """Connect the request to the arrays of a newly opened loop."""
         self._bind(views.output_reals, views.output_integers, views.output_bits, views.unit_valid)

@@ -128,10 +128,10 @@ def _await_goal(port: AxisPort, goal: float, timeout: float) -> Steps:
 
 
 def stop_profile(port: AxisPort) -> Steps:
-    """Stop by halt (bit 8, with the ramp of 0x605D), then hold the position of the standstill.
+    """Stop with halt (bit 8, ramp of 0x605D), then hold the position at standstill.
 
     Halt stays set until the drive has acknowledged the new set-point. Otherwise the drive would
-    continue to the old one.
+    continue to the previous set-point.
     """
     port.clear_bits(NEW_SET_POINT | AT_ONCE)
     port.set_bits(HALT)

@@ -78,7 +78,7 @@ class Move:
 
     @property
     def remaining(self) -> npt.NDArray[np.float64]:
-        """Goal minus actual position of each moving axis, (k,) [rad], [m]; NaN for a homing."""
+        """Goal minus actual position of each moving axis, (k,) [rad or m]; NaN for a homing."""
         return np.array([part.goal - part.port.position for part in self._parts])
 
     def stop(self) -> None:

@@ -61,7 +61,7 @@ class AxisUnits:
         counts_per_turn: encoder counts per turn of the motor.
         gear_ratio: motor turns per joint turn.
         direction: +1, or -1 if the joint turns opposite to the motor.
-        offset: position of the joint where the drive reads 0 [rad], [m].
+        offset: position of the joint where the drive reads 0 [rad or m].
         velocity_unit: value of one raw velocity count [rad/s of the motor]; None for one position
             count per second.
         rated_torque: rated torque of the motor [N·m]; None until it is read from 0x6076.
@@ -113,20 +113,20 @@ class AxisUnits:
 
     @property
     def position_scale(self) -> float:
-        """Value of one position count [rad], [m]."""
+        """Value of one position count [rad or m]."""
         turn = 2 * math.pi if self.metres_per_turn is None else self.metres_per_turn
         return self.direction * turn / (self.counts_per_turn * self.gear_ratio)
 
     @property
     def velocity_scale(self) -> float:
-        """Value of one velocity count [rad/s], [m/s]."""
+        """Value of one velocity count [rad/s or m/s]."""
         if self.velocity_unit is None:
             return self.position_scale
         return self.direction * self.velocity_unit * self.per_motor_radian
 
     @property
     def torque_scale(self) -> float:
-        """Value of one torque count [N·m], [N].
+        """Value of one torque count [N·m or N].
 
         Raises:
             ValueError: The rated torque has not been read yet.

@@ -112,7 +112,7 @@ class CarriedWatch:
         self._answers: Sequence[Answer] = ()
 
     def run(self) -> Procedure[None]:
-        """Watch until cancelled."""
+        """Watch the devices until cancelled."""
         while True:
             yield from self._carrier.listen()
             self._announce()

@@ -96,7 +96,7 @@ class FaultReport:
         return self._axis_error(stops, raise_faults=self._policy.raise_faults and not enabling)
 
     def ended(self, flags: int) -> LoopError | None:
-        """Return the error for a cycle that was not run; None if it was."""
+        """Return the error for a cycle that was not run; None if the cycle was run."""
         if flags & CYCLE_STOPPED:
             return LoopError("the cycle has ended: the link failed", log=self.log())
         if flags & CYCLE_NONE:
@@ -114,7 +114,7 @@ class FaultReport:
         return silence_error(self._exchange.query_silence(suspects), suspects, lost, log)
 
     def drive_error(self, axes: Sequence[int], what: str) -> DriveError:
-        """Stop all axes, and return the error for some of them.
+        """Stop all axes, and return the error for the axes in trouble.
 
         Args:
             axes: Numbers of the axes in trouble.

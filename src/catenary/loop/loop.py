@@ -172,9 +172,9 @@ class Loop:
             raise problems[0]
 
     def open(self) -> Loop:
-        """Enter without a `with` block, for a notebook or a server; return the loop.
+        """Enter the loop without a `with` block, for a notebook or a server; return the loop.
 
-        `close` leaves it. The end of the program and the MainDevice's `close` also leave it.
+        `close` leaves the loop. The end of the program and `close` of the MainDevice also leave it.
         """
         return self.__enter__()
 
@@ -406,7 +406,7 @@ class Loop:
 
     @property
     def timing(self) -> Timing:
-        """Timing of the cycles since the loop was opened; also available after its end."""
+        """Timing of the cycles since the loop was opened; also available when it is closed."""
         return self._networks[0].timing
 
     @property
@@ -506,7 +506,7 @@ class Loop:
             warnings.warn(f"while leaving the open loop: {problem}", RuntimeWarning, stacklevel=2)
 
     def _leave_at_exit(self, sessions: Sequence[Session]) -> None:
-        """Leave the loop when it is deleted or the program ends, if it is still open."""
+        """Ensure that an open loop is left when it is deleted, or when the program ends."""
         self._finalizer = weakref.finalize(self, leave_open_loop, sessions, self._guard)
 
     def _report_end(self, error: BaseException) -> None:
@@ -518,7 +518,7 @@ class Loop:
         """Stop every network, regardless of errors in the others; return the problems.
 
         If another thread is already leaving the loop, the call first waits for it, at most
-        `LEAVE_TIMEOUT`. The axes are then at rest when the call returns.
+        `LEAVE_TIMEOUT`.
         """
         is_ours = self._leaving.acquire(timeout=LEAVE_TIMEOUT)
         try:
@@ -553,8 +553,8 @@ def checked_quorum(quorum: int | None, count: int) -> int:
 def leave_open_loop(sessions: Sequence[Session], guard: SignalGuard) -> None:
     """Leave a loop that was deleted, or that is open at the end of the program, and warn.
 
-    There is no warning at the end of the program if the loop runs in the background. The warning
-    comes last, because it may be turned into an error.
+    There is no warning at the end of the program if the loop runs in the background and can be
+    left without problems. The warning comes last, because it may be turned into an error.
 
     Args:
         sessions: Sessions of the loop.

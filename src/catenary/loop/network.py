@@ -129,7 +129,7 @@ class Network:
 
     @property
     def timing(self) -> Timing:
-        """Timing of the cycles since the loop was opened; also available after its end."""
+        """Timing of the cycles since the loop was opened; also available when it is closed."""
         return self.session.timing()
 
     @property

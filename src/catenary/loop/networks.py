@@ -122,7 +122,7 @@ class NetworksIteration:
                 mover.step(its.time)
 
     def _judge(self, cycle: NetworksCycle, flags: Sequence[int]) -> None:
-        """Raise the error that ends the loop: too few networks, or a fault in a live one."""
+        """Raise the error that ends the loop: too few networks are alive, or one has a fault."""
         alive = [self._lives(one, mine) for one, mine in zip(self._sessions, flags, strict=True)]
         cycle.alive = tuple(alive)
         for one, mine, lives in zip(self._sessions, flags, alive, strict=True):

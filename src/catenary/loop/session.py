@@ -136,7 +136,7 @@ class Session:
 
     @property
     def is_open(self) -> bool:
-        """True if the cycle runs, in this process."""
+        """True while the loop is open in this process."""
         return self._opened and not self._left and self._process == os.getpid()
 
     @property
@@ -366,7 +366,7 @@ def _no_background() -> None:
 
 
 def take_down(main: MainDevice) -> list[Exception]:
-    """Bring down the devices of a loop that never ran a cycle; return the problems."""
+    """Bring the devices of a loop that never ran a cycle to PRE-OP; return the problems."""
     try:
         main.leave()
     except CatenaryError as problem:

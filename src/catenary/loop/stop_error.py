@@ -66,8 +66,8 @@ def stopped_error(stops: Sequence[StoppedAxis], cycle: CyclePlan, log: Log) -> D
         for what, names in alike.items()
     )
     reasons = dict.fromkeys(stop.reason for stop in stops)
-    advice = "; ".join(ADVICE[reason] for reason in reasons if reason in ADVICE)
-    return DriveError(report, log=log, hint=f"{advice}; {CONTINUE}")
+    advice = [ADVICE[reason] for reason in reasons if reason in ADVICE]
+    return DriveError(report, log=log, hint="; ".join([*advice, CONTINUE]))
 
 
 def _details(stop: StoppedAxis, cycle: CyclePlan, log: Log) -> str:

@@ -95,7 +95,7 @@ def counts(counters: Mapping[str, int]) -> str:
 
 
 def verdict(timing: Timing) -> Iterator[str]:
-    """Yield one line for each kind of problem, or one line if there is none."""
+    """Yield one line for each kind of problem, or a line that states that there is none."""
     if timing.is_virtual:
         yield VIRTUAL
     lines = [*_late(timing), *_uncommitted(timing), *_underrun(timing), *_lost(timing)]

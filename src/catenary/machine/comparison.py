@@ -170,8 +170,8 @@ def _cause_of_another(
     if shift:
         more = "more" if shift > 0 else "fewer"
         return (
-            f"the cable has {abs(shift)} {more} {_devices(shift)} before it than the file; correct "
-            "the cabling, change the positions in the file, or use aliases"
+            f"the cable has {abs(shift)} {more} {_devices(shift)} before it than the file has; "
+            "correct the cabling, change the positions in the file, or use aliases"
         )
     for other in expected:
         if other is not device and agrees(other.identity, sub.identity):

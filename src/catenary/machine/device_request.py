@@ -50,9 +50,9 @@ def _start_up(file: MachineFile, table: StartUpTable, path: KeyPath) -> StartUp:
 
 
 class StartUpRequest:
-    """Request for a device that states its start-up objects and whether it may be absent.
+    """Request with the start-up objects of one device. It does not request process data.
 
-    It does not request process data.
+    It also states whether the device may be absent.
     """
 
     def __init__(

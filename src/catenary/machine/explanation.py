@@ -168,7 +168,7 @@ def _described(path: KeyPath) -> str:
 
 
 def _type_at(path: KeyPath) -> Any:
-    """Return the type of a key path in the schema."""
+    """Return the type that the schema gives to a key path."""
     kind: Any = MachineTables
     for step in path:
         kind = next(_inner(kind, step), object)

@@ -169,7 +169,11 @@ class Machine:
         return Loop(*self.requests, laws=laws, sink=sink, **options)
 
     def _file_options(self) -> dict[str, Any]:
-        """Return the options of the file for a loop. Raises MachineFileError without requests."""
+        """Return the options of the file for a loop.
+
+        Raises:
+            MachineFileError: There are neither drives nor process data.
+        """
         if not self.drives and not self.process_data:
             raise self._file.error(
                 (),

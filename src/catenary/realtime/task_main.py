@@ -119,7 +119,11 @@ def prepare(work: Work) -> str:
 
 
 def schedule(task: Task, best_effort: bool) -> Scheduling:
-    """Set priority and processor of this thread. Raises RealtimeError unless `best_effort`."""
+    """Set priority and processor of this thread.
+
+    Raises:
+        RealtimeError: The kernel refuses one of them, and `best_effort` is False.
+    """
     refusals = []
     if task.cpu is not None:
         cpus = {task.cpu}

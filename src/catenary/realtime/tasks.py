@@ -124,7 +124,7 @@ class Tasks:
             True if all tasks have ended.
 
         Raises:
-            TaskError: a task failed.
+            TaskError: the failure of a task stopped all tasks.
         """
         supervisor = self._started()
         if self._clock is None:
@@ -147,7 +147,7 @@ class Tasks:
             raising: raise the failure that stopped the tasks.
 
         Raises:
-            TaskError: a task failed, or did not end in time.
+            TaskError: the failure of a task stopped all tasks, or a task did not end in time.
         """
         supervisor = self._started()
         supervisor.request_stop()
@@ -187,7 +187,8 @@ class Tasks:
             The result of the function.
 
         Raises:
-            TaskError: a task failed; `failures` contains the error as soon as it occurs.
+            TaskError: the failure of a task stopped all tasks. `failures` contains it as soon as it
+                occurs.
         """
         supervisor = self._started()
         if self._clock is not None:

@@ -87,7 +87,7 @@ class LawRunner:
     def _try(self, law: Law, native: core.Law) -> None:
         """Run steps on copies of the present values.
 
-        This maps the law's pages before its first cycle, and finds errors that occur in every step.
+        This loads the code of the law before its first cycle, and finds errors of every step.
         """
         actual, target = self._engine.blocks()
         with counted_allocations() as allocated:

@@ -129,7 +129,7 @@ class Watch:
         self._strangers: set[tuple[int, Identity]] = set()
 
     def run(self) -> Procedure[None]:
-        """Watch until cancelled."""
+        """Watch the devices until cancelled."""
         while True:
             if self._ring is not None:
                 self._ring.look()

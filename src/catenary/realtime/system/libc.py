@@ -50,7 +50,7 @@ def signal_on_parents_death(number: int) -> None:
 
 
 def change_malloc(trim_threshold: int, mmap_max: int) -> None:
-    """Set when malloc returns memory, and the maximum number of allocations by mmap."""
+    """Set how much free heap malloc keeps [bytes], and its maximum number of mmap allocations."""
     for option, value in ((M_TRIM_THRESHOLD, trim_threshold), (M_MMAP_MAX, mmap_max)):
         if call("mallopt", option, value) != 1:
             raise OSError(0, f"mallopt({option}, {value}) failed")
