@@ -18,7 +18,8 @@ class CycleClock(Protocol):
     def differences(self) -> list[tuple[float, int, int, int]]:
         """Return the time differences of each follower.
 
-        The values are mean, last, largest magnitude [ns] and number of reads."""
+        The values are mean, last, largest magnitude [ns] and number of reads.
+        """
 
     def keep_within(self, bound_ns: int) -> None:
         """Set the bound for the differences and the phase [ns]."""
