@@ -162,7 +162,7 @@ def deciding(folder: Path) -> Iterator[None]:
 
 
 def draft_path(folder: Path) -> Path:
-    """Return a new path that readers ignore. A socket path has at most 107 bytes."""
+    """Return a new, short path that readers ignore. A socket path has at most 107 bytes."""
     return folder / f"{DRAFT}{os.getpid()}-{os.urandom(4).hex()}"
 
 
