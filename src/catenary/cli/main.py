@@ -93,7 +93,7 @@ def main(
     """Run one command of `parser`, by default of `catenary`.
 
     Return the exit status: 0 for success, 1 for a failure, 2 for a wrong command line, 141 if the
-    reader of stdout has closed. `check` defines its own.
+    reader of stdout has closed. `check` also returns 2 if it cannot compare.
     """
     given = list(sys.argv[1:] if arguments is None else arguments)
     debug = "--debug" in given  # before or after the command

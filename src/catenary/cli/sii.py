@@ -201,7 +201,7 @@ def run_write(arguments: argparse.Namespace) -> int:
 
 
 def check_image(image: bytes, arguments: argparse.Namespace) -> None:
-    """Check that the image is valid. With --force, report and ignore faults that allow it.
+    """Check that the image is valid. With --force, report some faults without raising.
 
     Raises:
         EepromError: The image has a fault that is not ignored.

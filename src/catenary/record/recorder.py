@@ -102,8 +102,8 @@ class Recorder:
         """Write the cycles and events since the last call. Return the number of cycles.
 
         Raises:
-            RecordingError: The disk is full or fails. If possible, the file is repaired, and ends at
-                its last complete chunk.
+            RecordingError: The disk is full or fails. If possible, the file is repaired, and ends
+                with its last complete chunk.
         """
         rows, lost = self._share.rows(self._number)
         events, events_lost = self._share.events(self._serial)

@@ -172,7 +172,7 @@ class Desk:
         self.ended.store(place, serial)
 
     def end_all(self) -> None:
-        """End all leases, and prevent new ones. Called by the loop."""
+        """End all leases. Later leases are invalid, too. Called by the loop."""
         self._closed.store(0, 1)
 
     def ending(self, place: int, now_ns: int) -> Reason | None:
