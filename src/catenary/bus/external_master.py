@@ -35,7 +35,8 @@ class CycleClock(Protocol):
 class Carrier(Protocol):
     """Interface of a configured external master to a loop.
 
-    Its procedures wait, but request no frames."""
+    Its procedures wait, but request no frames.
+    """
 
     @property
     def image(self) -> object:

@@ -12,7 +12,7 @@ from catenary.loop.watches.device import Attendance
 
 
 class Exchange(Protocol):
-    """Exchange of a session: its own frames, or an external master (`CarriedExchange`)."""
+    """Exchange of a session, with its own frames or an external master (`CarriedExchange`)."""
 
     @property
     def watch(self) -> Attendance:

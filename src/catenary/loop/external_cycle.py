@@ -29,7 +29,7 @@ class CarriedExchange:
 
     def make_engine(self) -> Engine:
         """Return an engine that uses the process images of the external master."""
-        cycle = replace(self._session.plan.cycle, clock=None)  # the master synchronises them
+        cycle = replace(self._session.plan.cycle, clock=None)  # the master synchronises the clocks
         return Engine(cycle, self._session.main.link.capsule, self._carrier.image)
 
     def cycle_clock(self) -> CycleClock:
