@@ -89,7 +89,7 @@ def test_an_existing_file_is_replaced_only_with_force(
         shared.run(5)
         status, _, err = call(f"record {name} {recording} --seconds 0.01", capsys)
         assert (status, recording.read_bytes()) == (1, before)
-        assert err.splitlines()[0] == f"catenary: {recording} exists"
+        assert err.splitlines()[0] == f"catenary: {recording} already exists"
         assert "--force" in err.splitlines()[1]
         assert call(f"record {name} {recording} --seconds 0.01 --force", capsys)[0] == 0
     assert record.read(recording).name == name
