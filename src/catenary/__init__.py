@@ -13,8 +13,8 @@ Names are imported on first use. `import catenary` is fast and does not import N
 would prevent a process from entering a network namespace.
 """
 
-# Always False. Importing it from `typing` takes longer than this whole module. With a plain False,
-# Jedi would complete nothing.
+# False at run time. Importing it from `typing` would take longer than the rest of this module. With
+# the constant False, Jedi would not complete the names below.
 TYPE_CHECKING = not __name__
 
 if TYPE_CHECKING:

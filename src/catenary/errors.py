@@ -1,5 +1,7 @@
-"""All errors of the package. A message gives the device, the request, the reply, the likely cause
-and the next step. The numbers are attributes.
+"""All errors of the package.
+
+A message gives the device, the request, the reply, the likely cause and the next step. The numbers
+are attributes.
 
 A caller's mistake raises ValueError or TypeError before anything is sent. The errors here report
 faults of a device, the network or the machine.
@@ -86,7 +88,7 @@ class IdentityError(CatenaryError):
 
 
 class RegisterError(CatenaryError):
-    """A device answers, but rejects this access to its registers or memory."""
+    """An access to the registers or the memory of a device failed or was rejected."""
 
 
 class EepromError(CatenaryError):
@@ -94,7 +96,8 @@ class EepromError(CatenaryError):
 
 
 class MailboxError(CatenaryError):
-    """A device answered a mailbox service with a mailbox error or violated the protocol."""
+    """A mailbox service failed: a device does not support it, did not answer, answered with a
+    mailbox error, or violated the protocol."""
 
 
 class SdoAbort(CatenaryError):
@@ -162,8 +165,8 @@ class DriveError(LoopError):
 class MoveError(DriveError):
     """A move that ended before its target.
 
-    `axis` is the name of the axis. `remaining` is the target minus the actual position [rad], for
-    a linear axis [m]; NaN in homing.
+    `axis` is the name of the axis. `remaining` is the target minus the actual position [rad] or,
+    for a linear axis, [m]. It is NaN during homing.
     """
 
     def __init__(
@@ -175,7 +178,7 @@ class MoveError(DriveError):
 
 
 class RealtimeError(CatenaryError):
-    """The machine does not meet a real-time requirement. The hint says how to meet it."""
+    """The machine does not meet a real-time requirement. The hint shows how to meet it."""
 
 
 class TaskError(RealtimeError):

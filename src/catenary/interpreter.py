@@ -18,9 +18,9 @@ def is_own(executable: str, prefix: str, base_prefix: str) -> bool:
     `python -m venv` creates a symbolic link to the base interpreter, unless `--copies` is given.
 
     Args:
-        executable: As `sys.executable`.
-        prefix: As `sys.prefix`.
-        base_prefix: As `sys.base_prefix`.
+        executable: Path of the interpreter, as in `sys.executable`.
+        prefix: Folder of the environment, as in `sys.prefix`.
+        base_prefix: Folder of the base installation, as in `sys.base_prefix`.
     """
     inside = Path(executable).resolve().is_relative_to(Path(prefix).resolve())
     return inside and (prefix != base_prefix or (Path(prefix) / "conda-meta").is_dir())

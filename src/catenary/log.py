@@ -24,9 +24,10 @@ CHUNK = 4096  # rows per write
 class Log:
     """The last cycles of a loop, oldest first: `log["lateness_ns"]`, `log[-1]`, `log[-100:]`.
 
-    `numpy.asarray(log)` returns a structured array, shape (cycles,). `time` [s] is on the clock of
-    `cycle.time`, negative before the first iteration. With `Loop(log_axes=True)`, each axis has its
-    own fields, such as `shoulder.actual.position`. docs/how_to/recording.md lists all fields.
+    `numpy.asarray(log)` returns a structured array, shape (cycles,). `time` [s] has the same zero
+    as `cycle.time`, so it is negative before the first iteration. With `Loop(log_axes=True)`, each
+    axis has its own fields, such as `shoulder.actual.position`. docs/how_to/recording.md lists all
+    fields.
     """
 
     def __init__(self, rows: Rows) -> None:
@@ -66,7 +67,9 @@ class Log:
         | npt.NDArray[np.bool_]
         | npt.NDArray[np.integer[Any]],
     ) -> npt.NDArray[Any] | np.void | Log:
-        """Return a field by its name, shape (cycles,), a cycle by its position, or a part as a Log.
+        """Return a field, shape (cycles,), for a name, a cycle for an index, or a Log for a slice.
+
+        A list of indices or a mask also returns a Log.
 
         Raises:
             ValueError: The field does not exist.

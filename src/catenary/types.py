@@ -2,7 +2,7 @@
 types). Values are little endian.
 
     UINT.encode(5)              # b"\\x05\\x00"
-    UINT.decode(b"\\x05\\x00")    # 5, an int also for the type checker
+    UINT.decode(b"\\x05\\x00")    # 5; its static type is int
     by_name("UNSIGNED16")       # UINT
 """
 
@@ -200,7 +200,7 @@ class Octets(DataType[bytes]):
             raise ValueError(f"{self.name}: {text!r}: {error}") from None
 
 
-# The types of the entries in an array or a record, which complete access transfers at once.
+# Types that an array or a record may contain. Complete access transfers the whole object at once.
 Scalar: TypeAlias = (
     DataType[bool] | DataType[int] | DataType[float] | DataType[str] | DataType[bytes]
 )
@@ -278,7 +278,7 @@ def sized(kind: DataType[T], size: int) -> DataType[T]:
         size: The length [bytes].
 
     Raises:
-        ValueError: The type has a fixed length already, or `size` is less than 1.
+        ValueError: The type already has a fixed length, or `size` is less than 1.
     """
     if kind.bit_length or size < 1:
         raise ValueError(
@@ -358,7 +358,7 @@ _BY_NAME = {name: entry for entry in ALL for name in (entry.name, *entry.aliases
 
 
 def by_name(name: str) -> DataType[Value]:
-    """Return the type with a PLC or CANopen name. Raises ValueError if the name is unknown.
+    """Return the type with this PLC or CANopen name. Raises ValueError if the name is unknown.
 
     The comparison ignores case.
     """

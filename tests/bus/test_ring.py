@@ -25,7 +25,7 @@ def test_swapped_ports_are_an_error(ask: Callable[[cat.MainDevice], object]) -> 
 
 
 def test_a_ring_needs_two_ports() -> None:
-    with pytest.raises(ConfigurationError, match="twice"):
+    with pytest.raises(ConfigurationError, match="two different ports"):
         cat.MainDevice("eth9", "eth9")
     with pytest.raises(ConfigurationError, match="eth9"):
         cat.MainDevice(Interface("eth9"), "eth9")

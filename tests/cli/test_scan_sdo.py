@@ -110,7 +110,7 @@ def test_sdo_list_with_values_as_json(capsys: pytest.CaptureFixture[str]) -> Non
         ("sdo write virtual 2 0x6065 5", 2, "needs --type"),
         ("sdo write virtual 2 0x6065 -5 --type UDINT", 2, "-5 is not in 0 to 4294967295"),
         ("sdo write virtual 2 0x1018:1 5 --type UDINT", 1, "0x06010002"),
-        ("scan eth0,eth0", 1, "a ring needs two different ports"),
+        ("scan eth0,eth0", 1, "is not a ring"),
         ("scan nosuchnic", 1, "there is no network interface 'nosuchnic'"),
         ("scan virtual:nosuchfile.toml", 1, "nosuchfile.toml"),
     ],

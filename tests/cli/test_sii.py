@@ -154,7 +154,7 @@ def test_an_image_larger_than_the_eeprom_is_refused(
     path.write_bytes(image)
     status, _, err = call(f"sii write eth9 1 {path}", capsys)
     assert status == 1
-    assert "the image has 4096 bytes, but its EEPROM has only 2048" in err
+    assert "the image has 4096 bytes, but the EEPROM has only 2048 bytes" in err
     status, _, err = call(f"sii write eth9 1 {path} --force", capsys)
     assert status == 1
     assert "SII word 0x0400 cannot be set to 0x5555: the EEPROM does not acknowledge" in err

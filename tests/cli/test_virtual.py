@@ -41,5 +41,5 @@ def test_a_refused_priority_is_an_error(
     monkeypatch.setattr(scheduling, "request_scheduling", lambda **_: refused)
     assert main(["virtual", "serve", "lo", "--priority", "80"]) != 0
     message = capsys.readouterr().err
-    assert "lo cannot be served in real time: SCHED_FIFO 80 refused" in message
+    assert "cannot serve lo in real time: SCHED_FIFO 80 refused" in message
     assert "setcap" in message

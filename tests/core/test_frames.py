@@ -384,7 +384,7 @@ def test_a_divisor_that_makes_no_sense_is_refused(divider: int, phase: int) -> N
 def test_a_unit_in_frames_of_different_cycles_is_refused() -> None:
     plan = make_plan([axis(0)])
     again = replace(frame_plan([lrw(0)]), divider=2)
-    with pytest.raises(ValueError, match="other cycles"):
+    with pytest.raises(ValueError, match="the same divider and phase"):
         Bench(replace(plan, frames=(frame_plan([al_status(1), lrw(0)]), again)))
 
 

@@ -162,7 +162,7 @@ def test_a_missing_library_is_an_error(tmp_path: Path, monkeypatch: pytest.Monke
 def test_another_library_or_version_is_refused(tmp_path: Path) -> None:
     empty = tmp_path / "empty.so"
     subprocess.run(["gcc", "-shared", "-xc", "/dev/null", "-o", empty], check=True)
-    with pytest.raises(LinkError, match="is not a libethercat"):
+    with pytest.raises(LinkError, match="is not libethercat"):
         Library(empty)
     other = build(tmp_path, "1.6.1", "-UVERSION_MAGIC", "-DVERSION_MAGIC=0x201")
     with pytest.raises(LinkError, match=r"libethercat 2\.1 \(version magic 0x0201\)"):

@@ -162,7 +162,7 @@ def test_a_chunk_is_neither_tiny_nor_huge() -> None:
 
 def test_an_existing_file_is_refused(tmp_path: Path) -> None:
     (tmp_path / "x.mcap").write_text("precious")
-    with pytest.raises(RecordingError, match=r"x\.mcap exists") as caught:
+    with pytest.raises(RecordingError, match=r"x\.mcap already exists") as caught:
         RecordingFile(tmp_path / "x.mcap", make_layout(1))
     assert "--force" in caught.value.hint
     assert (tmp_path / "x.mcap").read_text() == "precious"

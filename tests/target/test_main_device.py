@@ -10,7 +10,7 @@ from catenary.virtual import Coupler, Segment
 
 
 def test_two_virtual_segments_are_not_a_ring() -> None:
-    with pytest.raises(ConfigurationError, match="is not one end of a ring") as caught:
+    with pytest.raises(ConfigurationError, match="cannot be one end of a ring") as caught:
         cat.MainDevice(Segment([Coupler()]), Segment([Coupler()]))
     assert "segment.first" in str(caught.value)
 

@@ -52,7 +52,7 @@ def test_padding_to_the_ethernet_minimum():
 def test_the_largest_frame():
     encoded = encode_frame([Datagram(EcatCommand.LRW, 0, bytes(frame.MAXIMUM_DATA))])
     assert len(encoded) == frame.MAXIMUM_SIZE
-    with pytest.raises(ValueError, match="at most"):
+    with pytest.raises(ValueError, match="exceed the 1498 bytes"):
         encode_frame([Datagram(EcatCommand.LRW, 0, bytes(frame.MAXIMUM_DATA + 1))])
 
 

@@ -1,9 +1,10 @@
 """Measurements of the loop on this machine: `catenary bench loop`, `latency` and `report`.
 
-The folder `benchmarks/` of the repository compares it with other programs and published figures.
+The folder `benchmarks/` of the repository compares the loop with other programs and with published
+figures.
 
 Call `enter_private_network` first. It may restart the program, which must not have started threads
-before (NumPy starts some). Therefore all imports in this file are inside functions.
+before (NumPy starts some). All imports in this file are therefore inside functions.
 """
 
 from __future__ import annotations

@@ -1,6 +1,8 @@
 """Job and Round: the input and the result of one peer in one round.
 
-Files transfer both between the process that runs the benchmark and the worker of one round.
+A peer is one of the compared programs, such as `catenary-inline`.
+
+Both are passed in files between the benchmark's process and the worker process of a round.
 """
 
 from __future__ import annotations

@@ -96,9 +96,17 @@ def run_all(
     rounds: int | None = None,
     busy_wait: float = 0.0,
 ) -> list[Run]:
-    """Run all peers, given by name and module, in alternating rounds.
+    """Run all peers in alternating rounds.
 
-    `rounds` is the number of rounds per peer; None for rounds of less than a second.
+    Args:
+        modules: Module of each peer, by name.
+        segment: Segment that is already served.
+        rate: Cycles per second [Hz].
+        seconds: Measured time per peer [s].
+        body: Body of the loops.
+        spin: True to run a busy Python thread next to every loop.
+        rounds: Number of rounds per peer; None for rounds of less than a second at 1 kHz.
+        busy_wait: Time of busy-waiting before each cycle start [s].
     """
     cycles = round(seconds * rate)
     rounds = rounds or math.ceil(cycles / ROUND_CYCLES)

@@ -70,7 +70,15 @@ def measure(
     answers: Sequence[int],
     body: Callable[[float], None] | None = None,
 ) -> Round:
-    """Run the loop and return its figures. `body` is a body that already runs, or None."""
+    """Run the loop and return its figures.
+
+    Args:
+        loop: The open loop.
+        arm: The drives of the loop.
+        job: The parameters of the round.
+        answers: Counts of answers to SDO requests, which increase during the run.
+        body: Function that each cycle calls with its time [s]; None for the body of the job.
+    """
     body = body or body_of(arm, job)
     before, cpu, first, answered = loop.timing.counters, 0.0, 0, 0
     last_unmeasured, end = job.warm_up - 1, job.warm_up + job.cycles

@@ -18,7 +18,7 @@ from catenary.realtime.child import start_python
 WARM_UP_CYCLES = 200
 BRING_UP_SECONDS = 60.0  # maximum time for the bring-up and enabling in a round
 
-MOST_FAILED = 10  # maximum number of repeated rounds
+MOST_FAILED = 10  # largest number of failed rounds that are repeated
 
 T = TypeVar("T")
 Progress = Callable[[str, int, int], None]  # peer, round, rounds
@@ -35,7 +35,7 @@ def run_with_retries(run: Callable[[], T], failed: list[str]) -> T:
 
     Args:
         run: The round.
-        failed: Receives the reasons of failed rounds.
+        failed: List to which the reasons of failed rounds are added.
 
     Raises:
         RoundError: Too many rounds have failed.
@@ -58,7 +58,8 @@ def interleave(
         jobs: One job for each peer.
         rounds: Number of rounds per job.
         progress: Called before each round.
-        failed: Receives the reasons of failed rounds, which are repeated. None to raise instead.
+        failed: List to which the reasons of failed rounds are added; these rounds are repeated.
+            None raises the error of the first failed round.
 
     Returns:
         The rounds by name of the peer.

@@ -64,7 +64,7 @@ def make_segment(
 
     Args:
         drives: Number of servos.
-        inputs: Number of input terminals, which add bytes without axes.
+        inputs: Number of input terminals. They enlarge the process data without adding axes.
         axes: Axes per servo.
         clock: Clock of the segment.
         ring: True for a ring.

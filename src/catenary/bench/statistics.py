@@ -40,7 +40,7 @@ class Rounds:
 
 @dataclass(frozen=True, slots=True)
 class Run:
-    """All rounds of one peer."""
+    """Figures of one peer over all of its rounds."""
 
     name: str
     cycles: int

@@ -1,4 +1,4 @@
-"""Interface to another master that exchanges the process images (a carrier)."""
+"""Interface to an external master, which exchanges the process images for a loop."""
 
 from __future__ import annotations
 
@@ -13,16 +13,19 @@ class CycleClock(Protocol):
     """Interface to the distributed clocks of a cycle; `core.Clock` implements it."""
 
     def figures(self) -> dict[str, float]:
-        """Return the figures [ns], as `core.Clock` does."""
+        """Return the clock figures [ns], with the keys of `core.Clock.figures`."""
 
     def differences(self) -> list[tuple[float, int, int, int]]:
-        """Return mean, last, largest magnitude [ns] and number of reads of each follower."""
+        """Return the time differences of each follower.
+
+        The values are mean, last, largest magnitude [ns] and number of reads.
+        """
 
     def keep_within(self, bound_ns: int) -> None:
         """Set the bound for the differences and the phase [ns]."""
 
     def reset_figures(self) -> None:
-        """Reset the largest magnitudes."""
+        """Set the largest magnitudes to zero."""
 
     @property
     def changes(self) -> int:
@@ -30,7 +33,10 @@ class CycleClock(Protocol):
 
 
 class Carrier(Protocol):
-    """Interface of a configured master to a loop. Its procedures wait, but request no frames."""
+    """Interface of a configured external master to a loop.
+
+    Its procedures wait, but request no frames.
+    """
 
     @property
     def image(self) -> object:
@@ -38,7 +44,7 @@ class Carrier(Protocol):
 
     @property
     def clock(self) -> CycleClock | None:
-        """Distributed clocks of the configuration; None if it has none."""
+        """Distributed clocks of the configuration; None if it does not use them."""
 
     def bring_to_op(self, positions: Sequence[int]) -> Procedure[None]:
         """Wait until these devices are in OP. Cycles must run during the wait.

@@ -100,7 +100,7 @@ class MainDevice:
 
     @property
     def carrier(self) -> Carrier | None:
-        """Master that exchanges the process images; None if the loop sends its own frames."""
+        """External master that exchanges the images; None if the loop sends its own frames."""
         return self.master.carrier
 
     @property

@@ -46,7 +46,7 @@ class Master(Protocol):
 
     @property
     def carrier(self) -> Carrier | None:
-        """Master that exchanges the process images; None if the loop sends its own frames."""
+        """External master that exchanges the images; None if the loop sends its own frames."""
 
     def scan(self) -> tuple[Sequence[SubDevice], tuple[str, ...]]:
         """Return the handles of all devices, in PRE-OP, and notes."""

@@ -1,1 +1,1 @@
-"""The command line: one file per command, which imports what it needs only when it runs."""
+"""Command line: one file per command. A command imports its libraries only when it runs."""

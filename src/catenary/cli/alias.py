@@ -36,7 +36,7 @@ def add_parser(commands: Commands) -> None:
         "value", metavar="VALUE", nargs="?", type=alias, help="1 to 65535; 0 for none"
     )
     parser.add_argument(
-        "--force", action="store_true", help="write it even if another device has it"
+        "--force", action="store_true", help="write the alias even if another device has it"
     )
     add_json(parser)
     parser.set_defaults(run=run)
@@ -80,7 +80,7 @@ def check_unique(
     """Check that no other device has the alias, now or after its next power-up.
 
     Raises:
-        ConfigurationError: Another device has it.
+        ConfigurationError: Another device has the alias.
     """
     from catenary.errors import ConfigurationError
     from catenary.procedure.alias import read_alias

@@ -89,7 +89,7 @@ def _positive_time(text: str, unit: str) -> float:
 def result_file(text: str) -> Path:
     """Return the path of a result file. Raises ArgumentTypeError if it cannot be written."""
     path = Path(text)
-    if os.path.isdir(path):  # no error if the folder is not readable
+    if os.path.isdir(path):  # `isdir` raises no exception if access is refused
         raise argparse.ArgumentTypeError(f"{text} is a folder")
     if not os.path.isdir(path.parent):
         raise argparse.ArgumentTypeError(f"the folder {path.parent} does not exist")

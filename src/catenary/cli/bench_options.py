@@ -43,7 +43,7 @@ def add_loop_options(parser: argparse.ArgumentParser) -> None:
     """Add the options of the commands that measure the loop."""
     add_drives(parser)
     add_rate(parser)
-    add_seconds(parser, 10.0, "duration per peer")
+    add_seconds(parser, 10.0, "duration for each variant")
     parser.add_argument(
         "--body", choices=("sine", "pd"), default="sine", help="computation in the loop body (sine)"
     )
@@ -54,13 +54,13 @@ def add_loop_options(parser: argparse.ArgumentParser) -> None:
         "--rounds",
         type=positive_number,
         metavar="N",
-        help="rounds per peer, each in a new process (default: rounds of 0.9 s at 1 kHz)",
+        help="rounds for each variant, each in a new process (default: rounds of 0.9 s at 1 kHz)",
     )
     parser.add_argument(
         "--busy-wait",
         type=seconds,
         default=0.0,
         metavar="S",
-        help="busy-wait before each cycle start [s] (0)",
+        help="duration of the busy-wait before each cycle start [s] (0)",
     )
     add_file(parser)

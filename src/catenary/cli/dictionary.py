@@ -36,7 +36,7 @@ class Row:
 def rows_of(device: SubDevice, notes: list[str], *, values: bool) -> Iterator[Row]:
     """Read all objects one by one, and yield their rows.
 
-    If the device does not describe an object, its row has the reason.
+    If an object has no description, its row contains the reason.
 
     Args:
         device: The device to read.

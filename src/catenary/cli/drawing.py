@@ -11,13 +11,16 @@ from catenary.wire.error_counters import ErrorCounters, PortErrors
 
 @dataclass(frozen=True, slots=True)
 class Node:
-    """One device. `delay_ns` is the one-way delay of its cable and the previous device, or None."""
+    """Device in a drawing.
+
+    `delay_ns` is the one-way delay of its cable and the previous device; None if it is unknown.
+    """
 
     name: str
     alias: int
     state: str
     delay_ns: int | None
-    errors: ErrorCounters | None  # None without an answer
+    errors: ErrorCounters | None  # None if the device does not answer
 
 
 @dataclass(frozen=True, slots=True)

@@ -20,8 +20,8 @@ def add_parser(commands: Commands) -> None:
         "graph",
         help="draw the wiring of the devices",
         description="Draws the devices, ports, cable delays, states and error counters of the "
-        "segment as a tree. Devices with clocks measure the one-way delays, including the previous "
-        "device. Exit status 1 if the ports contradict each other.",
+        "segment as a tree. A delay is one-way, and includes the previous device. It is "
+        "known only between devices with clocks. Exit status 1 if the ports contradict each other.",
         example="catenary graph eth0\ncatenary graph eth0 --dot | dot -Tsvg -o segment.svg",
     )
     add_target(parser)

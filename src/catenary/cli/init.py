@@ -82,7 +82,7 @@ def write(target: str, output: Path) -> int:
 
 
 def read_encoders(devices: Sequence[SubDevice]) -> Mapping[tuple[int, int], float]:
-    """Return the encoder counts per turn (0x608F) by (position, slot), where reported."""
+    """Return the reported encoder counts per turn (0x608F) by (position, slot)."""
     from catenary.errors import CatenaryError
     from catenary.machine.text import ENCODER
     from catenary.types import UDINT

@@ -60,7 +60,7 @@ class Parser(argparse.ArgumentParser):
 
 
 class ShowVersion(argparse.Action):
-    """Action that prints the version, with a slow import only on request."""
+    """Action that prints the version. Its slow import runs only on request."""
 
     def __call__(self, parser: argparse.ArgumentParser, *_: object) -> None:
         from importlib.metadata import version
@@ -92,7 +92,8 @@ def main(
 ) -> int:
     """Run one command of `parser`, by default of `catenary`.
 
-    Return the exit status: 0, 1 if something failed, 2 for a wrong command line.
+    Return the exit status: 0 for success, 1 for a failure, 2 for a wrong command line, 141 if the
+    reader of stdout has closed. `check` also returns 2 if it cannot compare.
     """
     given = list(sys.argv[1:] if arguments is None else arguments)
     debug = "--debug" in given  # before or after the command

@@ -45,7 +45,7 @@ def add_command(
 
 
 def filled(text: str) -> str:
-    """Wrap the lines to the width of the terminal, like argparse."""
+    """Wrap lines to the width of the terminal, like argparse. Keep indented lines unchanged."""
     width = shutil.get_terminal_size().columns - 2
     lines = text.splitlines()
     return "\n".join(line if line.startswith(" ") else textwrap.fill(line, width) for line in lines)

@@ -7,7 +7,7 @@ from typing import Self
 
 
 class Progress:
-    """Owner of one line of stderr. It prints nothing if stderr is not a terminal."""
+    """Progress line on stderr. It stays empty if stderr is not a terminal."""
 
     def __init__(self, verb: str) -> None:
         self._verb = verb

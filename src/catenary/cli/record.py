@@ -42,11 +42,13 @@ def add_parser(commands: Commands) -> None:
         action="store_true",
         help="record the last stored cycles of a share even if its process has died",
     )
-    parser.add_argument("--uid", type=number, help="owner of the share (default: you, or root)")
+    parser.add_argument(
+        "--uid", type=number, help="user ID of the share's owner (default: yours, then root's)"
+    )
     parser.add_argument(
         "--repair",
         action="store_true",
-        help="repair a file whose recorder was killed; give no SHARE",
+        help="repair a file whose recorder was killed; omit SHARE",
     )
     add_json(parser)
     parser.set_defaults(run=run)
@@ -102,7 +104,7 @@ def as_json(recorder: Recorder) -> str:
 def repair_file(arguments: argparse.Namespace) -> int:
     if arguments.share is not None:
         raise UsageError(
-            "--repair needs a file without a share", hint="catenary record --repair FILE.mcap"
+            "--repair takes only a file, without a share", hint="catenary record --repair FILE.mcap"
         )
     from catenary.record import repair
 

@@ -33,8 +33,8 @@ def add_parser(commands: Commands) -> None:
         commands,
         "reg",
         help="read or write registers of a device",
-        description="Reads or writes registers and memory of a device. The EtherCAT state does not "
-        "change.",
+        description="Reads or writes registers and memory of a device. The command itself "
+        "does not change the EtherCAT state.",
         example="catenary reg read eth0 2 AL_STATUS\ncatenary reg write eth0 2 0x0310 0 --size 4",
     ).add_subparsers(title="commands", metavar="COMMAND", required=True)
     _add_read(group)
@@ -74,7 +74,9 @@ def _add_write(group: Commands) -> None:
     )
     _add_place(writing)
     writing.add_argument("value", metavar="VALUE", help="2498, 0x9C2 or '01 02 0a'")
-    writing.add_argument("--size", metavar="BYTES", type=positive_number, help="size of a number")
+    writing.add_argument(
+        "--size", metavar="BYTES", type=positive_number, help="size of a numeric VALUE"
+    )
     add_force(writing)
     add_json(writing)
     writing.set_defaults(run=run_write)
@@ -122,7 +124,7 @@ def run_write(arguments: argparse.Namespace) -> int:
 
 
 def place(text: str, size: int | None) -> tuple[int, int | None, AnyRegister | None]:
-    """Return address, size and register of an argument; size and register are None if unknown."""
+    """Parse ADDRESS into address, size and register; size and register are None if unknown."""
     from catenary.wire.register_names import at_address, by_name, names, near
 
     if text[:1].isdigit():

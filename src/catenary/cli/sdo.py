@@ -73,9 +73,9 @@ def _add_list(group: Commands) -> None:
         "list",
         help="list all objects",
         description="Lists the index, type, access and name of all entries in the object "
-        "dictionary, as the device describes them. The access is r, w or both. States follow if it "
-        "is limited to them (P: PRE-OP, S: SAFE-OP, O: OP). R and T mark entries that can be "
-        "mapped into RxPDOs and TxPDOs.",
+        "dictionary, as the device describes them. The access is r, w or both. If it is limited "
+        "to some states, their letters follow (P: PRE-OP, S: SAFE-OP, O: OP). R and T mark entries "
+        "that can be mapped into RxPDOs and TxPDOs.",
         example="catenary sdo list eth0 2\ncatenary sdo list virtual 2 --values --json",
     )
     _add_device(listing)

@@ -93,7 +93,9 @@ def _add_write(group: Commands) -> None:
     writing.add_argument(
         "--dry-run", action="store_true", help="show the differences without writing"
     )
-    writing.add_argument("--force", action="store_true", help="write despite a failed check")
+    writing.add_argument(
+        "--force", action="store_true", help="write despite a fault that can be ignored"
+    )
     writing.set_defaults(run=run_write)
 
 
@@ -199,10 +201,10 @@ def run_write(arguments: argparse.Namespace) -> int:
 
 
 def check_image(image: bytes, arguments: argparse.Namespace) -> None:
-    """Check that the image is valid.
+    """Check that the image is valid. With --force, report some faults without raising.
 
     Raises:
-        EepromError: The image is not valid.
+        EepromError: The image has a fault that is not ignored.
     """
     from catenary.errors import EepromError
     from catenary.wire.sii_check import objections
@@ -219,7 +221,7 @@ def check_image(image: bytes, arguments: argparse.Namespace) -> None:
 
 
 def check_fit(image: bytes, device: SubDevice, extent: Extent, force: bool) -> None:
-    """Check that the image fits the device.
+    """Check that the image fits the device. With `force`, check only the addressable size.
 
     Raises:
         EepromError: The image is too large, or for another device.
@@ -229,7 +231,7 @@ def check_fit(image: bytes, device: SubDevice, extent: Extent, force: bool) -> N
 
     if len(image) > extent.limit:
         raise EepromError(
-            f"{device.station}: the image has {len(image)} bytes, but its controller can address "
+            f"{device.station}: the image has {len(image)} bytes, but the device can address "
             f"only {extent.limit} bytes of EEPROM",
             hint="use an image for this device",
         )
@@ -237,8 +239,8 @@ def check_fit(image: bytes, device: SubDevice, extent: Extent, force: bool) -> N
         return
     if len(image) > extent.size and not extent.note:
         raise EepromError(
-            f"{device.station}: the image has {len(image)} bytes, but its EEPROM has only "
-            f"{extent.size}",
+            f"{device.station}: the image has {len(image)} bytes, but the EEPROM has only "
+            f"{extent.size} bytes",
             hint="use an image for this device, or --force if the size in its EEPROM is wrong",
         )
     new, now = tolerant(image).header, device.identity

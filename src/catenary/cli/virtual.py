@@ -13,7 +13,7 @@ def add_parser(commands: Commands) -> None:
         commands,
         "virtual",
         help="serve a segment of virtual devices",
-        description="Serves a virtual segment that any MainDevice can use.",
+        description="Serves a virtual segment that any EtherCAT MainDevice can use.",
         example="catenary virtual serve veth1 --config machine.toml",
     ).add_subparsers(title="commands", metavar="COMMAND", required=True)
     _add_serve(group)
@@ -52,7 +52,8 @@ def _add_serve(group: Commands) -> None:
         type=seconds,
         default=2e-3,
         metavar="S",
-        help="drop frames that waited longer, because a cable does not store frames (0.002)",
+        help="drop frames that waited longer than S seconds, because a cable does not store "
+        "frames (0.002)",
     )
     parser.set_defaults(run=run)
 
@@ -97,7 +98,7 @@ def _raise_priority(interface: str, priority: int) -> None:
     if not scheduling.real_time:
         refused = "; ".join(scheduling.refusals)
         raise LinkError(
-            f"{interface} cannot be served in real time: {refused}", hint=permission_advice()
+            f"cannot serve {interface} in real time: {refused}", hint=permission_advice()
         )
 
 

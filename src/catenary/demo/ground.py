@@ -20,7 +20,7 @@ from catenary.realtime.private_network import veth_pair
 from catenary.virtual import demo_segment
 
 START_SECONDS = 20.0
-PRIORITY = 80  # same as the loop, because real devices do not wait for their MainDevice
+PRIORITY = 80  # as high as the loop's: real devices do not wait for their MainDevice
 
 
 @dataclass(frozen=True, slots=True)

@@ -13,9 +13,9 @@ from catenary.demo.text import ProgressBar
 
 PERIOD = 1e-3  # [s]
 COUNTS_PER_TURN = 2**20
-# The demo uses generous limits so that it runs on any machine, because the virtual devices share
-# the processors. Their pauses appear as lost and late cycles in the figures. Keep the defaults for
-# real devices.
+# The demo uses generous limits so that it runs on any machine: its virtual devices share the
+# processors with the loop. Their pauses appear as lost and late cycles in the figures. Keep the
+# defaults for real devices.
 LOST_LIMIT = 800  # cycles
 WATCHDOG = 1.0  # [s], of the devices
 LATE_LIMIT = 0.5  # [s]
@@ -49,7 +49,7 @@ def follow(loop: cat.Loop, arm: cat.Drives, recording: Recording, progress: Prog
 
 
 class Recording:
-    """Owner of reference and actual positions [rad], one row per cycle.
+    """Recorded reference and actual positions [rad], one row per cycle.
 
     The arrays are allocated in advance, so that each cycle needs only two small copies.
     """

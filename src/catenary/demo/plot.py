@@ -98,7 +98,7 @@ def histogram(buckets: Sequence[Bucket], *, low: float, high: float, title: str)
     """Draw counts over time [us].
 
     The axis of the counts is logarithmic, so that a single late cycle is visible. Buckets outside
-    of `low` to `high` are not drawn.
+    the range from `low` to `high` [us] are not drawn.
     """
     bars = rebin(inside(buckets, low, high), low, high, 48)
     x = Axis(low, high, LEFT, SMALL.right)

@@ -38,7 +38,7 @@ class Motion:
 
     time: Reals  # (cycles,) [s]
     reference: Reals  # (cycles, drives) [rad]
-    actual: Reals  # (cycles, drives) [rad], measured when the reference was written
+    actual: Reals  # (cycles, drives) [rad], received before the reference was written
 
     def error(self, delay: float) -> Reals:
         """Return the tracking error, shape (cycles, drives) [rad].
@@ -87,7 +87,7 @@ class Result:
 
 
 def as_json(result: Result) -> str:
-    """Return the text of `demo.json`. Its format is public, because programs read it."""
+    """Return the text of `demo.json`. The format is public: other programs read it."""
     return json.dumps(
         {
             "devices": [

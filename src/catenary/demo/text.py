@@ -32,13 +32,13 @@ def closing_lines(result: Result) -> str:
 
 
 def longer(result: Result) -> str:
-    """Return a note on late set-points, which are part of the tracking error."""
+    """Return a note on cycles without fresh set-points; empty if there were none."""
     late = result.timing.counters.get("uncommitted", 0)
     return f"; longer in {late} uncommitted cycles" if late else ""
 
 
 class ProgressBar:
-    """Owner of the last line of a terminal. It prints nothing without a terminal."""
+    """Progress bar in the last line of a terminal. It prints nothing to other streams."""
 
     def __init__(self, seconds: float, stream: TextIO | None = None) -> None:
         self._seconds = seconds

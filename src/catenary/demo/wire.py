@@ -18,7 +18,7 @@ from catenary.realtime.private_network import Private, state, veth_pair
 from catenary.virtual import read_segment
 
 START_SECONDS = 20.0
-PRIORITY = 80  # same as a loop, because real devices do not wait for their MainDevice
+PRIORITY = 80  # as high as a loop's: real devices do not wait for their MainDevice
 
 
 @contextmanager

@@ -81,7 +81,10 @@ class Ground(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class MachineGround:
-    """This machine; `root` is the root folder of its files. Raises OSError if refused."""
+    """This machine; `root` is the root folder of its files.
+
+    Both methods raise OSError if the access is refused.
+    """
 
     root: Path = Path("/")
 
@@ -115,14 +118,14 @@ def split(target: str) -> tuple[str, str]:
 
 
 def whole_number(value: str, target: str) -> int:
-    """Return the number. Raises OSError if the value is invalid, as a driver would."""
+    """Return the value as a number. Raises OSError if it is invalid, as a driver would."""
     if not re.fullmatch(r"\d{1,10}", value, re.ASCII):
         raise OSError(errno.EINVAL, f"{value!r} is not a number", target)
     return int(value)
 
 
 def chosen(text: str) -> str:
-    """Return the word in brackets if the text lists all possible values, else the text."""
+    """Return the word in brackets if the text lists all possible values; otherwise the text."""
     words = [word for word in text.split() if word.startswith("[") and word.endswith("]")]
     return words[0][1:-1] if words else text
 
@@ -135,7 +138,7 @@ class HostState:
         self.boot = boot
 
     def load(self) -> list[Made]:
-        """Return the changes, oldest first; none if the machine was rebooted since.
+        """Return the changes, oldest first; empty if the machine was rebooted since then.
 
         Raises StateError if the file is damaged, or if another user could have written it.
         """
@@ -190,7 +193,7 @@ class HostState:
 
 
 def open_state() -> HostState:
-    """Return the state file: in $XDG_STATE_HOME if set, else in /run for root or ~/.local/state.
+    """Return the state file: in $XDG_STATE_HOME if set, else in /run (root) or ~/.local/state.
 
     It is not in /run/catenary, where a group of users may create files.
     """
@@ -234,7 +237,7 @@ def apply(changes: Sequence[Change], ground: Ground, state: HostState) -> Iterat
 def undo(ground: Ground, state: HostState) -> Iterator[str]:
     """Undo all changes in reverse order, and yield a line with the result of each.
 
-    Keep values that were changed again since. Refused changes stay in the state file.
+    A value that was changed again since then is kept. Refused changes stay in the state file.
 
     Args:
         ground: Machine to change.

@@ -13,7 +13,7 @@ from catenary.doctor.machine import Machine
 
 SOURCE = "/sys/devices/system/clocksource/clocksource0/current_clocksource"
 FAST_SOURCES = {"tsc", "arch_sys_counter", "kvm-clock", "hyperv_clocksource_tsc_page", "riscv"}
-HARMLESS_PPM = 500.0  # maximum correction by the kernel itself: 0.5 us in 1 ms
+HARMLESS_PPM = 500.0  # largest correction that the kernel makes by itself: 0.5 us in 1 ms
 LARGEST_SLEW = {  # [ppm] default maximum of each daemon
     "chronyd": 83_333.333,  # maxslewrate, chrony.conf(5)
     "ptp4l": 900_000.0,  # max_frequency, ptp4l(8)

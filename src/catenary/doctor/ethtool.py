@@ -107,7 +107,7 @@ def c_string(answer: bytes, at: int) -> str:
 
 
 def read_link(name: str) -> Link:
-    """Read `struct ethtool_link_settings`: the first request returns the length of its masks."""
+    """Read `struct ethtool_link_settings`. The first request returns the length of its masks."""
     first = request(name, GLINKSETTINGS, LINK_SETTINGS_SIZE)
     words = abs(struct.unpack_from("b", first, MODE_WORDS_AT)[0])
     start = bytes(MODE_WORDS_AT - 4) + struct.pack("b", words)

@@ -90,7 +90,7 @@ def watch(machine: Machine, seconds: float, *, cpu: int | None) -> tuple[Machine
         cpu: processor of the measuring thread; None for any.
 
     Returns:
-        The machine with `watched` and `sent`, and the latency.
+        The machine with `watched` and `sent` set, and the latency.
     """
     before = machine.frames_sent()
     latency = measure(seconds, period=machine.period, priority=machine.priority, cpu=cpu)
@@ -106,7 +106,7 @@ def this_machine(
 
     Args:
         nic: network interface; None to check no card.
-        cpu: processor of the loop; None for an isolated CPU, else the last one.
+        cpu: processor of the loop; None for an isolated CPU, or the last CPU if none is isolated.
         period: period of the loop [s].
         priority: SCHED_FIFO priority of the loop's thread.
 

@@ -23,7 +23,7 @@ def card_interrupts(machine: Machine, card: Card) -> list[int]:
 
 
 def device_name(machine: Machine, place: str) -> str:
-    """Return the device name, such as virtio3, which interrupts of paravirtual cards have."""
+    """Return the device name, such as virtio3. Interrupts of paravirtual cards have this name."""
     device = machine.path(f"{place}/device")
     return device.resolve().name if device.exists() else ""
 
@@ -68,8 +68,8 @@ def interrupts(machine: Machine, card: Card) -> Check:
 def spinning(machine: Machine, card: Card) -> Check:
     """Check whether a loop may busy-wait (`receive="busy"`).
 
-    On the CPU that handles the card's interrupts, it would lose every frame, because the deferred
-    interrupt work would never run.
+    On the CPU that handles the card's interrupts, the loop would lose every frame, because the
+    deferred interrupt work would never run.
     """
     id, cpu = "spin", machine.loop_cpu
     if len(machine.cpus) < 2:

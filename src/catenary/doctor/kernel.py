@@ -63,7 +63,7 @@ def realtime_kernel(machine: Machine) -> str:
 
 
 def throttling(machine: Machine) -> Check:
-    """Check throttling: the share of each period for all real-time threads together, sched(7)."""
+    """Check the share of each period that all real-time threads may use together, sched(7)."""
     id, path = "kernel-rt-throttling", "/proc/sys/kernel/sched_rt_runtime_us"
     runtime = machine.number(path)
     if runtime is None:

@@ -26,7 +26,8 @@ class Machine:
     clock: adjustment of the kernel's clock; None if the kernel does not report it.
     wanted_cpu: CPU of the loop; None if the user gave none.
     period: period of the loop [s]. priority: SCHED_FIFO priority of its thread.
-    watched: time for which the card's frames were counted [s]. sent: frames sent in this time.
+    watched: time for which the sent frames of the card were counted [s].
+    sent: number of frames that the card sent in this time; None if not counted.
     """
 
     root: Path = Path("/")
@@ -100,7 +101,7 @@ class Machine:
 
     @cached_property
     def processes(self) -> frozenset[str]:
-        """Names of the running programs that are visible in this container."""
+        """Names of the running programs that this process can see."""
         names = (self.text(path) for path in self.matching("/proc/[0-9]*/comm"))
         return frozenset(name for name in names if name)
 

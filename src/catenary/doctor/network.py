@@ -178,7 +178,7 @@ def ipv6(machine: Machine, card: Card) -> Check:
         return passed(id, "off")
     lines = (machine.text("/proc/net/if_inet6") or "").splitlines()
     scopes = [words[3] for line in lines if (words := line.split())[-1] == card.name]
-    own = all(scope == "20" for scope in scopes)  # link-local addresses return by themselves
+    own = all(scope == "20" for scope in scopes)  # the kernel itself restores link-local addresses
     return warned(
         id,
         "on: the kernel sends router solicitations and multicast reports",

@@ -23,7 +23,7 @@ BAR = 40  # characters
 STEPS_US = (2, 5, 10, 20, 50, 100, 200, 500, 1000, 2000, 5000, 10_000, 50_000)
 COMMAND = re.compile(r"`[^`]*`|(?:\bsudo|\becho) [^;]*")
 UNBROKEN = "\0"
-BEYOND = 10**9  # step of all values above the last one
+BEYOND = 10**9  # stands for the step above the last one
 NOUNS: dict[Status, str] = {
     "PASS": "passed",
     "WARN": "warnings",

@@ -1,4 +1,4 @@
-"""State of the folder in which a group of users shares memory, as text to read and write.
+"""State of the folder in which a group of users shares memory, written as text.
 
 "absent"                    the folder does not exist
 "3771 root:catenary"        permissions, owner, group

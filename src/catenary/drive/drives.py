@@ -74,7 +74,7 @@ class Drives(Request):
       CiA 402 does not define are inputs, except `Channel(index, subindex, type, output=True)`.
     - `required`: if False, the loop continues without a lost drive. Its axes keep their last
       values. Enable them again when they are `present`.
-    - `divider`: cycles of the loop between two exchanges.
+    - `divider`: n to exchange in every n-th cycle of the loop.
     - `dc`: distributed clocks. True uses the settings in the SII of each device. A
       `DistributedClock` applies to all devices.
     - `pdos`: PDOs to assign on each device, `[0x1701, 0x1B01]`, or with their entries (index,

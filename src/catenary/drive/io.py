@@ -214,7 +214,7 @@ class Inputs(Channels):
         scale: factor of each mapped channel by name. Such a channel is a float.
         required: if False, the loop continues without a lost device, and its channels keep their
             last values: see `present`.
-        divider: cycles of the loop between two exchanges.
+        divider: n to exchange in every n-th cycle of the loop.
         dc: distributed clocks, as for `Drives`.
         pdos: PDOs to assign instead of the present ones, as for `Drives`.
         start_up: objects to write to each device before SAFE-OP.

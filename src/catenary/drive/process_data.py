@@ -63,7 +63,7 @@ class ProcessData(Request):
             ends for any reason. Outputs without a safe value become 0. The device then leaves OP
             and determines its outputs itself.
         start_up: objects to write to the device before SAFE-OP.
-        divider: cycles of the loop between two exchanges.
+        divider: n to exchange in every n-th cycle of the loop.
         required: if False, the loop continues without the device; see `present`.
         dc: distributed clocks. True uses the settings in the SII of the device.
 

@@ -223,9 +223,13 @@ cdef class Exchange:
     def make_copy(self, plan, copy, image_size, uint32_t place):
         domain_offset, image_offset, size = copy
         if domain_offset < 0 or size <= 0 or domain_offset + size > plan.size:
-            raise ValueError(f"{size} bytes at {domain_offset} exceed a domain of {plan.size}")
+            raise ValueError(
+                f"{size} bytes at {domain_offset} exceed a domain of {plan.size} bytes"
+            )
         if image_offset < 0 or image_offset + size > image_size:
-            raise ValueError(f"{size} bytes at {image_offset} exceed an image of {image_size}")
+            raise ValueError(
+                f"{size} bytes at {image_offset} exceed an image of {image_size} bytes"
+            )
         self.c.copies[place].domain_offset = domain_offset
         self.c.copies[place].image_offset = image_offset
         self.c.copies[place].size = size

@@ -1,4 +1,4 @@
-"""KernelClock: clock figures of a kernel master, in the form of a loop's own clock engine."""
+"""KernelClock: clock figures of a kernel master, in the form of `core.Clock`."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Configuration of the kernel master from a plan: devices, domains and requests; activation."""
+"""Configuration of the kernel master from a plan, and its activation."""
 
 from __future__ import annotations
 
@@ -19,11 +19,11 @@ from catenary.plan.planner import Plan
 from catenary.plan.start_up import WATCHDOG_DIVIDER, DevicePlan, Download
 from catenary.procedure.pdo import OPTIONAL_ABORTS
 
-EMERGENCIES = 16  # that the master stores for each device
-REQUEST_SIZE = 256  # bytes of an object read by request; a longer one takes a blocking call
+EMERGENCIES = 16  # largest number that the master stores for each device
+REQUEST_SIZE = 256  # [bytes] of an object that a request reads; a longer one needs a blocking call
 REGISTER_SIZE = 64
 
-Copy = tuple[int, int, int]  # offset in the domain, in the image, bytes
+Copy = tuple[int, int, int]  # offset in the domain, offset in the image, size [bytes]
 
 
 @dataclass(slots=True)
@@ -139,7 +139,7 @@ def _device(
     for download in (*plan.before_mapping, *plan.start_up):
         data = ctypes.create_string_buffer(download.data, len(download.data))
         if download.optional:
-            # Written here, because the master gives up a device that refuses an SDO of its list.
+            # Write it now: the master stops configuring a device that refuses a start-up SDO.
             _download_if_there(master, plan.position, download)
             continue
         place = (download.index, download.subindex, ctypes.addressof(data), len(data))
@@ -204,7 +204,7 @@ def _pdo_info(pdo: Pdo) -> abi.PdoInfo:
 def _configure_clock(
     master: Reservation, plan: DevicePlan, clock: ClockPlan | None, config: int, label: str
 ) -> None:
-    """Configure SYNC0. Its shift from the application time gives the frames time to pass first."""
+    """Configure SYNC0. It is later than the application time, so that the frames arrive first."""
     if plan.sync is None or clock is None:
         return
     shift_ns = plan.sync.shift_ns + clock.wire_ns + clock.allowance_ns
@@ -216,7 +216,7 @@ def _configure_clock(
 def _register(
     master: Reservation, plan: DevicePlan, domains: Sequence[Domain], config: int, label: str
 ) -> None:
-    """Map each SyncManager into the domain of its sync unit, and record what to copy."""
+    """Map each SyncManager into the domain of its sync unit, and record the copies to make."""
     place = plan.layout
     for direction in Direction:
         output = direction is Direction.OUTPUT

@@ -1,7 +1,7 @@
-"""Device descriptions from the data of the kernel master, in the form that our own scan returns.
+"""Device descriptions from the data of the kernel master, in the form that Catenary's scan returns.
 
 libethercat does not report everything: entries have no names or types, and SyncManagers have no
-addresses. The master chooses the missing values.
+addresses. The master itself chooses the addresses.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ STATUSWORD, SLOT_STRIDE, SLOTS_MAX = 0x6041, 0x800, 16
 PROFILE_DRIVE, PROFILE_MODULAR = 402, 5001
 ATTEMPTS = 3
 MAILBOXES = 2  # SyncManagers 0 and 1 of a device with a mailbox
-STATION_BASE = 0x03E9  # 1001, as in our own scan: libethercat does not report station addresses
+STATION_BASE = 0x03E9  # 1001, as in Catenary's scan: libethercat does not report station addresses
 
 # The master assigns the FMMUs; FMMU_BYTE_ORIENTED stops the plan from assigning one to the mailbox.
 CONTROLLER = Information(
@@ -143,8 +143,8 @@ def object_information(
 def _may_have_mailbox(syncs: Sequence[abi.SyncInfo]) -> bool:
     """Return True if the first two SyncManagers carry no PDOs.
 
-    An SDO upload from a device without a mailbox makes libethercat print an error on stderr, and
-    the kernel log one.
+    For an SDO upload from a device without a mailbox, libethercat prints an error on stderr, and
+    the kernel writes one to its log.
     """
     directions = [sync.dir for sync in syncs[:MAILBOXES] if not sync.n_pdos]
     return directions == [abi.DIRECTION_OUTPUT, abi.DIRECTION_INPUT]

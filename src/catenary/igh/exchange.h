@@ -27,7 +27,7 @@
 #define IGH_NAP_NS 20000              /* between two checks for missing frames */
 #define IGH_PATIENCE_FIRST_NS 50000
 #define IGH_PATIENCE_DECAY 14         /* patience decreases by 2^-14 of itself per cycle */
-#define IGH_GRACE 2                   /* times the patience: the backup interface's frames */
+#define IGH_GRACE 2                   /* wait for the backup interface: times the patience */
 #define IGH_DEAF 16u                  /* complete cycles without a monitor: main interface is lost */
 #define IGH_MISSED_MAX 1000000000u
 
@@ -213,7 +213,7 @@ static int igh_closed_collect(void *self, int64_t deadline)
     return -EBADF;
 }
 
-/* Invalidate the table: the master's handles are gone, and later calls return -EBADF. */
+/* Invalidate the table: the master's handles are invalid, and later calls return -EBADF. */
 static void igh_exchange_end(igh_exchange *x)
 {
     x->image.emit = igh_closed_emit;

@@ -94,7 +94,7 @@ def _unusable_node(index: int, node: str) -> LinkError:
     if not os.path.exists(node):
         if not MODULE.exists():
             return LinkError(
-                f"master {index}: the kernel module ec_master is not loaded, {node} does not exist",
+                f"master {index}: the kernel module ec_master is not loaded, so there is no {node}",
                 hint="sudo systemctl start ethercat; if that fails, the module was not built "
                 "for this kernel: docs/how_to/igh.md",
             )

@@ -71,7 +71,7 @@ class KernelAccess:
         """
         if self.active is not None and not self.cycling:
             raise ConfigurationError(
-                f"device {position}: the master is activated, and answers only while cycles run",
+                f"device {position}: the master is activated and answers only while cycles run",
                 hint="read and write objects before it is activated, or in a Loop",
             )
 

@@ -85,7 +85,7 @@ class BlockingCalls:
         return mine.result()
 
     def end(self) -> None:
-        """Wait for pending calls. They end when the master is released."""
+        """Wait up to END_TIMEOUT for each pending call. Forget those that do not end."""
         for call in self._under_way.values():
             call.thread.join(END_TIMEOUT)
         self._under_way.clear()
@@ -93,5 +93,5 @@ class BlockingCalls:
     def _late(self, position: int, what: str, why: str) -> CatenaryError:
         return MailboxError(
             f"device {position}: {what}: no answer within {self.timeout:g} s: {why}",
-            hint="it answers only while cycles run; dmesg | tail may show the reason",
+            hint="the master answers only while cycles run; dmesg | tail may show the reason",
         )

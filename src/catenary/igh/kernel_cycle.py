@@ -144,7 +144,7 @@ class KernelCarrier:
         return sub
 
     def _on_emergency(self, position: int, message: bytes) -> None:
-        """Put an event for an emergency (8 bytes) that the master has stored."""
+        """Emit an event for an emergency (8 bytes) that the master has stored."""
         sub = self._kernel.subs[position]
         received = Emergency(*_EMERGENCY.unpack(message))
         if isinstance(sub, SubDevice):
@@ -157,9 +157,7 @@ class KernelCarrier:
         for number in range(self._link_count):
             state = abi.MasterState()
             found = self._library.ecrt_master_link_state(handle, number, ctypes.byref(state))
-            if (
-                found < 0
-            ):  # no such interface; not read again: libethercat prints an error on stderr
+            if found < 0:  # no such interface: do not read it again, as libethercat prints an error
                 self._link_count = number
                 return
             before, self._links[number] = self._links[number], bool(state.link_up)

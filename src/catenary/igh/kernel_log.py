@@ -1,6 +1,8 @@
-"""AL status codes in the kernel's log: libethercat does not report them, and the master clears them
-in the device when it acknowledges the error (`ec_fsm_change_state_code` in IgH's
-master/fsm_change.c prints them)."""
+"""AL status codes from the kernel's log.
+
+libethercat does not report them, and the master clears them in the device when it acknowledges the
+error. `ec_fsm_change_state_code` in IgH's master/fsm_change.c writes them to the log.
+"""
 
 from __future__ import annotations
 
@@ -31,7 +33,7 @@ class KernelLog:
         return self._file is not None
 
     def status_code(self, master: int, position: int) -> int:
-        """Return the last AL status code of a device since this was opened; 0 if there is none."""
+        """Return the last AL status code of a device since the log was opened; 0 if none."""
         self._read()
         found = re.findall(LINE.format(master, position), self._text)
         return int(found[-1], 16) if found else 0

@@ -98,7 +98,7 @@ class KernelMaster:
     def read_objects(
         self, wanted: Mapping[int, Sequence[tuple[int, int]]]
     ) -> dict[int, dict[tuple[int, int], bytes]]:
-        """Read objects before a loop, one after the other.
+        """Read objects before a loop starts, one after the other.
 
         Returns:
             The data of each object that could be read, by position, index and subindex.
@@ -113,7 +113,7 @@ class KernelMaster:
         return found
 
     def configure(self, plan: Plan, epoch_ns: int) -> tuple[int | None, ...]:
-        """Configure the master by the plan and activate it. It then expects cycles.
+        """Configure the master by the plan and activate it. The loop must then run cycles.
 
         Args:
             plan: The plan of the loop.
@@ -198,7 +198,7 @@ class KernelMaster:
         return problems
 
     def _restore_sync_types(self, sub: bus.SubDevice) -> None:
-        """Restore the types of a device. Those of a lost device are kept until it returns."""
+        """Restore the types of a device. Keep the types of a lost device until it returns."""
         if not self.reservation.has(sub.position, sub.identity):
             sub.state = None
             return

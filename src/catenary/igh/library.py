@@ -26,8 +26,8 @@ INSTALL = (
 class Library:
     """Loaded libethercat. Each call is an attribute: `library.ecrt_master_send(master)`.
 
-    `returns` is True from 1.6.0 on. Before, some calls return nothing instead of 0 or -errno, and
-    their return values are never read.
+    `returns` is True from 1.6.0 on. Before 1.6.0, some calls return nothing instead of 0 or -errno.
+    Their return values are then never read.
     """
 
     def __init__(self, path: str | os.PathLike[str] | None = None) -> None:
@@ -75,7 +75,7 @@ class Library:
             hint: Hint of the error; a general one by default.
 
         Returns:
-            The result, 0 or more; 0 for a call without one.
+            The result, 0 or more; 0 for a call without a result.
 
         Raises:
             CatenaryError: The call returned -errno.
@@ -102,13 +102,13 @@ class Library:
 
     def _check(self, missing: list[str]) -> None:
         if "ecrt_version_magic" in missing:
-            raise LinkError(f"{self.path} is not a libethercat", hint=INSTALL)
+            raise LinkError(f"{self.path} is not libethercat", hint=INSTALL)
         magic = int(self.ecrt_version_magic())
         if magic not in abi.MAGICS:
             known = " and ".join(f"{each >> 8}.{each & 0xFF}" for each in abi.MAGICS)
             raise LinkError(
                 f"{self.path} is libethercat {magic >> 8}.{magic & 0xFF} (version magic "
-                f"0x{magic:04X}), which is not supported; use {known}, from 1.5.2 on",
+                f"0x{magic:04X}), which is not supported; supported: {known}, from 1.5.2 on",
                 hint="its structures may differ; install a supported release",
             )
         if missing:

@@ -43,5 +43,5 @@ class Master:
         return Reservation(Library(self._library), self.index, KernelTime(self._virtual_time))
 
     def make_master(self, main: MasterOwner) -> KernelMaster:
-        """Return the controller of the devices of a MainDevice."""
+        """Return the kernel master as the `bus.Master` of a MainDevice."""
         return KernelMaster(main)

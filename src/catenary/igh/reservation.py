@@ -18,7 +18,7 @@ from catenary.wire.al import AlState
 
 SCAN_TIMEOUT = 30.0  # [s]: some devices answer their first SDO after seconds
 EMPTY_TIMEOUT = 3.0  # [s]: a link that has just come up finds its devices within a second
-PREOP_TIMEOUT = 15.0  # [s] without a change, from INIT; the master itself waits 10
+PREOP_TIMEOUT = 15.0  # [s] without a change, from INIT; the master itself waits 10 s
 LEAVE_OP_TIMEOUT = 2.0  # [s] without a change, if the devices were in OP
 SETTLE_TIMEOUT = 60.0  # [s] for all devices: the master handles one after the other
 POLL_INTERVAL = 0.010  # [s] between two checks
@@ -28,7 +28,7 @@ UPLOAD_LIMIT = 1 << 16  # largest object [bytes]
 class Reservation:
     """Kernel master that is reserved for this process.
 
-    It implements `Link` with a clock only. It carries no frames: the master sends its own.
+    It implements `Link` with a clock only. It carries no frames: the master sends its own frames.
     """
 
     def __init__(self, library: Library, index: int, time: KernelTime) -> None:

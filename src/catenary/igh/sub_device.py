@@ -68,8 +68,10 @@ class SubDevice(bus.SubDevice):
             size: Number of bytes, 1 to 64.
 
         Raises:
+            ValueError: The address or the number of bytes is out of range.
             RegisterError: The request failed or was not answered in time.
             ConfigurationError: The master is not activated.
+            LoopError: The loop ended before the device answered.
         """
         device = self._checked(address, size)
         library = self.kernel.reservation.library
@@ -91,8 +93,10 @@ class SubDevice(bus.SubDevice):
             data: 1 to 64 bytes.
 
         Raises:
+            ValueError: The address or the number of bytes is out of range.
             RegisterError: The request failed or was not answered in time.
             ConfigurationError: The master is not activated.
+            LoopError: The loop ended before the device answered.
         """
         device = self._checked(address, len(data))
         library = self.kernel.reservation.library
@@ -137,7 +141,7 @@ class SubDevice(bus.SubDevice):
                 break
             yield after(POLL_INTERVAL)
         raise RegisterError(
-            f"{self.station}: {what} was not answered",
+            f"{self.station}: no answer to the request for {what}",
             hint="the master refuses requests to a device while it is in an error state",
         )
 

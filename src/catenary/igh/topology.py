@@ -3,7 +3,7 @@
 IgH measures them once, in its scan, from the times at which a frame passed each port in both
 directions (`ec_master_calc_dc` in its master/master.c). In a closed ring, the frame does not return
 but reaches the backup interface. The port times are then those of an earlier frame, and the delays
-are random. The clocks then agree with each other on a wrong time.
+are random. The clocks then agree with each other, but on a wrong time.
 """
 
 from __future__ import annotations
@@ -13,7 +13,9 @@ from collections.abc import Sequence
 from catenary.errors import ConfigurationError
 from catenary.igh.abi import SlaveInfo
 
-DELAY_MAX_NS = 100_000  # from one clock to the next: a hundred devices without clocks between them
+DELAY_MAX_NS = (
+    100_000  # between two clocks, even with a hundred devices without clocks between them
+)
 OPEN_RING = (
     "unplug the cable of the backup interface, run `sudo ethercat rescan`, start the loop, and "
     "plug the cable in again; or let Catenary send the frames itself: MainDevice('eth0', 'eth1')"

@@ -12,7 +12,7 @@ from catenary.loop.watches.device import Attendance
 
 
 class Exchange(Protocol):
-    """Exchange of the session's own frames, or of another master's frames (`CarriedExchange`)."""
+    """Exchange of a session, with its own frames or an external master (`CarriedExchange`)."""
 
     @property
     def watch(self) -> Attendance:

@@ -1,4 +1,4 @@
-"""Exchange of a session on frames and devices of another master (`bus.Carrier`)."""
+"""Exchange of a session through an external master (`bus.Carrier`)."""
 
 from __future__ import annotations
 
@@ -22,24 +22,24 @@ from catenary.wire.cia402 import SLOT_OFFSET, Object
 
 
 class CarriedExchange:
-    """Exchange of a session on another master's frames. Implements `Exchange`."""
+    """Exchange of a session through an external master. Implements `Exchange`."""
 
     def __init__(self, session: Session) -> None:
         self._session = session
 
     def make_engine(self) -> Engine:
-        """Return an engine that uses the process images of the carrier."""
-        cycle = replace(self._session.plan.cycle, clock=None)  # the carrier synchronises the clocks
+        """Return an engine that uses the process images of the external master."""
+        cycle = replace(self._session.plan.cycle, clock=None)  # the master synchronises the clocks
         return Engine(cycle, self._session.main.link.capsule, self._carrier.image)
 
     def cycle_clock(self) -> CycleClock:
-        """Return the carrier's view of the distributed clocks."""
+        """Return the distributed clocks, as the external master reports them."""
         clock = self._carrier.clock
         assert clock is not None  # `configure` has created it
         return clock
 
     def attend(self) -> None:
-        """Make the watch of devices."""
+        """Create the watch of the devices."""
         optional = {
             position
             for unit in self._session.plan.cycle.sync_units
@@ -59,7 +59,7 @@ class CarriedExchange:
         return carrier
 
     def bring_to_op(self) -> list[Pending[None]]:
-        """Let the carrier bring the devices to OP while the cycle runs."""
+        """Let the external master bring the devices to OP while the cycle runs."""
         required = [
             sub.position for sub in self._session.main.subs if self.watch.requires(sub.position)
         ]
@@ -70,11 +70,11 @@ class CarriedExchange:
         return [self._session.service.runner.submit(self.watch.run())]
 
     def query_silence(self, suspects: Sequence[int]) -> Evidence:
-        """Query all devices through the carrier."""
+        """Query all devices through the external master."""
         return self.query_states()
 
     def query_states(self) -> Evidence:
-        """Query all devices through the carrier for their states."""
+        """Query the states of all devices through the external master."""
         [answers] = self._session.service.converse(self._carrier.survey())
         return Evidence(answers)
 
@@ -90,7 +90,7 @@ class CarriedExchange:
                 self._session.service.step_without_thread()
             return answer.result()
         except CatenaryError:
-            return None  # a drive in trouble may not answer: the error then shows no code
+            return None  # a faulty drive may not answer; the error then contains no code
 
 
 class CarriedWatch:
@@ -112,7 +112,7 @@ class CarriedWatch:
         self._answers: Sequence[Answer] = ()
 
     def run(self) -> Procedure[None]:
-        """Watch the devices until cancelled."""
+        """Watch the devices until the procedure is cancelled."""
         while True:
             yield from self._carrier.listen()
             self._announce()
@@ -133,7 +133,7 @@ class CarriedWatch:
         return position not in self._optional
 
     def release(self, sub: SubDevice) -> None:
-        """Raise ValueError: a carrier does not hold devices, but brings them back itself."""
+        """Raise ValueError, because the external master brings devices back to OP itself."""
         raise ValueError(
             f"{sub.station} is not held: the kernel master brings devices back to OP itself"
         )
@@ -162,15 +162,15 @@ class CarriedWatch:
 
 
 def carried(plan: Plan) -> Plan:
-    """Return the plan without its frames, which the carrier makes.
+    """Return the plan without frames, because the external master makes them.
 
     Raises:
-        ConfigurationError: The plan needs frames that the carrier does not make.
+        ConfigurationError: The plan needs frames that the external master does not make.
     """
     kinds = {datagram.kind for frame in plan.cycle.frames for datagram in frame.datagrams}
     if DatagramKind.CYCLE_NUMBER in kinds:
         raise ConfigurationError(
-            "exact_matching=True is not possible: another master makes the frames on this network",
+            "exact_matching=True is not possible: an external master makes the frames",
             hint="omit the option, or open the network interface directly",
         )
     return replace(plan, cycle=replace(plan.cycle, frames=()))

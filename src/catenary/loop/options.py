@@ -33,8 +33,8 @@ class StopPolicy:
         handover: Time for which CST keeps its torque after a law or stream ended, before a quick
             stop [s].
         command_timeout: In the background, time for which the targets of an update are valid [s].
-            After it, CSV decelerates and CST makes a quick stop. None: 0.2 s in CSV, 20 ms in CST.
-            CSP holds without limit.
+            After it, CSV and PV decelerate and CST makes a quick stop. None: 0.2 s in CSV and PV,
+            20 ms in CST. CSP holds without limit.
         stop_deadline: Time for the axes to reach standstill when the loop is left [s].
         lost_limit: Number of consecutive bad cycles that raises WorkingCounterError.
         raise_faults: True: raise DriveError if a drive is in fault or leaves OPERATION_ENABLED by

@@ -42,7 +42,7 @@ DoubleWord = Annotated[int, Meta(ge=0, le=0xFFFFFFFF)]
 Object = Annotated[str, Meta(description="object, 0xINDEX:SUBINDEX", examples=["0x6000:11"])]
 Mode = Literal["csp", "csv", "cst", "pp", "pv", "hm"]
 TypeName = Annotated[str, Meta(description="data type", examples=["UINT", "REAL"])]
-Divider = Annotated[int, Meta(description="cycles of the loop between two exchanges", ge=1)]
+Divider = Annotated[int, Meta(description="n: exchange in every n-th cycle", ge=1)]
 
 
 class Table(msgspec.Struct, forbid_unknown_fields=True, frozen=True, kw_only=True):

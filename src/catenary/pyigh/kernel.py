@@ -28,7 +28,7 @@ WORDS = {
 
 
 class MemoryCell:
-    """A mapped object in a domain, in whole bytes. Valid while the master is active."""
+    """A mapped object in a domain, in whole bytes. It is valid while the master is active."""
 
     def __init__(self, address: int, number: Number, signed: bool) -> None:
         self._value = WORDS[number.bit_length, signed].from_address(address)

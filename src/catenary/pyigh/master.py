@@ -60,7 +60,8 @@ class Steps(Protocol):
 class MasterBase:
     """Master for a program that calls each step of the cycle itself.
 
-    Use it as a context manager, or call `close`.
+    Use it as a context manager, or call `close`. Without libethercat, `ecat_master_receive` runs a
+    whole cycle of a `Loop`: it sends the outputs, waits and reads the inputs.
 
     Args:
         target: A target as for `MainDevice`, or a MainDevice.
@@ -92,7 +93,7 @@ class MasterBase:
         self.close()
 
     def close(self) -> None:
-        """End the operation and release the master."""
+        """End the operation. Close the MainDevice if this object created it."""
         steps, self._steps = self._steps, None
         try:
             if steps is not None:

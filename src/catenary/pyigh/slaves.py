@@ -85,7 +85,7 @@ class SlaveBase:
                 )
 
     def bind(self, cells: Mapping[tuple[int, int], Cell]) -> None:
-        """Set the cells of the mapped objects; empty when the master is not active."""
+        """Set the cells of the mapped objects. Without an active master, there are no cells."""
         self._cells = cells
 
     def read(self, index: int, subindex: int = 0) -> int:
@@ -177,12 +177,12 @@ class SlaveServo(SlaveBase):
         return False
 
     def disable(self) -> None:
-        """Switch the axis off."""
+        """Write controlword 0 (disable voltage)."""
         self.write(Object.CONTROLWORD, 0)
 
     @property
     def state(self) -> AxisState | None:
-        """CiA 402 state of the axis; None if its statusword is not a valid state."""
+        """CiA 402 state of the axis; None if its statusword encodes no valid state."""
         return state_of(self.read(Object.STATUSWORD))
 
     def check(self) -> None:

@@ -2,8 +2,8 @@
 
 OMG DDS-XTypes 1.3 §7.4.3, version 1, as ROS 2 writes it. The encoding is little endian. Every
 primitive is aligned to its own size; offsets count from the end of the 4-byte encapsulation header.
-A string is its length, including the final zero, and its bytes. A sequence is its length and its
-elements. An array has no length.
+A string consists of its length (with the final zero) and its bytes. A sequence consists of its
+length and its elements. An array has no length.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ Rows = npt.NDArray[np.void]
 
 @dataclass(frozen=True, slots=True)
 class CdrMessage:
-    """A message type: a template with all fields zero, and the dtype with their offsets."""
+    """A message type: a template with all numbers zero, and the dtype with their offsets."""
 
     dtype: np.dtype[np.void]
     constant: bytes

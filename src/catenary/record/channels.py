@@ -209,9 +209,12 @@ def _comment(field: Field) -> str:
 
 
 def _ros_name(name: str) -> str:
-    """Return a valid ROS name: lower-case letters, digits, single underscores, first a letter."""
+    """Return a valid ROS name.
+
+    It begins with a letter, and contains lower-case letters, digits and single underscores.
+    """
     plain = re.sub(r"[^a-z0-9]+", "_", name.lower()).strip("_")
-    # readers make Python classes from the definitions, so a keyword is not a usable name
+    # Readers make Python classes from the definitions, so a keyword is not usable as a name.
     usable = plain[:1].isalpha() and not keyword.iskeyword(plain)
     return plain if usable else f"x_{plain}".rstrip("_")
 

@@ -1,4 +1,4 @@
-"""Figures of a recording with matplotlib: one row per axis, and below it the cycle timing.
+"""Figures of a recording with matplotlib: one row per axis, with the cycle timing below.
 
 The module does not use pyplot. It therefore has no global state and opens no window.
 """
@@ -66,7 +66,7 @@ STYLE = {
 
 @dataclass(frozen=True, slots=True)
 class Line:
-    """A line of each axis, with its legend and style."""
+    """One quantity of all axes, drawn as one line per axis in the same style."""
 
     name: str
     values: Floats  # (cycles, axes)

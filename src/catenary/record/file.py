@@ -1,6 +1,8 @@
-"""Writer of rows and events to an MCAP file: chunks of 0.5 s, compressed with zstd, with an index.
+"""Writer of rows and events to an MCAP file with an index.
 
-The MCAP library writes the file; this module encodes the messages.
+The file consists of chunks of about 0.5 s, compressed with zstd.
+
+The MCAP library writes the file. This module encodes the messages.
 """
 
 from __future__ import annotations
@@ -34,7 +36,7 @@ from catenary.record.output import Output
 from catenary.share import SharedEvent
 
 INFO_KINDS = ("DeviceReturned", "LinkRestored", "ClockLocked", "Marker")
-CHUNK_SECONDS = 0.5  # maximum loss if the recorder is killed
+CHUNK_SECONDS = 0.5  # [s] approximate loss if the recorder is killed
 SMALLEST_CHUNK, LARGEST_CHUNK = 1 << 14, 1 << 22  # [bytes]
 SEQUENCE_MASK = 0xFFFFFFFF
 
@@ -61,7 +63,8 @@ class RecordingFile:
             force: replace an existing file.
 
         Raises:
-            RecordingError: The file exists (without `force`), or the extra is not installed.
+            RecordingError: The file exists (without `force`), another recorder is writing it, or
+                the extra is not installed.
             OSError: The file cannot be created or written.
         """
         library: Any = require("mcap.writer")
@@ -132,7 +135,8 @@ class RecordingFile:
 def level_of(kind: str) -> int:
     """Return the log level of an event kind.
 
-    Kinds of errors end the loop. Kinds of recovery and markers are only information.
+    An error ends the loop. Recoveries and markers are only information. All other events are
+    warnings.
     """
     if kind.endswith("Error"):
         return ERROR
@@ -140,7 +144,7 @@ def level_of(kind: str) -> int:
 
 
 def chunk_size(layout: Layout, channels: list[Channel]) -> int:
-    """Return the uncompressed size of CHUNK_SECONDS of cycles, within bounds [bytes]."""
+    """Return the uncompressed size of a chunk [bytes]: CHUNK_SECONDS of cycles, within bounds."""
     record = 31  # header of an MCAP message record
     cycle = sum(len(channel.message.constant) + record for channel in channels)
     return min(max(int(cycle * CHUNK_SECONDS / layout.period), SMALLEST_CHUNK), LARGEST_CHUNK)
@@ -151,6 +155,6 @@ def _create(path: str | os.PathLike[str], force: bool) -> Output:
         return Output(path, force=force)
     except FileExistsError as error:
         raise RecordingError(
-            f"{Path(path)} exists",
+            f"{Path(path)} already exists",
             hint="use another name, or replace the file with --force (force=True)",
         ) from error

@@ -26,7 +26,7 @@ class Layout(msgspec.Struct, frozen=True):
     period: float  # [s]
     axes: tuple[str, ...]
     fields: tuple[Field, ...]
-    clock: str = "monotonic"  # clock of the times: "monotonic" of the machine, or "virtual"
+    clock: str = "monotonic"  # clock of the times: "monotonic" or "virtual"
     utc_offset_ns: int = 0  # UTC minus that clock
 
     @property
@@ -35,7 +35,7 @@ class Layout(msgspec.Struct, frozen=True):
         return np.dtype([(field.name, field.dtype, field.shape) for field in self.fields])
 
     def field(self, name: str) -> Field | None:
-        """Return the field of a name; None if the layout has none."""
+        """Return the field with this name; None if the layout does not contain it."""
         return next((field for field in self.fields if field.name == name), None)
 
     def of_axes(self, name: str) -> bool:

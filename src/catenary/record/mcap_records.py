@@ -1,4 +1,4 @@
-"""Reader of the complete records of an MCAP file, also of a truncated one.
+"""Reader of the complete records of an MCAP file, which may be truncated.
 
 The library's readers raise an error at a truncated end. This module reads up to the last complete
 record. MCAP: https://mcap.dev/spec
@@ -20,12 +20,12 @@ from catenary.record.extra import require
 
 MAGIC = b"\x89MCAP0\r\n"
 HEAD = struct.Struct("<BQ")  # opcode, length of the content
-MESSAGE_HEAD = struct.Struct("<BQHIQQ")  # the same; channel, sequence, log time, publish time
+MESSAGE_HEAD = struct.Struct("<BQHIQQ")  # opcode, length; channel, sequence, log time, publish time
 HEADER, FOOTER, SCHEMA, CHANNEL, MESSAGE, CHUNK, MESSAGE_INDEX = range(0x01, 0x08)
 METADATA, DATA_END = 0x0C, 0x0F
 LAYOUT_RECORD = "catenary.layout"  # metadata at the start of a recording
 END_RECORD = "catenary.end"  # metadata at its end
-LARGEST_CHUNK = 1 << 28  # [bytes] a larger size indicates damage
+LARGEST_CHUNK = 1 << 28  # [bytes]; a larger size indicates damage
 
 
 @contextmanager
@@ -135,7 +135,7 @@ def chunk_records(data: bytes) -> Iterator[tuple[int, int, int]]:
 
 
 def chunk_messages(data: bytes) -> Iterator[ChunkMessage]:
-    """Yield the messages in the content of a chunk, in their order."""
+    """Yield the messages in the content of a chunk, in file order."""
     for opcode, at, end in chunk_records(data):
         if opcode == MESSAGE:
             _, _, channel, sequence, time_ns, _ = MESSAGE_HEAD.unpack_from(data, at)

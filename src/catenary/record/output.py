@@ -21,7 +21,7 @@ class Output:
 
         Raises:
             FileExistsError: The file exists (without `force`).
-            RecordingError: Another recorder is writing it.
+            RecordingError: Another recorder is writing the file.
         """
         new = 0 if force else os.O_EXCL
         self._fd = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_CLOEXEC | new, 0o666)

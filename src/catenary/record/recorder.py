@@ -1,4 +1,4 @@
-"""Recorder, which writes every cycle of a share into a file.
+"""Recorder, which writes the cycles of a share into a file.
 
 It attaches to the share like any other reader, so it cannot delay the loop. It counts the cycles
 that it misses. The file contains an event for each gap, and the total number of missed cycles.
@@ -40,8 +40,8 @@ class Recorder:
         with record.Recorder("arm", "arm.mcap") as recorder:
             recorder.run(seconds=60.0)
 
-    The recording starts with the oldest cycle in the share. `take` writes the new cycles; `run`
-    repeats this until the loop ends.
+    The recording starts with the oldest cycle in the share. `take` writes the new cycles. `run`
+    calls it until the loop ends.
 
     Args:
         share: name of the share, or a Reader from `cat.attach`.
@@ -51,7 +51,9 @@ class Recorder:
         uid: user ID of the owner of the share (`cat.attach`).
 
     Raises:
-        RecordingError: The file exists (without `force`), or the extra is not installed.
+        ShareError: The share cannot be opened (`cat.attach`).
+        RecordingError: The file exists (without `force`), another recorder is writing it, the extra
+            is not installed, or the disk is full.
         OSError: The file cannot be created.
     """
 
@@ -100,8 +102,8 @@ class Recorder:
         """Write the cycles and events since the last call. Return the number of cycles.
 
         Raises:
-            RecordingError: The disk is full or fails. The file is repaired and contains the
-                recording up to this point.
+            RecordingError: The disk is full or fails. If possible, the file is repaired, and ends
+                with its last complete chunk.
         """
         rows, lost = self._share.rows(self._number)
         events, events_lost = self._share.events(self._serial)
@@ -114,11 +116,11 @@ class Recorder:
         return len(rows)
 
     def run(self, *, seconds: float | None = None, stop: threading.Event | None = None) -> None:
-        """Record until the loop ends, for `seconds` [s], or until `stop` is set.
+        """Record until the loop ends, `seconds` [s] have passed, or `stop` is set.
 
         Args:
-            seconds: maximum duration [s]; None for no limit.
-            stop: event that ends the recording.
+            seconds: maximum duration [s]; None sets no limit.
+            stop: event that another thread or a signal handler sets to end the recording.
 
         Raises:
             RecordingError: The disk is full or fails, as for `take`.
@@ -147,7 +149,7 @@ class Recorder:
         if self._file is None:
             return
         try:
-            # Read the state before the last cycles: after the end, the loop writes no more.
+            # Read the state before the last cycles, because an ended loop writes no more cycles.
             state = self._share.state
             self.take()
             self.ended = ENDINGS[state]
@@ -202,7 +204,7 @@ class Recorder:
     def _repaired(self, error: OSError) -> RecordingError:
         """Repair the file after a failed write. Return the error to raise."""
         reason = error.strerror or str(error)
-        failed = f"{self.path}: {reason}"
+        failed = f"cannot write {self.path}: {reason}"
         try:
             repaired = repair(self.path, end={"ended": reason, "lost": self.lost})
         except OSError as second:

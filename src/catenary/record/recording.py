@@ -52,7 +52,7 @@ class Recording:
     """The cycles of a loop, oldest first. `recording["position"]` has the shape (cycles, axes).
 
     `lost` is the number of cycles that the recorder missed. `ended` is the reason for the end of
-    the recording; it is "cut off" if the file is truncated, because the recorder was killed.
+    the recording. It is "cut off" if the file is truncated, for example by a killed recorder.
     """
 
     layout: Layout
@@ -60,7 +60,8 @@ class Recording:
     events: tuple[SharedEvent, ...]
     lost: int
     ended: str
-    began_ns: int | None = None  # of a part: start of the whole recording, on the loop's clock
+    # Start of the whole recording, on the loop's clock; None: the first row.
+    began_ns: int | None = None
 
     def __getitem__(self, field: str) -> npt.NDArray[Any]:
         if self.layout.field(field) is None:
@@ -194,7 +195,7 @@ class _Reader:
         messages = self._messages[topic(layout, "events")]
         texts = [decode_text(message.data) for message in messages]
         events = (msgspec.json.decode(text, type=SharedEvent) for text in texts)
-        first = self._span[0]  # events before the first cycle were read before it was set
+        first = self._span[0]  # the part was unknown while events before the first cycle were read
         return Recording(
             layout=layout,
             rows=_rows(layout, self._messages, head["format"]),

@@ -47,7 +47,7 @@ def repair(path: str | os.PathLike[str], *, end: Mapping[str, object] | None = N
 
     Args:
         path: the file.
-        end: entries of the end record; None for those of a truncated file.
+        end: entries of the end record; None marks the recording as cut off.
 
     Raises:
         RecordingError: The file is not a recording, or a recorder is writing it.

@@ -15,7 +15,7 @@ PREFIXES = ((1.0, ""), (1e-3, "m"), (1e-6, "µ"), (1e-9, "n"))
 
 
 def of_axes(recording: Recording, field: str | None) -> Floats | None:
-    """Return a field with one value per axis, (cycles, axes); None if it was not recorded.
+    """Return a field with shape (cycles, axes); None if it was not recorded per axis.
 
     Args:
         recording: the recording.
@@ -27,7 +27,7 @@ def of_axes(recording: Recording, field: str | None) -> Floats | None:
 
 
 def reference_of(recording: Recording) -> str | None:
-    """Return the field to compare positions with; None if the recording does not contain it.
+    """Return the field to compare positions with; None if it is unknown.
 
     If any drive is in CSP, this is the commanded position. In other modes, only the application
     knows the reference.
@@ -38,7 +38,9 @@ def reference_of(recording: Recording) -> str | None:
 
 
 def tracking_error(recording: Recording, reference: str | None) -> Floats | None:
-    """Return reference minus actual position, (cycles, axes) [rad]; None if one is missing.
+    """Return reference minus actual position, shape (cycles, axes); None if one is missing.
+
+    The unit is that of the position.
 
     Args:
         recording: the recording.
@@ -105,7 +107,9 @@ def with_gaps(recording: Recording, values: Floats) -> tuple[Floats, Floats]:
 
 
 def thin(time: Floats, values: Floats, most: int) -> tuple[Floats, Floats]:
-    """Reduce lines to the minimum and maximum of equal parts, which look the same in a plot.
+    """Reduce lines to the minimum and maximum of each of `most` equal parts.
+
+    The reduced lines look the same in a plot.
 
     Args:
         time: (points,).
@@ -140,7 +144,7 @@ def peaks(time: Floats, values: Floats, most: int) -> tuple[Floats, Floats]:
 
 
 def prefix_for(values: Floats) -> tuple[float, str]:
-    """Return the SI prefix, and its factor, with which the largest value is at least 0.1."""
+    """Return factor and symbol of the SI prefix with which the largest value is at least 0.1."""
     finite = np.abs(values[np.isfinite(values)])
     top = float(finite.max()) if len(finite) else 0.0
     if top == 0.0:

@@ -44,7 +44,7 @@ class CompleteChunk:
 
 @dataclass(slots=True)
 class Summary:
-    """Owner of the contents of the complete part of a data section."""
+    """Contents of the complete part of a data section."""
 
     end: int = len(MAGIC)  # position after the complete part
     schemas: dict[int, Any] = field(default_factory=dict)

@@ -31,7 +31,7 @@ class Mark:
 
 
 def marks_of(recording: Recording) -> list[Mark]:
-    """Return the events and the starts of quick stops, sorted by time."""
+    """Return the marks of events and of the starts of quick stops, sorted by time."""
     start = recording.start_ns * 1e-9
     events = [Mark(e.time - start, e.kind, EVENT, (3, 2)) for e in recording.events]
     stops = [
@@ -61,7 +61,7 @@ def braking(recording: Recording) -> npt.NDArray[np.bool_]:
 
 
 def stop_text(recording: Recording, axes: list[int]) -> str:
-    """Return the name of a quick stop mark of these axes."""
+    """Return the label of the mark for a quick stop of these axes."""
     one = recording.axes[axes[0]]
     return f"quick stop: {one if len(axes) == 1 else count_of(len(axes), 'axis', 'axes')}"
 

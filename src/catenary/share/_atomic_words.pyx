@@ -3,7 +3,8 @@
 
 Release stores pair with acquire loads: data written before a store is visible after a load of the
 new value. Full fences ensure the converse: if a load still returns the old value, earlier reads did
-not see data written after the store. x86 guarantees the first half in hardware, AArch64 neither.
+not see data written after the store. x86 guarantees the first property in hardware. AArch64
+guarantees neither.
 Time budget: 0.1 us for a call from Python, 0.3 us for all words of a desk.
 """
 
@@ -29,7 +30,8 @@ cdef class Words:
         PyObject_GetBuffer(memory, &self.buffer, PyBUF_WRITABLE)
         size = <uint64_t>self.buffer.len
         if not 1 <= count <= COUNT_MAX or offset % 8 or stride % 8 or not 8 <= stride <= size:
-            raise ValueError(f"invalid words: {count} at offset {offset}, stride {stride} bytes")
+            raise ValueError(f"invalid count, offset or stride: {count} words at offset {offset},"
+                             f" stride {stride} bytes")
         if offset > size or (count - 1) * stride + 8 > size - offset:
             raise ValueError(f"{count} words at offset {offset}, stride {stride} bytes, do not fit"
                              f" in {size} bytes")

@@ -1,11 +1,11 @@
-"""Binding of the mutex in mutex.h, which lies in a shared buffer."""
+"""Python binding of the shared-memory mutex in mutex.h."""
 
 MUTEX_SIZE: int
 
 class SharedMutex:
     """A mutex at byte `offset` of a buffer. With `fresh`, the constructor initialises it.
 
-    Raises ValueError if it does not fit in the buffer, or is not a mutex of this version.
+    Raises ValueError if the mutex does not fit in the buffer, or if its version differs.
     """
 
     def __init__(self, memory: object, offset: int, *, fresh: bool = False) -> None: ...

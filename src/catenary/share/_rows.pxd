@@ -55,10 +55,13 @@ cdef struct cycle_rows:
     uint64_t record_size
     uint64_t actual_size
     uint64_t target_size
-    uint64_t actual_at         # in the row
+    uint64_t actual_at         # offset in the row
     uint64_t target_at
 
 cdef class CycleWriter(Ring):
-    """A ring whose rows are the cycles of an engine. `sizes`: bytes of the three blocks."""
+    """A ring whose rows are the cycles of an engine.
+
+    `sizes` contains the sizes of the record, the actual values and the targets [bytes].
+    """
     cdef cat_sink sink
     cdef cycle_rows rows

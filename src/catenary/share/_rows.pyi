@@ -4,7 +4,7 @@ def memory_size(count: int, size: int) -> int:
     """Return the memory size [bytes] of a ring of `count` rows of `size` bytes."""
 
 def row_parts(record_size: int, actual_size: int, target_size: int) -> tuple[int, int, int, int]:
-    """Return the offsets of the three blocks of a cycle in its row, and the size of the row."""
+    """Return the offsets of record, actual values and targets in a row, and its size [bytes]."""
 
 class Ring:
     """A ring of `count` rows (a power of two) of `size` bytes, at byte `offset` of a buffer.
@@ -45,7 +45,10 @@ class Ring:
         """Mark the ring as ended and wake all readers. No more rows will come."""
 
 class CycleWriter(Ring):
-    """A ring whose rows are the cycles of an engine. `sizes`: bytes of the three blocks."""
+    """A ring whose rows are the cycles of an engine.
+
+    `sizes` contains the sizes of the record, the actual values and the targets [bytes].
+    """
 
     def __init__(
         self,

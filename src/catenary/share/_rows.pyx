@@ -91,7 +91,7 @@ cdef class Ring:
                 break
             PyErr_CheckSignals()
         if rc < 0:
-            raise OSError(-rc, "futex")
+            raise OSError(-rc, "cannot wait for a row: futex(2) failed")
         return rc == 1
 
     # ---- writing
@@ -103,7 +103,7 @@ cdef class Ring:
         if self.buffer.readonly:
             raise ValueError("the memory is read-only")
         if size > self.view.size:
-            raise ValueError(f"{size} bytes do not fit in a row of {self.view.size}")
+            raise ValueError(f"{size} bytes do not fit in a row of {self.view.size} bytes")
         place = ring_begin(&self.view, number)
         cat_copy_to_shared(place, PyBytes_AS_STRING(row), size)
         cat_clear_shared(place + size, self.view.size - size)

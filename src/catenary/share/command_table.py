@@ -79,7 +79,7 @@ REASONS = {
 
 
 class Geometry(NamedTuple):
-    """Offsets of the parts of the memory."""
+    """Offsets of the parts of a desk, and sizes [bytes]."""
 
     closed: int
     holders: int
@@ -159,7 +159,7 @@ class Desk:
         )
 
     def reason(self, place: int, serial: int) -> Reason:
-        """Return the reason why a lease of this place has ended."""
+        """Return the reason why a lease of this place has ended; EXPIRED if it was not recorded."""
         if self._closed.load(0):
             return Reason.LOOP_ENDED
         is_recorded = serial in (self.ended.load(place), int(self.places[place]["last"]))
@@ -172,13 +172,13 @@ class Desk:
         self.ended.store(place, serial)
 
     def end_all(self) -> None:
-        """End all leases, so that none can be renewed or taken. Called by the loop."""
+        """End all leases. Later leases are invalid, too. Called by the loop."""
         self._closed.store(0, 1)
 
     def ending(self, place: int, now_ns: int) -> Reason | None:
         """Return the reason why the lease of a place must end; None if it remains valid.
 
-        The method checks whether the client process is alive, which takes a system call.
+        The method reads /proc to check whether the client process is alive.
         """
         if self.deadlines_ns.load(place) <= now_ns:
             return Reason.EXPIRED if self.client(place).is_alive else Reason.DIED

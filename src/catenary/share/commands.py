@@ -39,7 +39,7 @@ class Commanded(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class AxisCommand:
-    """Set-points of a client. None: the quantity is not commanded."""
+    """Set-points of a client. A quantity that is not commanded is None."""
 
     axes: tuple[int, ...]  # indices, in the order of the layout
     position: Values | None  # [rad], one for each of `axes`
@@ -50,7 +50,7 @@ class AxisCommand:
 
 @dataclass(frozen=True, slots=True)
 class LeaseEnd:
-    """A lease that has ended. Its axes are no longer commanded under it."""
+    """A lease that has ended. Its client no longer commands the axes."""
 
     axes: tuple[str, ...]
     reason: Reason
@@ -70,7 +70,10 @@ class _Known:
 
 
 class CommandReader:
-    """The loop's record of its clients. Only the iterating thread uses it; it never blocks."""
+    """Reader of the commands and leases of all clients.
+
+    Only the thread that iterates the loop uses it. It never blocks.
+    """
 
     def __init__(self, desk: Desk, layout: ShareLayout) -> None:
         self._desk = desk
@@ -96,7 +99,7 @@ class CommandReader:
         taken = desk.taken.load(place)
         rows, lost = desk.rings[place].copy_after(taken)
         array = np.frombuffer(rows, desk.row)
-        array = array[array["lease"] <= known.serial]  # leave those of a lease not recorded yet
+        array = array[array["lease"] <= known.serial]  # read those of a new lease later
         if not len(array):
             return []
         desk.taken.store(place, taken + lost + len(array))
@@ -127,7 +130,7 @@ class CommandReader:
                 self._end_if_over(place, serial, now, check_clients)
 
     def _record(self, place: int, serial: int) -> bool:
-        """Record a lease if it is new. Return False if it has just been released."""
+        """Record a lease if it is new. Return False if the place has changed meanwhile."""
         if place in self._known:
             return True
         axes = tuple(np.flatnonzero(self._desk.holders == serial).tolist())
@@ -168,7 +171,8 @@ def apply(
         ended: leases that have ended.
         drives: the drives to command.
         axes: names of the axes, in the order of the layout.
-        commanded: commanded positions [rad], shape (axes,). NaN leaves the target unchanged.
+        commanded: commanded positions [rad], shape (axes,). NaN leaves the target
+            position unchanged.
     """
     places = {name: (each.target, k) for each in drives for k, name in enumerate(each.names)}
     for name in (name for end in ended for name in end.axes if name in places):

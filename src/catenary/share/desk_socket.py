@@ -21,7 +21,7 @@ from catenary.share.folder import draft_path
 ANSWER = b"desk"
 BACKLOG = 16
 TIMEOUT = 2.0  # [s]
-RETRY = 0.1  # [s] pause after a failed accept, for example without a free descriptor
+RETRY = 0.1  # [s] pause after a failed accept, for example if no descriptor is free
 PAUSE = 0.002  # [s] after each client, and between the attempts of a client
 CREDENTIALS = struct.Struct("3i")  # pid, uid, gid: struct ucred
 
@@ -47,7 +47,7 @@ class DeskSocket:
     def publish(self, under: Path) -> None:
         """Rename the socket to `under`, and start the thread.
 
-        It replaces a socket that a killed process has left behind.
+        It replaces the socket of a killed process.
         """
         self.path.rename(under)
         self.path = under
@@ -90,7 +90,8 @@ def request_descriptor(path: Path, owner: int) -> int:
         owner: expected user id of the server.
 
     Raises:
-        FileNotFoundError, PermissionError: from the kernel.
+        FileNotFoundError: the socket does not exist.
+        PermissionError: this user must not connect to the socket.
         ShareError: no process answers, or the process belongs to another user.
     """
     flags = socket.SOCK_SEQPACKET | socket.SOCK_CLOEXEC
@@ -102,7 +103,8 @@ def request_descriptor(path: Path, owner: int) -> int:
             _, uid, _ = CREDENTIALS.unpack(peer)
             if uid != owner:
                 raise ShareError(
-                    f"user {uid} answers on {path}, but the share belongs to user {owner}"
+                    f"a process of user {uid} answers on {path}, but the share belongs to "
+                    f"user {owner}"
                 )
             flags = socket.MSG_CMSG_CLOEXEC
             _, descriptors, _, _ = socket.recv_fds(connection, len(ANSWER), 1, flags)

@@ -21,7 +21,7 @@ class SharedEvent(msgspec.Struct, frozen=True):
     kind: str  # name of the class in `cat.events`, or of the error that ended the loop
     message: str
     time: float  # on the clock of the loop [s]
-    position: int | None  # of the device; None: the event concerns the segment
+    position: int | None  # position of the device; None: the event concerns the segment
     details: Mapping[str, object]
 
     def __str__(self) -> str:
@@ -36,7 +36,7 @@ def encode_event(incident: Incident, serial: int, number: int) -> bytes:
     Args:
         incident: the event.
         serial: serial number of the event.
-        number: number of the last cycle.
+        number: number of the last cycle before the event.
     """
     event = SharedEvent(
         serial,
@@ -59,7 +59,10 @@ def encode_event(incident: Incident, serial: int, number: int) -> bytes:
 
 
 def encodable(value: object) -> object:
-    """Replace characters that UTF-8 cannot encode by '?'. A device's text must not stop a loop."""
+    """Replace characters that UTF-8 cannot encode by '?'.
+
+    The text of a device must not stop a loop.
+    """
     return value.encode(errors="replace").decode() if isinstance(value, str) else value
 
 

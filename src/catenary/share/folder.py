@@ -65,7 +65,7 @@ def user_folder(uid: int) -> Path:
 
 
 def prepare(folder: Path, mode: int) -> None:
-    """Create the folder of this user if it is missing.
+    """Create the folder of this user if it is missing, and set its mode.
 
     Args:
         folder: the folder.
@@ -92,7 +92,7 @@ def prepare(folder: Path, mode: int) -> None:
 
 
 def trusted_owners(uid: int | None) -> tuple[int, ...]:
-    """Return the users whose files may be opened: user `uid`, or for None this user and root."""
+    """Return the users whose files may be opened: `uid`; if it is None, this user and root."""
     return (os.geteuid(), 0) if uid is None else (uid,)
 
 
@@ -138,7 +138,7 @@ def not_trusted(path: Path, owner: int) -> ShareError:
 
 
 def names(uid: int | None) -> list[str]:
-    """Return the names of all shares that `find` can see."""
+    """Return the names of the shares in all folders that `find` searches."""
     found: set[str] = set()
     for folder in (GROUP_FOLDER, *map(user_folder, trusted_owners(uid))):
         with suppress(OSError):
@@ -148,7 +148,7 @@ def names(uid: int | None) -> list[str]:
 
 @contextmanager
 def deciding(folder: Path) -> Iterator[None]:
-    """Lock the folder: in the block, no other process creates or removes files of it.
+    """Lock the folder, so that only one process at a time publishes or removes a share in it.
 
     Raises ShareError if another process holds the lock for longer than `LOCK_TIMEOUT`.
     """
@@ -162,7 +162,7 @@ def deciding(folder: Path) -> Iterator[None]:
 
 
 def draft_path(folder: Path) -> Path:
-    """Return a new path that readers ignore. It is short: a socket path has at most 107 bytes."""
+    """Return a new, short path that readers ignore. A socket path has at most 107 bytes."""
     return folder / f"{DRAFT}{os.getpid()}-{os.urandom(4).hex()}"
 
 
@@ -188,9 +188,10 @@ def _outside(uid: int) -> int:
 
 
 def _is_group_folder() -> bool:
-    """Return True if /run/catenary belongs to root, is sticky, and is not writable for all users.
+    """Return True if /run/catenary belongs to root and has safe permissions.
 
-    Without the sticky bit, members of its group could rename and remove the files of others.
+    Not all users may write to it. If its group may, it must be sticky. Otherwise, members of the
+    group could rename and remove the files of others.
     """
     try:
         status = GROUP_FOLDER.lstat()
@@ -204,7 +205,8 @@ def _is_group_folder() -> bool:
 def _search_permissions(mode: int) -> int:
     """Return the search permissions that a folder needs for files of `mode`.
 
-    All users may traverse it, because file and folder can have different groups (newgrp(1)).
+    If other users may access the files, all users may traverse the folder, because file and folder
+    can have different groups (newgrp(1)).
     """
     return 0o011 if mode & 0o077 else 0
 

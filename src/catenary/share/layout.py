@@ -53,7 +53,7 @@ class ShareField(msgspec.Struct, frozen=True):
     dtype: str  # NumPy type of one number: "<f8"
     shape: tuple[int, ...]  # (): a scalar
     unit: str  # "rad", "rad/s", "N·m", "ns"; "": a count, a code, or a unit of the device
-    offset: int  # in the row [bytes]
+    offset: int  # offset in the row [bytes]
     per_axis: bool  # True if the field has one number for each axis of the layout
 
 
@@ -62,7 +62,7 @@ class RingPlace(msgspec.Struct, frozen=True):
 
     offset: int  # [bytes]
     count: int  # number of rows
-    size: int  # of a row [bytes]
+    size: int  # size of a row [bytes]
 
 
 class ShareLayout(msgspec.Struct, frozen=True):
@@ -74,9 +74,9 @@ class ShareLayout(msgspec.Struct, frozen=True):
     period: float  # [s]
     axes: tuple[str, ...]  # names, in the order of the per-axis fields
     fields: tuple[ShareField, ...]
-    clock: Clock  # of scheduled_ns and wake_ns
+    clock: Clock  # clock of scheduled_ns and wake_ns
     utc_offset_ns: int  # UTC minus that clock
-    opened: float  # UTC [s]
+    opened: float  # time at which the share was opened, UTC [s]
     writer: Process
     rows: RingPlace
     events: RingPlace

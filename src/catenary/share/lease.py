@@ -16,13 +16,13 @@ from catenary.share.command_table import COMMANDS, PLACES, QUANTITIES, Desk, Rea
 from catenary.share.layout import ShareLayout
 from catenary.share.process import this_process
 
-LOCK_TIMEOUT_NS = 2_000_000_000  # a running owner unlocks much earlier; a dead one is recovered
+LOCK_TIMEOUT_NS = 2_000_000_000  # a running owner unlocks much earlier; a dead one loses the lock
 
 
 class Lease:
-    """The right to command some axes. `Reader.lease` creates it.
+    """Right to command some axes. `Reader.lease` creates it.
 
-    It ends when it is released, when it is not renewed in time, or when its process ends.
+    It ends when it is released or not renewed in time, or when its process or the loop ends.
 
         with arm.lease(axes=["1 Servo"], for_=0.5) as command:
             command.send(position=[0.3])       # also renews the lease
@@ -55,7 +55,8 @@ class Lease:
         """Send set-points for the axes of the lease, and renew the lease.
 
         The loop applies the set-points in the next cycle in which it reads commands. Each value is
-        a scalar or has shape (axes,), in the order of the lease. None: not commanded.
+        a scalar or has shape (axes,), in the order of the lease. A quantity that is
+        None is not commanded.
 
         Args:
             position: positions [rad].
@@ -195,7 +196,7 @@ def locked(desk: Desk) -> Iterator[None]:
     if taken is None:
         raise LeaseError(
             f"another client has locked the desk for {LOCK_TIMEOUT_NS * 1e-9:g} s",
-            hint="a debugger or SIGSTOP has stopped that client: continue or end it",
+            hint="a debugger or SIGSTOP may have stopped that client: continue or end it",
         )
     try:
         yield
@@ -208,12 +209,12 @@ def free(desk: Desk, place: int, reason: Reason) -> None:
     entry, serial = desk.places[place], desk.leases.load(place)
     entry["reason"] = reason
     entry["last"] = serial
-    desk.leases.store(place, 0)  # before the holders: their reader checks this word afterwards
+    desk.leases.store(place, 0)  # before the holders, because the loop reads it after them
     desk.holders[desk.holders == serial] = 0
 
 
 def axis_numbers(layout: ShareLayout, axes: Sequence[str | int] | None) -> list[int]:
-    """Return the indices of axes in the layout. Raises ValueError if unknown or repeated."""
+    """Return the indices of axes in the layout. Raises ValueError if one is unknown or repeated."""
     if axes is None:
         return list(range(len(layout.axes)))
     if isinstance(axes, str):
@@ -242,7 +243,7 @@ def lease_of(
         desk: desk of the loop.
         layout: layout of the share.
         axes: names or numbers of the axes; None: all axes.
-        for_: time until the lease expires [s].
+        for_: time until the lease expires, counted from the last renewal [s].
     """
     if not 0 < for_ <= 3600:
         raise ValueError(f"for_={for_} s: must be positive and at most 3600 s")

@@ -98,10 +98,11 @@ def open_segment(
         path: the file.
         owners: user ids whose files are accepted.
         writable: True maps the file for writing, too.
-        granted: mode with the largest accepted write permissions of other users; None: any.
+        granted: mode that limits the accepted write permissions of other users; None: no limit.
 
     Raises:
-        FileNotFoundError, PermissionError: from the kernel.
+        FileNotFoundError: the file does not exist.
+        PermissionError: this user must not open the file.
         ShareError: the file is empty or not a regular file, has another owner, or is writable for
             more users than `granted` permits.
     """
@@ -129,7 +130,7 @@ def check_status(
         path: the file, for messages.
         status: its status.
         owners: user ids whose files are accepted.
-        granted: mode with the largest accepted write permissions of other users; None: any.
+        granted: mode that limits the accepted write permissions of other users; None: no limit.
 
     Raises:
         ShareError: the file is not accepted.
@@ -198,6 +199,6 @@ def _memfd(name: str) -> int:
     try:
         return os.memfd_create(name, flags | MFD_NOEXEC_SEAL)
     except OSError as error:
-        if error.errno != errno.EINVAL:  # before Linux 6.3
+        if error.errno != errno.EINVAL:  # EINVAL: Linux before 6.3
             raise
     return os.memfd_create(name, flags)

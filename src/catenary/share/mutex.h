@@ -14,7 +14,7 @@
 typedef struct share_mutex {
     char magic[8];
     uint32_t version;
-    uint32_t size;                    /* of pthread_mutex_t: must be the same in all processes */
+    uint32_t size;                    /* sizeof(pthread_mutex_t): must be the same in all processes */
     pthread_mutex_t mutex;
 } share_mutex;
 

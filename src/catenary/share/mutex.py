@@ -52,10 +52,10 @@ class Mutex:
         except FileNotFoundError as error:
             raise ShareError(f"user {uid} has no mutex {name!r}") from error
         except ValueError as error:
-            raise ShareError(f"the mutex {name!r}: {error}") from error
+            raise ShareError(f"cannot open the mutex {name!r}: {error}") from error
 
     def acquire(self, timeout: float | None = None) -> bool:
-        """Acquire the lock. Return False after `timeout` [s].
+        """Acquire the lock. Return False if `timeout` [s] passes first; None waits without a limit.
 
         Raises RuntimeError if this thread already holds it.
         """

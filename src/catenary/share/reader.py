@@ -75,7 +75,9 @@ def _attached(name: str, stale: bool, uid: int | None) -> Reader:
             hint="its writer can allow it: cat.Share(..., mode=0o640) for the group",
         ) from error
     except ShareError as error:
-        raise ShareError(f"the share {name!r}: {error.message}", hint=error.hint) from error
+        raise ShareError(
+            f"cannot open the share {name!r}: {error.message}", hint=error.hint
+        ) from error
     try:
         reader = Reader(segment, layout)
     except (ValueError, OverflowError) as error:
@@ -147,7 +149,7 @@ class Reader:
         return self._ring(CYCLES).newest
 
     def wait(self, timeout: float | None = None) -> bool:
-        """Wait for a cycle that is newer than those `read` and `wait` have already returned.
+        """Wait for a cycle after the last one that `read` or `wait` has reported.
 
         Return False after `timeout` [s], or if no more cycles will come (see `alive`).
         """

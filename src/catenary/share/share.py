@@ -135,7 +135,7 @@ class Share:
 
     @property
     def layout(self) -> ShareLayout:
-        """Layout of the current loop, or of the last one."""
+        """Layout of the data of the current loop, or of the last one."""
         if self._layout is None:
             raise RuntimeError(f"the share {self.name!r} has no layout before a Loop is open")
         return self._layout
@@ -233,7 +233,7 @@ class Share:
             raise
 
     def _refuse_taken(self) -> None:
-        """Raise ShareError if a running writer uses the name. A dead writer is replaced."""
+        """Raise ShareError if a running writer uses the name. A dead writer may be replaced."""
         if self._segment is not None and self._segment.is_published:
             return
         path = folder.own_folder() / self._file

@@ -12,17 +12,18 @@ class MainDevice(bus.MainDevice):
     """MainDevice of one segment: `MainDevice("eth0")`, `MainDevice("virtual")`.
 
     Further forms: `MainDevice(Segment([...]))`; `MainDevice("eth0", "eth1")` for a ring between
-    two ports; `MainDevice("igh:0")` for the IgH kernel master (docs/how_to/igh.md).
+    two interfaces; `MainDevice("igh:0")` for the IgH kernel master (docs/how_to/igh.md).
 
         with cat.MainDevice("eth0") as main:
             for sub in main.scan():
                 print(sub.position, sub.name, sub.identity, sub.state)
 
-    Leaving the block always brings all devices to INIT.
+    Leaving the block brings all devices of the last `scan` to INIT, if they can be reached. The IgH
+    kernel master leaves its devices in PRE-OP.
 
     Args:
         target: Name of a segment, or a link source.
-        second: Second port of a ring.
+        second: Name or link source of the second interface of a ring; None without a ring.
         force: Open an interface even if another master is live on it (docs/how_to/networks.md).
             It has no effect on the kernel master.
     """
@@ -39,15 +40,15 @@ class MainDevice(bus.MainDevice):
 
 
 def _ring(first: LinkSource, second: str | LinkSource) -> Ring:
-    """Return the ring between two ports.
+    """Return the ring between two link sources.
 
     Raises:
-        ConfigurationError: A port is a whole virtual segment, which has a clock of its own.
+        ConfigurationError: A source is a whole virtual segment instead of one of its ends.
     """
     ring = Ring(first, source_of(second))
     if any(hasattr(end, "open_end") for end in (ring.first, ring.second)):
         raise ConfigurationError(
-            "a whole virtual segment is not one end of a ring",
+            "a whole virtual segment cannot be one end of a ring",
             hint="create Segment([...], ring=True), and open MainDevice(segment.first, "
             "segment.second)",
         )

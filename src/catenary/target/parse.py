@@ -71,7 +71,7 @@ def _ring(target: str) -> LinkSource:
 
 
 def in_virtual_time(target: str) -> bool:
-    """Return True if the target is a virtual segment with its own clock."""
+    """Return True if the target is a virtual segment in virtual time."""
     return named_target(target).partition(":")[0] == VIRTUAL
 
 

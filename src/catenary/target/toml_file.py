@@ -26,7 +26,7 @@ def read_toml(path: str | Path) -> TomlFile:
     """Read a TOML file.
 
     Raises:
-        MachineFileError: It cannot be opened, is not UTF-8, or is not TOML.
+        MachineFileError: The file cannot be opened, is not UTF-8, or is not TOML.
     """
     where = Path(path)
     try:
@@ -51,7 +51,7 @@ def read_toml(path: str | Path) -> TomlFile:
 def target_of(file: TomlFile) -> str:
     """Return the `target` that a machine file names.
 
-    The path of a virtual segment's file is relative to the folder of the machine file.
+    In the file, the path of a virtual segment is relative to the folder of the machine file.
 
     Raises:
         MachineFileError: The file has no target, or an invalid one.

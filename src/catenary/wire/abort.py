@@ -1,4 +1,7 @@
-"""SDO abort codes, ETG.1000.6 §5.6.2.7 table 41 and ETG.1020. The hints are our own."""
+"""SDO abort codes, ETG.1000.6 §5.6.2.7 table 41 and ETG.1020.
+
+The hints are not part of the standard.
+"""
 
 from __future__ import annotations
 

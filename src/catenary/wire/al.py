@@ -133,7 +133,7 @@ def _state(word: int) -> AlState:
 
 
 _CODES = (
-    # ETG.1000.6 table 11 and ETG.1020 table "AL Status Codes"; the causes are our own.
+    # ETG.1000.6 table 11 and ETG.1020 table "AL Status Codes". The standards give no causes.
     StatusCode(0x0000, "No error"),
     StatusCode(0x0001, "Unspecified error", "the device gives no details; see its manual"),
     StatusCode(0x0002, "No memory", "the mapping is larger than the device can hold"),
@@ -223,14 +223,16 @@ _CODES = (
     StatusCode(
         0x0029, "Free run needs 3-buffer mode", "a process data SyncManager is in mailbox mode"
     ),
-    StatusCode(0x002A, "Background watchdog", "the application inside the device hangs"),
+    StatusCode(
+        0x002A, "Background watchdog", "the application in the device has stopped responding"
+    ),
     StatusCode(
         0x002B, "No valid inputs and outputs", "no process data arrived: check that the loop runs"
     ),
     StatusCode(
         0x002C,
         "Fatal synchronization error",
-        "SYNC0 is missing, or process data arrives without it",
+        "SYNC0 is missing, or is not synchronous with the process data",
     ),
     StatusCode(
         0x002D, "No synchronization error", "the SYNC signal or the process data did not arrive"

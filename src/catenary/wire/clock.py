@@ -85,7 +85,7 @@ def decode_clock(data: bytes) -> Clock:
 
 
 def decode_receive_times(data: bytes) -> tuple[int, int, int, int]:
-    """Return the arrival times of the latching write at the four ports [ns, local, 32 bits]."""
+    """Return the local times [ns] at which the latching write arrived at the four ports."""
     if len(data) != _RECEIVE_TIMES.size:
         raise DecodeError(f"receive times: needs {_RECEIVE_TIMES.size} bytes, received {len(data)}")
     port_0, port_1, port_2, port_3 = _RECEIVE_TIMES.unpack(data)

@@ -12,7 +12,7 @@ class Loop(IntEnum):
     """Loop setting of a port: its behaviour when the link comes up or goes down."""
 
     AUTO = 0  # open while the link is up
-    AUTO_CLOSE = 1  # closes when the link goes down; only a write opens it
+    AUTO_CLOSE = 1  # closes when the link goes down; only a write opens it again
     OPEN = 2
     CLOSED = 3
 

@@ -57,7 +57,10 @@ class ErrorCounters:
             raise ValueError(f"error counters: {error}") from None
 
     def since(self, before: ErrorCounters) -> ErrorCounters:
-        """Return the counts since `before`. If one decreased, all are assumed to have restarted."""
+        """Return the counts since `before`.
+
+        If a counter decreased, return the present counts: all counters have probably restarted.
+        """
         if self.restarted(before):
             return self
         one, two, three, four = (

@@ -54,7 +54,7 @@ class Fmmu:
 
 
 def decode_fmmu(data: bytes) -> Fmmu:
-    """Decode an FMMU block of 16 bytes. Reserved bits are ignored, as in controllers."""
+    """Decode an FMMU block of 16 bytes. Reserved bits are ignored."""
     if len(data) != SIZE:
         raise DecodeError(f"FMMU: needs {SIZE} bytes, received {len(data)}")
     logical, length, first, last, physical, start, kind, enabled = _BLOCK.unpack(data)

@@ -47,7 +47,7 @@ class Frame:
     """One frame. `padding` contains the bytes after the last datagram; `encode` restores them.
 
     `counted_padding` is the part of the padding that the length in the EtherCAT header includes. It
-    is usually 0. TwinCAT includes padding to an even length, some masters all of the padding.
+    is usually 0. TwinCAT includes the padding to an even length. Some masters include all of it.
     """
 
     datagrams: tuple[Datagram, ...]
@@ -86,7 +86,8 @@ class Frame:
         )
         if len(payload) + len(self.padding) > MAXIMUM_PAYLOAD:
             raise ValueError(
-                f"datagrams of {len(payload)} bytes exceed a frame, at most {MAXIMUM_PAYLOAD} fit"
+                f"datagrams of {len(payload)} bytes and their padding exceed the {MAXIMUM_PAYLOAD} "
+                "bytes of a frame"
             )
         if not 0 <= self.counted_padding <= len(self.padding):
             raise ValueError(

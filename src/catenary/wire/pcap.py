@@ -1,4 +1,4 @@
-"""Captures of Ethernet frames in pcap format (draft-ietf-opsawg-pcap), as `tcpdump -w` writes it.
+"""Captures of Ethernet frames in the pcap format of `tcpdump -w` (draft-ietf-opsawg-pcap).
 
 The decoder accepts both byte orders, and time stamps in microseconds or nanoseconds. It omits a
 truncated last record; `Capture.cut` is the number of its bytes.

@@ -5,8 +5,8 @@ The decoder accepts both byte orders. The encoder writes one interface, with tim
     capture = encode_header("eth0") + b"".join(encode_packet(packet) for packet in packets)
     decode_pcapng(capture).packets == tuple(packets)
 
-The decoder omits a last block that is truncated (killed program, full disk), like Wireshark.
-`Capture.cut` is the number of its bytes.
+Like Wireshark, the decoder omits a truncated last block. A killed program or a full disk can leave
+one. `Capture.cut` is the number of its bytes.
 """
 
 from __future__ import annotations
@@ -99,7 +99,8 @@ def encode_packet(packet: Packet) -> bytes:
         raise ValueError(f"pcapng: time {packet.time_ns} ns is out of range; use 0 to 2**64 - 1")
     if packet.interface or not len(packet.data) <= original < 1 << 32:
         raise ValueError(
-            f"pcapng: invalid interface {packet.interface} or original length {original}"
+            f"pcapng: interface {packet.interface} is not 0, or original length {original} is out "
+            "of range"
         )
     high, low = packet.time_ns >> 32, packet.time_ns & 0xFFFF_FFFF
     body = struct.pack("<IIIII", 0, high, low, len(packet.data), original) + _pad(packet.data)
@@ -152,10 +153,17 @@ class _State:
 
     interfaces: list[Interface] = field(default_factory=list)
     packets: list[Packet] = field(default_factory=list)
-    first_interface: int = 0  # index of the first interface of the present section
+    first_interface: int = 0  # index of the first interface of the current section
 
     def interface(self, number: int) -> int:
-        """Return the index in the file of interface `number` of the section."""
+        """Return the index in the file of an interface of the current section.
+
+        Args:
+            number: Index of the interface in the section.
+
+        Raises:
+            DecodeError: The file does not describe the interface.
+        """
         found = self.first_interface + number
         if found >= len(self.interfaces):
             raise DecodeError(

@@ -23,7 +23,7 @@ PROCESS_RAM = 0x1000  # start of the memory for mailboxes and process data
 # No slots: `Register[int](...)` of a frozen class with slots fails in Python 3.11 (cpython#105332).
 @dataclass(frozen=True)
 class Register(Generic[T]):
-    """One register: its address, its name, and its format, a `struct` format of a single value.
+    """One register: its address, its name, and the `struct` format of its value.
 
     A register with several fields is a `Register[bytes]`. A separate module converts its fields.
     """
@@ -259,5 +259,5 @@ def receive_time(port: int) -> Register[int]:
 
 def _checked(number: int, count: int) -> int:
     if not 0 <= number < count:
-        raise ValueError(f"number {number} is out of range; use 0 to {count - 1}")
+        raise ValueError(f"register index {number} is out of range; use 0 to {count - 1}")
     return number

@@ -33,7 +33,7 @@ def names() -> tuple[str, ...]:
 
 
 def by_name(name: str) -> AnyRegister:
-    """Return the register with a name. Case, spaces and underscores are ignored.
+    """Return the register with this name. Case, spaces and underscores are ignored.
 
     Raises:
         ValueError: No register has this name. The message lists similar names.
@@ -60,8 +60,8 @@ def at_address(address: int, size: int | None = None) -> AnyRegister | None:
 
     Args:
         address: Address of the first byte.
-        size: Size [bytes]. If it is None, numbers take precedence over blocks, then smaller
-            registers over larger ones, as for a read without a size.
+        size: Size [bytes]; None for any size. Several registers may then match: numbers take
+            precedence over blocks, then smaller registers over larger ones.
     """
     found = [
         each for each in _by_key().values() if each.address == address and size in (None, each.size)

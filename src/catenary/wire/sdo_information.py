@@ -239,7 +239,7 @@ def decode_entry_description(data: bytes) -> EntryDescription:
 
 
 def decode_error(data: bytes) -> int | None:
-    """Return the abort code in the data of an ERROR; None if it is incomplete.
+    """Return the abort code in the data of an ERROR message; None if the data is incomplete.
 
     KickCAT (CoE/mailbox/response.cc, SDOInformationMessage::abort) appends the code, but the length
     in its header does not include it. The message then ends before the code.

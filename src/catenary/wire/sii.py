@@ -34,8 +34,9 @@ MAXIMUM_SIZE = 0x20000  # bytes: 64 Ki words, more than any EEPROM on the market
 MAXIMUM_CATEGORIES = 512
 END_OF_CATEGORIES = 0xFFFF
 
+CONFIGURATION_WORDS = 0x0008  # number of words that the controller loads at power-up
+
 # Word addresses
-CONFIGURATION_WORDS = 0x0008  # loaded by the controller at power-up; the last is the checksum
 STATION_ALIAS_WORD = 0x0004
 CHECKSUM_WORD = 0x0007
 IDENTITY_WORD = 0x0008
@@ -239,7 +240,7 @@ class Sii:
         return self._join(CategoryType.STRINGS, decode_strings)
 
     def string(self, number: int) -> str:
-        """Return the text with a number; empty if the number is 0 or does not exist."""
+        """Return the text with this number; empty if the number is 0 or does not exist."""
         strings = self.strings
         return strings[number - 1] if 0 < number <= len(strings) else ""
 
@@ -303,7 +304,7 @@ def decode_sii(image: bytes) -> Sii:
 def _split(image: bytes) -> tuple[tuple[Category, ...], int]:
     found: list[Category] = []
     offset = HEADER_SIZE
-    while offset < len(image):  # without an end mark, the last byte is the end
+    while offset < len(image):  # without an end mark, the categories end with the image
         kind, size = decode_category_header(image[offset : offset + CATEGORY_HEADER_SIZE])
         if kind == END_OF_CATEGORIES:
             break

@@ -145,8 +145,8 @@ def encode_strings(strings: Sequence[str]) -> bytes:
     """Return the strings category.
 
     Raises:
-        ValueError: More than 255 strings, a string of more than 255 characters, or a character
-            outside Latin-1.
+        ValueError: There are more than 255 strings, a string has more than 255 characters, or a
+            character is not in Latin-1.
     """
     if len(strings) > 255:
         raise ValueError(f"SII strings: at most 255 are possible, got {len(strings)}")
@@ -251,7 +251,7 @@ class Pdo:
 
     @property
     def bit_length(self) -> int:
-        """Sum of the lengths of its entries."""
+        """Sum of the lengths of its entries [bits]."""
         return sum(entry.bit_length for entry in self.entries)
 
     def encode(self) -> bytes:

@@ -64,7 +64,8 @@ def _size(image: bytes) -> Objection | None:
     if len(image) <= specified:
         return None
     return Objection(
-        f"the image has {len(image)} bytes, but its header specifies an EEPROM of {specified}",
+        f"the image has {len(image)} bytes, but its header specifies an EEPROM of {specified} "
+        "bytes",
         "word 0x3E must contain the size of the EEPROM in kbit minus one",
         insist=True,
     )

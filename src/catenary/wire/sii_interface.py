@@ -8,7 +8,9 @@ from enum import IntEnum
 from catenary.errors import DecodeError
 
 CONFIGURATION_TO_PDI = 0x01  # bit of 0x0500: the device's processor owns the EEPROM
-CONFIGURATION_FORCE = 0x02  # bit of 0x0500: take the EEPROM back even while the PDI uses it
+CONFIGURATION_FORCE = (
+    0x02  # bit of 0x0500: assign the EEPROM to EtherCAT even while the PDI uses it
+)
 PDI_ACCESS_ACTIVE = 0x01  # bit of 0x0501
 
 
