@@ -278,7 +278,10 @@ def test_two_drives_requests_for_one_axis(cell: Cell) -> None:
     def arm() -> Drives:
         return Drives(cell.main.subs.drives, counts_per_turn=2**20, velocity_limit=1.0)
 
-    with pytest.raises(ConfigurationError, match=r"two requests write byte 0 of its outputs: Drives\(.*\) \(controlword\)"):
+    with pytest.raises(
+        ConfigurationError,
+        match=r"two requests write byte 0 of its outputs: Drives\(.*\) \(controlword\)",
+    ):
         cell.main.plan(arm(), arm())
 
 

@@ -186,5 +186,8 @@ def test_closing_closes_the_link_inside():
     ],
 )
 def test_refuses_an_impossible_fault(options):
-    with pytest.raises(ValueError, match=r"must be one of|is outside|only kind|must not start|cannot have|do not count"):
+    with pytest.raises(
+        ValueError,
+        match=r"must be one of|is outside|only kind|must not start|cannot have|do not count",
+    ):
         Fault(**options)
