@@ -21,7 +21,10 @@ from catenary.virtual._segment cimport (
 
 
 cdef class Buffers:
-    """SyncManagers of all controllers. `position`: the device; `n`: number of the SyncManager."""
+    """SyncManagers of all controllers. `position`: the device; `n`: number of the SyncManager.
+
+    Methods raise IndexError if the device or the SyncManager does not exist.
+    """
 
     cdef Core _core
     cdef cat_segment *_segment
@@ -36,7 +39,10 @@ cdef class Buffers:
         return sm.start, sm.length, sm_registers(c, n)[4], bool(sm.enabled), bool(sm.full)
 
     def block(self, int position, int n, bint blocked):
-        """Block or release a SyncManager from the PDI side. A blocked one refuses all access."""
+        """Block or release a SyncManager from the PDI side. A blocked one refuses all access.
+
+        A change empties the buffers.
+        """
         cdef controller *c = self._core._at(position)
         cdef uint8_t *r
         self._core._sync_manager_at(position, n)

@@ -11,7 +11,10 @@ from catenary.virtual._segment cimport (
 
 
 cdef class Motors:
-    """Motors of all devices of `core`. `position`: position of the device; `axis`: axis number."""
+    """Motors of all devices of `core`. `position`: position of the device; `axis`: axis number.
+
+    Methods raise IndexError if the device or the axis does not exist.
+    """
 
     cdef Core _core
     cdef cat_segment *_segment
@@ -57,14 +60,14 @@ cdef class Motors:
         a.velocity_gain, a.integral_gain = velocity_gain, integral_gain
 
     def place(self, int position, int axis, double to):
-        """Move the shaft to a position [rad]."""
+        """Move the shaft to a position [rad], in a plant at its next step."""
         cdef servo_axis *a = self._core._axis(position, axis)
         lock(self._segment)
         servo_place(a, to)
         unlock(self._segment)
 
     def load(self, int position, int axis, double load):
-        """Apply an external torque to the shaft [N m]."""
+        """Apply an external torque to the shaft, until the next call [N m]."""
         self._core._axis(position, axis).load = load
 
     def inject(self, int position, int axis, int code):

@@ -54,6 +54,10 @@ cdef class CompiledPlant:
             data: Address of an mjData.
             period_ns: Time step [ns].
             keep: Owner of the model and its data, which the core keeps alive.
+
+        Raises:
+            ValueError: The segment already has a plant, or a value is out of range.
+            MemoryError: Out of memory.
         """
         cdef plant *p
         if core._segment.plant != NULL:
@@ -97,6 +101,10 @@ cdef class CompiledPlant:
             dry: Dry friction at the joint [N·m or N].
             brake: Additional friction of the closed brake [N·m or N].
             brake_delay_ns: Closing time of the brake [ns].
+
+        Raises:
+            IndexError: The joint does not exist.
+            ValueError: An address or the ratio is 0.
         """
         cdef plant_joint *j = self._joint(n)
         if not (q and v and force and friction and ratio):
@@ -106,12 +114,15 @@ cdef class CompiledPlant:
         j.brake_delay = brake_delay_ns
 
     def hang(self, int n, int position, int axis):
-        """Connect the motor of an axis to joint n.
+        """Connect the motor of an axis to joint n, and copy the state of the joint to the motor.
 
         Args:
             n: Number of the joint.
             position: Position of the device.
             axis: Axis number.
+
+        Raises:
+            IndexError: The joint, the device or the axis does not exist.
         """
         cdef plant_joint *j = self._joint(n)
         lock(self._core._segment)
@@ -166,5 +177,5 @@ cdef class CompiledPlant:
 
     @property
     def complaint(self) -> str:
-        """Error message of MuJoCo, which stopped the plant; empty: none."""
+        """Warning or error message of MuJoCo that stopped the plant; empty: none."""
         return (<bytes>self._plant.words).decode("utf-8", "replace")

@@ -55,7 +55,10 @@ cdef int _serve_application(void *owner) noexcept with gil:
 
 
 cdef class Core:
-    """Owner of the memory of all controllers. `position`: position of a device, from 0."""
+    """Owner of the memory of all controllers. `position`: position of a device, from 0.
+
+    Methods raise IndexError if the device does not exist.
+    """
 
     def __cinit__(self, int count, bint is_virtual, *, bint ring=False, int64_t detection_ns=0):
         if not 0 <= count <= 65535:
@@ -105,6 +108,10 @@ cdef class Core:
             lrw: True if the device supports LRW.
             identification: Explicit device ID; 0: none.
             ports: Numbers of the ports.
+
+        Raises:
+            ValueError: The position already has a controller, or a value is out of range.
+            MemoryError: Out of memory.
         """
         cdef controller *c = self._at(position)
         cdef int made
@@ -126,7 +133,7 @@ cdef class Core:
         memcpy(c.sii.image, <const char *>sii, len(sii))
 
     def remove_controller(self, int position):
-        """Remove a device. Its position and its cables remain."""
+        """Remove a device and disconnect its motors. Its position and its cables remain."""
         cdef controller *c = self._at(position)
         lock(self._segment)
         controller_remove(c)
@@ -145,8 +152,11 @@ cdef class Core:
     def switch_power(self, int position, bint on):
         """Switch the power of a device on or off.
 
-        Without power, the device loses all data except its EEPROM, crystal and shaft positions, and
-        its neighbours lose light.
+        Without power, the device loses all data except its EEPROM, crystal, shaft positions, loads
+        and STO inputs. Its neighbours lose light.
+
+        Raises:
+            ValueError: The position has no controller.
         """
         cdef controller *c = self._at(position)
         if c.memory == NULL:
@@ -187,7 +197,11 @@ cdef class Core:
         return bool(self._segment.is_virtual)
 
     def use_clock(self, clock):
-        """Use the virtual time of a shared clock, `clock.capsule` (native/clock.h)."""
+        """Use the virtual time of a shared clock, `clock.capsule` (native/clock.h).
+
+        Raises:
+            ValueError: The capsule is not that of a virtual clock, or has another version.
+        """
         cdef const cat_clock *table
         capsule = clock.capsule
         if not PyCapsule_IsValid(capsule, CAT_CLOCK_CAPSULE):
@@ -224,7 +238,7 @@ cdef class Core:
             return -EIO
 
     def raise_failure(self):
-        """Raise the exception that the service has raised, if any."""
+        """Raise and clear the exception that the service has raised, if any."""
         failure, self.failure = self.failure, None
         if failure is not None:
             raise failure
@@ -257,7 +271,9 @@ cdef class Core:
     # -- the PDI side ---------------------------------------------------------------------------
 
     def peek(self, int position, int address, int size):
-        """Return bytes of a controller's memory without side effects.
+        """Return bytes of a controller's memory, without the side effects of a read by a frame.
+
+        New inputs of the models are first written into the buffers.
 
         Args:
             position: Position of the device.
@@ -294,7 +310,7 @@ cdef class Core:
         unlock(self._segment)
 
     def fetch_al_control(self, int position):
-        """Return the requested state, and unlock the register for the next request."""
+        """Return AL control, and unlock the register for the next request."""
         cdef controller *c = self._at(position)
         lock(self._segment)
         c.al_unread = 0
@@ -331,7 +347,7 @@ cdef class Core:
         return when
 
     def output_image(self, int position, int n):
-        """Return the last complete outputs without side effects; empty before the first outputs."""
+        """Return the last complete outputs without side effects; empty if there are none."""
         cdef controller *c = self._at(position)
         cdef sync_manager *sm = self._sync_manager_at(position, n)
         if not (sm.enabled and sm.written) or sm.mailbox:
@@ -377,7 +393,11 @@ cdef class Core:
         unlock(self._segment)
 
     def run_model(self, int position, int64_t period_ns):
-        """Step the model of a device every `period_ns` from now on."""
+        """Step the model of a device every `period_ns` from now on, independent of SYNC pulses.
+
+        Raises:
+            ValueError: The period is shorter than 1 us.
+        """
         cdef controller *c = self._at(position)
         if period_ns < 1000:
             raise ValueError(f"a device cycle of {period_ns} ns is shorter than 1 us")
@@ -399,6 +419,9 @@ cdef class Core:
             signal: Bit of the pulses in 0x0981.
             cycle_ns: Period of the pulses [ns].
             longest_step_ns: Maximum interval between steps [ns].
+
+        Raises:
+            ValueError: A time is out of range.
         """
         cdef controller *c = self._at(position)
         cdef int64_t steps
@@ -419,6 +442,9 @@ cdef class Core:
             minimum_ns: Shortest SYNC0 cycle [ns].
             copy_ns: Minimum time from the arrival of outputs to the pulse [ns].
             limit: Number of consecutive pulses without new outputs that is an error.
+
+        Raises:
+            ValueError: A value is out of range.
         """
         cdef controller *c = self._at(position)
         if not (0 <= minimum_ns and 0 <= copy_ns and 1 <= limit <= 0xFFFF):
@@ -445,7 +471,7 @@ cdef class Core:
         return time
 
     def pulses(self, int position):
-        """Return the numbers of SYNC0 and SYNC1 pulses since power-on."""
+        """Return the numbers of SYNC0 and SYNC1 pulses since the controller was created."""
         cdef controller *c = self._at(position)
         return c.sync.pulses0, c.sync.pulses1
 
@@ -504,7 +530,11 @@ cdef class Core:
         return f.frames, f.datagrams, f.malformed, f.foreign, f.lost, f.expired
 
     def pass_frame(self, bytes frame):
-        """Process one frame without delay and return it; None if it is lost."""
+        """Process one frame without delay and return it; None if it is lost or not EtherCAT.
+
+        Raises:
+            ValueError: The frame is too long.
+        """
         cdef uint8_t buffer[2048]
         cdef int exit = -LOSS_NO_LIGHT
         cdef int size = len(frame)

@@ -40,6 +40,9 @@ cdef class Wires:
             up: (device, port) of the end closer to the first interface of the MainDevice. Devices
                 -1 and -2 are the interfaces of the MainDevice.
             down: (device, port) of the other end.
+
+        Raises:
+            ValueError: The cable, a device or a port does not exist.
         """
         cdef cable_end above, below
         above.device, above.port = up
@@ -110,6 +113,9 @@ cdef class Wires:
             delay_ns: Delay of FAULT_DELAY [ns].
             cable: Cable of FAULT_CORRUPT.
             offset: Offset of the byte for FAULT_GARBLE; -1: a random bit.
+
+        Raises:
+            ValueError: The maximum number of faults is active.
         """
         cdef int n
         cdef frame_fault *f

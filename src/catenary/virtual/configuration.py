@@ -246,7 +246,7 @@ HINT = (
 
 @contextmanager
 def _named(where: str) -> Iterator[None]:
-    """Convert errors of constructors into ConfigurationError that names the place in the file."""
+    """Convert errors of constructors into a ConfigurationError that names the place in the file."""
     try:
         yield
     except OUT_OF_RANGE as error:
@@ -286,7 +286,8 @@ def read_segment(path: str | Path, *, clock: ClockKind = "virtual", ring: bool =
         ring: True makes the segment a ring, regardless of the file.
 
     Raises:
-        ConfigurationError: The file is invalid. The message names the file and the field.
+        ConfigurationError: The file cannot be read or is invalid, or its plant cannot be simulated.
+            The message names the file.
     """
     file = _read(path)
     devices = []

@@ -87,9 +87,9 @@ class Description:
     def revision(self) -> int:
         """Revision number: 1 in the upper word, a checksum of the description in the lower word.
 
-        The checksum ensures that devices with different SIIs have different revisions. SOEM reads
-        the SII only once for all devices with the same identity (src/ec_config.c,
-        ecx_lookup_prev_sii).
+        The checksum does not include names, serial number, alias and device ID. It distinguishes
+        devices whose SIIs differ otherwise, because SOEM reads the SII only once for all devices
+        with the same identity (src/ec_config.c, ecx_lookup_prev_sii).
         """
         kind = replace(self, name="", order="", group="", serial=0, alias=0, identification=0)
         return 0x0001_0000 | zlib.crc32(repr(kind).encode()) & 0xFFFF

@@ -3,7 +3,8 @@
  *
  * With SYNC0, the device latches its inputs and updates its outputs at the pulse. Its internal cycle
  * is a fraction of the SYNC0 cycle, and each pulse restarts it. If the pulses stop, the internal
- * cycle continues, half a step later than expected, until the device detects the loss. */
+ * cycle continues, half a step later than expected. The device detects the loss after more than
+ * `limit` + 1 cycles without a pulse. */
 #ifndef CATENARY_VIRTUAL_DEVICE_CYCLE_H
 #define CATENARY_VIRTUAL_DEVICE_CYCLE_H
 
@@ -53,7 +54,8 @@ static void model_step_free(controller *c) {
     model_inputs(c);
 }
 
-/* End the synchronisation of the device if the pulses have stopped. */
+/* If the pulses have stopped, set the sync error. If the outputs are valid, also set a fault on all axes
+ * and raise EVENT_SYNC_LOST. */
 static void pulses_lost(controller *c) {
     synchronous_cycle *d = &c->synchronous;
     if (!d->seen || c->segment->now - d->last <= (int64_t)(d->limit + 1) * d->cycle)
@@ -90,7 +92,8 @@ static void model_step(controller *c) {
         model_step_free(c);
 }
 
-/* Return 1 if new outputs have arrived since the last pulse, in time to be copied for this pulse. */
+/* Return 1 if new outputs have arrived since the last pulse, in time to be copied for this pulse. Count
+ * outputs that are too late. */
 static int outputs_in_time(controller *c) {
     synchronous_cycle *d = &c->synchronous;
     if (c->outputs.sm < 0 || !(*outputs_status(c) & SM_STATUS_WRITTEN))

@@ -37,7 +37,7 @@ class FaultEvent(NamedTuple):
 
     time: float  # time on the segment's clock [s]
     fault: f.Fault
-    what: Literal["begins", "ends", "misses"]  # "misses": the target no longer exists
+    what: Literal["begins", "ends", "misses"]  # "misses": it could not begin
 
 
 class Loss(NamedTuple):
@@ -84,7 +84,7 @@ class FaultPlayer:
         return not (self._waiting or self._planned or left)
 
     def add(self, fault: f.Fault) -> None:
-        """Schedule a fault.
+        """Schedule a fault for its time, or begin it immediately if it has none.
 
         Raises:
             ValueError: The fault does not fit this segment. The message names the field.
@@ -109,7 +109,7 @@ class FaultPlayer:
         self._agenda.at(self._core.epoch + round(at * SECOND), partial(self._due, fault))
 
     def start(self) -> None:
-        """Start the fault clock. Called at the first frame."""
+        """Schedule the waiting faults. Called once, when the time of the segment starts."""
         waiting, self._waiting = self._waiting, []
         for fault in waiting:
             self._plan(fault, fault.at or 0.0)
@@ -122,7 +122,7 @@ class FaultPlayer:
         try:
             self._check_kind(fault)
             self._check_room(fault)
-        except ValueError:  # the device has been replaced
+        except ValueError:  # the device was replaced, or too many frame faults are active
             self.log.append(FaultEvent(self.now, fault, "misses"))
             return
         self.log.append(FaultEvent(self.now, fault, "begins"))
@@ -285,7 +285,7 @@ class FaultPlayer:
         return lambda: undo() if device in self._devices else None
 
     def _while_running(self, device: AppliedDevice, undo: End) -> End:
-        """Return `undo`, which is skipped if the device has lost its power and thus the fault."""
+        """Return a function that calls `undo`, unless a power loss has already ended the fault."""
         application = device.application
         return lambda: undo() if device.application is application else None
 

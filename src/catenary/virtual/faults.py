@@ -4,9 +4,10 @@
     segment.inject(cut(between=(4, 5)))          # without `at`: immediately
 
 Every fault has a start time `at` [s] on the clock of the segment; docs/how_to/faults.md defines its
-zero. Without `at`, the fault starts immediately. `for_` is its duration [s]. Without `for_`, the
-fault does not end by itself. In TOML, the field `kind` names the fault, and `for_` and `with_` are
-written `for` and `with`.
+zero. Without `at`, the fault starts immediately. `for_` is its duration [s]. Without `for_`, most
+faults do not end by themselves. Faults of frames then affect `n` frames (default: 1), and `swap`
+and `exchange` end immediately. In TOML, the field `kind` names the fault, and `for_` and `with_`
+are written `for` and `with`.
 """
 
 from __future__ import annotations
@@ -99,7 +100,7 @@ class Corrupt(_OfFrames, tag="corrupt", frozen=True):
 
 
 class Garble(_OfFrames, tag="garble", frozen=True):
-    """Corruption of frames that leaves the frame check sequence valid.
+    """Corruption of returning frames that leaves the frame check sequence valid.
 
     The fault inverts the byte at `offset`, or one random bit if `offset` is None.
     """
@@ -183,7 +184,7 @@ class Swap(_LastingOfDevice, tag="swap", frozen=True):
 
 
 class Exchange(_LastingOfDevice, tag="exchange", frozen=True):
-    """Exchange of the positions of two devices. Neither has power for `for_`."""
+    """Exchange of the positions of two devices. Both lose power: for `for_`, or only briefly."""
 
     device: int
     other: int

@@ -70,7 +70,8 @@ static void frame_garble(cat_segment *s, uint8_t *frame, uint32_t length, int of
     frame[14 + bit / 8] ^= (uint8_t)(1u << (bit & 7));
 }
 
-/* Count a corrupt frame: an RX error at the port of arrival, forwarded errors at later controllers. */
+/* Count a corrupt frame: an RX error at the port of arrival, a forwarded error at each later port, and
+ * an error in each later processing unit. */
 static void frame_corrupted(cat_segment *s, const route *r, const arrival *where) {
     for (const arrival *a = where; a < r->arrivals + r->arrival_count; a++) {
         if (a->device < 0)

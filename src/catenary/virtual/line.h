@@ -2,7 +2,8 @@
  *
  * All controllers process a frame when it is sent. The frame returns after its transmission time and
  * the delay of its route, unless a cable on the route goes dark before. In virtual time, only
- * `wait_until` advances `now`. */
+ * `wait_until` advances `now`. With a shared clock, `send`, `receive` and `spend` also
+ * advance it. */
 #ifndef CATENARY_VIRTUAL_LINE_H
 #define CATENARY_VIRTUAL_LINE_H
 
@@ -251,7 +252,7 @@ static int line_receive(void *self, const uint8_t **frame) {
 
 static inline int64_t earlier(int64_t a, int64_t b) { return a < b ? a : b; }
 
-/* Return the arrival time of the next frame. */
+/* Return the arrival time of the next frame; NEVER if no frame is queued. */
 static int64_t line_due(void *self) {
     const queued_frame *q = queue_first(self);
     return q ? q->arrival : NEVER;

@@ -61,7 +61,7 @@ class Mailbox:
         self._fetching = False
 
     def silence(self, silent: bool) -> None:
-        """Stop the mailbox, or resume it and deliver the waiting answers."""
+        """Stop the mailbox, or resume it: fetch a waiting request and deliver waiting answers."""
         self.silent = silent
         self.request_written()
         self._deliver()

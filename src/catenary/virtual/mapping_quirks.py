@@ -41,8 +41,9 @@ class MappingQuirks(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_
     # Objects that cannot be mapped (0x06040041), although the dictionary marks them as mappable.
     refused_objects: tuple[int, ...] = ()
 
-    # CoE details in the SII, ETG.2010 table 5. 0x2F sets all bits. If bit 2 is clear, the PDO
-    # assignment cannot be changed; if bit 3 is clear, the PDO entries cannot be changed.
+    # CoE details in the SII, ETG.2010 table 5. 0x2F sets all bits except bit 4. If bit 2 is clear,
+    # the SII declares that the PDO assignment cannot be changed; bit 3 does so for the PDO entries.
+    # The details do not change the object dictionary.
     coe_details: int = 0x2F
 
     def __post_init__(self) -> None:

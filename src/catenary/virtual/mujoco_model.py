@@ -42,7 +42,7 @@ def read_model(path: str | Path, *, step: float, contacts: bool) -> Model:
     Args:
         path: Path of the file.
         step: Time step of the simulation [s].
-        contacts: False disables contacts and ignores collision shapes.
+        contacts: False disables contacts and ignores the collision shapes of a URDF.
 
     Raises:
         ConfigurationError: MuJoCo or the file is missing, or the model is invalid.
@@ -109,9 +109,12 @@ def _remove_shapes(root: ElementTree.Element, path: Path | None = None) -> dict[
 
 
 def _mesh(name: str, path: Path) -> Path:
-    """Return the path of a mesh.
+    """Return the path of a mesh, relative to one of the folders above the URDF file.
 
-    The function searches `package://name/meshes/x.stl` in the folders above the URDF file.
+    For a URI such as `package://name/meshes/x.stl`, leading folders of the name can be missing.
+
+    Raises:
+        ConfigurationError: The mesh does not exist.
     """
     below = name.removeprefix("package://").removeprefix("file://")
     parts = Path(below).parts
@@ -221,7 +224,9 @@ class Model:
         return f"body {self.model.body(self.model.geom_bodyid[geom]).name!r}"
 
     def add_motor(self, name: str, *, inertia: float, viscous: float) -> None:
-        """Add the inertia and friction of a motor to a joint.
+        """Add the inertia and viscous friction of a motor to a joint.
+
+        Also make the dry friction of the joint stiff.
 
         Args:
             name: Name of the joint.
@@ -236,7 +241,11 @@ class Model:
         self.model.dof_solimp[dof] = SOLIMP
 
     def settle(self) -> None:
-        """Recompute the derived values after all motors were added, and reset to the start."""
+        """Recompute the derived values after all motors were added, and reset to the start.
+
+        Raises:
+            ConfigurationError: MuJoCo cannot simulate one step of the model.
+        """
         self._mujoco.mj_setConst(self.model, self.data)
         self._start()
         try:

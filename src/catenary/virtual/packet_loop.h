@@ -1,6 +1,7 @@
 /* Packet loop that serves a segment on one NIC, or on two for a ring. It is independent of `link`, so
  * that each tests the other. The loop blocks in poll, and steps the models after it has sent the
- * answer. Time budget from the arrival of a frame to its answer: 10 us on an idle core.
+ * answer. If a device synchronises to SYNC pulses, the loop also steps them before each frame. Time
+ * budget from the arrival of a frame to its answer: 10 us on an idle core.
  *
  * A cable does not store frames. Therefore the loop drops a frame that was in the socket for longer
  * than `max_age`. The age of a frame is the difference between CLOCK_REALTIME and the receive time
@@ -30,14 +31,15 @@ static void finish_sii(cat_segment *s) {
     }
 }
 
-/* Send a frame on its interface. If the queue of the interface is full, the frame is lost. */
+/* Send a frame on its interface; return 0 or -errno. If the queue of the interface is full, the frame is
+ * lost. */
 static int packet_send(const int *fds, int end, const uint8_t *frame, uint32_t length) {
     if (fds[end] < 0 || send(fds[end], frame, length, 0) >= 0)
         return 0;
     return errno == ENOBUFS || errno == EAGAIN ? 0 : -errno;
 }
 
-/* Queue a frame that a fault delays, for its interface. */
+/* Queue a frame that a fault delays, for its interface. If the queue is full, drop the frame. */
 static void packet_delay(cat_segment *s, int end, const uint8_t *frame, uint32_t length, int64_t delay) {
     segment_end *e = &s->ends[end];
     if (queue_full(e))
@@ -49,7 +51,7 @@ static void packet_delay(cat_segment *s, int end, const uint8_t *frame, uint32_t
     queue_put(e);
 }
 
-/* Process a frame; return 0 or -errno. */
+/* Process a frame and send it, or queue it if a fault delays it. Return 0 or -errno. */
 static int packet_through(cat_segment *s, const int *fds, int from, uint8_t *frame, uint32_t length) {
     lock(s);
     s->passage = monotonic_now();
@@ -143,7 +145,8 @@ static int packets_due(cat_segment *s, const int *fds, int64_t *next) {
     return 0;
 }
 
-/* Answer up to 64 frames from each interface in turn, and then let the models run. */
+/* Answer up to 64 frames from each interface in turn; return 0 or -errno. The limit lets the models run
+ * under load. */
 static int packets_answer(cat_segment *s, const int *fds, int64_t max_age) {
     int answered = 1;
     for (int burst = 0; burst < 64 && answered; burst++) {

@@ -45,7 +45,7 @@ typedef struct plant {
     int wild;                         /* number, from 1, of the joint that exceeded WILD; 0: none */
     int ending;                       /* real time: the thread must end */
     uint64_t steps;
-    char words[256];                  /* error message of MuJoCo */
+    char words[256];                  /* warning or error message of MuJoCo, which stops the plant */
     jmp_buf escape;                   /* exit from a failed step */
 } plant;
 
@@ -69,7 +69,7 @@ static void plant_apply(plant *p, int64_t now) {
     }
 }
 
-/* Update the encoder values. */
+/* Update the encoder values, and set `wild` if a motor is too fast. */
 static void plant_show(plant *p) {
     for (int k = 0; k < p->count; k++) {
         plant_joint *j = &p->joints[k];
@@ -85,8 +85,8 @@ static void plant_show(plant *p) {
 
 static __thread plant *plant_stepped;  /* the plant that this thread is stepping */
 
-/* Handle a message of MuJoCo. After an error, MuJoCo would end the process. Therefore the handler
- * leaves the step with longjmp. The state of the step is not used again. */
+/* Store the first warning or error of MuJoCo. After an error, MuJoCo would end the process. Therefore the
+ * handler leaves the step with longjmp. The state of the step is not used again. */
 static void plant_message(const mujoco_message *m) {
     plant *p = plant_stepped;
     if (m->level < MUJOCO_WARNING)
@@ -109,8 +109,8 @@ static void plant_simulate(plant *p) {
     p->set_handler(NULL);
 }
 
-/* Do the step that is due. In real time, other threads can run while MuJoCo computes, but they do not
- * pass p->due. */
+/* Do the step that is due. After a failure, stop the plant and wake the service. In real time, other
+ * threads can run while MuJoCo computes, but they do not pass p->due. */
 static void plant_step(cat_segment *s) {
     plant *p = s->plant;
     plant_apply(p, s->now);

@@ -164,7 +164,8 @@ class Plant:
 
         Raises:
             ValueError: The plant already belongs to a segment.
-            ConfigurationError: The joints do not match the axes of the servos.
+            ConfigurationError: The joints do not match the axes of the servos, or MuJoCo cannot
+                simulate the model.
         """
         if self._compiled is not None:
             raise ValueError(
@@ -296,7 +297,7 @@ class Plant:
         self.check()  # the thread prints this error and ends; frames are still answered
 
     def stop(self) -> None:
-        """Stop the thread. The plant does not move until `start`."""
+        """Stop the thread and wait for its end. The plant does not move until `start`."""
         if self._compiled is not None and self._thread is not None:
             self._compiled.end()
             self._thread.join()

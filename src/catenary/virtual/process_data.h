@@ -1,6 +1,7 @@
 /* Process data of a device: copies between its SyncManager buffers and its slots. A slot is a 64-bit
- * number for an object that can be mapped. The application creates the mapping tables on entry to
- * SAFE-OP and checks them against the buffers. The functions here check every range again. */
+ * number for an object of the model. The application creates the mapping tables on entry to SAFE-OP and
+ * checks them against the buffers. Devices without an application create them at power-on. The
+ * functions here check every range again. */
 #ifndef CATENARY_VIRTUAL_PROCESS_DATA_H
 #define CATENARY_VIRTUAL_PROCESS_DATA_H
 

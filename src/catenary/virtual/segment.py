@@ -180,7 +180,13 @@ class Segment:
         return self.open_end(second=False)
 
     def open_end(self, *, second: bool) -> SegmentLink:
-        """Open a link at the first end, or with `second` at the second end of a ring."""
+        """Open a link at the first end, or with `second` at the second end of a ring.
+
+        In real time, the first link starts the service thread. Closing the last link ends it.
+
+        Raises:
+            ValueError: The end already has a link or does not exist.
+        """
         if second in self._links:
             raise ValueError("the segment already has an open link at this end; close it first")
         name = "virtual, second end" if second else "virtual"
@@ -236,14 +242,15 @@ class Segment:
         return self._faults.take_losses()
 
     def unplug(self) -> None:
-        """Unplug the cable between the MainDevice and the first device, so that no frame returns.
+        """Unplug the uplink cables of all devices.
 
-        Unlike with a fault, the controllers detect this immediately.
+        Unlike with a fault, the controllers detect this immediately. The cable between the last
+        device of a ring and the MainDevice stays plugged in.
         """
         self._plug_first(0)
 
     def plug(self, devices: int | None = None) -> None:
-        """Plug in all cables. With `devices`, the line ends after this number of devices."""
+        """Plug in the uplinks of the first `devices` devices (None: all), and unplug the others."""
         self._plug_first(len(self._devices) if devices is None else devices)
 
     def _plug_first(self, devices: int) -> None:

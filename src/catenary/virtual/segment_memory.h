@@ -1,4 +1,4 @@
-/* Creation and destruction of a segment. Only these functions allocate memory. */
+/* Creation and destruction of a segment. Only these functions and `CompiledPlant` allocate memory. */
 #ifndef CATENARY_VIRTUAL_SEGMENT_MEMORY_H
 #define CATENARY_VIRTUAL_SEGMENT_MEMORY_H
 
@@ -16,7 +16,8 @@ static int controller_make(controller *c, uint32_t ram, uint32_t sii_words, int 
     return c->memory && c->sii.image && c->slots && c->axes;
 }
 
-/* Clear all that is lost without power. Properties of the device, EEPROM, crystal and shafts remain. */
+/* Clear all that is lost without power. Properties of the device, its EEPROM, crystal and shafts, and
+ * the loads and STO inputs of its axes remain. */
 static void controller_forget(controller *c) {
     memset(c->memory, 0, c->memory_size);
     memset(c->slots, 0, (size_t)c->slot_count * sizeof *c->slots);
@@ -105,7 +106,7 @@ static void controller_blank(controller *c) {
     ports_reset(c);
 }
 
-/* Remove a device. Its position and its cables remain. */
+/* Remove a device and disconnect its motors from the plant. Its position and its cables remain. */
 static void controller_remove(controller *c) {
     controller empty = {.segment = c->segment, .position = c->position};
     memcpy(empty.ports, c->ports, sizeof empty.ports);

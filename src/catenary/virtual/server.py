@@ -103,7 +103,8 @@ class Server:
             answer all frames.
 
     Raises:
-        LinkError: The interface does not exist, is down, or access is not permitted.
+        LinkError: An interface does not exist, is down or is used twice, or access is not
+            permitted.
         ValueError: An option does not fit the segment or is out of range.
     """
 
@@ -180,7 +181,10 @@ class Server:
             self._started.set()
 
     def wait(self, timeout: float | None = None) -> bool:
-        """Wait up to `timeout` [s] for the end of the packet loop. Return True if it has ended."""
+        """Wait for the end of the packet loop, at most `timeout` [s]; None: no limit.
+
+        Return True if the packet loop has ended.
+        """
         return self._ended.wait(timeout)
 
     def raise_failure(self) -> None:
@@ -192,7 +196,10 @@ class Server:
             self.segment.plant.check()
 
     def stop(self) -> None:
-        """End the packet loop and release the interfaces. A forked child closes only its copies."""
+        """End the packet loop and the service thread, and release the interfaces.
+
+        A forked child closes only its copies of the sockets.
+        """
         if self._socket.fileno() < 0:
             return
         if self._process != os.getpid():
@@ -248,7 +255,9 @@ def serve(
         on_fault: Function to call with each entry of the fault log.
 
     Raises:
-        LinkError: The interface does not exist, is down, or access is not permitted.
+        LinkError: An interface does not exist, is down or is used twice, access is not permitted,
+            or the packet loop failed.
+        ConfigurationError: The simulation of the plant stopped.
         ValueError: An option does not fit the segment or is out of range.
     """
     if with_parent:

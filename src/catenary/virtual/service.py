@@ -38,11 +38,11 @@ class Service:
         core.use_service(self.run)
 
     def at_first_frame(self, action: Callable[[], None]) -> None:
-        """Run `action` once, when the time of the segment starts."""
+        """Set an action that runs once, when the time of the segment starts."""
         self._at_first_frame = action
 
     def run(self) -> int:
-        """Run all pending work and return the time of the next action [ns].
+        """Run all pending work. Return the time of the next action [ns]; FOREVER if there is none.
 
         Stop signals are blocked during the call. Otherwise a KeyboardInterrupt in the MainDevice's
         program could lose a request inside a device.

@@ -115,7 +115,8 @@ static inline int64_t servo_counts(const servo_axis *a) {
     return llrint(a->position * a->counts_per_radian) - a->zero;
 }
 
-/* Return 1 if the drive follows its targets. While bit 12 is hidden, it holds its last demand. */
+/* Return 1 if the drive follows its targets. With bit 12 hidden or never set, it holds its last demand,
+ * unless it has the quirk `follows_without_bit_12`. */
 static inline int servo_follows(const servo_axis *a) {
     return a->quirks.follows_without_bit_12 || !(a->quirks.never_bit_12 || a->bit_12_hidden > 0);
 }

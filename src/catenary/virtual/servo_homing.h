@@ -15,7 +15,7 @@ typedef enum { HOMING_NOT_STARTED, HOMING_SEARCHES, HOMING_ATTAINED, HOMING_FAIL
 
 enum { HOME_HERE_OLD = 35, HOME_HERE = 37, HOME_STOP_POSITIVE = -3, HOME_STOP_NEGATIVE = -4 };
 
-/* Set home to the present position. */
+/* Set home to the present position, and restart the loops there. */
 static void homing_attain(servo_axis *a, const int64_t *slots) {
     a->zero = llrint(a->position * a->counts_per_radian) + slots[SLOT_HOME_OFFSET];
     servo_hold(a);
@@ -46,7 +46,8 @@ static void homing_command(servo_axis *a, const int64_t *slots) {
     a->homing_asked = (uint8_t)asked;
 }
 
-/* Return the torque of mode 6. A search moves at 0x6099:01 with the ramp 0x609A; otherwise hold. */
+/* Return the torque of mode 6. A search moves at 0x6099:01 with the ramp 0x609A, until the axis presses
+ * against the stop, which is then home. Without a search, the axis stops. */
 static double homing_drive(servo_axis *a, const int64_t *slots, double limit, double dt) {
     double speed = 0, step = larger(1e-3, (double)slots[SLOT_HOMING_ACCELERATION] * a->radian_per_velocity) * dt;
     if (a->homing == HOMING_SEARCHES) {

@@ -4,12 +4,13 @@
  *
  * Profile position. A rising edge of controlword bit 4 accepts 0x607A as a new set-point. The drive
  * uses it immediately if bit 5 is set or if no set-point is active. Otherwise it stores the set-point
- * in a buffer for one set-point. With bit 6, it is relative to the last target. Statusword bit 12
- * acknowledges the set-point. It is cleared when controlword bit 4 is 0 and the buffer is free.
+ * in a buffer for one set-point. With bit 6, the set-point is relative to the last target. Statusword
+ * bit 12 acknowledges the set-point. This bit is cleared when controlword bit 4 is 0 and the buffer is
+ * free.
  * Statusword bit 10: the position was within 0x6067 of the target for the time 0x6068. Controlword
  * bit 9 (blending into the next set-point) is ignored.
  * Profile velocity. 0x60FF is the target. Statusword bit 10: the velocity was within 0x606D of the
- * target for the time 0x606E. Statusword bit 12: the speed is below 0x606F.
+ * target for the time 0x606E. Statusword bit 12: the speed is at most 0x606F.
  * Both modes. Halt (controlword bit 8) slows down as 0x605D selects and then holds. Bit 10 then means
  * standstill. When halt is cleared, the motion continues. Included by servo.h. */
 #ifndef CATENARY_VIRTUAL_SERVO_PROFILE_H
@@ -132,7 +133,7 @@ static void profile_drive(servo_axis *a, const int64_t *slots, double dt) {
     profile_reached(a, slots, dt);
 }
 
-/* Return bits 10 to 12 of the statusword. */
+/* Return bits 10 to 13 of the statusword. */
 static uint16_t profile_status(const servo_axis *a, const int64_t *slots) {
     uint16_t word = a->profile.reached ? 0x0400 : 0;
     if (a->mode == PV)

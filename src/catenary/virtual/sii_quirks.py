@@ -17,8 +17,8 @@ class SiiQuirks(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only
     # that is erased after the identity contains 65535.
     mailbox_size: int | None = None
 
-    # Number of entries in the SyncManager category, which is padded with unused entries. A
-    # controller has at most 16 SyncManagers (ESC data sheet, register 0x0800).
+    # Number of entries in the SyncManager category, which is truncated, or padded with unused
+    # entries. A controller has at most 16 SyncManagers (ESC data sheet, register 0x0800).
     sync_managers: int | None = None
 
     # Content of categories 50 and 51. "absent": only the object dictionary lists the PDOs

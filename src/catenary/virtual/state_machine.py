@@ -130,7 +130,7 @@ class StateMachine:
         self._device.show_al_status(state | shown, self._identification if shown else 0)
 
     def report_arrival(self) -> None:
-        """Complete a waiting request for OP, after the first process data or SYNC pulse."""
+        """Check a waiting request for OP again, after the first process data or SYNC pulse."""
         waiting, self._waiting = self._waiting, None
         if waiting is not None and waiting[1] == self._request:
             self._request += 1

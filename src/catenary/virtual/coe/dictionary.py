@@ -206,9 +206,9 @@ class Dictionary:
         return value.to_bytes((bit + 7) // 8, "little")
 
     def write_complete(self, index: int, first: int, data: bytes) -> None:
-        """Write all subindices with complete access.
+        """Write the subindices in `data` with complete access, except those that are read-only.
 
-        Clear subindex 0 first and set it last, as PDO objects require.
+        If subindex 0 is writable, clear it first and set it last, as PDO objects require.
 
         Args:
             index: Index of the object.

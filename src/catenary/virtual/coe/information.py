@@ -28,7 +28,10 @@ def _message(opcode: int, payload: bytes, left: int = 0) -> bytes:
 
 
 class InformationServer:
-    """Server of SDO information requests for one dictionary. `size`: mailbox size [bytes]."""
+    """Server of SDO information requests for one dictionary.
+
+    `size`: mailbox size without its header [bytes].
+    """
 
     def __init__(
         self, dictionary: Dictionary, *, size: int, quirks: MailboxQuirks = NO_MAILBOX_QUIRKS

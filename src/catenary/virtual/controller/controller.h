@@ -1,8 +1,9 @@
 /* Virtual EtherCAT SubDevice controller and its segment: memory, values derived from it for the frame
  * path, and the events that wake the application.
  *
- * Two sides access a controller: frames (the EtherCAT side) and the application (the PDI side). Each
- * access holds the mutex of the segment. Nothing here allocates memory, waits or calls Python. */
+ * Two sides access a controller: frames (the EtherCAT side) and the application (the PDI side). The
+ * frame path holds the mutex of the segment. The application also holds it, except to access single
+ * values or to copy memory. The functions in this file do not allocate memory, wait or call Python. */
 #ifndef CATENARY_VIRTUAL_CONTROLLER_H
 #define CATENARY_VIRTUAL_CONTROLLER_H
 
@@ -31,9 +32,9 @@ enum controller_event {
     EVENT_MAILBOX_READ = 4,          /* SM1 was emptied by the MainDevice */
     EVENT_REPEAT_REQUEST = 8,
     EVENT_WATCHDOG = 16,             /* the process data watchdog expired */
-    EVENT_OUTPUTS = 32,              /* the first process data since the SyncManager was enabled */
-    EVENT_EMERGENCY = 64,            /* a device model has a new error code */
-    EVENT_SYNC_SEEN = 128,           /* the first SYNC0 pulse has arrived */
+    EVENT_OUTPUTS = 32,              /* the first complete process data since `expect_outputs` */
+    EVENT_EMERGENCY = 64,            /* a device model has set or reset its error code */
+    EVENT_SYNC_SEEN = 128,           /* the first SYNC pulse has arrived */
     EVENT_SYNC_MISSED = 256,         /* too many consecutive pulses without new outputs */
     EVENT_SYNC_LOST = 512,           /* the pulses have stopped */
     EVENT_RESET = 1024               /* the MainDevice resets the device */
@@ -90,7 +91,7 @@ typedef struct {
 typedef struct {
     uint64_t next0, next1;           /* system times of the next pulses [ns], modulo 2^64 */
     int64_t due;                     /* segment time of the earlier pulse */
-    uint32_t pulses0, pulses1;       /* numbers of pulses since power-on */
+    uint32_t pulses0, pulses1;       /* numbers of pulses since the controller was created */
     uint8_t active;
     uint8_t awaits0, awaits1;        /* a next pulse is pending */
 } sync_unit;
@@ -272,9 +273,9 @@ typedef struct cat_segment {
     int64_t sii_due;                 /* earliest end of an EEPROM access, for the packet loop */
     int64_t service_due;             /* due time of the service (Python) */
     struct plant *plant;             /* model of the joints that the motors drive; NULL: none */
-    int synchronous;                 /* number of devices that synchronise to SYNC0 */
+    int synchronous;                 /* number of devices that synchronise to SYNC pulses */
     int inputs_stale;                /* set if any controller has stale inputs */
-    int pending;                     /* set if any controller has events */
+    int pending;                     /* set if the service has work, for example events of a controller */
     int event_fd;                    /* event descriptor of the service thread; -1: none */
     const cat_clock *clock;          /* shared virtual clock; NULL: the clock is private */
     int is_virtual;

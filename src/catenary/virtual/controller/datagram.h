@@ -147,8 +147,9 @@ static void registers_written(controller *c, uint32_t first, uint32_t end, const
     clock_registers_written(c, first, end, data, passage);
 }
 
-/* Write registers. Return 1 if any byte was written. The write mask protects the status bits of the
- * SII control word, whose command bits change only after the check. */
+/* Write registers and apply the effects of the write. Return 1 if any byte was written. The write mask
+ * protects the status bits of the SII control word. The other bits of this word can be written only
+ * while the SII is accessible. */
 static int register_write(controller *c, uint32_t address, uint32_t size, const uint8_t *data, int64_t passage) {
     uint8_t activate[MAX_SM], loops = c->memory[REG_DL_CONTROL + 1];
     int done = 0;
@@ -252,8 +253,8 @@ static inline int station_matches(const controller *c, uint16_t station) {
         || ((c->memory[REG_DL_CONTROL + 3] & DL_CONTROL_ALIAS) && load16(c->memory + REG_ALIAS) == station);
 }
 
-/* Process one datagram at one controller. `header` points to its ten bytes, of which ADP is
- * incremented. */
+/* Process one datagram at one controller, and return the increment of the working counter. `header`
+ * points to the ten bytes of its header. Auto-increment and broadcast commands increment ADP. */
 static int datagram_at(controller *c, uint8_t *header, uint32_t size, uint8_t *data, int64_t passage) {
     int command = header[0];
     uint16_t adp = load16(header + 2);
@@ -291,7 +292,8 @@ static void datagram_through(cat_segment *s, const route *r, uint32_t stops, uin
     store16(data + size, counter);
 }
 
-/* Count a malformed frame, with invalid lengths, in every processing unit. */
+/* Count a frame with an invalid type or length, in the segment and in the first `stops` processing
+ * units of the route. */
 static void frame_malformed(cat_segment *s, const route *r, uint32_t stops) {
     s->counters.malformed++;
     for (uint32_t k = 0; k < stops; k++)

@@ -118,7 +118,7 @@ static void dc_reset_filters(controller *c, int64_t when) {
     dc_steer(c, 0, when);
 }
 
-/* Return the system time minus the delay from the reference clock, as a frame carries it. */
+/* Return the system time minus the delay from the reference clock, with scatter, as a frame reads it. */
 static inline uint64_t dc_received_time(controller *c, int64_t when) {
     uint64_t scatter = (uint64_t)crystal_scatter(&c->clock.crystal);
     return (uint64_t)dc_system_time(c, when) + scatter - load32(c->memory + REG_DC_DELAY);
@@ -148,7 +148,8 @@ static void dc_tune(controller *c, double error, double swing, double turn, doub
     x->scatter = scatter;
 }
 
-/* Reset the clock to its state after power-on, except the crystal. `bits`: 0 (no clock), 32 or 64. */
+/* Reset the clock to its state after power-on, except the errors of the crystal. `bits`: 0 (no clock),
+ * 32 or 64. */
 static void dc_power_on(controller *c, int bits) {
     dc_clock *k = &c->clock;
     c->has_dc = (uint8_t)bits;

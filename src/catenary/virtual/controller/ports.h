@@ -2,8 +2,8 @@
  * section II 0x0101, 0x0110, 0x0310).
  *
  * A cable carries light while it is plugged in and both sides have power. A controller detects the
- * loss of light after the time `detection`, and then closes the loop. Until then, it sends frames
- * into the dark cable. New light establishes a link immediately. */
+ * loss of light after the time `detection`. It then closes the loop, unless DL control holds the loop
+ * open. Until then, it sends frames into the dark cable. New light establishes a link immediately. */
 #ifndef CATENARY_VIRTUAL_PORTS_H
 #define CATENARY_VIRTUAL_PORTS_H
 
@@ -18,7 +18,8 @@ static inline int loop_mode_of(const controller *c, int p) {
     return c->fixed_loops ? LOOP_AUTO : c->memory[REG_DL_CONTROL + 1] >> (2 * p) & 3;
 }
 
-/* Update DL status: links in bits 4 to 7; from bit 8 on, loop closed and communication of each port. */
+/* Update DL status: links in bits 4 to 7; from bit 8 on, loop closed and communication of each port.
+ * Set the event bit if the status has changed, and mark the routes as stale. */
 static void ports_show(controller *c) {
     uint8_t *status = c->memory + REG_DL_STATUS;
     uint8_t links = 0, loops = 0;
@@ -145,7 +146,7 @@ static int light_update(cat_segment *s) {
     return darker;
 }
 
-/* Reset to the state after power-on: no link is detected, and all loops wait for a link. */
+/* Reset the ports: no link is detected, and all loops are closed. */
 static void ports_reset(controller *c) {
     for (int p = 0; p < PORTS; p++) {
         c->ports[p].link = 0;

@@ -18,8 +18,9 @@ static uint8_t sii_checksum(const uint8_t *image) {
     return crc;
 }
 
-/* Load the configuration of the controller from the first words, at power-on and for the reload
- * command. The reload command does not change the alias. */
+/* Load the configuration of the controller from the first words of the EEPROM, at power-on and for the
+ * reload command. If the words are missing or their checksum is wrong, set error bits instead. Only the
+ * first successful load sets the alias. */
 static void sii_load(controller *c) {
     uint16_t control = load16(c->memory + REG_SII_CONTROL);
     control &= (uint16_t)~(SII_ERROR_CHECKSUM | SII_ERROR_LOADING);

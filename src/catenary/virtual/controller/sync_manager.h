@@ -32,7 +32,8 @@ static inline void sm_show_status(controller *c, int n) {
     store16(c->memory + REG_ECAT_EVENT, raised ? events | event : events & (uint16_t)~event);
 }
 
-/* Apply a change of the registers of SyncManager n, by either side. */
+/* Apply a change of the registers of SyncManager n, by either side. Empty its buffers if it was
+ * enabled, disabled, blocked or released. */
 static void sm_configured(controller *c, int n) {
     sync_manager *sm = &c->sm[n];
     const uint8_t *r = sm_registers(c, n);
@@ -63,7 +64,8 @@ static inline uint8_t *sm_buffer(controller *c, const sync_manager *sm, uint8_t 
     return c->memory + sm->start + (sm->mailbox ? 0u : (uint32_t)which * sm->length);
 }
 
-/* Return a buffer that is neither the last complete one nor held by the other side. */
+/* Return the number of a buffer that is neither `a` nor `b`: the last complete one, and one in
+ * use. */
 static inline uint8_t sm_free_buffer(uint8_t a, uint8_t b) {
     uint8_t k = 0;
     while (k == a || k == b)
@@ -143,7 +145,8 @@ static inline int sm_ecat_read(controller *c, int n, uint32_t offset, uint32_t s
     return 1;
 }
 
-/* Read a complete buffer from the PDI side. Return the number of bytes, or -1 if there is none. */
+/* Copy the last complete buffer from the PDI side and mark it as read. This empties a mailbox. Return
+ * the number of bytes, or -1 if there is no data or `room` is too small. */
 static inline int sm_pdi_read(controller *c, int n, uint8_t *data, uint32_t room) {
     sync_manager *sm = &c->sm[n];
     if (!sm->enabled || !sm->ecat_writes || sm->length > room || (sm->mailbox && !sm->full) || !sm->written)
@@ -159,7 +162,8 @@ static inline int sm_pdi_read(controller *c, int n, uint8_t *data, uint32_t room
     return sm->length;
 }
 
-/* Return the buffer that the application may write now, or NULL. `sm_pdi_written` publishes it. */
+/* Return the buffer that the application may write now, or NULL. *which receives its number.
+ * `sm_pdi_written` publishes it. */
 static inline uint8_t *sm_pdi_buffer(controller *c, int n, uint8_t *which) {
     sync_manager *sm = &c->sm[n];
     if (!sm->enabled || sm->blocked || sm->ecat_writes || (sm->mailbox && sm->full))
@@ -239,7 +243,8 @@ static int ram_access(controller *c, uint32_t address, uint32_t size, uint8_t *d
     return done;
 }
 
-/* Return a byte of the last complete buffer for a bit-wise write, without side effects. */
+/* Return a byte of process RAM for a bit-wise write, without side effects. In a SyncManager, it is a
+ * byte of the last complete buffer. */
 static inline uint8_t ram_peek(controller *c, uint32_t address) {
     uint32_t run;
     int n = sm_at(c, address, &run);

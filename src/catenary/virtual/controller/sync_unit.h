@@ -48,7 +48,8 @@ static inline uint8_t sync_await(const controller *c, uint64_t *time, uint64_t n
     return ahead <= INT64_MAX;
 }
 
-/* Return the distance from `now` to `time`. A distance of 0 or less means reached. */
+/* Return the distance from `now` to `time`, limited to SYNC_HORIZON in both directions. A distance of 0 or
+ * less means reached. */
 static inline int64_t sync_ahead(uint64_t time, uint64_t now) {
     int64_t ahead = (int64_t)(time - now);
     return ahead < -SYNC_HORIZON ? -SYNC_HORIZON : ahead > SYNC_HORIZON ? SYNC_HORIZON : ahead;
@@ -58,7 +59,7 @@ static inline int sync_reached(int awaits, uint64_t time, uint64_t now) {
     return awaits && sync_ahead(time, now) <= 0;
 }
 
-/* Compute the segment time of the next pulse at the present rate of the clock. */
+/* Schedule the next pulse. Its segment time is computed from the present rate of the clock. */
 static void sync_schedule(controller *c) {
     sync_unit *u = &c->sync;
     u->due = NEVER;
@@ -108,7 +109,8 @@ static void sync_time_jumped(controller *c, int64_t when) {
     sync_schedule(c);
 }
 
-/* Emit SYNC1, which follows a SYNC0 after its cycle time. The next SYNC0 restarts this time. */
+/* Emit SYNC1. Return SYNC_PULSE_1 if the device receives it, or 0. SYNC1 follows a SYNC0 after the time
+ * in 0x09A4. The first SYNC0 after SYNC1 starts this time again. */
 static int sync_pulse1(controller *c) {
     int shown = c->memory[REG_SYNC_ACTIVATION] & SYNC_PULSE_1;
     c->memory[REG_SYNC_ACTIVATION_STATUS] &= (uint8_t)~SYNC_PENDING_1;
@@ -117,8 +119,8 @@ static int sync_pulse1(controller *c) {
     return shown;
 }
 
-/* Return the duration of a pulse. If the next pulse is due before its end, the signal stays active
- * and no further pulses occur (section I §9.2.3.1). */
+/* Return the duration of a pulse, at least SYNC_HOLD_MIN [ns]. If the next pulse is due before the end
+ * of the pulse, the signal stays active and no further pulses occur (section I §9.2.3.1). */
 static inline int64_t sync_hold(const controller *c) {
     int64_t length = 10 * (int64_t)load16(c->memory + REG_SYNC_PULSE_LENGTH);
     return length > SYNC_HOLD_MIN ? length : SYNC_HOLD_MIN;

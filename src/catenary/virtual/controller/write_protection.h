@@ -37,7 +37,8 @@ static void protection_written(controller *c) {
     c->is_protected = (m[REG_WRITE_PROTECTION] | m[REG_ESC_WRITE_PROTECTION]) & 1;
 }
 
-/* Advance the reset sequence, and show its progress in the register. */
+/* Advance the reset sequence, and show its progress in the register. The last value of the sequence
+ * raises EVENT_RESET. */
 static void reset_written(controller *c) {
     static const uint8_t sequence[3] = {0x52, 0x45, 0x53};
     uint8_t value = c->memory[REG_RESET];

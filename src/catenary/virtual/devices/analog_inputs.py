@@ -65,9 +65,9 @@ class AnalogInputs(AppliedDevice):
             alias: Station alias.
             serial: Serial number.
             lrw: True if the device supports LRW.
-            mailbox_bytes: Size of each mailbox.
+            mailbox_bytes: Size of each mailbox [bytes].
             mailbox_delay: Time until a request is answered [s].
-            crystal: Frequency error of the clock.
+            crystal: Frequency error and jitter of the clock.
             clock_bits: Width of the clock, 32 or 64.
             second_pdo: Second PDO of each channel, from 0x1A10 on. "compact": it contains only the
                 value and is not assigned, as in Beckhoff's EL30xx. "twice": it is also assigned,
@@ -163,12 +163,15 @@ class AnalogInputs(AppliedDevice):
     def apply_volts(self, channel: int, volts: float) -> None:
         """Apply a voltage to one channel.
 
+        A voltage out of range is clamped and sets the error bit and a range bit.
+
         Args:
             channel: Channel number, from 0.
             volts: Voltage [V]; full scale is ±10 V.
 
         Raises:
             IndexError: The channel does not exist.
+            ValueError: The device is not in a segment.
         """
         if not 0 <= channel < self.channels:
             raise IndexError(f"channel must be 0 to {self.channels - 1}, not {channel}")

@@ -210,7 +210,7 @@ class Application:
             self.states.fail(SAFE_OP, code)
 
     def send_emergency(self, code: int, data: bytes = b"") -> None:
-        """Send an emergency message, ETG.1000.6 §5.6.4.
+        """Send an emergency message, ETG.1000.6 §5.6.4. A no-op in INIT.
 
         Args:
             code: Error code; 0: the error was reset.

@@ -81,7 +81,7 @@ class Device:
             agenda: Delayed actions of the segment.
 
         Raises:
-            ValueError: The device is already in a segment.
+            ValueError: The device is already in a segment, or the position is occupied.
         """
         if self._core is not None:
             raise ValueError(f"{self.name} is already in a segment; create a new device")
@@ -106,13 +106,16 @@ class Device:
         self.switch_on()
 
     def detach(self) -> None:
-        """Switch the device off and remove it from its segment, so that another can use it."""
+        """Switch the device off and forget its segment. Another segment can then use the device."""
         self.switch_off()
         self._core = self._agenda = None
         self.position = -1
 
     def switch_on(self) -> None:
-        """Switch the power on. The device boots with its stored defaults."""
+        """Switch the power on. The device boots with its stored defaults.
+
+        A no-op if the device has power or is not in a segment.
+        """
         if self._agenda is None or self._scheduler is not None:
             return
         self._scheduler = Scheduler(self._agenda)
@@ -128,7 +131,10 @@ class Device:
         self.core.switch_power(self.position, False)
 
     def reset(self) -> None:
-        """Switch the power off and on again, after the requesting frame has left the device."""
+        """Schedule a power cycle for the time when the requesting frame has left the device.
+
+        A no-op if the device has no power.
+        """
         if self._scheduler is None or self._agenda is None:
             return
         self._scheduler.after(RESET_DELAY_NS, self.switch_off)
@@ -149,8 +155,8 @@ class Device:
     def outputs_taken_ns(self) -> int | None:
         """Time of the last output update on the segment's clock (`segment.now_ns`) [ns].
 
-        Depending on the device, outputs change with the frame, with its internal cycle, or at
-        SYNC0. None: no update since power-on.
+        Depending on the device, outputs change with the frame, with its internal cycle, or at SYNC
+        pulses. None: no update since power-on.
         """
         when = self.core.outputs_at(self.position)
         return None if when == FOREVER else when
@@ -173,7 +179,7 @@ class Device:
         self.core.freeze(self.position, frozen)
 
     def count_errors(self, port: int, *, invalid_frames: int = 0, lost_links: int = 0) -> None:
-        """Increase the error counters of one port, as a bad cable would.
+        """Increase the error counters of one port, as a bad cable would, up to 255.
 
         Args:
             port: Port number, 0 to 3.
@@ -181,7 +187,7 @@ class Device:
             lost_links: Number of lost links to add.
 
         Raises:
-            ValueError: The port does not exist.
+            ValueError: The port does not exist, or the device is not in a segment.
         """
         if not 0 <= port <= 3:
             raise ValueError(f"port must be 0 to 3, not {port}")

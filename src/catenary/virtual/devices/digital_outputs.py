@@ -89,7 +89,7 @@ class DigitalOutputs(Device):
 
     @property
     def outputs(self) -> int:
-        """Output levels; bit 0 is channel 1."""
+        """Output levels; bit 0 is channel 1. 0 while the outputs are off."""
         if not self.core.outputs_valid(self.position):
             return 0
         if self._by_sync0:

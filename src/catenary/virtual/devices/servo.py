@@ -152,12 +152,12 @@ class Servo(AppliedDevice):
             max_velocity: Maximum velocity [rad/s].
             following_error_turns: Following error window [turns].
             position_limits: Software position limits (minimum, maximum) [rad]; None: no limits.
-            mailbox_bytes: Size of each mailbox.
+            mailbox_bytes: Size of each mailbox [bytes].
             mailbox_delay: Time until a request is answered [s].
-            crystal: Frequency error of the clock.
+            crystal: Frequency error and jitter of the clock.
             clock_bits: Width of the clock, 32 or 64.
             lrw: True if the device supports LRW.
-            sync_missed_limit: Number of consecutive SYNC0 pulses without new outputs after which
+            sync_missed_limit: Number of consecutive SYNC pulses without new outputs after which
                 the drive reports a fault.
             quirks: Differences of the drive from the profile.
             mapping_quirks: Quirks of the PDOs.
@@ -437,7 +437,7 @@ class Servo(AppliedDevice):
         return self._motors.state(self.position, 0)[2]
 
     def received(self, axis: int = 0) -> Received:
-        """Return the outputs that the axis currently uses, as raw values."""
+        """Return the present controlword and targets of the axis, as raw values."""
         first = _segment.SLOTS_PER_AXIS * axis
         return Received(*(self.core.slot(self.position, first + slot) for slot in RECEIVED_SLOTS))
 
@@ -455,7 +455,7 @@ class Servo(AppliedDevice):
         self._motors.place(self.position, axis, position)
 
     def apply_load(self, torque: float, axis: int = 0) -> None:
-        """Apply an external torque to the shaft.
+        """Apply an external torque to the shaft, until the next call.
 
         Args:
             torque: Torque [N·m].

@@ -44,7 +44,7 @@ def add_homing(
 
 
 def homing_presets(velocity_per_radian: float) -> tuple[tuple[int, int], ...]:
-    """Return the defaults as (slot, value): method 37, 1 rad/s, 0.2 rad/s and 10 rad/s²."""
+    """Return the defaults as (slot, value): method 37, 1 and 0.2 rad/s, 10 rad/s², 30 % torque."""
     return (
         (_segment.SLOT_HOMING_METHOD, HERE),
         (_segment.SLOT_HOMING_SPEED, round(velocity_per_radian)),

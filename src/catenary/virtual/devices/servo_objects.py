@@ -101,7 +101,9 @@ DEFAULT_TX = (0x6041, 0x6061, 0x606C, 0x6064, 0x6077)
 
 
 def profile_presets(counts: int, velocity_counts: int) -> tuple[tuple[int, int], ...]:
-    """Return the defaults of the profile modes as (slot, value): 10 rad/s and 100 rad/s².
+    """Return the defaults of the profile modes as (slot, value).
+
+    They are 10 rad/s, 100 rad/s², the halt option, and the windows and threshold of bits 10 and 12.
 
     Args:
         counts: Position counts per turn.

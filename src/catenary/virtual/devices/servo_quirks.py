@@ -74,8 +74,9 @@ class ServoQuirks(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_on
     watchdog_trigger: bool = True
 
     # True: the drive refuses SAFE-OP with AL status code 0x001F, "invalid watchdog configuration",
-    # unless the trigger bit is set exactly when the watchdog time is not 0. Source: Beckhoff's
-    # slave stack code (SSC 5.11 to 5.13), ecatslv.c, StartInputHandler.
+    # unless the trigger bit is set exactly when the watchdog is active: its time and divider are
+    # not 0, and the device has outputs. Source: Beckhoff's slave stack code (SSC 5.11 to 5.13),
+    # ecatslv.c, StartInputHandler.
     checks_watchdog: bool = False
 
     def __post_init__(self) -> None:

@@ -104,7 +104,10 @@ class Synchronisation:
     # -- for the state machine -----------------------------------------------------------------
 
     def check(self) -> int:
-        """Return 0, or an AL status code if the clock configuration forbids PRE-OP → SAFE-OP."""
+        """Return 0, or an AL status code if the clock configuration forbids PRE-OP → SAFE-OP.
+
+        Store the period of the pulses for `begin`.
+        """
         self._checked_ns = 0
         by_pdi, activation = self._core.peek(self._position, SYNC_CONTROL, 2)
         switched_on = bool(activation & ACTIVE)
@@ -124,7 +127,7 @@ class Synchronisation:
         return 0
 
     def begin(self) -> None:
-        """Begin the synchronisation on entry to SAFE-OP.
+        """Begin the synchronisation on entry to SAFE-OP. A no-op in free run.
 
         Use the checked values, because frames may have changed the registers in the meantime.
         """
@@ -152,8 +155,8 @@ class Synchronisation:
     def cycle_ns(self) -> int:
         """Period of the signal to which the device synchronises [ns].
 
-        SYNC1 occurs with the first SYNC0 after the time in its register (Beckhoff, ESC data sheet
-        I §9.2.3.5).
+        SYNC1 follows a SYNC0 after the time in 0x09A4. The first SYNC0 after SYNC1 starts this time
+        again (Beckhoff, ESC data sheet I §9.2.3.5).
         """
         sync0_ns = self.sync0_cycle_ns
         if self._synchronous == DC_SYNC0 or not sync0_ns:
