@@ -296,7 +296,11 @@ def decode_pdos(data: bytes) -> tuple[Pdo, ...]:
 
 @dataclass(frozen=True, slots=True)
 class ClockMode:
-    """One mode of distributed clocks (category 60). A cycle time of 0 is the loop's period."""
+    """One mode of distributed clocks (category 60).
+
+    If the cycle time is 0, `sync0_factor` gives SYNC0's cycle: a multiple of the exchange period,
+    or a fraction if negative.
+    """
 
     cycle_time_ns: int = 0
     shift_time_ns: int = 0
