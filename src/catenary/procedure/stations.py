@@ -99,7 +99,7 @@ def bring_all_down(stations: Sequence[Station], state: AlState, timeout: float) 
     Args:
         stations: The devices.
         state: The requested state.
-        timeout: Longest time for all devices together [s].
+        timeout: Longest time of each broadcast request [s]; there are at most two.
 
     Raises:
         StateError: A device stays in a higher state. The message names the first one.
