@@ -1,9 +1,9 @@
 """Start and stop of SYNC signals, ETG.1000.4 §6.8.5 and ETG.1020 §"Distributed clocks".
 
 SYNC signals are started in PRE-OP, because devices check them on the way to SAFE-OP. All devices
-receive the same start time, which must be in the future when the last device receives it. This is
-verified, because a 32-bit clock reaches a past start time again only after 4 s, and a 64-bit clock
-never does.
+receive the same start time plus their shift. It must be in the future when the last device receives
+it. This is verified, because a 32-bit clock reaches a past start time again only after 4 s, and a
+64-bit clock never does.
 """
 
 from __future__ import annotations

@@ -177,7 +177,7 @@ def decode_strings(data: bytes) -> tuple[str, ...]:
 
 
 def encode_fmmus(uses: Sequence[int]) -> bytes:
-    """Return the FMMU category."""
+    """Return the FMMU category. Raises ValueError if a number is not 0 to 255."""
     data = bytes(uses)
     return data + (b"\xff" if len(data) % 2 else b"")
 
