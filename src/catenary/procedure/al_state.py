@@ -100,7 +100,7 @@ def write_control(station: Station, control: AlControl) -> Procedure[None]:
 
 
 def acknowledge(station: Station, pending: DeviceState) -> Procedure[DeviceState]:
-    """Acknowledge an AL error by requesting the present state. Return the state without the error.
+    """Acknowledge an AL error by requesting the present state. Return the new state.
 
     If the standard does not define the present state, INIT is requested.
 

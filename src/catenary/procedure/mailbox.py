@@ -61,7 +61,7 @@ UNEXPECTED_MAX = 64  # unexpected messages in a row; the queues of devices are s
 
 
 def exclusively(channel: MailboxChannel, conversation: Procedure[T]) -> Procedure[T]:
-    """Run a conversation when no other conversation with this device is active.
+    """Wait until no other conversation with this device is active, then run a conversation.
 
     Conversations are never interleaved. They run in the order in which they were started.
 
@@ -201,7 +201,9 @@ def send_only(channel: MailboxChannel, kind: Type, data: bytes) -> Procedure[boo
 
 
 def drain(channel: MailboxChannel, accept: Callable[[Mailbox], T | None]) -> Procedure[list[T]]:
-    """Read all messages in the mailbox without sending a request: late answers, emergencies.
+    """Read the messages in the mailbox without sending a request: late answers, emergencies.
+
+    At most `UNEXPECTED_MAX` messages are read.
 
     Args:
         channel: The mailbox of the device.
@@ -307,10 +309,10 @@ def _fetch(channel: MailboxChannel, deadline: Deadline) -> Procedure[Mailbox | N
 def _poll(channel: MailboxChannel) -> Procedure[tuple[bool, Mailbox | None, int]]:
     """Read the next message, if there is one.
 
-    A small mailbox is read in the same frame as its status, if counters identify repetitions. An
-    empty mailbox does not change, and answers with a working counter of 0. If the frame is lost,
-    the mailbox may have been emptied. Its status is then polled. A repetition is requested only if
-    nothing arrives within a grace period, because some stacks cannot repeat a message.
+    A small mailbox is read in the same frame as its status, if counters identify repetitions. The
+    read has no effect on an empty mailbox, and returns a working counter of 0. If the frame is
+    lost, the mailbox may have been emptied. Its status is then polled. A repetition is requested
+    only if nothing arrives within a grace period, because some stacks cannot repeat a message.
 
     Returns:
         True if there was a message, the message, and the time [ns]. The message is None if there

@@ -70,8 +70,8 @@ def write_downloads(
     Raises:
         MappingError: The device refused the new mapping. The message names the object and the
             alternatives.
-        SdoAbort: The device refused another download. An optional object may be absent, be
-            read-only, or refuse the value.
+        SdoAbort: The device refused another download. Optional objects that are absent, read-only,
+            or refuse the value are skipped.
         ConfigurationError: The value of a start-up object differs after it was written.
     """
     for step in plan.before_mapping:

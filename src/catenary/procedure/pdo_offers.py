@@ -52,9 +52,9 @@ def read_offers(
 ) -> Procedure[DeviceDescription]:
     """Read the PDOs that are not assigned. Return the description with them.
 
-    PDOs and assignments that the device does not allow to change are marked as `fixed`. Use this
-    function for a direction in which requested objects are missing. After a missing or malformed
-    reply, the entries of the remaining PDOs are those of the SII.
+    PDOs and assignments that cannot be changed are marked as `fixed`. Use this function for a
+    direction in which requested objects are missing. After a missing or malformed reply, the
+    entries of the remaining PDOs are those of the SII.
 
     Args:
         channel: The mailbox of the device.

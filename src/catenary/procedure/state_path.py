@@ -62,9 +62,10 @@ def upwards(target: AlState, above: AlState = AlState.INIT) -> tuple[AlState, ..
 def climb(
     station: Station, device: DeviceDescription, target: AlState
 ) -> Procedure[MailboxChannel | None]:
-    """Bring a device to INIT, PRE-OP or BOOT, and configure its mailbox on the way up.
+    """Bring a device to INIT, PRE-OP or BOOT.
 
-    Before PRE-OP, the EEPROM is assigned to the device's processor.
+    On the way up to PRE-OP, its mailbox is configured, and its EEPROM is assigned to its processor.
+    For BOOT, its bootstrap mailbox is configured.
 
     Args:
         station: The device.
