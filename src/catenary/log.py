@@ -67,7 +67,7 @@ class Log:
         | npt.NDArray[np.bool_]
         | npt.NDArray[np.integer[Any]],
     ) -> npt.NDArray[Any] | np.void | Log:
-        """Return a field, shape (cycles,), for a name, a cycle for an index, or a Log for a slice.
+        """Return a field for a name, shape (cycles,); one cycle for an index; a Log for a slice.
 
         A list of indices or a mask also returns a Log.
 

@@ -49,7 +49,7 @@ class Master(Protocol):
         """External master that exchanges the images; None if the loop sends its own frames."""
 
     def scan(self) -> tuple[Sequence[SubDevice], tuple[str, ...]]:
-        """Return the handles of all devices, in PRE-OP, and notes."""
+        """Bring all devices to PRE-OP. Return their handles, and notes about the segment."""
 
     def passive_scan(self, *, names: bool) -> Sequence[DeviceDescription]: ...
 

@@ -54,10 +54,10 @@ class Pending(Generic[T]):
         return self.task.result()
 
     def cancel(self) -> None:
-        """Discard the result. A procedure that has not started does not start.
+        """Discard the result. This has no effect once `done`.
 
-        A transfer in progress continues to its end, because a device must not be left in the
-        middle of one.
+        A procedure that has not started does not start. A transfer in progress continues to its
+        end, because a device must not be left in the middle of one.
         """
         self._cancelled = not self._finished.is_set()
 

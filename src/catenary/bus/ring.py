@@ -41,7 +41,7 @@ class Cuts(NamedTuple):
 
 
 def named(cable: Ends) -> str:
-    """Return a cable as text, by its ends."""
+    """Return the description of a cable: its two ends."""
     first, second = cable
     if first is None:
         return f"the first port and device {second}"

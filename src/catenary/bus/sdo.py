@@ -227,7 +227,7 @@ class Sdo:
         return found
 
     def describe(self, index: int) -> DescribedObject:
-        """Read one object with its entries: types, lengths, access and names.
+        """Read the description of one object and its entries: types, lengths, access and names.
 
         The `notes` of the result name the entries that the device does not describe.
         """

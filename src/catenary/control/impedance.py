@@ -25,7 +25,7 @@ class Impedance:
     commanded and the measured external torque. It includes dry friction.
 
     Without a torque sensor, the observer cannot distinguish friction from a contact. Set
-    `compensation` to the size of the dry friction. To larger torques, the axis then yields like the
+    `compensation` to the size of the dry friction. Larger torques then deflect the axis against the
     spring. With a sensor, pass `external` to the step. The observer then compensates all friction.
 
     Args:

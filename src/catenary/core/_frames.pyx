@@ -179,7 +179,7 @@ cdef int frames_emit(void *self) noexcept nogil:
 
 
 cdef void forget_returns(frames_t *f) noexcept nogil:
-    """Reset the sums of `judge`, after the frames were sent."""
+    """Reset the sums and flags of `judge` after the frames were sent."""
     cdef uint32_t unit
     for unit in range(f.image.unit_count):
         f.units[unit].right = 0

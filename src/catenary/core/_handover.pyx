@@ -2,11 +2,11 @@
 """Hand-over between the cycle and Python: private buffers for Python, and triple buffers
 (native/triple_buffer.h) in both directions, so that values of different cycles are never mixed.
 
-Theory of operation. One block of memory per direction and slot: a header and the arrays of one
-table, items of 8 bytes first. Slots 0 to 2 are exchanged. PRIVATE is Python's own, OF_LAW holds the
-targets of a law, BEFORE_LAW those before its step. `published` counts publications and is the futex
-word on which Python sleeps while `waiting`. `sticky` keeps flags of cycles that Python has not read
-yet.
+Theory of operation. There is one block of memory per direction and slot: a header, then the arrays
+of one table, with items of 8 bytes first. Slots 0 to 2 are exchanged. PRIVATE is Python's own,
+OF_LAW holds the targets of a law, BEFORE_LAW those before its step. `published` counts publications
+and is the futex word on which Python sleeps while `waiting`. `sticky` holds the flags of cycles
+that Python has not read yet.
 
 Budget: 0.1 us per direction for three drives, to copy about 200 bytes.
 """

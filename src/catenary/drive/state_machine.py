@@ -67,7 +67,7 @@ def controlword_towards(
 ) -> int:
     """Return the command bits (0 to 3 and 7) for the next transition towards a requested state.
 
-    A rising edge of bit 7 resets a fault, so the other command bits are cleared first.
+    Before a fault reset (a rising edge of bit 7), the other command bits are cleared.
 
     Args:
         state: present state of the drive; None if the statusword does not encode a valid state.

@@ -293,7 +293,7 @@ cdef int injector_wait_until(void *self, int64_t deadline, int wake_on_frame) no
         if status < 0 or (status == 0 and until == deadline):
             return status
         if injector.inner.now(injector.inner.self) > deadline:
-            return 0                  # lost frames arrive faster than virtual time advances
+            return 0                  # the deadline passed while lost frames kept arriving
 
 
 cdef class FaultInjector(WrapperLink):

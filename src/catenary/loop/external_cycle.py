@@ -162,10 +162,11 @@ class CarriedWatch:
 
 
 def carried(plan: Plan) -> Plan:
-    """Return the plan without frames, because the external master makes them.
+    """Return the plan without frames, because the external master builds them.
 
     Raises:
-        ConfigurationError: The plan needs frames that the external master does not make.
+        ConfigurationError: The plan needs exact matching, which an external master does not
+            support.
     """
     kinds = {datagram.kind for frame in plan.cycle.frames for datagram in frame.datagrams}
     if DatagramKind.CYCLE_NUMBER in kinds:

@@ -122,7 +122,11 @@ class NetworksIteration:
                 mover.step(its.time)
 
     def _judge(self, cycle: NetworksCycle, flags: Sequence[int]) -> None:
-        """Raise the error that ends the loop: too few networks are alive, or one has a fault."""
+        """Update `cycle.alive`, and check the networks.
+
+        Raise an error if too few networks are alive, or if a live one has a fault. If a dead
+        network ends the loop, the axes of the others are stopped first.
+        """
         alive = [self._lives(one, mine) for one, mine in zip(self._sessions, flags, strict=True)]
         cycle.alive = tuple(alive)
         for one, mine, lives in zip(self._sessions, flags, alive, strict=True):

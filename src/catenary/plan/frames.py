@@ -38,7 +38,7 @@ ACYCLIC_GUARD = 0.1  # share of the period without acyclic frames: keeps the nex
 
 @dataclass(frozen=True, slots=True)
 class _Piece:
-    """Datagram before it has a place in a frame. Offsets count from its data."""
+    """Datagram before it has a place in a frame. Offsets count from the start of its data."""
 
     kind: DatagramKind
     command: EcatCommand

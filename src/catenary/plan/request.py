@@ -65,9 +65,10 @@ class WrittenPdo:
 class DistributedClock:
     """Distributed clocks of a device: SYNC signals, in phase with those of all other devices.
 
-    Values of None come from an OpMode of the device's SII. It is the one named `op_mode`, otherwise
-    the first one that starts SYNC0 or, if there is none, SYNC1. Without such an OpMode, SYNC0 fires
-    every period, without shift and SYNC1 (AssignActivate 0x0300).
+    Options that are None come from an OpMode of the device's SII: the one named `op_mode`. Without
+    a name, it is the first one that starts SYNC0 or, if there is none, SYNC1. If there is none of
+    these either, SYNC0 fires every period, without a shift and without SYNC1 (AssignActivate
+    0x0300).
 
     Args:
         op_mode: Name of the OpMode, as in the ESI file; case is ignored.
@@ -78,7 +79,8 @@ class DistributedClock:
             SYNC1 alone.
 
     Raises:
-        ValueError: A time is impossible.
+        TypeError: `op_mode` is not a string.
+        ValueError: A time or `assign_activate` is out of range.
     """
 
     op_mode: str | None = None
@@ -218,7 +220,7 @@ class Views:
     output_bits: Bytes
     output_bytes: Bytes
     unit_valid: Bytes  # (units of the whole plan,) 1 if the unit's last exchange was valid
-    movers: list[Mover] = field(default_factory=list)  # of the whole loop, during their motion
+    movers: list[Mover] = field(default_factory=list)  # active movers of the whole loop
     # Returns True while the loop runs. After the loop, requests have no effect.
     is_open: Callable[[], bool] = lambda: True
     # Returns True while a law or a stream sets the targets

@@ -1,1 +1,5 @@
-"""Conversations with devices, as generators without I/O, clock or retries."""
+"""Conversations with devices, as generators without I/O and without a clock.
+
+Unless its docstring specifies otherwise, a procedure also raises ResponseTimeout if a device does
+not answer in time, and SegmentError if several devices answer to one station address.
+"""

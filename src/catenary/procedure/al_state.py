@@ -58,7 +58,8 @@ def request_state(
         timeout: Time for the change [s]; None for the default of the state.
 
     Raises:
-        StateError: The device refuses or takes too long. The error contains the AL status code.
+        StateError: The device refuses, takes too long, or does not clear a pending error. The
+            exception contains the AL status code.
     """
     before = yield from read_state(station)
     if before.error:
@@ -99,7 +100,9 @@ def write_control(station: Station, control: AlControl) -> Procedure[None]:
 
 
 def acknowledge(station: Station, pending: DeviceState) -> Procedure[DeviceState]:
-    """Acknowledge an AL error by requesting the present state.
+    """Acknowledge an AL error by requesting the present state. Return the new state.
+
+    If the standard does not define the present state, INIT is requested.
 
     A controller with device emulation only copies AL control to AL status. Its error is then a copy
     of the acknowledgement, and a request without acknowledgement clears it.

@@ -57,7 +57,7 @@ class ClockMeasurement:
 
     @property
     def first(self) -> int | None:
-        """Position of the default reference, the first device with a system time, or None."""
+        """Position of the default reference: the first device with a system time, or None."""
         for position, local in enumerate(self.local_times_ns):
             if local is not None:
                 return position
@@ -81,6 +81,10 @@ def measure(
         second_end: In a ring, the port to close during the measurement. In an intact ring, frames
             do not return through the ports. None for a line.
         latches: The number of latches.
+
+    Raises:
+        ClockError: Not all clocks received the broadcast that latches the times, or the port of the
+            ring did not stay closed.
     """
     if second_end is None:
         return (yield from _measure(devices, latches))
@@ -235,7 +239,7 @@ def alignment(device: DeviceDescription, offset: int, delay: int) -> tuple[Reque
 
 
 def filters(station: int | None = None) -> tuple[Request, ...]:
-    """Return the requests that reset the time loop of a device; None for all devices.
+    """Return the requests that reset the time loop of `station`, or of all devices if it is None.
 
     Filter depths are written first, because some controllers apply them when the loop is reset.
     """
@@ -264,7 +268,10 @@ def no_system_time(device: DeviceDescription) -> ClockError:
 
 
 def _latch(clocks: Sequence[DeviceDescription]) -> Procedure[int]:
-    """Latch the receive times of all ports by broadcast, and return the time [ns, link's clock]."""
+    """Latch the receive times of all ports by broadcast, and return the time [ns, link's clock].
+
+    Raises ClockError if fewer devices than `clocks` received the broadcast.
+    """
     [before] = yield [read(EcatCommand.FPRD, clocks[0].station_address, RECEIVE_TIME_LATCH)]
     [reply] = yield [write(EcatCommand.BWR, 0, RECEIVE_TIME_LATCH, 0)]
     if reply.lost or reply.working_counter < len(clocks):

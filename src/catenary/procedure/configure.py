@@ -66,7 +66,7 @@ def configure_process_data(
     """Write the SyncManagers and FMMUs of the process data, and the watchdog.
 
     The device must be in PRE-OP. All process-data SyncManagers are disabled first, because an
-    enabled SyncManager keeps its length.
+    enabled SyncManager keeps its length. Unused FMMUs are cleared, and the watchdog is verified.
 
     Args:
         station: The device.
@@ -74,8 +74,8 @@ def configure_process_data(
         plan: Its plan.
 
     Raises:
-        ConfigurationError: The watchdog registers do not keep the written values, or a control byte
-            of the SII is invalid.
+        ConfigurationError: The watchdog registers or the trigger bits of the SyncManagers do not
+            keep the written values, or a control byte of the SII is invalid.
     """
     planned = plan.layout.sync_managers
     possible = {each.index for each in device.sync_managers if not _is_mailbox(device, each.index)}
@@ -108,7 +108,7 @@ def _watchdog_registers(plan: DevicePlan) -> list[tuple[Register[int], int]]:
 def _verify_watchdog(
     station: Station, plan: DevicePlan, written: list[tuple[Register[int], int]]
 ) -> Procedure[None]:
-    """Verify the watchdog registers and the trigger bits."""
+    """Read back the watchdog registers and trigger bits. Raise an error if one of them differs."""
     outputs = [m for m in plan.layout.sync_managers if m.direction is Direction.OUTPUT]
     expected = [(reg, value, ~0) for reg, value in written]
     expected += [

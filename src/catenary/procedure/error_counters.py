@@ -49,7 +49,9 @@ def read_error_counters(stations: Sequence[Station]) -> Procedure[Totals]:
 
 
 def counted_since(now: Totals, before: Totals) -> tuple[Totals, frozenset[int]]:
-    """Return the counts between two readings, and the devices whose counters restarted.
+    """Return the counts between two readings, and the positions whose counters restarted.
+
+    If a device did not answer the earlier reading, its later counts are returned unchanged.
 
     Args:
         now: The later reading.

@@ -2,8 +2,9 @@
 
 A procedure is a generator. It yields a list of requests and is resumed with the list of replies, in
 the same order. To wait, it yields `after(seconds)` and is resumed with an empty list after that
-time. It never sleeps, retries or accesses a link; its runner does. Its `return` value is the
-result. Its only clock is the time in its replies (`Reply.time_ns`, the link's clock).
+time. It neither sleeps nor accesses a link; its runner does, and also repeats lost requests. The
+`return` value is the result. The only clock is the time in the replies (`Reply.time_ns`, the link's
+clock).
 
     def read_al_status(station):
         [reply] = yield [read(EcatCommand.FPRD, station, AL_STATUS)]

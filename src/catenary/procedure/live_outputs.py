@@ -69,7 +69,8 @@ def find_running(device_count: int) -> Procedure[list[Running]]:
 def find_refreshed(running: Sequence[Running]) -> Procedure[list[int]]:
     """Return the positions of devices in OP whose outputs a master refreshes. Nothing is written.
 
-    This takes at most twice the longest watchdog time. Only devices whose outputs trigger an
+    The search ends when the first such device is found, so others may be missing from the result.
+    It takes at most twice the longest watchdog time. Only devices whose outputs trigger an
     enabled watchdog are checked. Devices in SAFE-OP are not checked, because a watchdog that was
     never triggered looks active.
     """
@@ -97,7 +98,11 @@ def find_refreshed(running: Sequence[Running]) -> Procedure[list[int]]:
 
 
 def _watchdog_time(device: Running) -> Procedure[int]:
-    """Return the watchdog time of a device [ns]; 0 if it is too long or no output triggers it."""
+    """Return the watchdog time of a device [ns]; 0 if the device cannot be checked.
+
+    This is the case if the watchdog is disabled or too long, if no outputs trigger it, or if the
+    device does not answer.
+    """
     count = min(device.sync_managers, SYNC_MANAGER_COUNT)
     replies = yield [
         read(EcatCommand.APRD, -device.position, WATCHDOG_DIVIDER),

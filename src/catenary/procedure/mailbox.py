@@ -61,7 +61,7 @@ UNEXPECTED_MAX = 64  # unexpected messages in a row; the queues of devices are s
 
 
 def exclusively(channel: MailboxChannel, conversation: Procedure[T]) -> Procedure[T]:
-    """Run a conversation when no other conversation with this device is active.
+    """Wait until no other conversation with this device is active, then run a conversation.
 
     Conversations are never interleaved. They run in the order in which they were started.
 
@@ -99,7 +99,8 @@ def converse(
 
     Raises:
         ResponseTimeout: No answer within `timeout`, or too many frames were lost.
-        MailboxError: The device violates the protocol, or answers with a mailbox error.
+        MailboxError: The device violates the protocol, answers with a mailbox error, does not read
+            its mailbox, or is restarted before it answers.
     """
     if channel.owed:
         channel.posted_ns = None
@@ -138,7 +139,8 @@ def further(
         timeout: Longest time until the part arrives [s].
 
     Raises:
-        ResponseTimeout: No answer within `timeout`.
+        ResponseTimeout: No answer within `timeout`, or too many frames were lost.
+        MailboxError: As in `converse`.
     """
     channel.owed = True
     before = channel.dropped
@@ -189,6 +191,9 @@ def send_only(channel: MailboxChannel, kind: Type, data: bytes) -> Procedure[boo
 
     Returns:
         False if the frame was lost. The device may still have received the message.
+
+    Raises:
+        MailboxError: The device does not read its mailbox.
     """
     channel.counter = next_counter(channel.counter)
     message = Mailbox(kind, data, channel.counter).encode(channel.layout.receive_size)
@@ -196,11 +201,19 @@ def send_only(channel: MailboxChannel, kind: Type, data: bytes) -> Procedure[boo
 
 
 def drain(channel: MailboxChannel, accept: Callable[[Mailbox], T | None]) -> Procedure[list[T]]:
-    """Read all messages in the mailbox without sending a request: late answers, emergencies.
+    """Read the messages in the mailbox without sending a request: late answers, emergencies.
+
+    At most `UNEXPECTED_MAX` messages are read.
 
     Args:
         channel: The mailbox of the device.
         accept: Function that converts a message. It returns None for an unexpected message.
+
+    Returns:
+        The converted messages. Emergencies are stored in the channel.
+
+    Raises:
+        MailboxError: A message is invalid or a mailbox error.
     """
     found: list[T] = []
     for _ in range(UNEXPECTED_MAX):  # a device may send without end; the rest is read later
@@ -244,7 +257,7 @@ def _post(channel: MailboxChannel, message: bytes) -> Procedure[tuple[bool, bool
 
 
 def _settle(channel: MailboxChannel) -> Procedure[None]:
-    """Wait for a late answer, so that it is not mistaken for the answer to the next request."""
+    """Wait for a late answer and drop it, so that the next request does not receive it."""
     received = yield from _fetch(channel, Deadline(GRACE))
     if received is not None:
         _drop_late(channel, received)
@@ -273,7 +286,7 @@ def _stuck(channel: MailboxChannel, full: bool) -> MailboxError:
 
 
 def _fetch(channel: MailboxChannel, deadline: Deadline) -> Procedure[Mailbox | None]:
-    """Return the next message of the device; None if the deadline has passed."""
+    """Wait for the next message of the device. Return None if the deadline has passed."""
     pace = Pace(max(POLL, channel.answer_delay_ns * 1e-10))  # a tenth of the expected time
     empty_ns: int | None = None
     while True:
@@ -296,14 +309,14 @@ def _fetch(channel: MailboxChannel, deadline: Deadline) -> Procedure[Mailbox | N
 def _poll(channel: MailboxChannel) -> Procedure[tuple[bool, Mailbox | None, int]]:
     """Read the next message, if there is one.
 
-    A small mailbox is read in the same frame as its status. This does not change an empty mailbox,
-    which answers with a working counter of 0. If the frame is lost, it is unknown whether it
-    emptied the mailbox, so this is done only if counters identify repetitions. The mailbox is then
-    read again. A repetition is requested only if nothing arrives within a grace period, because
-    some stacks cannot repeat a message.
+    A small mailbox is read in the same frame as its status, if counters identify repetitions. The
+    read has no effect on an empty mailbox, and returns a working counter of 0. If the frame is
+    lost, the mailbox may have been emptied. Its status is then polled. A repetition is requested
+    only if nothing arrives within a grace period, because some stacks cannot repeat a message.
 
     Returns:
-        True if there was a message, the message (None for a repetition), and the time [ns].
+        True if there was a message, the message, and the time [ns]. The message is None if there
+        was none, or if it was a repetition.
     """
     careful = not channel.counts or channel.layout.send_size > EAGER_MAX
     if careful or channel.unsure_ns is not None:
@@ -351,7 +364,10 @@ def _read_request(channel: MailboxChannel) -> Request:
 
 
 def _take(channel: MailboxChannel) -> Procedure[Mailbox | None]:
-    """Read the mailbox. Return None if it was empty or contained a repetition."""
+    """Read the mailbox. If the frame is lost, request a repetition.
+
+    Return None if the mailbox was empty or contained a message that was already accepted.
+    """
     for _ in range(RECOVERIES):
         [reply] = yield [_read_request(channel)]
         if not reply.lost:
@@ -383,6 +399,9 @@ def _request_repetition(channel: MailboxChannel) -> Procedure[bool]:
 
     Returns:
         True if the buffer contains a message.
+
+    Raises:
+        MailboxError: The device does not acknowledge the request.
     """
     channel.repeat_requested = not channel.repeat_requested
     channel.repetitions += 1

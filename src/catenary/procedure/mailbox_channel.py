@@ -53,7 +53,7 @@ class MailboxChannel:
     posted_ns: int | None = None  # time of the last request, until its answer arrives
     answer_delay_ns: int = 0  # expected time until the device answers
     unsure_ns: int | None = None  # time of a lost frame that may have emptied the mailbox
-    owed: bool = False  # a request timed out; its answer may still arrive
+    owed: bool = False  # an answer may still arrive: a request is pending or has timed out
     undescribed: int = 0  # number of missing or malformed SDO information answers in a row
     emptied: bool = False  # configured again since the request, so no answer will arrive
 

@@ -30,7 +30,9 @@ TIMEOUT = 5.0  # [s] for all names of one device
 def name_entries(
     channel: MailboxChannel, device: DeviceDescription
 ) -> Procedure[DeviceDescription]:
-    """Return the description, with the names of the assigned entries and PDOs as far as known.
+    """Read the names and data types of the assigned entries, and the names of the assigned PDOs.
+
+    Return the description with those that are known.
 
     Args:
         channel: The mailbox of the device.

@@ -19,7 +19,7 @@ T = TypeVar("T")
 
 TEMPORARY = 1 << 1  # the settings expire after about a second, even if the program is killed
 LOOPS = 8  # first bit of the loop settings, for port 0
-POLLS, PAUSE = 10, 1e-3  # [s] between polls: controllers close a port at the end of a frame
+POLLS, PAUSE = 10, 1e-3  # polls, and [s] between them: a port closes at the end of a frame
 
 
 def as_line(station: Station, port: int, procedure: Procedure[T]) -> Procedure[T]:

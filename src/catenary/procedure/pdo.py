@@ -39,6 +39,9 @@ def read_mapping(
     Args:
         channel: The mailbox of the device.
         device: The description.
+
+    Raises:
+        MappingError: An assigned PDO is in neither the dictionary nor the SII.
     """
     outputs = yield from _read_direction(channel, device, Direction.OUTPUT)
     inputs = yield from _read_direction(channel, device, Direction.INPUT)
@@ -67,7 +70,8 @@ def write_downloads(
     Raises:
         MappingError: The device refused the new mapping. The message names the object and the
             alternatives.
-        SdoAbort: The device refused another download.
+        SdoAbort: The device refused another download. Optional objects that are absent, read-only,
+            or refuse the value are skipped.
         ConfigurationError: The value of a start-up object differs after it was written.
     """
     for step in plan.before_mapping:
@@ -148,6 +152,8 @@ def verify_mapping(
 ) -> Procedure[None]:
     """Read the mapping after it was written, and write the old one back if it differs.
 
+    A direction whose 0x1C1x cannot be read is not verified.
+
     Args:
         channel: The mailbox of the device.
         device: The description with the old mapping.
@@ -177,7 +183,7 @@ def _shape(assignments: tuple[Assignment, ...]) -> tuple[tuple[int, int, int], .
 def _read_direction(
     channel: MailboxChannel, device: DeviceDescription, direction: Direction
 ) -> Procedure[tuple[Assignment, ...] | None]:
-    """Read the assignments; return None if the dictionary has none of this direction."""
+    """Read the assignments; return None if no 0x1C1x of this direction can be read."""
     known = {pdo.index: pdo for pdo in device.pdos(direction)}
     before = {each.sync_manager: each for each in device.assignments(direction)}
     shown = False

@@ -29,7 +29,7 @@ OFFERS_MAX = 64  # number of PDOs read per direction; an EL6731 has 250
 def read_first_mapping(
     channel: MailboxChannel, device: DeviceDescription
 ) -> Procedure[DeviceDescription]:
-    """Return the description with the mapping that the device reports.
+    """Read the mapping that the device reports. Return the description with it.
 
     Notes name the differences from the SII, or the reason why the mapping of the SII is used.
 
@@ -50,10 +50,11 @@ def read_first_mapping(
 def read_offers(
     channel: MailboxChannel, device: DeviceDescription, direction: Direction
 ) -> Procedure[DeviceDescription]:
-    """Return the description with the PDOs that are not assigned, and with `fixed` flags.
+    """Read the PDOs that are not assigned. Return the description with them.
 
-    Use this for a direction in which requested objects are missing. After a missing or malformed
-    reply, the entries of the remaining PDOs are those of the SII.
+    PDOs and assignments that cannot be changed are marked as `fixed`. Use this function for a
+    direction in which requested objects are missing. After a missing or malformed reply, the
+    entries of the remaining PDOs are those of the SII.
 
     Args:
         channel: The mailbox of the device.
@@ -84,9 +85,10 @@ def read_offers(
 def read_values(
     channel: MailboxChannel, device: DeviceDescription, places: Sequence[tuple[int, int]]
 ) -> Procedure[DeviceDescription]:
-    """Return the description with the values of some objects, which a plan displays.
+    """Read some objects, which a plan displays. Return the description with their values.
 
-    After a missing or malformed reply, the remaining objects are not read.
+    The value is None if the device refuses. After a missing or malformed reply, the remaining
+    objects are not read.
 
     Args:
         channel: The mailbox of the device.

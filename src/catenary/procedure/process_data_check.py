@@ -15,6 +15,8 @@ from catenary.wire.datagram import EcatCommand
 def probe_inputs(areas: Mapping[int, tuple[int, int]]) -> Procedure[tuple[int, ...]]:
     """Return the positions of the devices that do not insert their inputs.
 
+    A device whose frame is lost is not reported.
+
     Args:
         areas: Inputs of each device as (logical address, size [bytes]), by position.
     """

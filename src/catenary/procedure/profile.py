@@ -33,6 +33,8 @@ def read_profile(
 ) -> Procedure[DeviceDescription]:
     """Read the device type and the slots of CiA 402 axes. Return the description with them.
 
+    The description is unchanged if the device refuses to read its device type.
+
     Args:
         channel: The mailbox of the device.
         device: The description.
@@ -53,10 +55,11 @@ def read_profile(
 def read_object(
     channel: MailboxChannel, device: DeviceDescription, index: int, subindex: int
 ) -> Procedure[ObjectInformation]:
-    """Read the description of a dictionary entry. Its bit length is 0 if it does not exist.
+    """Read the description of a dictionary entry.
 
-    If the device does not describe the entry (SDO information), the length is that of its value.
-    Only the device can then decide whether the entry can be mapped.
+    If the device does not describe the entry (SDO information), the length is that of its value, or
+    0 if the device refuses to read it. Only the device can then decide whether the entry can be
+    mapped.
 
     Args:
         channel: The mailbox of the device.

@@ -16,7 +16,7 @@ from catenary.wire.register import STATION_ADDRESS
 
 
 def visit(device_count: int) -> Procedure[tuple[StationRegisters, ...]]:
-    """Read the registers of all devices. Present station addresses are kept if they are unique."""
+    """Replace missing and duplicate station addresses, then read the registers of all devices."""
     found = yield from read_addresses(device_count)
     addresses = distinct(found)
     yield from give_addresses(found, addresses)

@@ -42,8 +42,8 @@ class Presence(NamedTuple):
 def find_devices(at_most: int) -> Procedure[list[Presence]]:
     """Return the present devices, by position.
 
-    The result is empty if devices appear or disappear at the same time. Try again later. In a cut
-    ring, the devices after the cut are counted but have no position.
+    The result is empty if a frame is lost, or if devices appear or disappear at the same time. Try
+    again later. In a cut ring, the devices after the cut are counted but have no position.
 
     Args:
         at_most: Maximum number of devices to read.
@@ -98,7 +98,10 @@ def identify(station: Station) -> Procedure[Identity]:
 
 
 def bring_to_pre_op(station: Station, channel: MailboxChannel | None) -> Procedure[None]:
-    """Bring a device from any state through INIT to PRE-OP, and clear its configuration.
+    """Bring a device from any state through INIT to PRE-OP.
+
+    In INIT, its FMMUs, SyncManagers and SYNC signals are cleared, its mailbox is configured, and
+    its EEPROM is assigned to its processor.
 
     Args:
         station: The device.

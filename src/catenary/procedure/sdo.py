@@ -64,8 +64,8 @@ def upload(
 
     Raises:
         SdoAbort: The device refuses the transfer.
-        MailboxError: The device announces more than `limit` bytes, sends more than announced, or
-            takes longer than `timeout`.
+        MailboxError: The device announces more than `limit` bytes, takes longer than `timeout`, or
+            violates the protocol.
     """
     return exclusively(channel, _upload(channel, index, subindex, complete_access, limit, timeout))
 
@@ -168,6 +168,7 @@ def download(
 
     Raises:
         SdoAbort: The device refuses the transfer.
+        MailboxError: The device violates the protocol.
     """
     return exclusively(channel, _download(channel, index, subindex, data, complete_access))
 

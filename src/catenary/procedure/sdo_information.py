@@ -92,6 +92,7 @@ def read_object_list(
 
     Raises:
         SdoAbort: The device refuses the request.
+        MailboxError: The answer is invalid.
     """
     data, cut = yield from _ask(channel, list_request(kind), Opcode.LIST_RESPONSE, (0, 0))
     indices = _understood(channel, decode_object_list, data).indices
@@ -115,6 +116,7 @@ def read_object_description(channel: MailboxChannel, index: int) -> Procedure[Ob
 
     Raises:
         SdoAbort: The device refuses the request.
+        MailboxError: The answer is invalid.
     """
     data, _ = yield from _ask(channel, object_request(index), Opcode.OBJECT_RESPONSE, (index, 0))
     return _understood(channel, decode_object_description, data)
@@ -133,6 +135,7 @@ def read_entry_description(
 
     Raises:
         SdoAbort: The device refuses the request.
+        MailboxError: The answer is invalid.
     """
     request = entry_request(index, subindex, info)
     data, _ = yield from _ask(channel, request, Opcode.ENTRY_RESPONSE, (index, subindex))
@@ -149,6 +152,10 @@ def describe_object(channel: MailboxChannel, index: int) -> Procedure[DescribedO
     Args:
         channel: The mailbox of the device.
         index: The index of the object.
+
+    Raises:
+        SdoAbort: The device refuses to describe the object.
+        MailboxError: The description of the object is invalid.
     """
     description = yield from read_object_description(channel, index)
     single = description.object_code == ObjectCode.VAR
@@ -208,6 +215,10 @@ def list_objects(
     Args:
         channel: The mailbox of the device.
         kind: The kind of list.
+
+    Raises:
+        SdoAbort: The device refuses to list its objects.
+        MailboxError: The list is invalid.
     """
     indices, note = yield from read_object_list(channel, kind)
     found: list[ObjectDescription] = []

@@ -1,8 +1,7 @@
 """Read access to the SII, ETG.1000.4 §6.4 (interface) and ETG.1000.6 §5.4 (content).
 
 Only the used words of the header and the requested categories are read. Known words are not read
-again.
-If an EEPROM is ready by the next frame, the frame that fetches a word also contains the read
+again. If an EEPROM is ready by the next frame, the frame that fetches a word also contains the read
 command for the next one.
 """
 
@@ -46,12 +45,15 @@ _EIGHT_BYTES = ControlStatus(eight_bytes=True).word
 def read_image(station: Station, *, wanted: Collection[int] = WANTED) -> Procedure[bytes]:
     """Read the image up to the end mark.
 
-    Unread words of the header are zero. Categories that are not wanted are omitted. If
-    there is no end mark, as in an unprogrammed EEPROM, the categories are truncated.
+    Unread words of the header are zero. Categories that are not wanted are omitted. If there is no
+    end mark, as in an unprogrammed EEPROM, the categories are truncated.
 
     Args:
         station: The device.
         wanted: Types of the categories to read.
+
+    Raises:
+        EepromError: The EEPROM cannot be read.
     """
     reader = _Reader(station)
     image = bytearray(2 * HEADER_WORDS)
@@ -76,6 +78,9 @@ def read_words(station: Station, first: int, count: int) -> Procedure[bytes]:
         station: The device.
         first: Address of the first word.
         count: Number of words.
+
+    Raises:
+        EepromError: The EEPROM cannot be read.
     """
     return (yield from _Reader(station).words(first, count))
 

@@ -29,10 +29,10 @@ class Extent(NamedTuple):
 
 
 def read_extent(station: Station) -> Procedure[Extent]:
-    """Return the size of an EEPROM.
+    """Read the size of an EEPROM.
 
     The size is in the header. If the header is damaged, the image ends at the end mark. Without an
-    end mark, as in an unprogrammed EEPROM, a small limit is returned.
+    end mark, as in an unprogrammed EEPROM, the size is at most `CAUTIOUS`.
     """
     [reply] = yield [read(EcatCommand.FPRD, station.address, SII_CONTROL_STATUS)]
     word = SII_CONTROL_STATUS.unpack(answered(reply, station, "SII status"))
@@ -58,7 +58,7 @@ def read_extent(station: Station) -> Procedure[Extent]:
 def _wraps(station: Station, header: bytes) -> Procedure[bool]:
     """Return True if the content repeats after the range of one address byte.
 
-    Emulated EEPROMs (KickCAT, other processors) accept two address bytes without reporting it.
+    Emulated EEPROMs (KickCAT, other processors) support two address bytes, but do not report this.
     """
     beyond = yield from read_words(station, SMALL // 2, PROBE_WORDS)
     return beyond == header[: 2 * PROBE_WORDS]

@@ -66,7 +66,8 @@ def write_words(station: Station, wanted: Sequence[Change]) -> Procedure[None]:
         wanted: The words to write.
 
     Raises:
-        EepromError: A word could not be written. The message names the first such word.
+        EepromError: A word could not be written. The message names it. Later words are not written.
+        ValueError: An address or a value has more than 16 bits.
     """
     for each in wanted:
         yield from write_word(station, each)

@@ -1,6 +1,6 @@
 """State changes of one device through intermediate states, ETG.1000.6 §6.4.1.
 
-On the way up, no state may be skipped, and the device is configured before each request. On the way
+On the way up, no state may be skipped, and the device is configured between the states. On the way
 down, all intermediate states may be skipped.
 """
 
@@ -46,7 +46,9 @@ def path(now: AlState | None, target: AlState) -> tuple[AlState, ...]:
 
 
 def upwards(target: AlState, above: AlState = AlState.INIT) -> tuple[AlState, ...]:
-    """Return the states after `above` up to `target`; empty if `target` is lower.
+    """Return the states after `above` up to `target`; only BOOT if `target` is BOOT.
+
+    The result is empty if `target` is not higher than `above`.
 
     Args:
         target: The last state.
@@ -62,13 +64,20 @@ def climb(
 ) -> Procedure[MailboxChannel | None]:
     """Bring a device to INIT, PRE-OP or BOOT.
 
+    On the way up to PRE-OP, its mailbox is configured, and its EEPROM is assigned to its processor.
+    For BOOT, its bootstrap mailbox is configured.
+
     Args:
         station: The device.
         device: Its description.
         target: The final state.
 
     Returns:
-        The mailbox of the device if it was configured, otherwise None.
+        The standard mailbox of the device if it was configured, otherwise None.
+
+    Raises:
+        StateError: The device refuses a state or takes too long.
+        EepromError: The device has no bootstrap mailbox, which BOOT requires.
     """
     channel = None
     before = (yield from read_state(station)).state

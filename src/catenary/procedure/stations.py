@@ -99,7 +99,7 @@ def bring_all_down(stations: Sequence[Station], state: AlState, timeout: float) 
     Args:
         stations: The devices.
         state: The requested state.
-        timeout: Longest time for all devices together [s].
+        timeout: Longest time of each broadcast request [s]; there are at most two.
 
     Raises:
         StateError: A device stays in a higher state. The message names the first one.
@@ -132,7 +132,10 @@ def _all_to(state: AlState, timeout: float) -> Procedure[bool]:
 
 
 def _request_all(word: int, timeout: float) -> Procedure[bool]:
-    """Write AL control until the OR of all AL status words is `word`, with or without an error.
+    """Write AL control until all devices accept it, then wait for the state in AL status.
+
+    Return True if the OR of all AL status words is `word`, or `word` without bit 4. Return False if
+    the reply is lost or `timeout` [s] has passed.
 
     A controller rejects AL control until its application has read the previous one. The working
     counter is then too small, and the request is repeated for all devices.

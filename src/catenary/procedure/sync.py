@@ -1,9 +1,9 @@
 """Start and stop of SYNC signals, ETG.1000.4 §6.8.5 and ETG.1020 §"Distributed clocks".
 
 SYNC signals are started in PRE-OP, because devices check them on the way to SAFE-OP. All devices
-receive the same start time, which must be in the future when the last device receives it. This is
-verified, because a 32-bit clock reaches a past start time again only after 4 s, and a 64-bit clock
-never does.
+receive the same start time plus their shift. It must be in the future when the last device receives
+it. This is verified, because a 32-bit clock reaches a past start time again only after 4 s, and a
+64-bit clock never does.
 """
 
 from __future__ import annotations
@@ -69,6 +69,9 @@ def bring_together(
         follow: The clock that all others follow.
         second_end: In a ring, the port that is wired to the second interface; None for a line.
 
+    Returns:
+        The measurement of the clocks.
+
     Raises:
         ClockError: The clocks cannot be set up.
     """
@@ -90,8 +93,9 @@ def rejoin(
     delay_ns: int,
     epoch_ns: int,
 ) -> Procedure[None]:
-    """Set the clock of a device that was switched off, while all other clocks run.
+    """Set the clock of a device that was switched off, and start its SYNC signals.
 
+    All other clocks keep running.
     The system times of the device and of its peers are read in the same frame. Their difference is
     the offset.
 
@@ -104,7 +108,7 @@ def rejoin(
         epoch_ns: Present system time minus the link's time [ns].
 
     Raises:
-        ClockError: None of the peers answers.
+        ClockError: None of the peers answers, or the SYNC signals do not start in time.
     """
     device = devices[position]
     resets = filters(device.station_address)

@@ -30,8 +30,8 @@ class Signal:
     def set(self) -> bool:
         """Release the task once, as soon as its period allows. This never blocks.
 
-        Return False if 64 releases are already pending. This one is then dropped and counted.
-        Raises RuntimeError if no task has this trigger.
+        Return False if 64 releases are already pending. The new release is then dropped and
+        counted. Raises RuntimeError if no task has this trigger.
         """
         if self._ends is None:
             if self._place is None:

@@ -214,7 +214,7 @@ def _ros_name(name: str) -> str:
     It begins with a letter, and contains lower-case letters, digits and single underscores.
     """
     plain = re.sub(r"[^a-z0-9]+", "_", name.lower()).strip("_")
-    # Readers make Python classes from the definitions, so a keyword is not usable as a name.
+    # MCAP readers generate Python classes from the definitions, so a keyword cannot be a name.
     usable = plain[:1].isalpha() and not keyword.iskeyword(plain)
     return plain if usable else f"x_{plain}".rstrip("_")
 

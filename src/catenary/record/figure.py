@@ -1,4 +1,4 @@
-"""Figures of a recording with matplotlib: one row per axis, with the cycle timing below.
+"""Figures of a recording, drawn with matplotlib: one row per axis, with the cycle timing below.
 
 The module does not use pyplot. It therefore has no global state and opens no window.
 """

@@ -59,7 +59,7 @@ def rms(values: Floats) -> Floats:
 
 
 def largest(values: Floats) -> Floats:
-    """Return the largest magnitude of each column, without NaN."""
+    """Return the largest magnitude of each column, ignoring NaN and infinity; 0 if none is left."""
     return np.asarray(np.abs(values).max(axis=0, where=np.isfinite(values), initial=0.0))
 
 

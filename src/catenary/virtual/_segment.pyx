@@ -331,7 +331,7 @@ cdef class Core:
         self._at(position).outputs_valid = valid
 
     def expect_outputs(self, int position):
-        """Raise EVENT_OUTPUTS when the next complete process data arrives."""
+        """Arm EVENT_OUTPUTS for the next complete process data."""
         self._at(position).outputs_seen = 0
 
     def outputs_seen(self, int position):

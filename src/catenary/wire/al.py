@@ -108,7 +108,7 @@ def states_in(word: int) -> frozenset[AlState]:
 
 @dataclass(frozen=True, slots=True)
 class StatusCode:
-    """An AL status code: the text of the standard, and the most frequent cause."""
+    """An AL status code: the text of the standard, and a frequent cause or a hint."""
 
     code: int
     text: str

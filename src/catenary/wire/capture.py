@@ -8,7 +8,7 @@ from catenary.wire.pcapng import Capture, decode_pcapng
 
 
 def decode_capture(data: bytes) -> Capture:
-    """Decode a file. Raises DecodeError if the format is unknown.
+    """Decode a file. Raises DecodeError if the format is unknown or the content is invalid.
 
     A truncated last packet is omitted.
     """

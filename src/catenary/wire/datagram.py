@@ -25,7 +25,7 @@ class EcatCommand(IntEnum):
     LRD = 10  # logical address, through the FMMUs
     LWR = 11
     LRW = 12
-    ARMW = 13  # the addressed device reads, all others write
+    ARMW = 13  # the addressed device inserts data, all others store data
     FRMW = 14
 
     @property
@@ -132,7 +132,7 @@ class Datagram:
 
 
 def decode_datagram(data: bytes, offset: int = 0) -> tuple[Datagram, bool]:
-    """Decode the datagram at `offset`. Return it, and True if another one follows.
+    """Decode the datagram at `offset`. Also return True if another datagram follows.
 
     Args:
         data: The bytes of a frame.

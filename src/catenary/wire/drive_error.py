@@ -105,7 +105,10 @@ ERROR_CODES: dict[int, str] = {
 
 
 def error_text(code: int) -> str:
-    """Return the text of an error code, or of its group (0x7380 belongs to "sensor")."""
+    """Return the text of an error code, or of its group (0x7380 belongs to "sensor").
+
+    For an unknown group, return "unknown error".
+    """
     for known in (code, code & 0xFFF0, code & 0xFF00, code & 0xF000):
         if known in ERROR_CODES:
             return ERROR_CODES[known]

@@ -116,7 +116,7 @@ def encode_frame(
 
 
 def decode_frame(data: bytes) -> Frame:
-    """Decode a frame. Raises DecodeError with the reason if it is not an EtherCAT frame."""
+    """Decode a frame. Raises DecodeError if it is not an EtherCAT frame or is invalid."""
     if reason := _why_alien(data):
         raise DecodeError(f"not an EtherCAT frame: {reason}")
     length = int.from_bytes(data[ETHERNET_HEADER_SIZE:HEADER_SIZE], "little") & 0x07FF

@@ -31,7 +31,7 @@ def is_pcap(data: bytes) -> bool:
 
 
 def decode_pcap(data: bytes) -> Capture:
-    """Decode a file. Raises DecodeError if it is not a pcap file."""
+    """Decode a file. Raises DecodeError if it is not a pcap file or its header is truncated."""
     form = _format(data)
     if form is None:
         raise DecodeError(f"not a pcap file: magic number {data[:4].hex() or 'missing'}")

@@ -128,7 +128,7 @@ def encode_statistics(time_ns: int, *, received: int, dropped: int) -> bytes:
 
 
 def decode_pcapng(data: bytes) -> Capture:
-    """Decode a file. Raises DecodeError if it is not a pcapng file.
+    """Decode a file. Raises DecodeError if it is not a pcapng file or a block is invalid.
 
     A truncated last block is omitted.
     """
@@ -149,7 +149,7 @@ def decode_pcapng(data: bytes) -> Capture:
 
 @dataclass(slots=True)
 class _State:
-    """Owner of the interfaces and packets that were decoded so far."""
+    """Interfaces and packets that were decoded so far."""
 
     interfaces: list[Interface] = field(default_factory=list)
     packets: list[Packet] = field(default_factory=list)
@@ -187,7 +187,10 @@ class _Block(NamedTuple):
 
 
 def _blocks(data: bytes) -> Iterator[_Block]:
-    """Yield every complete block. Raises DecodeError if the first one is incomplete."""
+    """Yield every complete block.
+
+    Raises DecodeError if a block is invalid, or if the first block is incomplete.
+    """
     offset, order = 0, ""
     while offset < len(data):
         if offset + _MINIMUM_BLOCK > len(data):

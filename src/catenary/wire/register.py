@@ -1,7 +1,8 @@
-"""Register map of an EtherCAT SubDevice Controller (ESC). Each register is defined once.
+"""Register map of an EtherCAT SubDevice Controller (ESC).
 
 The sources are ETG.1000.4 §6 and Beckhoff's ESC data sheet, section II (register descriptions).
-Indexed registers are functions: `fmmu(k)`, `sync_manager(k)`, `receive_time(port)`.
+Indexed registers are functions, such as `fmmu(k)` or `receive_time(port)`. They raise ValueError if
+the index is out of range.
 """
 
 from __future__ import annotations
@@ -25,7 +26,7 @@ PROCESS_RAM = 0x1000  # start of the memory for mailboxes and process data
 class Register(Generic[T]):
     """One register: its address, its name, and the `struct` format of its value.
 
-    A register with several fields is a `Register[bytes]`. A separate module converts its fields.
+    A block of several values is a `Register[bytes]`. Other modules convert its fields.
     """
 
     address: int

@@ -118,7 +118,7 @@ def decode_sdo_information(data: bytes) -> SdoInformation:
 
 
 def list_request(kind: ListType) -> SdoInformation:
-    """Return the request for the indices of all objects of a kind."""
+    """Return the request for an object list: the indices of all objects of a kind."""
     return SdoInformation(Opcode.LIST_REQUEST, struct.pack("<H", kind))
 
 
@@ -185,7 +185,7 @@ class ObjectDescription:
 
 
 def decode_object_description(data: bytes) -> ObjectDescription:
-    """Decode the data of an OBJECT_RESPONSE."""
+    """Decode the joined data of all OBJECT_RESPONSE fragments."""
     if len(data) < _OBJECT.size:
         raise DecodeError(f"object description: needs {_OBJECT.size} bytes, received {len(data)}")
     name = bytes(data[_OBJECT.size :]).decode("latin-1")
@@ -195,7 +195,7 @@ def decode_object_description(data: bytes) -> ObjectDescription:
 
 @dataclass(frozen=True, slots=True)
 class EntryDescription:
-    """Description of an entry. `rest` contains the fields selected by `info`, then the name."""
+    """Description of an entry. `rest` contains the optional fields in `info`, then the name."""
 
     index: int
     subindex: int

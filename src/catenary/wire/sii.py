@@ -91,7 +91,7 @@ _NO_AREA = MailboxArea()
 
 @dataclass(frozen=True, slots=True)
 class Header:
-    """The first 64 words.
+    """Header of an image: the first 64 words.
 
     The device receives messages in the `receive` areas and sends messages in the `send` areas.
     """
@@ -273,7 +273,7 @@ class Sii:
 
     @property
     def clock_modes(self) -> tuple[ClockMode, ...]:
-        """Modes of distributed clocks; the first is the default."""
+        """Modes of distributed clocks, in the order of the image."""
         return self._join(CategoryType.DISTRIBUTED_CLOCKS, decode_clock_modes)
 
     def _join(self, kind: CategoryType, decode: Callable[[bytes], tuple[T, ...]]) -> tuple[T, ...]:

@@ -177,7 +177,7 @@ def decode_strings(data: bytes) -> tuple[str, ...]:
 
 
 def encode_fmmus(uses: Sequence[int]) -> bytes:
-    """Return the FMMU category."""
+    """Return the FMMU category. Raises ValueError if a number is not 0 to 255."""
     data = bytes(uses)
     return data + (b"\xff" if len(data) % 2 else b"")
 
@@ -296,7 +296,11 @@ def decode_pdos(data: bytes) -> tuple[Pdo, ...]:
 
 @dataclass(frozen=True, slots=True)
 class ClockMode:
-    """One mode of distributed clocks (category 60). A cycle time of 0 is the loop's period."""
+    """One mode of distributed clocks (category 60).
+
+    If the cycle time is 0, `sync0_factor` gives SYNC0's cycle: a multiple of the exchange period,
+    or a fraction if negative.
+    """
 
     cycle_time_ns: int = 0
     shift_time_ns: int = 0

@@ -28,7 +28,10 @@ class Direction(IntEnum):
 
 
 class Status(IntFlag):
-    """Bits of the status byte (offset 5). Bits 4 and 5 show the last buffer written."""
+    """Bits of the status byte (offset 5).
+
+    Bits 4 and 5 are the number of the last written buffer, from 0; 3 if none was written.
+    """
 
     INTERRUPT_WRITE = 0x01
     INTERRUPT_READ = 0x02
@@ -59,7 +62,8 @@ class PdiControl(IntFlag):
 class Control:
     """The control byte (offset 4), which the SII contains as well.
 
-    Bits 0 to 3 select the mode. Bits 4 to 6 enable interrupts and the watchdog trigger.
+    Bits 0 and 1 select the buffering mode, bits 2 and 3 the direction. Bits 4 to 6 enable
+    interrupts and the watchdog trigger.
     """
 
     buffering: Buffering
@@ -81,7 +85,7 @@ class Control:
 
     @classmethod
     def from_byte(cls, byte: int) -> Control:
-        """Return the decoded byte. Bit 7 is ignored. Raises DecodeError if the mode is invalid."""
+        """Return the decoded byte; bit 7 is ignored. Raises DecodeError for an invalid mode."""
         try:
             buffering, direction = Buffering(byte & 0x03), Direction(byte >> 2 & 0x03)
         except ValueError as error:
@@ -90,7 +94,7 @@ class Control:
         return cls(buffering, direction, bool(byte & 0x10), bool(byte & 0x20), watchdog)
 
 
-# The values are 0x26, 0x22, 0x64 and 0x20.
+# The values of the four bytes are 0x26, 0x22, 0x64 and 0x20.
 MAILBOX_OUT = Control(Buffering.MAILBOX, Direction.WRITE, interrupt_pdi=True)
 MAILBOX_IN = Control(Buffering.MAILBOX, Direction.READ, interrupt_pdi=True)
 OUTPUTS = Control(Buffering.THREE_BUFFERS, Direction.WRITE, interrupt_pdi=True, watchdog=True)
