@@ -387,7 +387,12 @@ class Drives(Request):
             Handle of the move, as for `move_to`.
 
         Raises:
-            ValueError, IndexError, DriveError, ConfigurationError, RuntimeError: As for `move_to`.
+            ValueError: A goal or rate is not valid or beyond a limit, a rate has no default,
+                `axes` is empty, or the mode is neither CSP nor PP.
+            IndexError: An axis does not exist.
+            DriveError: An axis is not enabled, or a law or a stream sets its targets.
+            ConfigurationError: `jerk` is given, and ruckig is not installed or finds no motion.
+            RuntimeError: The loop is not open.
         """
         chosen = self._movable(axes)
         moves = self._moving()
