@@ -94,7 +94,7 @@ class FrequencyResponse:
 
     `frequency` (k,) is in Hz. `response` (k,) is the complex ratio of output to input. `coherence`
     (k,), 0 to 1, is the part of the output power that depends linearly on the input. The response
-    is reliable where the coherence is close to 1. It is not finite where the input has no signal.
+    is reliable where the coherence is close to 1, and NaN where the input has no signal.
     """
 
     frequency: Row

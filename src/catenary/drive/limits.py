@@ -209,8 +209,8 @@ def _deceleration(
 ) -> Chosen:
     """Return the deceleration from the option, from a plausible 0x6085, or from BRAKE_TIME.
 
-    Without any velocity limit, return the default. Raise ConfigurationError if `velocity_limit` is
-    infinite.
+    Without any velocity limit, return the default, or raise ConfigurationError if `velocity_limit`
+    is infinite.
     """
     if options.deceleration_limit is not None:
         return _given(options.deceleration_limit)

@@ -141,7 +141,7 @@ def default_acceleration(axis: Axis) -> float | None:
 
 
 def default_velocity(axis: Axis) -> float | None:
-    """Return the velocity limit; None without one, or if the application gave `math.inf`."""
+    """Return the velocity limit; None if there is none, or if the application gave `math.inf`."""
     return None if axis.options.velocity_limit == math.inf else axis.bounds.velocity.value
 
 

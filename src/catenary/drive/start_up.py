@@ -89,7 +89,7 @@ def _check_quick_stop(axis: Axis) -> None:
 def downloads(axis: Axis, sub: SubDevice, period_ns: int) -> tuple[tuple[int, int, bytes], ...]:
     """Return the objects to write at the start-up: mode, 0x60C2, ramps and homing settings.
 
-    The call reads the mode and 0x60C2 by SDO. Objects with the right value are not written.
+    The call reads the mode and 0x60C2 by SDO, and omits each that already has the right value.
 
     Args:
         axis: the axis.
