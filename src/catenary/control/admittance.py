@@ -34,6 +34,9 @@ class NaturalAdmittance:
         velocity_gain: gain of the velocity loop [N·m·s/rad].
         limit: largest torque, in both directions [N·m].
 
+    Raises:
+        ValueError: A value is NaN or out of range, or the number of values is wrong.
+
     Source: Newman, Stability and performance limits of interaction controllers, ASME J. Dyn. Sys.
     Meas. Control 114(4), 1992; Newman and Zhang, Stable interaction control and Coulomb friction
     compensation using natural admittance control, J. Robotic Systems 11(1), 1994.

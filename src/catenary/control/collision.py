@@ -21,14 +21,17 @@ THRESHOLD_GAINS = 2  # limit, time
 class Residual:
     """Settings of a generalized-momentum observer, which estimates the external torque.
 
-    The estimate needs only torque and velocity. It follows the external torque as a first-order
-    low-pass.
+    The estimate does not need a measured acceleration. It follows the external torque as a
+    first-order low-pass.
 
     Args:
         axes: number of axes.
         gain: bandwidth of the observer [1/s].
         inertia: inertia of each axis [kg·m²], for `residual`. `model_residual` uses the inertia of
             its model instead.
+
+    Raises:
+        ValueError: A value is NaN or out of range, or the number of values is wrong.
 
     Source: r = K (p - ∫ (τ + Cᵀ q̇ - g + r) dt) with p = M q̇. De Luca and Mattone, Sensorless robot
     collision detection and hybrid force/motion control, ICRA 2005; Haddadin, De Luca and
@@ -72,7 +75,7 @@ def residual(
         dt: time since the previous step [s].
 
     Returns:
-        Estimate of the external torque [N·m].
+        Estimate of the external torque [N·m]; 0 in the first step.
 
     Raises:
         ValueError: `parameters` belongs to a different block.
@@ -104,10 +107,11 @@ def model_residual(
         position: measured positions (n,) [rad].
         velocity: measured velocities (n,) [rad/s].
         dt: time since the previous step [s].
-        external: output, estimates of the external torques (n,) [N·m].
+        external: output, estimates of the external torques (n,) [N·m]; 0 in the first step.
 
     Raises:
-        ValueError: The parameters or the model do not fit.
+        ValueError: `parameters` or `model` belongs to a different block, or the model has another
+            number of joints.
     """
     n = len(position)
     for i in range(n):
@@ -123,7 +127,11 @@ def model_residual(
 def observed(
     memory: Row, m: int, parameters: Row, i: int, impulse: float, velocity: float, dt: float
 ) -> float:
-    """Integrate r' = K (impulse / dt - r) implicitly, which is stable for any gain and period."""
+    """Integrate r' = K (impulse / dt - r) implicitly, which is stable for any gain and period.
+
+    Return the estimate r, which is 0 in the first step. Raise ValueError if `parameters` belongs to
+    a different block.
+    """
     if parameters[0] != RESIDUAL:
         raise ValueError("residual: not the parameters of a Residual")
     gain = parameters[1 + RESIDUAL_GAINS * i]
@@ -145,6 +153,9 @@ class Threshold:
         axes: number of axes.
         limit: largest accepted magnitude, in the unit of the value.
         time: accepted duration beyond the limit [s].
+
+    Raises:
+        ValueError: A value is NaN or out of range, or the number of values is wrong.
     """
 
     axes: int
@@ -169,7 +180,7 @@ class Threshold:
 
 @compiles
 def threshold(memory: Row, parameters: Row, i: int, value: float, dt: float) -> bool:
-    """Return True if a value has exceeded its limit for longer than the accepted time.
+    """Compute one step of axis `i`.
 
     Args:
         memory: `Threshold.memory`.
@@ -177,6 +188,9 @@ def threshold(memory: Row, parameters: Row, i: int, value: float, dt: float) -> 
         i: number of the axis.
         value: quantity to compare; its sign does not matter.
         dt: time since the previous step [s].
+
+    Returns:
+        True if the value has exceeded its limit for longer than the accepted time.
 
     Raises:
         ValueError: `parameters` belongs to a different block.

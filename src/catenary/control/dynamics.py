@@ -37,8 +37,9 @@ class Dynamics:
         armature: inertia to add to each joint [kg·m²], one value or one per axis.
 
     Raises:
-        ConfigurationError: MuJoCo is not installed, the file is not a valid model, or a joint is
-            missing or is neither a hinge nor a slide.
+        ConfigurationError: MuJoCo is not installed, the file is not a valid model, a joint is
+            missing, given twice, or neither a hinge nor a slide, or their number is not `axes`.
+        ValueError: `armature` is negative or NaN, or has a wrong number of values.
 
     Source: MuJoCo's `mj_inverse` (Featherstone's recursive Newton-Euler, computed in C).
     """
@@ -84,7 +85,11 @@ class Dynamics:
         return np.array([KIND, *addresses, *counts, *np.ravel(model.places)], dtype=np.float64)
 
     def gravity(self, position: Vector) -> Row:
-        """Return the torque (n,) [N·m] that holds the arm still at `position` (n,) [rad]."""
+        """Return the torque (n,) [N·m] that holds the arm still at `position` (n,) [rad].
+
+        Raises:
+            ValueError: `position` does not have one number per joint.
+        """
         return self._solve(self._checked("position", position), 0.0, 0.0)
 
     def inverse(self, position: Vector, velocity: Vector, acceleration: Vector) -> Row:
@@ -183,7 +188,7 @@ def check(memory: Row, n: int) -> None:
 
 @compiles
 def solve(memory: Row, position: Row, torque: Row) -> None:
-    """Call `mj_inverse` at `position`.
+    """Call `mj_inverse` at `position`, and write its torques to `torque`.
 
     The caller has already written velocities and accelerations.
     """

@@ -20,6 +20,9 @@ class FeedForward:
         axes: number of axes.
         inertia: inertia of each axis [kg·m²].
         damping: damping of each axis [N·m·s/rad].
+
+    Raises:
+        ValueError: A value is NaN or out of range, or the number of values is wrong.
     """
 
     axes: int
@@ -67,6 +70,9 @@ class Friction:
         coulomb: dry friction [N·m].
         transition: velocity range in which the dry friction changes its sign, about
             ± `transition` [rad/s].
+
+    Raises:
+        ValueError: A value is NaN or out of range, or the number of values is wrong.
 
     Source: Armstrong-Hélouvry, Dupont and Canudas de Wit, A survey of models, analysis tools and
     compensation methods for the control of machines with friction, Automatica 30(7), 1994; tanh

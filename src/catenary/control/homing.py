@@ -53,6 +53,9 @@ class Homing:
         travel: longest travel without a stop [rad].
         time: time for which the torque must last [s].
         clearance: distance from the open stop at which an axis has returned [rad].
+
+    Raises:
+        ValueError: A value is NaN or out of range, or the number of values is wrong.
     """
 
     axes: int
@@ -97,7 +100,8 @@ def homing(
         dt: time since the previous step [s].
 
     Returns:
-        Velocity set-point [rad/s].
+        Velocity set-point [rad/s]; 0 while the axis waits for the others, and when homing has
+        ended.
 
     Raises:
         ValueError: `parameters` belongs to a different block.
@@ -137,7 +141,10 @@ def stops(memory: Row) -> Stops:
 def next_stage(
     memory: Row, parameters: Row, i: int, n: int, position: float, torque: float, dt: float
 ) -> float:
-    """Return the stage of axis `i` after this step."""
+    """Return the stage of axis `i` after this step.
+
+    The step counts the time at the torque, and stores the position of a stop that it finds.
+    """
     m, p = STATES * i, 1 + NUMBERS * i
     stage: float = memory[m]
     direction = direction_of(stage)
@@ -172,8 +179,9 @@ def direction_of(stage: float) -> float:
 
 @compiles
 def pressed(memory: Row, m: int, parameters: Row, p: int, forward: float, dt: float) -> bool:
-    """Return True if the torque in the direction of motion indicates a stop.
+    """Return True if the torque has indicated a stop for the required time.
 
+    The call adds `dt` to this time, or resets the time if the torque is too small.
     `forward` is the torque times the signed opening velocity and the direction of motion.
     """
     if forward < parameters[p + 1] * abs(parameters[p]):

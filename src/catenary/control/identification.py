@@ -29,6 +29,10 @@ class Chirp:
         last: frequency at the end [Hz].
         duration: duration of the sweep [s]. The value is zero afterwards.
 
+    Raises:
+        ValueError: A value is NaN or out of range, the number of values is wrong, or `first` and
+            `last` of an axis are equal.
+
     Source: Farina, Simultaneous measurement of impulse response and distortion with a swept-sine
     technique, AES 108, 2000.
     """
@@ -62,6 +66,8 @@ class Chirp:
 def chirp(parameters: Row, i: int, time: float) -> float:
     """Return the value of the sweep, A sin(2π f₀ T / ln(f₁/f₀) ((f₁/f₀)^(t/T) - 1)).
 
+    Before the start and after the duration T, the value is 0.
+
     Args:
         parameters: `Chirp.parameters`.
         i: number of the axis.
@@ -87,8 +93,8 @@ class FrequencyResponse:
     """Frequency response of one axis at k frequencies.
 
     `frequency` (k,) is in Hz. `response` (k,) is the complex ratio of output to input. `coherence`
-    (k,), 0 to 1, is the part of the output that depends linearly on the input. The response is
-    reliable where the coherence is close to 1.
+    (k,), 0 to 1, is the part of the output power that depends linearly on the input. The response
+    is reliable where the coherence is close to 1, and NaN where the input has no signal.
     """
 
     frequency: Row
@@ -124,8 +130,8 @@ def frequency_response(
         Response and coherence at the frequencies above 0 Hz.
 
     Raises:
-        ValueError: The input and output differ in length, the period is not positive, or the
-            segment does not fit at least twice.
+        ValueError: The input and output differ in shape, the period is not positive, or the
+            segment has fewer than 8 samples or does not fit at least twice.
 
     Source: H₁ = S_xy / S_xx by Welch's method with Hann windows, the mean of each segment removed;
     coherence `|S_xy|² / (S_xx S_yy)`. Bendat and Piersol, Random Data, ch. 6 and 9.

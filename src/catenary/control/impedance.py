@@ -13,7 +13,7 @@ from catenary.control.pid import limited
 
 KIND = 7.0
 GAINS = 7  # stiffness, damping, inertia, friction, bandwidth, compensation, limit
-STATES = 3  # initialised, state of the filter, previous torque
+STATES = 3  # initialised, state of the filter, previous torque without the feed-forward
 
 
 @dataclass(frozen=True)
@@ -37,6 +37,10 @@ class Impedance:
         bandwidth: bandwidth of the observer [rad/s]; 0 disables the observer.
         compensation: largest torque that the observer compensates [N·m].
         limit: largest torque, in both directions [N·m].
+
+    Raises:
+        ValueError: A value is NaN or out of range, the number of values is wrong, or an axis with
+            an observer has no inertia.
 
     Source: Ohnishi, Shibata and Murakami, Motion control for advanced mechatronics, IEEE/ASME
     Transactions on Mechatronics 1(1), 1996 (disturbance observer); Hogan, Impedance control, ASME
@@ -121,9 +125,10 @@ def impedance(
 def disturbance(
     memory: Row, m: int, parameters: Row, p: int, external: float, velocity: float, dt: float
 ) -> float:
-    """Estimate the disturbance d = Q(s) (u + external - (m s + b) v) with Q = w / (s + w).
+    """Return the disturbance d = Q(s) (u + external - (m s + b) v) with Q = w / (s + w).
 
-    The equivalent form z = Q (u + external + (m w - b) v), d = z - m w v needs no derivative.
+    The equivalent form z = Q (u + external + (m w - b) v), d = z - m w v needs no derivative. The
+    result is 0 in the first step, and for a bandwidth of 0.
     """
     inertia, viscous, bandwidth = parameters[p], parameters[p + 1], parameters[p + 2]
     if bandwidth == 0.0:

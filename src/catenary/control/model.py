@@ -42,6 +42,8 @@ def load_model(
 ) -> Model:
     """Load a model and select its joints.
 
+    Contacts, joint limits and dry friction are disabled, and `armature` is added to the joints.
+
     Args:
         path: MJCF or URDF file.
         joints: names of the joints, in the order of the axes; None for all.
@@ -49,7 +51,9 @@ def load_model(
         armature: inertia to add to each joint [kg·m²].
 
     Raises:
-        ConfigurationError: MuJoCo, the file or a joint is missing, or an axis cannot move a joint.
+        ConfigurationError: MuJoCo, the file or a joint is missing, the file is not a valid model,
+            the joints do not match `axes`, or an axis cannot move a joint.
+        ValueError: `armature` is negative or NaN, or has a wrong number of values.
     """
     mujoco = _mujoco()
     native = _native(mujoco, path)

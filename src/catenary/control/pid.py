@@ -31,7 +31,8 @@ class Pid:
         limit: largest output, in both directions.
         rate: largest change of the output per second.
         derivative_time: time constant of the low-pass of the derivative [s].
-        tracking_time: time constant of the anti-windup [s]; None for proportional / integral.
+        tracking_time: time constant of the anti-windup [s]; None for proportional / integral, or
+            for no anti-windup if `integral` is 0.
 
     Raises:
         ValueError: A value is NaN or out of range, or the number of values is wrong.
@@ -94,7 +95,8 @@ def pid(
         i: number of the axis.
         reference: target value.
         measured: measured value.
-        feed_forward: value to add to the output. The limits apply to the sum.
+        feed_forward: value to add to the output. The limits apply to the sum. The rate limit of the
+            first step starts from this value.
         dt: time since the previous step [s].
 
     Returns:

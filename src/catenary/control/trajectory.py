@@ -133,8 +133,8 @@ def trajectory(
         Motion from the start to the last goal.
 
     Raises:
-        ValueError: A goal is outside the limits, the axes cannot stop within them, or a number is
-            NaN. The message names the axis and the limit.
+        ValueError: The start or a goal is outside the limits, the axes cannot stop within them, an
+            argument is not valid, or ruckig finds no motion.
         ConfigurationError: ruckig is not installed.
 
     Source: Berscheid and Kröger, Jerk-limited real-time trajectory generation with arbitrary target

@@ -36,7 +36,7 @@ def axis_sources(subs: Iterable[AxisSource]) -> list[tuple[SubDevice, int]]:
     """Return (SubDevice, slot) of every axis. A SubDevice without a slot means all of its slots.
 
     Raises:
-        TypeError: `subs` is not a list, or an element is neither a SubDevice nor a tuple.
+        TypeError: `subs` is not iterable, or an element is neither a SubDevice nor a tuple.
         ValueError: The list is empty, an axis is given twice, or a device is not a drive.
     """
     if not isinstance(subs, Iterable):
@@ -89,7 +89,7 @@ def axis_names(
         names: names from the application; None for the default names.
 
     Raises:
-        ValueError: The number of names is wrong, or a name is used twice.
+        ValueError: `names` is a string, their number is wrong, or a name is used twice.
     """
     if names is None:
         return tuple(axis_name(sub, slot) for sub, slot in sources)
@@ -101,7 +101,11 @@ def axis_names(
 
 
 def axis_modes(first: str, others: Sequence[str]) -> tuple[Mode, ...]:
-    """Return the modes of an axis without duplicates, starting with `first`."""
+    """Return the modes of an axis without duplicates, starting with `first`.
+
+    Raises:
+        ValueError: A mode is unknown.
+    """
     return tuple(dict.fromkeys(mode_of(name) for name in (first, *others)))
 
 
@@ -222,8 +226,9 @@ def named_columns(columns: Columns) -> dict[str, AxisObject]:
     """Return the objects of the option `columns` by name.
 
     Raises:
-        TypeError: An object is neither a Channel nor (index, subindex, type).
-        ValueError: A column without an object has an unknown name.
+        TypeError: An object is neither a Channel nor (index, subindex, type[, scale]), or its type
+            is not numeric.
+        ValueError: A column without an object has an unknown name, or a number is out of range.
     """
     named: dict[str, AxisObject] = {}
     for column in columns.items() if isinstance(columns, Mapping) else columns:
@@ -244,7 +249,9 @@ def force_and_torque(
     torques: Sequence[float | None],
     metres_per_turn: Sequence[float | None],
 ) -> tuple[float | None, ...]:
-    """Return the force limit [N] of each linear axis, the torque limit [N·m] of each rotary axis.
+    """Return one limit per axis: a force [N] if it is linear, a torque [N·m] if it is rotary.
+
+    A limit that is not given is None.
 
     Args:
         forces: option `force_limit` of each axis.
@@ -272,7 +279,10 @@ def force_and_torque(
 
 
 def _axis_object(name: str, spec: ColumnSpec) -> AxisObject:
-    """Return the object of a column. It is an output if CiA 402 or the Channel defines it so."""
+    """Return the object of a column.
+
+    The object of a Channel is an output if CiA 402 or the Channel defines it as one.
+    """
     if isinstance(spec, AxisObject):
         return spec
     channel = make_channel("columns", name, spec)

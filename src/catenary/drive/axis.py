@@ -61,7 +61,7 @@ class Axis:
 
     @property
     def uses_torque(self) -> bool:
-        """True if the request includes a torque."""
+        """True if the axis measures, limits or commands a torque, or has one as a column."""
         return "torque" in self.measured or self.needs_torque
 
     @property
@@ -79,7 +79,7 @@ class Axis:
         """Limits and reactions in force.
 
         Raises:
-            ConfigurationError: A required limit is unknown.
+            ConfigurationError: velocity_limit is infinite and no deceleration is known.
         """
         homing_offset = None if self.homing is None else self.homing.offset_counts(self.units)
         own = own_limits(self.settings, self.units, homing_offset)
@@ -158,7 +158,12 @@ class Axis:
         return optional - set(self.columns.values())
 
     def plan(self, layout: ImageLayout) -> AxisPlan:
-        """Return the axis for the core. It also uses objects that are mapped without a request."""
+        """Return the axis for the core, including objects that are mapped without a request.
+
+        Raises:
+            MappingError: The controlword or the statusword is not in the process data.
+            ConfigurationError: velocity_limit is infinite and no deceleration is known.
+        """
         bounds = self.bounds
         assert bounds.acceleration.value is not None
         assert bounds.deceleration.value is not None
@@ -194,8 +199,8 @@ class Axis:
     def _demand(self, layout: ImageLayout, mode: Mode, wanted: AxisObject) -> Number | None:
         """Return the place of a demand value; None if it is not mapped or the mode is not used.
 
-        The axis never requests a demand value, because the request could change a mapping that is
-        sufficient without it.
+        Only the application can request a demand value, as a column. A request by the axis could
+        change a mapping that is sufficient without this value.
         """
         used = mode in self.modes or (mode is Mode.CSP and self.holds_on_loss)
         return self._place(layout, wanted) if used else None
@@ -208,7 +213,9 @@ class Axis:
         return self._place(layout, wanted)
 
     def maps(self, wanted: AxisObject, layout: ImageLayout) -> bool:
-        """Return True if an object is in the process data.
+        """Return True if an object is in the process data and its scale is known.
+
+        The scale of a torque is unknown without the rated torque.
 
         Args:
             wanted: object of the axis.

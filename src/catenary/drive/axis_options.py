@@ -34,7 +34,7 @@ LIMITS = tuple(field.name for field in fields(LimitOptions))
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class AxisOptions:
-    """Options of `Drives` with one value for all axes, or a sequence of one per axis."""
+    """Options of `Drives` with one value for all axes, or a sequence with one per axis."""
 
     mode: PerAxis[str]
     counts_per_turn: PerAxis[float]
@@ -61,12 +61,17 @@ class AxisOptions:
         return per_axis(name, getattr(self, name), n)
 
     def units(self, n: int) -> list[AxisUnits]:
-        """Return the scales of n axes."""
+        """Return the scales of n axes. Raises ValueError if an option is not valid."""
         rows = zip(*(self.each(name, n) for name in UNITS), strict=True)
         return [AxisUnits(**dict(zip(UNITS, row, strict=True))) for row in rows]
 
     def limits(self, n: int) -> list[LimitOptions]:
-        """Return the limits of n axes. The force limit of a linear axis is in `torque_limit`."""
+        """Return the limits of n axes. The force limit of a linear axis is in `torque_limit`.
+
+        Raises:
+            ValueError: The number of values is wrong, or a force or torque limit does not fit the
+                axis.
+        """
         columns = {name: self.each(name, n) for name in LIMITS}
         columns["torque_limit"] = force_and_torque(
             self.each("force_limit", n), columns["torque_limit"], self.each("metres_per_turn", n)
@@ -100,7 +105,8 @@ def make_axes(
         common: Options that all axes share.
 
     Raises:
-        ValueError: An option is impossible, or a required one is missing.
+        TypeError: The option `pdos` or `start_up` has the wrong type.
+        ValueError: An option is not valid, or a required one is missing.
     """
     n = len(sources)
     units, limits = options.units(n), options.limits(n)

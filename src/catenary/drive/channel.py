@@ -107,6 +107,7 @@ class Channel:
         Raises:
             TypeError: The type needs an integer.
             ValueError: The value is out of the range of the type, or is not finite.
+            OverflowError: The value is infinite, and the type is an integer with a scale.
         """
         number = value if self.scale is None else value / self.scale
         if isinstance(self.type, Boolean):
@@ -167,7 +168,8 @@ def make_channels(option: str, specs: Mapping[str, ChannelSpec]) -> dict[str, Ch
 def channel_of(entry: Entry, scale: float | None = None) -> Channel:
     """Return the channel of a mapped entry.
 
-    An entry of unknown type becomes BOOL if it has one bit, otherwise an unsigned integer.
+    If the type of the entry is unknown or has another length, the channel is BOOL for one bit.
+    Otherwise it is an integer of the length of the entry, signed only if the known type is signed.
 
     Args:
         entry: mapped entry.

@@ -149,12 +149,15 @@ def unique_names(parts: list[tuple[str, str, str]]) -> list[str]:
 
 
 def short_name(entry: str, pdo: str, position: str) -> str:
-    """Return the name of the entry, such as "Output"."""
+    """Return the name of the entry, such as "Output"; without one, that of the PDO, or "value"."""
     return entry or pdo or "value"
 
 
 def pdo_name(entry: str, pdo: str, position: str) -> str:
-    """Return the names of the PDO and the entry, such as "Channel 3 Output"."""
+    """Return the names of the PDO and the entry, such as "Channel 3 Output".
+
+    Without both, return "value".
+    """
     return f"{pdo} {entry}".strip() or "value"
 
 

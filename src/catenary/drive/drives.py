@@ -105,12 +105,13 @@ class Drives(Request):
     - `torque_limit` [N·m], or `force_limit` [N] for a linear axis.
     - `step_limit` [rad]: largest difference between two CSP set-points. A larger step is refused.
       The default is twice the distance in one exchange at `velocity_limit`, and at least 0.1 rad
-      (5 mm). The option is required if `velocity_limit` is infinite.
+      (5 mm). The option is required in CSP if `velocity_limit` is infinite.
 
     Reactions to a loss of set-points. They do not change the set-points that you write:
 
     - `deceleration_limit` [rad/s²]: the default is a plausible 0x6085 of the drive, otherwise
-      `velocity_limit` / 0.25 s.
+      `velocity_limit` / 0.25 s. If `velocity_limit` is infinite and the drive has no plausible
+      limit either, the option is required.
     - `acceleration_limit` [rad/s²]: the default is the deceleration. It also limits the moves,
       which use `velocity_limit` / 0.25 s if this option is not given.
     - `torque_slope` [N·m/s]: slope of the torque in CST on the return to the set-points. By
@@ -118,6 +119,9 @@ class Drives(Request):
     - `on_loss`: reaction when the core stops an axis: "quick_stop" (default), "disable", or
       "csp_hold" (change to CSP and hold the position). It is required in CST if the quick stop of
       the drive (0x605A) does not brake.
+
+    Before a loop is open, the state of the axes and all requests raise RuntimeError. After the loop
+    is closed, requests raise it again.
 
     Raises:
         TypeError: An option has the wrong type.
@@ -271,7 +275,10 @@ class Drives(Request):
     # The next call of `next(loop)` commits these requests together with the targets.
 
     def enable(self, axes: Axes = ALL) -> None:
-        """Request that axes be enabled. Each axis starts from its actual position."""
+        """Request that axes be enabled, after a fault reset if an axis is in fault.
+
+        Each axis starts from its actual position.
+        """
         self._request("enable", RequestedState.ENABLED, axes)
 
     def disable(self, axes: Axes = ALL) -> None:
@@ -283,7 +290,7 @@ class Drives(Request):
         self._request("quick_stop", RequestedState.QUICK_STOP, axes)
 
     def reset_faults(self, axes: Axes = ALL) -> None:
-        """Request a fault reset for the axes in fault. No axis moves before `enable`."""
+        """Request a fault reset for the axes in fault. They stay disabled until `enable`."""
         chosen = set(self._numbers(axes))
         self._request("reset_faults", RequestedState.RESET, sorted(chosen & set(self.faults)))
 
@@ -291,6 +298,7 @@ class Drives(Request):
         """Request a change of the mode of operation.
 
         Until the drive reports the new mode, it continues in the old mode without fresh set-points.
+        A halt that a failed move has left set is cleared.
 
         Args:
             mode: the start mode or one of `other_modes`.
@@ -298,6 +306,7 @@ class Drives(Request):
 
         Raises:
             ValueError: The mode is unknown, or the axis was made without it.
+            IndexError: An axis does not exist.
             RuntimeError: The loop is not open.
         """
         new_mode = mode_of(mode)
@@ -334,8 +343,8 @@ class Drives(Request):
             position: goal [rad or m]; one value, or one for each of `axes`.
             velocity: largest velocity [rad/s or m/s]; None for `velocity_limit`.
             acceleration: acceleration and deceleration [rad/s² or m/s²]; None for
-                `acceleration_limit`, otherwise `velocity_limit` / 0.25 s.
-            jerk: largest jerk [rad/s³ or m/s³]; None for a trapezoid. A value needs
+                `acceleration_limit`, or for `velocity_limit` / 0.25 s if there is no such limit.
+            jerk: largest jerk [rad/s³ or m/s³]; None for a trapezoid. Only for CSP. A value needs
                 `pip install 'catenary[traj]'`.
             axes: numbers of the axes.
 
@@ -343,9 +352,12 @@ class Drives(Request):
             Handle of the move: pass it to `loop.wait`, or poll its `done`.
 
         Raises:
-            ValueError: A goal or rate is beyond a limit, or the mode is neither CSP nor PP.
-            DriveError: An axis is not enabled.
-            ConfigurationError: `jerk` is given and ruckig is not installed.
+            ValueError: A goal or rate is not valid or beyond a limit, a rate has no default,
+                `axes` is empty, or the mode is neither CSP nor PP.
+            IndexError: An axis does not exist.
+            DriveError: An axis is not enabled, or a law or a stream sets its targets.
+            ConfigurationError: `jerk` is given, and ruckig is not installed or finds no motion.
+            RuntimeError: The loop is not open.
         """
         chosen = self._movable(axes)
         goals = values_of("position", position, len(chosen))
@@ -375,9 +387,12 @@ class Drives(Request):
             Handle of the move, as for `move_to`.
 
         Raises:
-            ValueError: A goal or rate is beyond a limit, or the mode is neither CSP nor PP.
-            DriveError: An axis is not enabled.
-            ConfigurationError: `jerk` is given and ruckig is not installed.
+            ValueError: A goal or rate is not valid or beyond a limit, a rate has no default,
+                `axes` is empty, or the mode is neither CSP nor PP.
+            IndexError: An axis does not exist.
+            DriveError: An axis is not enabled, or a law or a stream sets its targets.
+            ConfigurationError: `jerk` is given, and ruckig is not installed or finds no motion.
+            RuntimeError: The loop is not open.
         """
         chosen = self._movable(axes)
         moves = self._moving()
@@ -401,8 +416,11 @@ class Drives(Request):
             error or is no longer enabled.
 
         Raises:
-            ValueError: The drives were made without "hm", or an axis is already homing.
-            DriveError: An axis is not enabled.
+            ValueError: The drives were made without "hm", an axis is already homing, or `axes` is
+                empty.
+            IndexError: An axis does not exist.
+            DriveError: An axis is not enabled, or a law or a stream sets its targets.
+            RuntimeError: The loop is not open.
         """
         chosen = self._movable(axes)
         moves = self._moving()
@@ -446,6 +464,11 @@ class Drives(Request):
 
         The call reads the drives by SDO (PRE-OP or later): rated torque, reactions, limits, mode
         and interpolation time.
+
+        Raises:
+            ConfigurationError: A required rated torque or deceleration is unknown, a quick stop in
+                CST may not brake, or 0x60C2 cannot represent the period.
+            SdoAbort: A drive refuses to read an object that it has.
         """
         self._period_ns = period_ns
         self._read_drives()
@@ -474,7 +497,11 @@ class Drives(Request):
     def tables(self, layout: ImageLayout) -> RequestTables:
         """Return the axes and columns for the core.
 
-        Columns are sorted by name, then by axis, so that each name is one array.
+        The columns of one name are consecutive, one per axis, so that each name is one array. The
+        next call of `pdos` reads the drives again.
+
+        Raises:
+            MappingError: A required object is not in the process data.
         """
         self._is_read = False  # the next plan reads the settings again
         self._units = np.array([layout.sync_unit(axis.device) for axis in self._axes], np.intp)
@@ -501,7 +528,7 @@ class Drives(Request):
         )
 
     def bind(self, views: Views) -> None:
-        """Connect the request to the arrays of a newly opened loop."""
+        """Connect the request to the arrays of a newly opened loop, and write the initial rates."""
         self._views = views
         self.actual.bind(
             views.actual_position,
@@ -537,7 +564,7 @@ class Drives(Request):
         return AxisPort(views, index, facts, write=write, put_rate=put_rate)
 
     def _slices(self, reals: Array, integers: Array, *, output: bool) -> dict[str, Array]:
-        """Return the part of the bank array that belongs to each column."""
+        """Return, for each column by name, its part of the bank array."""
         used = {Bank.REAL: 0, Bank.INTEGER: 0}
         slices: dict[str, Array] = {}
         for name, column in self._columns.items():

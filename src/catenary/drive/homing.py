@@ -120,7 +120,11 @@ def leave_homing(port: AxisPort, mode: int) -> None:
 
 
 def stop_homing(port: AxisPort, mode: int) -> Steps:
-    """End the homing and wait until the drive is in another mode."""
+    """End the homing, and wait until the drive is in another mode and follows its targets.
+
+    Raises:
+        MoveError: The drive does not change its mode in time.
+    """
     leave_homing(port, mode)
     yield
     yield from _await_mode(port, mode)

@@ -25,7 +25,13 @@ class Place(NamedTuple):
         return self.channel.decode(raw & ((1 << self.channel.bit_length) - 1))
 
     def write(self, image: memoryview | bytearray, value: float | int) -> None:
-        """Write a value of the channel into the bytes of the device."""
+        """Write a value of the channel into the bytes of the device; other bits do not change.
+
+        Raises:
+            TypeError: The type needs an integer.
+            ValueError: The value is out of the range of the type, or is not finite.
+            OverflowError: The value is infinite, and the type is an integer with a scale.
+        """
         mask = (1 << self.channel.bit_length) - 1 << self.shift
         raw = int.from_bytes(image[self.first : self.end], "little") & ~mask
         raw |= self.channel.encode(value) << self.shift

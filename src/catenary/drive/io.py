@@ -41,7 +41,10 @@ A = TypeVar("A", Reals, Integers, Bytes)
 
 
 class BankArray(Generic[A]):
-    """Attribute of Inputs and Outputs that is the array of a bank. An assignment writes into it."""
+    """Attribute of Inputs and Outputs that is the array of a bank.
+
+    An assignment writes into the array of Outputs. For Inputs, it raises AttributeError.
+    """
 
     def __init__(self, bank: Bank) -> None:
         self._bank = bank
@@ -121,7 +124,7 @@ class Channels(Request):
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Names of all channels, in the order of the process data."""
+        """Names of all channels, in the order of `channels`; without it, of the process data."""
         return tuple(channel.name for channel in self._channels)
 
     def __iter__(self) -> Iterator[str]:
@@ -160,7 +163,11 @@ class Channels(Request):
         return requests
 
     def tables(self, layout: ImageLayout) -> RequestTables:
-        """Return one column per channel."""
+        """Return one column per channel.
+
+        Raises:
+            MappingError: A channel is not in the process data.
+        """
         columns = tuple(column(channel, layout, self.direction) for channel in self._channels)
         self._units = [layout.sync_unit(sub.position) for sub in self.subs]
         if self.direction is Direction.OUTPUT:
@@ -169,7 +176,11 @@ class Channels(Request):
 
     @property
     def present(self) -> tuple[bool, ...]:
-        """Tuple with True for each SubDevice that replied in its last exchange."""
+        """Tuple with True for each SubDevice that replied in its last exchange.
+
+        Raises:
+            RuntimeError: No loop has been opened yet.
+        """
         if self._unit_valid is None:
             raise RuntimeError("no process data is exchanged before a Loop is open")
         return tuple(bool(self._unit_valid[unit]) for unit in self._units)
@@ -203,7 +214,7 @@ class Inputs(Channels):
         gauge = Inputs(subs[2], scale={"Value": 10 / 0x7FFF})
         sensor = Inputs(subs[3], channels={"force": (0x6000, 1, types.REAL)})
 
-    Each array has the order of the process data. A channel is also accessible by name:
+    Each array has the order of `names`. A channel is also accessible by name:
     `buttons["Input 1"]`.
 
     Args:

@@ -91,7 +91,7 @@ class LimitOptions:
             raise ValueError(f"{name}: position_min {low} must be below position_max {high}")
 
     def lacks_velocity(self, modes: Sequence[Mode]) -> bool:
-        """Return True if the default velocity limit of CSP and PP applies."""
+        """Return True if an axis in CSP or PP has no `velocity_limit` from the application."""
         return self.velocity_limit is None and not {Mode.CSP, Mode.PP}.isdisjoint(modes)
 
 
@@ -207,7 +207,11 @@ def _positions(options: LimitOptions, own: OwnLimits) -> tuple[Chosen, Chosen]:
 def _deceleration(
     name: str, options: LimitOptions, velocity: float | None, own: OwnLimits, units: AxisUnits
 ) -> Chosen:
-    """Return the deceleration from the option, from a plausible 0x6085, or from BRAKE_TIME."""
+    """Return the deceleration from the option, from a plausible 0x6085, or from BRAKE_TIME.
+
+    Without any velocity limit, return the default, or raise ConfigurationError if `velocity_limit`
+    is infinite.
+    """
     if options.deceleration_limit is not None:
         return _given(options.deceleration_limit)
     if own.deceleration is not None and _is_plausible(own.deceleration, velocity):

@@ -106,6 +106,9 @@ def move_profile(port: AxisPort, goal: float, rates: Rates) -> Steps:
 
     Raises:
         MoveError: The drive does not acknowledge the set-point, or does not reach it in time.
+        CatenaryError: The drive does not accept a rate by SDO.
+
+    After such an error, halt (bit 8) stays set.
     """
     expected = make_profile(Motion(port.position, port.velocity), goal, rates._replace(jerk=None))
     timeout = SLACK[0] * expected.duration + SLACK[1]
@@ -132,6 +135,9 @@ def stop_profile(port: AxisPort) -> Steps:
 
     Halt stays set until the drive has acknowledged the new set-point. Otherwise the drive would
     continue to the previous set-point.
+
+    Raises:
+        MoveError: The axis does not stop in time, or the drive does not acknowledge the set-point.
     """
     port.clear_bits(NEW_SET_POINT | AT_ONCE)
     port.set_bits(HALT)
@@ -142,7 +148,7 @@ def stop_profile(port: AxisPort) -> Steps:
 
 def _hand_over(port: AxisPort, position: float) -> Steps:
     """Send one set-point, which takes effect immediately."""
-    if port.handshake:  # the previous move has left bit 4 set; the drive needs a falling edge
+    if port.handshake:  # the previous handshake did not end; the drive must see bit 4 fall
         port.clear_bits(NEW_SET_POINT)
         yield from _pause(port, ANSWER_EXCHANGES * port.exchange)
     yield from _await_acknowledge(port, False, position)
@@ -178,7 +184,10 @@ def _pause(port: AxisPort, seconds: float) -> Steps:
 
 
 def _await_rest(port: AxisPort) -> Steps:
-    """Wait until the axis has been at rest for the time STILL."""
+    """Wait until the axis has been at rest for the time STILL.
+
+    Raise MoveError after STOP_TIMEOUT.
+    """
     begun = still = port.now
     while port.now - still < STILL:
         if not port.at_rest:

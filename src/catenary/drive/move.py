@@ -160,14 +160,14 @@ class Moves:
             self._leave_if_idle()
 
     def check(self) -> None:
-        """End the moves of axes that were stopped."""
+        """End the moves of axes that cannot continue."""
         with self._lock:
             for axis, (part, _) in list(self._active.items()):
                 self._check(axis, part)
             self._leave_if_idle()
 
     def end(self) -> None:
-        """End all moves because the loop ends."""
+        """End all moves as failed, because the loop ends."""
         with self._lock:
             for axis, (part, _) in list(self._active.items()):
                 hint = "wait for the move before you leave the loop: loop.wait(move)"

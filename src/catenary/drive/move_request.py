@@ -79,9 +79,10 @@ def make_parts(
         Motion of each axis, and the default timeout of a wait [s].
 
     Raises:
-        ValueError: A goal or rate is beyond a limit, or the mode is neither CSP nor PP.
-        DriveError: An axis is not enabled.
-        ConfigurationError: The jerk is limited and ruckig is not installed.
+        ValueError: A goal or rate is not valid or beyond a limit, a rate has no default, a jerk is
+            given in PP, or the mode is neither CSP nor PP.
+        DriveError: An axis is not enabled, or a law or a stream sets its targets.
+        ConfigurationError: The jerk is limited, and ruckig is not installed or finds no motion.
     """
     if options.jerk is not None:
         load_ruckig()
@@ -106,7 +107,7 @@ def make_homing_part(axis: Axis, port: AxisPort) -> Part:
 
     Raises:
         ValueError: The axis was made without "hm", or is already homing.
-        DriveError: The axis is not enabled.
+        DriveError: The axis is not enabled, or a law or a stream sets its targets.
     """
     if Mode.HM not in axis.modes:
         raise ValueError(f"{axis.name} was made without mode 'hm'; add Drives(other_modes=['hm'])")
@@ -140,7 +141,7 @@ def default_acceleration(axis: Axis) -> float | None:
 
 
 def default_velocity(axis: Axis) -> float | None:
-    """Return the velocity limit; None if the application disabled it with `math.inf`."""
+    """Return the velocity limit; None if there is none, or if the application gave `math.inf`."""
     return None if axis.options.velocity_limit == math.inf else axis.bounds.velocity.value
 
 
@@ -215,7 +216,11 @@ def _rates(axes: Sequence[Axis], options: RateOptions) -> list[Rates]:
 
 
 def _rate(axis: Axis, name: str, value: float | None, known: float | None) -> float:
-    """Return a rate within its limit; the default if it is not given."""
+    """Return a rate after a check of its range; the default if it is not given.
+
+    Raises:
+        ValueError: The rate is not positive or above its limit, or there is no default.
+    """
     unit = getattr(axis.units.names, name)
     if value is None:
         if known is None:

@@ -68,8 +68,10 @@ class ProcessData(Request):
         dc: distributed clocks. True uses the settings in the SII of the device.
 
     Raises:
-        TypeError: An object is neither a Channel nor (index, subindex, type[, scale]).
-        ValueError: A name is unknown or used twice, or a value is out of range.
+        TypeError: An option has the wrong type, for example an object that is neither a Channel nor
+            (index, subindex, type[, scale]).
+        ValueError: A name is unknown or used twice, a value is out of range, or `safe` is given
+            with `outputs={}`.
     """
 
     def __init__(
@@ -113,12 +115,20 @@ class ProcessData(Request):
 
     @property
     def inputs(self) -> memoryview:
-        """Input bytes of the device, read-only; the same object while the loop is open."""
+        """Input bytes of the device, read-only; the same object while the loop is open.
+
+        Raises:
+            RuntimeError: No loop has been opened yet.
+        """
         return self._image(Direction.INPUT)
 
     @property
     def outputs(self) -> memoryview:
-        """Output bytes of the device, writable; the same object while the loop is open."""
+        """Output bytes of the device, writable; the same object while the loop is open.
+
+        Raises:
+            RuntimeError: No loop has been opened yet, or the request has `outputs={}`.
+        """
         if not self._writes:
             raise RuntimeError(f"{self!r} cannot write outputs: it was made with outputs={{}}")
         return self._image(Direction.OUTPUT)
@@ -131,7 +141,11 @@ class ProcessData(Request):
 
     @property
     def present(self) -> bool:
-        """True if the device replied in its last exchange."""
+        """True if the device replied in its last exchange.
+
+        Raises:
+            RuntimeError: No loop has been opened yet.
+        """
         if self._unit_valid is None:
             raise RuntimeError("no process data is exchanged before a Loop is open")
         return bool(self._unit_valid[self._unit])
@@ -145,6 +159,7 @@ class ProcessData(Request):
 
         Raises:
             KeyError: The name is unknown.
+            TypeError: The name is not a string.
             RuntimeError: No loop has been opened yet.
         """
         direction, place = self._place(name)
@@ -155,8 +170,10 @@ class ProcessData(Request):
 
         Raises:
             KeyError: The name is unknown.
-            TypeError: The name is that of an input, or the object needs an integer.
-            ValueError: The value is out of the range of the type.
+            TypeError: The name is that of an input or not a string, or the object needs an integer.
+            ValueError: The value is out of the range of the type, or is not finite.
+            OverflowError: The value is infinite, and the type is an integer with a scale.
+            RuntimeError: No loop has been opened yet.
         """
         direction, place = self._place(name)
         if direction is Direction.INPUT:
@@ -186,7 +203,12 @@ class ProcessData(Request):
         return {self._subs[0].position: request}
 
     def tables(self, layout: ImageLayout) -> RequestTables:
-        """Return the bytes as areas, and named inputs also as columns for laws and recordings."""
+        """Return the bytes as areas, and named inputs also as columns for laws and recordings.
+
+        Raises:
+            MappingError: A channel is not in the process data, or has another length there.
+            ConfigurationError: `safe` does not have the length of the outputs.
+        """
         device = self._subs[0].position
         self._unit = layout.sync_unit(device)
         self._places = {

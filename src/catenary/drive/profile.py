@@ -82,7 +82,7 @@ def make_profile(start: Motion, goal: float, rates: Rates) -> Profile:
         rates: limits of the profile.
 
     Raises:
-        ConfigurationError: The jerk is limited and ruckig is not installed.
+        ConfigurationError: The jerk is limited, and ruckig is not installed or finds no motion.
     """
     if rates.jerk is None:
         return _trapezoid(start, goal, rates.velocity, rates.acceleration)
@@ -94,10 +94,10 @@ def make_stop(start: Motion, rates: Rates) -> Profile:
 
     Args:
         start: motion at the start.
-        rates: limits of the profile.
+        rates: limits of the profile; the velocity limit is not used.
 
     Raises:
-        ConfigurationError: The jerk is limited and ruckig is not installed.
+        ConfigurationError: The jerk is limited, and ruckig is not installed or finds no motion.
     """
     if rates.jerk is None:
         speed, acceleration = abs(start.velocity), rates.acceleration

@@ -170,7 +170,11 @@ def own_limits(
 def _position_limits(
     settings: DriveSettings, units: AxisUnits, home_offset: int | None
 ) -> tuple[float | None, float | None]:
-    """Return 0x607D minus the home offset 0x607C (IEC 61800-7-201, software position limit)."""
+    """Return the limits of 0x607D minus the home offset 0x607C, at the joint [rad or m].
+
+    A limit that is missing or not plausible is None. Source: IEC 61800-7-201, software position
+    limit.
+    """
     low, high = settings.position_min, settings.position_max
     if low is None or high is None or low >= high:
         return None, None
@@ -186,7 +190,9 @@ def _position_limits(
 
 
 def _velocity_limit(settings: DriveSettings, units: AxisUnits) -> tuple[float | None, str]:
-    """Return the smaller of 0x6080 (rpm of the motor) and 0x607F, and its source.
+    """Return the smaller of 0x6080 (rpm of the motor) and 0x607F at the joint, and its source.
+
+    The limit is None if neither is plausible.
 
     0x607F has the velocity unit of the drive, so it is used only if `velocity_unit` is given.
     """

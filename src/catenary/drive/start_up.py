@@ -17,7 +17,10 @@ OBJECT_MISSING = (0x06020000, 0x06090011)
 
 
 def with_rated_torque(axis: Axis, sub: SubDevice) -> Axis:
-    """Return the axis with the rated torque from 0x6076, unless the application gave one.
+    """Read 0x6076 by SDO, and return the axis with this rated torque.
+
+    The axis is returned unchanged if the application gave a rated torque or the axis uses no
+    torque. It is also unchanged if it only measures the torque and the drive has no rated torque.
 
     Args:
         axis: the axis.
@@ -25,6 +28,7 @@ def with_rated_torque(axis: Axis, sub: SubDevice) -> Axis:
 
     Raises:
         ConfigurationError: The axis needs its torque, but the drive does not have a rated torque.
+        SdoAbort: The drive has 0x6076, but refuses to read it.
     """
     if axis.units.rated_torque is not None or not axis.uses_torque:
         return axis
@@ -46,7 +50,7 @@ def with_rated_torque(axis: Axis, sub: SubDevice) -> Axis:
 
 
 def with_settings(axes: Sequence[Axis], subs: Sequence[SubDevice]) -> tuple[Axis, ...]:
-    """Return the axes with the reactions and limits of their drives.
+    """Read the reactions and limits of the drives by SDO, and return the axes with them.
 
     Args:
         axes: the axes.
@@ -85,6 +89,8 @@ def _check_quick_stop(axis: Axis) -> None:
 def downloads(axis: Axis, sub: SubDevice, period_ns: int) -> tuple[tuple[int, int, bytes], ...]:
     """Return the objects to write at the start-up: mode, 0x60C2, ramps and homing settings.
 
+    The call reads the mode and 0x60C2 by SDO, and omits each that already has the right value.
+
     Args:
         axis: the axis.
         sub: its device.
@@ -95,6 +101,7 @@ def downloads(axis: Axis, sub: SubDevice, period_ns: int) -> tuple[tuple[int, in
 
     Raises:
         ConfigurationError: 0x60C2 cannot represent the period.
+        SdoAbort: The drive refuses to read an object that it has.
     """
     found = _mode(axis, sub) + _interpolation(axis, sub, period_ns) + _ramps(axis)
     return found + (axis.homing.downloads(axis.units, axis.index(0)) if axis.homing else ())

@@ -46,7 +46,7 @@ class AxisDefaults(NamedTuple):
     velocity_limit: float  # default in CSP and PP
     step_limit: float  # smallest default step limit
     standstill: float  # velocity below which the axis is at rest
-    deceleration: float  # for an axis without a velocity limit and without a cyclic mode
+    deceleration: float  # for an axis without a velocity limit, whose only mode is "hm"
 
 
 ROTARY_DEFAULTS = AxisDefaults(2 * math.pi, 0.1, 0.05, 25.0)
@@ -141,6 +141,9 @@ class AxisUnits:
         Args:
             number: the number.
             unit: its unit; RAW means a scale of 1.
+
+        Raises:
+            ValueError: The unit is that of a torque, and the rated torque has not been read yet.
         """
         match unit:
             case Unit.POSITION:

@@ -23,10 +23,10 @@ class AxisValues:
 
     __slots__ = ("_columns", "_owner", "mode", "position", "torque", "velocity")
 
-    position: Reals  # (n,) [rad]
-    velocity: Reals  # (n,) [rad/s]
-    torque: Reals  # (n,) [N·m]
-    mode: Modes  # (n,) modes of operation: 8 CSP, 9 CSV, 10 CST
+    position: Reals  # (n,) [rad or m]
+    velocity: Reals  # (n,) [rad/s or m/s]
+    torque: Reals  # (n,) [N·m or N]
+    mode: Modes  # (n,) modes of operation: 1 PP, 3 PV, 6 HM, 8 CSP, 9 CSV, 10 CST
 
     _owner: str
     _columns: Mapping[str, Array]
@@ -45,9 +45,9 @@ class AxisValues:
         """Point the attributes at the arrays of a newly opened loop.
 
         Args:
-            position: (n,) [rad].
-            velocity: (n,) [rad/s].
-            torque: (n,) [N·m].
+            position: (n,) [rad or m].
+            velocity: (n,) [rad/s or m/s].
+            torque: (n,) [N·m or N].
             mode: (n,) modes of operation.
             columns: further arrays by name.
         """

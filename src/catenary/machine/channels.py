@@ -49,7 +49,8 @@ def make_channels(
         device: description of the device.
 
     Raises:
-        MachineFileError: An object without a type is not in a PDO of the device.
+        MachineFileError: An object, a type or a scale is not valid, or an object without a type is
+            not in a PDO of the device.
     """
     direction = Direction.INPUT if path[-1] == "inputs" else Direction.OUTPUT
     return {
@@ -107,7 +108,11 @@ def _entry(
     device: DeviceDescription,
     direction: Direction,
 ) -> Entry:
-    """Return the entry that has the type of the object; UNTYPED if the file gives the type."""
+    """Return the PDO entry that supplies the type of an object; UNTYPED if the file gives the type.
+
+    Raises:
+        MachineFileError: The object has no type in the file and is not in a PDO of the device.
+    """
     if isinstance(spec, ChannelTable) and spec.type is not UNSET:
         return UNTYPED
     text = spec if isinstance(spec, str) else spec.object

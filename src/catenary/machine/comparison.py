@@ -21,7 +21,7 @@ class Comparison(NamedTuple):
     The verdicts are:
 
     - "same": the identities agree.
-    - "different": the device found has another identity.
+    - "different": the device found has another identity, or several devices have its alias.
     - "missing": a required device was not found.
     - "absent": an optional device was not found.
     - "unknown": the file does not contain the device found.

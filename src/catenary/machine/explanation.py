@@ -82,7 +82,7 @@ def _path(text: str, content: Mapping[str, object]) -> KeyPath:
 
 
 def _failing_key(content: Mapping[str, object], path: KeyPath, text: str) -> str:
-    """Return the key of the table at `path` whose value causes the error."""
+    """Return the key of the table at `path` whose value causes the error; else the first key."""
     table = _at(content, path)
     assert isinstance(table, dict)
     for key, value in table.items():
@@ -123,7 +123,7 @@ def _explain_unknown(path: KeyPath, key: str) -> Explanation:
 
 
 def _owner(key: str) -> str:
-    """Return the header of the table that has a key."""
+    """Return the header of the table that has a key; empty if no table has it."""
     for table in Table.__subclasses__():
         header = (table.__doc__ or "").partition(":")[0]
         if key in table.__struct_fields__ and header.startswith("["):
@@ -168,7 +168,7 @@ def _described(path: KeyPath) -> str:
 
 
 def _type_at(path: KeyPath) -> Any:
-    """Return the type that the schema gives to a key path."""
+    """Return the type of a key path in the schema; `object` if the schema lacks the path."""
     kind: Any = MachineTables
     for step in path:
         kind = next(_inner(kind, step), object)

@@ -91,7 +91,7 @@ class MachineFile:
             linear: True if the quantities belong to a linear axis.
 
         Raises:
-            MachineFileError: A quantity has a wrong unit.
+            MachineFileError: A quantity is not a number, or its unit is missing or wrong.
         """
         return {
             name: self._value(getattr(table, name), dimension, (*path, name), linear)

@@ -32,9 +32,9 @@ class MachineParts:
 
 
 def raise_differences(file: MachineFile, found: Sequence[Comparison]) -> None:
-    """Raise an error for the first difference between file and segment.
+    """Raise an error for the first difference between file and segment, if there is one.
 
-    The other differences are notes of the error.
+    The other differences are notes of the error. Unknown and absent devices are not differences.
 
     Args:
         file: the machine file.
@@ -73,7 +73,8 @@ def make_found(file: MachineFile, found: Sequence[Comparison]) -> MachineParts:
 
     Raises:
         CatenaryError: A device of the file did not reach PRE-OP.
-        MachineFileError: A table requests an object or axis that its device does not have.
+        MachineFileError: A table requests an object or axis that its device does not have, or an
+            option is not valid.
     """
     subs = {each.name: each.found for each in found if each.verdict == "same" and each.found}
     for sub in subs.values():

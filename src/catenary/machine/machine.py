@@ -39,7 +39,8 @@ class Machine:
 
     The `with` statement opens the link and compares the identities of the devices with the file.
     This does not change any device, except with the IgH master. It then brings the devices to
-    PRE-OP. At the end, it brings them to INIT.
+    PRE-OP. At the end, it brings them to INIT. `subs`, `drives`, `process_data`, `requests` and
+    `loop` raise RuntimeError while the machine is not open.
 
     Args:
         path: the machine file.
@@ -48,6 +49,8 @@ class Machine:
 
     Raises:
         MachineFileError: The file cannot be read, or it is not valid. The error names line and key.
+        ConfigurationError: `target` is not a valid name.
+        TypeError: `target` is neither a name nor a link source.
     """
 
     def __init__(
@@ -70,9 +73,13 @@ class Machine:
     def open(self) -> Self:
         """Open the link, check the identities, and bring the devices to PRE-OP; return self.
 
+        After an error, the machine is closed again.
+
         Raises:
             IdentityError: A device has another identity, or two devices have the same alias.
             SegmentError: A required device is missing.
+            MachineFileError: A table requests an object or axis that its device does not have.
+            CatenaryError: The link cannot be opened, or a device did not reach PRE-OP.
         """
         self._main.open()
         try:
@@ -83,7 +90,7 @@ class Machine:
         return self
 
     def close(self) -> None:
-        """Bring all devices to INIT and close the link."""
+        """Bring the devices to INIT, if possible, and close the link."""
         self._main.close()
 
     @property
@@ -148,7 +155,9 @@ class Machine:
         default of `Loop`.
 
         Raises:
-            MachineFileError: The file has neither drives nor process data.
+            MachineFileError: The machine has neither drives nor process data with present devices.
+            KeyError: The device of `clocks.reference` is absent.
+            RuntimeError: The machine is not open.
             ValueError: An option is not valid.
         """
         options = self._file_options()
@@ -172,7 +181,8 @@ class Machine:
         """Return the options of the file for a loop.
 
         Raises:
-            MachineFileError: There are neither drives nor process data.
+            MachineFileError: There are neither drives nor process data with present devices.
+            KeyError: The device of `clocks.reference` is absent.
         """
         if not self.drives and not self.process_data:
             raise self._file.error(
@@ -190,7 +200,7 @@ class Machine:
         return self._found
 
     def _find(self) -> MachineParts:
-        """Check the identities, scan the devices, and make the requests."""
+        """Check the identities, bring the devices to PRE-OP, scan them, and make the requests."""
         file = self._file
         if not self._has_own_master:  # the IgH master does not support a passive scan
             raise_differences(file, compare(file.tables.device, self._main.passive_scan()))

@@ -29,7 +29,8 @@ def loop_options(file: MachineFile, reference: SubDevice | None = None) -> dict[
 
     Args:
         file: the machine file.
-        reference: device of `clocks.reference`; None if it is not known yet.
+        reference: device of `clocks.reference`; None if the file gives none, or if the devices are
+            not known yet.
 
     Raises:
         MachineFileError: A value is out of range.
@@ -49,14 +50,15 @@ def loop_options(file: MachineFile, reference: SubDevice | None = None) -> dict[
 
 
 def drives_options(file: MachineFile, role: str) -> dict[str, Any]:
-    """Return the options of `Drives` from [drives.ROLE].
+    """Return the options of `Drives` from [drives.ROLE], without its axes.
 
     Args:
         file: the machine file.
         role: name of the drives.
 
     Raises:
-        MachineFileError: A value is out of range, or a required option is missing.
+        MachineFileError: A value is not valid, a required option is missing, or the devices have
+            different values of `op_mode`.
     """
     path: KeyPath = ("drives", role)
     table = file.tables.drives[role]
@@ -86,7 +88,7 @@ def process_data_options(file: MachineFile, role: str) -> dict[str, Any]:
         role: name of the process data.
 
     Raises:
-        MachineFileError: A value is out of range.
+        MachineFileError: The clock or the index of a PDO is not valid.
     """
     path: KeyPath = ("process_data", role)
     table = file.tables.process_data[role]

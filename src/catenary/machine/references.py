@@ -24,7 +24,7 @@ class AxisAddress(NamedTuple):
     """Address of an axis in the file."""
 
     device: str  # name of the device
-    slot: int | None  # None for a device with a single axis
+    slot: int | None  # None if the file gives no slot; the device then has a single axis
 
     def __str__(self) -> str:
         return self.device if self.slot is None else f"{self.device}/{self.slot}"
@@ -62,7 +62,7 @@ def check_device(file: MachineFile, path: KeyPath, name: str) -> None:
 
 
 def nearest(name: str, names: Sequence[str]) -> str:
-    """Return the end of a message about an unknown name: the nearest name, or all names.
+    """Return the end of a message about an unknown name: the nearest name, or all names if any.
 
     Args:
         name: the unknown name.
@@ -111,7 +111,7 @@ def axis_addresses(file: MachineFile, role: str) -> list[AxisAddress]:
         role: name of the drives.
 
     Raises:
-        MachineFileError: An axis is neither a device nor device/slot.
+        MachineFileError: An axis does not name a device of the file, or its slot is out of range.
     """
     found = []
     for number, text in enumerate(file.tables.drives[role].axes):
@@ -127,7 +127,7 @@ def axis_addresses(file: MachineFile, role: str) -> list[AxisAddress]:
 
 
 def _check_axes(file: MachineFile) -> None:
-    """Check that every axis belongs to one role, once."""
+    """Check that the lists of axes are not empty and that each axis is used only once."""
     owners: dict[AxisAddress, str] = {}
     for role, table in file.tables.drives.items():
         if not table.axes:

@@ -97,7 +97,7 @@ def make_process_data(file: MachineFile, role: str, subs: Subs) -> ProcessData:
 
 
 def make_device_requests(file: MachineFile, subs: Subs) -> list[StartUpRequest]:
-    """Return requests for the devices with start-up objects, and for those that may be absent.
+    """Return requests for present devices that have start-up objects or that may be absent.
 
     Args:
         file: the machine file.

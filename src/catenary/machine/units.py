@@ -1,6 +1,6 @@
 """Conversion of physical quantities from text, such as "170 deg" or "500 us", to SI units.
 
-A number that is not text is already in SI units.
+A value that is a number, not text, is already in SI units.
 """
 
 from __future__ import annotations
