@@ -115,3 +115,13 @@ def test_exception_in_the_service_reaches_the_caller() -> None:
         segment.service.agenda.after(1_000, fail)
         with pytest.raises(RuntimeError, match="application"):
             link.wait_until(1_000_000, False)
+
+
+def test_a_wrong_position_does_not_leave_the_segment_locked() -> None:
+    segment = Segment([Coupler()])
+    for call in (segment._core.refresh_inputs, segment._core.system_time):
+        with pytest.raises(IndexError):
+            call(7)
+    with pytest.raises(IndexError):
+        segment._wires.delay_cable(99, 100)
+    assert segment._core.system_time(0) >= 0  # would wait for ever on a locked mutex

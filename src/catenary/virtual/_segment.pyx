@@ -388,8 +388,9 @@ cdef class Core:
         unlock(self._segment)
 
     def refresh_inputs(self, int position):
+        cdef controller *c = self._at(position)  # raises before the lock is taken
         lock(self._segment)
-        inputs_put(self._at(position))
+        inputs_put(c)
         unlock(self._segment)
 
     def run_model(self, int position, int64_t period_ns):
@@ -465,8 +466,9 @@ cdef class Core:
     def system_time(self, int position):
         """Return the exact time of a device's clock [ns], without the scatter that frames read."""
         cdef int64_t time
+        cdef controller *c = self._at(position)  # raises before the lock is taken
         lock(self._segment)
-        time = dc_system_time(self._at(position), self._segment.now)
+        time = dc_system_time(c, self._segment.now)
         unlock(self._segment)
         return time
 

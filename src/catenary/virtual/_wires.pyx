@@ -84,8 +84,9 @@ cdef class Wires:
 
     def delay_cable(self, int n, int64_t delay_ns):
         """Set the one-way delay of a cable [ns]."""
+        cdef cable *k = self._cable(n)  # raises before the lock is taken
         lock(self._core._segment)
-        self._cable(n).delay = delay_ns
+        k.delay = delay_ns
         segment_light(self._core._segment, False)
         unlock(self._core._segment)
 
