@@ -120,7 +120,7 @@ class DistributedClock:
 class DeviceRequest:
     """Objects that one device must exchange cyclically.
 
-    An existing mapping is only changed if a requested object is missing or `pdos` requires it.
+    An existing mapping is only changed if a required object is missing or `pdos` requires it.
     Several requests may name one device. Its divider is then the greatest common divisor of their
     dividers, and it is required if any of them requires it.
     """
