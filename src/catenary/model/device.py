@@ -176,7 +176,7 @@ class ObjectInformation:
 
 @dataclass(frozen=True, slots=True)
 class ObjectValue:
-    """Value of a dictionary entry when it was read; None if it could not be read."""
+    """Value of a dictionary entry when it was read. `data` is None if it could not be read."""
 
     index: int
     subindex: int
@@ -204,7 +204,7 @@ class DeviceDescription:
     parent: int | None = None  # position of the device before it in the tree
     parent_port: int | None = None
     system_time: bool = False  # the device has a clock that can be synchronised (0x0910)
-    op_modes: tuple[OpMode, ...] = ()  # modes of distributed clocks; the first is the default
+    op_modes: tuple[OpMode, ...] = ()  # modes of distributed clocks, in the order of the SII
     group: str = ""
     order: str = ""
     device_type: int | None = None  # object 0x1000
