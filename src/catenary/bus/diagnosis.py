@@ -55,8 +55,8 @@ def diagnose(
 
     Args:
         subs: Devices to read.
-        since: Earlier diagnosis to count from. The counts are from power-up if this is None, or if
-            the number of devices has changed.
+        since: Earlier diagnosis to count from. The counts are from power-up if this is None or has
+            another number of devices, and for devices that were silent then.
         lost_frames: Number of frames lost or damaged in the same time span.
         ring: True if the segment is a ring.
     """

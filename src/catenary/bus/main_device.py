@@ -304,8 +304,8 @@ class MainDevice:
         While a loop runs, call it from another thread.
 
         Args:
-            since: Earlier diagnosis to count from. The counts are from power-up if this is None, or
-                if the number of devices has changed.
+            since: Earlier diagnosis to count from. The counts are from power-up if this is None or
+                has another number of devices, and for devices that were silent then.
             subs: Devices of a `passive_scan`; None for those of the last `scan`.
             lost_frames: Number of frames lost or damaged in the same time span.
         """
