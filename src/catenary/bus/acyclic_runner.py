@@ -138,8 +138,8 @@ class AcyclicRunner:
     def next_due_ns(self) -> int:
         """Time of the next step with work [ns, the queue's clock].
 
-        It is 0 for new procedures and for frames, and NEVER_NS if there are no procedures. Without
-        frames, it is the end of the first pause minus `grain_ns`.
+        It is 0 while procedures or frames are pending. Otherwise, it is the end of the first pause
+        minus `grain_ns`, or a time in the far future if there are no procedures.
         """
         if self._submitted or self._under_way or self._outbox:
             return 0

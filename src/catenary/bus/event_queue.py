@@ -64,7 +64,7 @@ class Events:
     def put(self, event: Event) -> None:
         """Add an event with a time of the link's clock, and call the listeners with it.
 
-        Never waits for space: the oldest event is dropped if the queue is full.
+        If the queue is full, the oldest event is dropped; the call never waits for space.
         """
         with self._changed:
             if len(self._pending) >= self._capacity:

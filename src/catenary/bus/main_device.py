@@ -83,7 +83,7 @@ class MainDevice:
 
     @property
     def link(self) -> Link:
-        """The open link. Raises RuntimeError if it is not open, and in a forked child."""
+        """The open link. Raises RuntimeError if no link is open, and in a forked child."""
         if self._link is None or self._is_inherited:
             raise self._not_open()
         return self._link
@@ -105,7 +105,7 @@ class MainDevice:
 
     @property
     def counts(self) -> FrameCounts:
-        """Frame counts outside a loop. Raises RuntimeError while a loop runs or if not open."""
+        """Frame counts outside a loop. Raises RuntimeError under the conditions of `runner`."""
         return self.runner.counts
 
     def open(self) -> Self:
