@@ -172,7 +172,7 @@ class Mover(Protocol):
         """Write the targets of the next commit. `now` is the time of the cycle [s]."""
 
     def check(self) -> None:
-        """End the motions of stopped axes, after a bad cycle."""
+        """End the motions of stopped axes, after a cycle that reported a stop or a problem."""
 
     def end(self) -> None:
         """End all motions, because the loop ends."""
