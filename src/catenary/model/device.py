@@ -211,7 +211,7 @@ class DeviceDescription:
     slots: tuple[int, ...] = ()  # CiA 402 axes: objects + 0x800·slot
     objects: tuple[ObjectInformation, ...] = ()  # dictionary entries that were read
     values: tuple[ObjectValue, ...] = ()  # present values of objects in a start-up list
-    mapping_source: str = "SII"  # or "CoE"
+    mapping_source: str = "SII"  # or "CoE", or "IgH master"
     notes: tuple[str, ...] = ()  # faults of its SII, or differences from its dictionary
 
     @property
