@@ -35,7 +35,7 @@ class AcyclicQueue(Protocol):
 
 @dataclass(slots=True, eq=False)
 class _Turn:
-    """Replies to one step of a task, collected until they are complete."""
+    """Replies to one step of a task, collected until none is missing."""
 
     task: Task[Any]
     replies: list[Reply | None]
@@ -93,7 +93,11 @@ class AcyclicRunner:
         self._owner = threading.get_ident()
 
     def submit(self, procedure: Procedure[T]) -> Pending[T]:
-        """Queue a procedure. It starts at the next step."""
+        """Queue a procedure and return its handle. The procedure starts at the next step.
+
+        Raises:
+            LoopError: The loop has ended.
+        """
         pending = Pending(Task(procedure))
         with self._lock:
             if self._closed:
@@ -104,11 +108,11 @@ class AcyclicRunner:
         return pending
 
     def run(self, procedure: Procedure[T]) -> T:
-        """Run a procedure and return its result. Do not call this in the loop's thread.
+        """Queue a procedure, wait for its end, and return its result or raise its error.
 
         Raises:
             RuntimeError: The caller is the loop's thread, which would deadlock.
-            LoopError: The loop has ended.
+            LoopError: The loop has ended, or ends during the wait.
         """
         if threading.get_ident() == self._owner:
             procedure.close()
@@ -132,14 +136,21 @@ class AcyclicRunner:
 
     @property
     def next_due_ns(self) -> int:
-        """Time of the next step with work [ns, the queue's clock]; 0 if a step has work now."""
+        """Time of the next step with work [ns, the queue's clock].
+
+        It is 0 while procedures or frames are pending. Otherwise, it is the end of the first pause
+        minus `grain_ns`, or a time in the far future if there are no procedures.
+        """
         if self._submitted or self._under_way or self._outbox:
             return 0
         wakes = [pending.task.wake_ns or 0 for pending in self._active]
         return min(wakes, default=NEVER_NS) - self._grain_ns
 
     def step(self) -> None:
-        """Advance all procedures by one exchange."""
+        """Receive replies, advance each procedure by at most one exchange, and send new frames.
+
+        Lost frames are sent again if they are repeatable. At most FRAMES_PER_STEP frames are sent.
+        """
         now = self._queue.now()
         self._receive(now)
         self._expire(now)
@@ -149,7 +160,7 @@ class AcyclicRunner:
         self._send(now)
 
     def close(self) -> None:
-        """End all procedures. Their callers get LoopError."""
+        """End all procedures with LoopError, and refuse new ones."""
         with self._lock:
             self._closed = True
             left = [*self._active, *self._submitted]

@@ -50,13 +50,17 @@ def describe_mappings(
 ) -> None:
     """Update the mapping and the requested objects in the descriptions of all CoE devices.
 
-    Objects that are requested but not mapped are read from the dictionaries.
+    Objects that are requested but not mapped are read from the dictionaries. A device without
+    requests keeps its description if it cannot be read.
 
     Args:
         runner: Runner of the procedures.
         subs: Devices of the segment.
         requests: Process-data requests.
         period_ns: Period of the cycle [ns].
+
+    Raises:
+        CatenaryError: A device with requests cannot be read. No description changes.
     """
     asked = gather_requests(requests, period_ns)
     with_coe = [sub for sub in subs if sub.description.coe]
@@ -72,9 +76,10 @@ def bring_to_safe_op(
     epoch_ns: int = 0,
     ring: RingLink | None = None,
 ) -> ClockMeasurement | None:
-    """Write the plan to all devices, synchronise their clocks, and request SAFE-OP.
+    """Bring all devices to PRE-OP, write the plan, synchronise the clocks, and request SAFE-OP.
 
-    All devices are handled at the same time.
+    All devices are handled at the same time. 0x1C32:01 and 0x1C33:01 are saved before clocks are
+    first used, and restored by a later plan without clocks.
 
     Args:
         runner: Runner of the procedures.
@@ -89,6 +94,8 @@ def bring_to_safe_op(
     Raises:
         SegmentError: The number of devices differs from the plan.
         IdentityError: A device is not the planned one.
+        StateError: A device refuses a state.
+        ClockError: The ring is cut, so the clocks cannot be synchronised.
     """
     if len(subs) != len(plan.devices):
         raise SegmentError(
@@ -117,9 +124,9 @@ def bring_to_safe_op(
 
 
 def _renewed(sub: SubDevice, request: DeviceRequest | None) -> Procedure[DeviceDescription]:
-    """Return the current description of a device.
+    """Read a device and return its new description.
 
-    If a device without requests cannot be read, return its description from the scan.
+    If a device without requests cannot be read, return its previous description.
     """
     reading = within(READ_TIMEOUT, sub.station, _describe(sub, request or DeviceRequest()))
     try:

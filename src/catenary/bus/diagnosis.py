@@ -55,8 +55,9 @@ def diagnose(
 
     Args:
         subs: Devices to read.
-        since: Earlier diagnosis to count from. None counts from the power-up of the devices.
-        lost_frames: Number of frames lost or damaged since then.
+        since: Earlier diagnosis to count from. The counts are from power-up if this is None or has
+            another number of devices, and for devices that were silent then.
+        lost_frames: Number of frames lost or damaged in the same time span.
         ring: True if the segment is a ring.
     """
     stations = [sub.station for sub in subs]

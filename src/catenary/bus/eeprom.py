@@ -43,7 +43,7 @@ def read_eeprom(
     Args:
         main: MainDevice of the device.
         station: Device.
-        size: Number of bytes.
+        size: Number of bytes; an odd number is rounded down.
         progress: Function to call with (words done, words in total).
     """
     total = size // 2

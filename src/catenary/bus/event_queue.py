@@ -48,8 +48,9 @@ class Events:
         event = main.events.get(timeout=1.0)      # the next one, or None
 
     If events are not fetched, the oldest beyond `capacity` are dropped and counted in `dropped`.
-    Events are put with times of the link's clock. Events of a loop are fetched with times on the
-    clock of `cycle.time`, which are negative during start-up.
+    Events are put with times of the link's clock. After the first iteration of a loop has begun,
+    the events of this loop are fetched with times on the clock of `cycle.time`. Events of the
+    start-up then have negative times.
     """
 
     def __init__(self, capacity: int = CAPACITY) -> None:
@@ -61,7 +62,10 @@ class Events:
         self._listeners: tuple[Callable[[Event], None], ...] = ()
 
     def put(self, event: Event) -> None:
-        """Add an event with a time of the link's clock. Never waits."""
+        """Add an event with a time of the link's clock, and call the listeners with it.
+
+        If the queue is full, the oldest event is dropped; the call never waits for space.
+        """
         with self._changed:
             if len(self._pending) >= self._capacity:
                 self._pending.popleft()
@@ -99,7 +103,7 @@ class Events:
         return len(self._pending)
 
     def begin_loop(self, zero_ns: Callable[[], int]) -> None:
-        """Count event times from the first iteration of a loop.
+        """Count the times of new events from the first iteration of a loop.
 
         Args:
             zero_ns: Function that returns the cycle start of that iteration [ns, link's clock]; 0
@@ -157,7 +161,11 @@ class Callbacks:
         self._callbacks.append(callback)
 
     def report(self, event: Event) -> None:
-        """Queue an event for all callbacks. Never waits for them."""
+        """Queue an event for all callbacks; no effect without callbacks. Never waits for them.
+
+        In real time, start the thread if it does not run. If the queue is full, the oldest event is
+        dropped.
+        """
         if not self._callbacks:
             return
         with self._lock:
@@ -183,7 +191,10 @@ class Callbacks:
             self._delivering = False
 
     def close(self) -> None:
-        """End the thread after the pending events. Wait at most CLOSE_TIMEOUT for its end."""
+        """End the thread after the pending events. Wait at most CLOSE_TIMEOUT for its end.
+
+        In virtual time, call the callbacks with the pending events.
+        """
         self.deliver()
         with self._lock:
             thread, self._thread = self._thread, None

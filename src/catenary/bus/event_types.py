@@ -72,9 +72,12 @@ class DeviceReplaced(Event):
 
 @dataclass(frozen=True, slots=True)
 class DeviceHeld(Event):
-    """Device that returned but is not brought to OP: by policy, or because the attempt failed."""
+    """Device that returned but is not brought to OP.
 
-    state: int  # AL state in which it is held
+    The cause is the policy, a failed attempt, or an identity that cannot be read.
+    """
+
+    state: int  # AL state in which it is held; 0 if unknown
     reason: str
 
 
@@ -108,7 +111,8 @@ class LinkRestored(Event):
 class FaultFound(Event):
     """Fault of a cable, a device or its supply, found by error counters. Frames may still pass.
 
-    `sub` is the faulty device, or the device after the faulty cable.
+    `sub` is the faulty device, or the device after the faulty cable; for a fault of several
+    devices, the last one.
     """
 
     finding: Finding
@@ -127,12 +131,13 @@ class DuplicateFrames(Event):
 
 @dataclass(frozen=True, slots=True)
 class ClockUnlocked(Event):
-    """Loss of synchronisation: the difference of at least one clock exceeds the bound.
+    """Loss of synchronisation: a clock or the phase exceeds the bound, or the reference is silent.
 
-    `sub` is the device with the largest difference.
+    `sub` is the device with the largest difference. It is the reference clock if this device does
+    not answer, or if the phase of the cycle starts is off.
     """
 
-    difference: float  # from the reference clock [s]
+    difference: float  # from the reference clock [s]; infinite if it has not been read
     bound: float  # [s]
 
 

@@ -46,7 +46,16 @@ class FrameMaster:
         """Do nothing: a forked child only holds the link, which the MainDevice releases."""
 
     def scan(self) -> tuple[Sequence[SubDevice], tuple[str, ...]]:
-        """Reset all devices, bring them to PRE-OP and read their descriptions."""
+        """Reset all devices, bring them to PRE-OP and read their descriptions.
+
+        Return the handles of the devices, and notes about the segment. If a device cannot be
+        brought to PRE-OP, its handle has the error.
+
+        Raises:
+            LinkError: Another master refreshes the outputs of a device, unless `force`.
+            NoDeviceError: No device answers.
+            SegmentError: The two ports of a ring are swapped.
+        """
         main, runner = self._main, self._main.runner
         runner.flush()
         device_count, states = runner.run(count())
@@ -73,7 +82,7 @@ class FrameMaster:
     def _judge_running(
         self, runner: BlockingRunner, device_count: int, states: int
     ) -> tuple[str, ...]:
-        """Return a note on devices that another program has left in SAFE-OP or OP.
+        """Return a note on devices that another program has left in SAFE-OP or OP, if any.
 
         Raises:
             LinkError: Another master refreshes their outputs, unless `force`.
@@ -120,7 +129,10 @@ class FrameMaster:
     def request_states(
         self, devices: Sequence[DeviceDescription], positions: Sequence[int], state: AlState
     ) -> dict[int, Outcome]:
-        """Bring devices of a passive scan to a state and leave them there."""
+        """Bring devices to a state and leave them there.
+
+        Return the reached state or the error, by position.
+        """
         from catenary.bus.states import request_states
 
         return request_states(self._main.runner, devices, positions, state)
@@ -135,7 +147,7 @@ class FrameMaster:
         return self._main.converse(diagnose(subs, since=since, lost_frames=lost_frames, ring=ring))
 
     def read_mappings(self, requests: Sequence[ProcessDataRequest], period_ns: int) -> None:
-        """Read the mappings, and the dictionary entries of requested, unmapped objects."""
+        """Update the mappings and the requested objects in the descriptions of the devices."""
         from catenary.bus.bring_up import describe_mappings
 
         describe_mappings(self._main.runner, self._main.subs, requests, period_ns)
@@ -147,7 +159,10 @@ class FrameMaster:
         return dict(zip(positions, found, strict=True))
 
     def configure(self, plan: Plan, epoch_ns: int) -> tuple[int | None, ...]:
-        """Configure every device as planned and bring all to SAFE-OP."""
+        """Configure every device as planned and bring all to SAFE-OP.
+
+        Return the delays after the first clock [ns], by position; empty without clocks.
+        """
         from catenary.bus.bring_up import bring_to_safe_op
 
         main = self._main
@@ -170,7 +185,11 @@ class FrameMaster:
             sub.state = state
 
     def _handle(self, found: ScannedDevice) -> SubDevice:
-        """Return the existing handle if the device at this position is the same, or a new one."""
+        """Update and return the handle of a scanned device. Its emergencies become events.
+
+        The handle is the existing one if the identity at its position is the same, otherwise a new
+        one.
+        """
         subs = self._main.subs
         position = found.description.position
         known = subs[position] if position < len(subs) else None

@@ -83,7 +83,7 @@ class MainDevice:
 
     @property
     def link(self) -> Link:
-        """The open link."""
+        """The open link. Raises RuntimeError if no link is open, and in a forked child."""
         if self._link is None or self._is_inherited:
             raise self._not_open()
         return self._link
@@ -105,7 +105,7 @@ class MainDevice:
 
     @property
     def counts(self) -> FrameCounts:
-        """Frame counts outside a loop. Raises RuntimeError while a loop runs."""
+        """Frame counts outside a loop. Raises RuntimeError under the conditions of `runner`."""
         return self.runner.counts
 
     def open(self) -> Self:
@@ -169,9 +169,10 @@ class MainDevice:
         return self._ownership.others or other_sockets(self._link)
 
     def close(self) -> None:
-        """Bring the devices of the last `scan` to INIT, if possible, and close the link.
+        """End a running loop, bring the devices to INIT, and close the link.
 
-        No effect in a forked child.
+        Only the devices of the last `scan` are brought to INIT, if they can be reached. A forked
+        child only releases the parent's link; no frame is sent.
         """
         self.forget()
         if self._link is None:
@@ -228,11 +229,11 @@ class MainDevice:
         expected: Sequence[Identity | tuple[int, int] | None] | None = None,
         strict: bool = True,
     ) -> SubDevices:
-        """Find all devices and bring them to PRE-OP.
+        """Find all devices, bring them to PRE-OP, and update `subs` and `notes`.
 
-        Devices that are still there keep their handles. A device that cannot be read or brought to
-        PRE-OP does not affect the others. Devices that another program left in SAFE-OP or OP
-        are reset, and `notes` names them.
+        A handle is kept if its position has a device with the same identity. A device that cannot
+        be read or brought to PRE-OP does not affect the others. Devices that another program left
+        in SAFE-OP or OP are reset, and `notes` names them.
 
         Args:
             expected: By position, an identity or (vendor, product); None accepts any device.
@@ -244,6 +245,7 @@ class MainDevice:
             All devices, by position.
 
         Raises:
+            RuntimeError: A loop runs, or the MainDevice is not open.
             LinkError: Another master refreshes the outputs of a device, unless `force`.
             NoDeviceError: No device answers.
             IdentityError: A device is not the expected one.
@@ -263,7 +265,8 @@ class MainDevice:
     def passive_scan(self, *, names: bool = True) -> SubDevices:
         """Read the devices without changing a state or mapping, for diagnosis.
 
-        `subs` does not change, and `close` leaves these devices in their states.
+        Devices without a unique station address get one. `subs` does not change, and `close` leaves
+        these devices in their states. Raises RuntimeError while a loop runs.
 
         Args:
             names: True to also read the EEPROMs. If False, devices have no name or identity.
@@ -274,12 +277,12 @@ class MainDevice:
     def request_states(
         self, subs: Sequence[SubDevice], positions: Sequence[int], state: AlState
     ) -> dict[int, Outcome]:
-        """Bring devices of a `passive_scan` to a state and leave them there.
+        """Bring devices to a state and leave them there.
 
         Do not call this while a loop runs.
 
         Args:
-            subs: All devices of the passive scan.
+            subs: All devices of the segment, from `scan` or `passive_scan`.
             positions: Positions of the devices to change.
             state: Requested state.
 
@@ -301,9 +304,10 @@ class MainDevice:
         While a loop runs, call it from another thread.
 
         Args:
-            since: Earlier diagnosis to count from. None counts from the power-up of the devices.
+            since: Earlier diagnosis to count from. The counts are from power-up if this is None or
+                has another number of devices, and for devices that were silent then.
             subs: Devices of a `passive_scan`; None for those of the last `scan`.
-            lost_frames: Number of frames lost or damaged since then.
+            lost_frames: Number of frames lost or damaged in the same time span.
         """
         chosen = self.subs if subs is None else subs
         return self.master.diagnose(chosen, since=since, lost_frames=lost_frames)
@@ -319,8 +323,9 @@ class MainDevice:
     ) -> Plan:
         """Return a printable plan for these requests, from the current mapping of the devices.
 
-        The devices must be in PRE-OP. Nothing is written. For further options, call `read_mappings`
-        and then `catenary.plan.make_plan` with `PlanOptions`.
+        The devices must be in PRE-OP. Their descriptions are updated (`read_mappings`), but nothing
+        is written to them. For further options, call `read_mappings` and then
+        `catenary.plan.make_plan` with `PlanOptions`.
 
         Args:
             requests: `Drives`, `Inputs`, `Outputs` and other process-data requests.
@@ -331,7 +336,10 @@ class MainDevice:
             watchdog: Watchdog time [s], as for `Loop`.
 
         Raises:
+            CatenaryError: A device did not reach PRE-OP in the scan, or cannot be read.
             MappingError: A device cannot map an object.
+            ConfigurationError: The requests contradict each other or do not fit into the period.
+            ValueError: An option is out of its range.
         """
         from catenary.plan.options import PlanOptions
         from catenary.plan.planner import make_plan
@@ -354,7 +362,9 @@ class MainDevice:
             period: Period of the cycle [s].
 
         Raises:
-            CatenaryError: A device did not reach PRE-OP in the scan. This is its error.
+            CatenaryError: A device did not reach PRE-OP in the scan, or cannot be read. This is
+                its error.
+            ValueError: The period is out of its range.
         """
         self._raise_errors()
         from catenary.plan.options import period_in_ns
@@ -362,13 +372,16 @@ class MainDevice:
         self.master.read_mappings(requests, period_in_ns(period))
 
     def configure(self, plan: Plan) -> None:
-        """Configure every device as planned and bring all to SAFE-OP."""
+        """Configure every device as planned and bring all to SAFE-OP.
+
+        This updates `clock_epoch_ns` and `clock_delays_ns`. Raises RuntimeError while a loop runs.
+        """
         self.require_no_loop()
         self.clock_epoch_ns = self._epoch_ns()
         self.clock_delays_ns = self.master.configure(plan, self.clock_epoch_ns)
 
     def leave(self, *, timeout: float = LEAVE_TIMEOUT) -> None:
-        """End operation: bring all devices to PRE-OP.
+        """End operation: take the link back from the loop, and bring all devices to PRE-OP.
 
         Args:
             timeout: Timeout for each state change [s]. The kernel master uses its own timeout.
@@ -391,7 +404,14 @@ class MainDevice:
         return self.master.read_objects(wanted)
 
     def converse(self, procedure: Procedure[T]) -> T:
-        """Run a procedure and return its result. While a loop runs, use its acyclic queue."""
+        """Run a procedure, wait for its end, and return its result or raise its error.
+
+        While a loop runs, use its acyclic queue. Without a loop, events are delivered afterwards
+        (`deliver_events`).
+
+        Raises:
+            RuntimeError: The caller is the thread of the loop, or the MainDevice is not open.
+        """
         while True:
             runner = self._any_runner
             try:
@@ -403,9 +423,9 @@ class MainDevice:
                     self.deliver_events()
 
     def request(self, procedure: Procedure[T]) -> Pending[T]:
-        """Start a procedure in the acyclic queue of a loop.
+        """Start a procedure in the acyclic queue of the running loop, and return its handle.
 
-        Without a loop, run it to completion.
+        Without a loop, wait for the end of the procedure.
         """
         while True:
             runner = self._any_runner
@@ -454,7 +474,10 @@ class MainDevice:
 
     @property
     def runner(self) -> BlockingRunner:
-        """Runner of procedures outside a loop. Raises RuntimeError while a loop runs."""
+        """Runner of procedures outside a loop.
+
+        Raises RuntimeError while a loop runs, if the link is not open, and in a forked child.
+        """
         if self._blocking is None or self._is_inherited:
             raise self._not_open()
         self.require_no_loop()

@@ -15,7 +15,7 @@ HEADINGS = ("PDO", "object", "name", "type", "bits", "bit offset")
 
 @dataclass(frozen=True, slots=True)
 class PdoRow:
-    """One mapped object. `bit_offset` counts from the first byte of its direction, as in
+    """One mapped object, or a gap. `bit_offset` counts from the first byte of its direction, as in
     `ProcessData.inputs` and `ProcessData.outputs`."""
 
     direction: Direction

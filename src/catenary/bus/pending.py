@@ -38,7 +38,7 @@ class Pending(Generic[T]):
 
     @property
     def error(self) -> BaseException | None:
-        """Error of the procedure; None if it has not ended, or has ended without one."""
+        """Error of the procedure; None if it is running, succeeded or was cancelled."""
         return self.task.error if self._finished.is_set() and not self._cancelled else None
 
     def result(self) -> T:

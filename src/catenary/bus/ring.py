@@ -79,9 +79,9 @@ def find_cuts(state: RingState, device_count: int) -> Cuts | None:
 
 
 def check_direction(state: RingState) -> None:
-    """Raise SegmentError if the two ports are swapped.
+    """Raise SegmentError if the ring is closed and its two ports are swapped.
 
-    Frames of the first port would then pass all devices in the unprocessed direction.
+    Frames of the first port then pass all devices in the unprocessed direction.
     """
     if state.shape is Shape.CLOSED and state.second_devices and not state.first_devices:
         raise SegmentError(
@@ -103,6 +103,9 @@ def assign_from_both_ends(
         runner: Runner of the procedures.
         ring: Ring link.
         device_count: Number of devices in the ring.
+
+    Raises:
+        SegmentError: The two ports are swapped.
     """
     state = ring.state
     check_direction(state)
@@ -118,7 +121,7 @@ def assign_from_both_ends(
 def end_for_clocks(
     runner: BlockingRunner, ring: RingLink, devices: Sequence[DeviceDescription]
 ) -> RingEnd | None:
-    """Return the port to close while delays are measured.
+    """Count the devices, and return the port to close while delays are measured.
 
     Args:
         runner: Runner of the procedures.
@@ -126,10 +129,11 @@ def end_for_clocks(
         devices: Descriptions of the devices.
 
     Returns:
-        The port; None if the ring is already open at that port.
+        The port; None if the ring was already open at that port during the scan.
 
     Raises:
-        ClockError: The ring is cut elsewhere, so its two parts cannot be synchronised.
+        ClockError: The ring is cut elsewhere, so its two parts cannot be synchronised; or it was
+            cut during the scan, but is closed now.
     """
     device_count = runner.run(count()).devices  # this also updates `ring.state`
     topology = make_topology([device.open_ports for device in devices], ring=True)

@@ -68,11 +68,19 @@ class BlockingRunner:
         self._lent = False
 
     def run(self, procedure: Procedure[T]) -> T:
-        """Run a procedure to its end, and return its result."""
+        """Run a procedure to its end, and return its result or raise its error.
+
+        Raises:
+            LinkLent: A loop uses the link.
+        """
         return self.run_all([procedure])[0]
 
     def submit(self, procedure: Procedure[T]) -> Pending[T]:
-        """Run a procedure to its end, and return it as Pending."""
+        """Run a procedure to its end, and return its handle, which has the result or the error.
+
+        Raises:
+            LinkLent: A loop uses the link.
+        """
         pending = Pending(Task(procedure))
         with self._mine():
             try:
@@ -87,6 +95,9 @@ class BlockingRunner:
 
         If some fail, the others run to their ends. Then the first error is raised, with the other
         errors as notes.
+
+        Raises:
+            LinkLent: A loop uses the link.
         """
         with self._mine():
             tasks = [Task(procedure) for procedure in procedures]
@@ -119,7 +130,7 @@ class BlockingRunner:
             yield
 
     def flush(self) -> None:
-        """Discard frames that were received earlier."""
+        """Discard the received frames that are pending, and count them as stale."""
         while self._link.receive() is not None:
             self.counts.stale += 1
 
@@ -184,7 +195,7 @@ class BlockingRunner:
     def _collect(
         self, under_way: dict[int, tuple[Parcel, list[int]]], replies: dict[int, Reply]
     ) -> None:
-        """Receive the frames of one window, until a deadline."""
+        """Receive the frames of one window, until a deadline. Missing frames count as lost."""
         deadline = self._link.now() + self._timeout_ns
         while under_way and self._link.now() < deadline:  # it also ends under a flood of frames
             raw = self._link.receive()

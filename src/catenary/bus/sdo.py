@@ -31,7 +31,7 @@ class Conversations(Protocol):
         ...
 
     def request(self, procedure: Procedure[T]) -> Pending[T]:
-        """Start a procedure without waiting for its end."""
+        """Start a procedure. Wait for its end only if no loop runs."""
         ...
 
 
@@ -112,7 +112,10 @@ class Sdo:
         Raises:
             SdoAbort: The device refuses the transfer.
             DecodeError: The bytes are not a value of the type.
-            MailboxError: The object is longer than `limit`, or takes longer than `timeout`.
+            MailboxError: The object is longer than `limit`, or takes longer than `timeout`; or the
+                device has no object dictionary.
+            ValueError: The index or the subindex is out of range.
+            RuntimeError: The caller is the iterating thread of a loop.
         """
         asked = self._upload(index, subindex, complete, limit, timeout)
         if type is None:
@@ -145,6 +148,10 @@ class Sdo:
 
         Raises:
             SdoAbort: The device refuses the transfer.
+            MailboxError: The device has no object dictionary.
+            TypeError: `value` is neither bytes nor a value of the type.
+            ValueError: The index, the subindex or the value is out of range.
+            RuntimeError: The caller is the iterating thread of a loop.
         """
         self._sub.main.converse(self._download(index, subindex, value, type, complete))
 
@@ -179,9 +186,10 @@ class Sdo:
         limit: int = UPLOAD_LIMIT,
         timeout: float = UPLOAD_TIMEOUT,
     ) -> Pending[T] | Pending[bytes]:
-        """Read an object without waiting: poll `done`, then call `result()`.
+        """Read an object while a loop runs, without waiting: poll `done`, then call `result()`.
 
-        The arguments are those of `read`. Without a loop, the answer is available at once.
+        `result()` raises the error, if any. The arguments are those of `read`. Without a loop, the
+        call waits for the answer.
         """
         asked = self._upload(index, subindex, complete, limit, timeout)
         if type is None:
@@ -205,9 +213,10 @@ class Sdo:
         type: DataType[T] | None = None,
         complete: bool = False,
     ) -> Pending[None]:
-        """Write an object without waiting: poll `done`, then call `result()`.
+        """Write an object while a loop runs, without waiting: poll `done`, then call `result()`.
 
-        `result()` raises the error, if any. The arguments are those of `write`.
+        `result()` raises the error, if any. The arguments are those of `write`. Without a loop, the
+        call waits for the answer.
         """
         return self._sub.main.request(self._download(index, subindex, value, type, complete))
 
@@ -268,7 +277,7 @@ class Sdo:
 
 
 def read_each(sdo: Sdo, places: Sequence[tuple[int, int]]) -> Procedure[Objects]:
-    """Read objects one after the other. Refused objects are omitted.
+    """Read objects one after the other, and return their bytes. Refused objects are omitted.
 
     Args:
         sdo: Access to the device.

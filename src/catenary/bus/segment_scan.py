@@ -62,7 +62,10 @@ def station_of(device: DeviceDescription) -> Station:
 
 
 def bring_to_pre_op(device: DeviceDescription) -> Procedure[ScannedDevice]:
-    """Open the mailbox, request PRE-OP, and read the profile, the mapping and missing names."""
+    """Open the mailbox, assign the EEPROM to the device, and request PRE-OP.
+
+    Then read the profile, the mapping and missing names. A device without a mailbox is not read.
+    """
     station = station_of(device)
     if device.mailbox is None:
         yield from hand_over(station)
@@ -113,7 +116,7 @@ def with_places(devices: Sequence[DeviceDescription]) -> tuple[DeviceDescription
 
 
 def oddities(devices: Sequence[DeviceDescription], *, ring: bool) -> tuple[str, ...]:
-    """Return contradictions of the wiring (except in a ring) and of the EEPROMs, as text.
+    """Return contradictions of the wiring (except in a ring) and the notes of the devices.
 
     Args:
         devices: Descriptions of the devices.

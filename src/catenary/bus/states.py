@@ -27,8 +27,9 @@ def request_states(
 ) -> dict[int, Outcome]:
     """Bring devices to a state; a failed device does not affect the others.
 
-    For SAFE-OP, a device is configured with its current mapping, by a plan for all devices. OP is
-    requested without process data, which devices with outputs refuse.
+    For SAFE-OP and OP, a device below SAFE-OP passes through INIT and is configured with its
+    current mapping, by a plan for all devices. OP is requested without process data, which devices
+    with outputs refuse.
 
     Args:
         runner: Runner of the procedures.
@@ -56,7 +57,7 @@ def _below_safe_op(runner: BlockingRunner, chosen: Mapping[int, DeviceDescriptio
 def _configure(
     runner: BlockingRunner, devices: Sequence[DeviceDescription], positions: Iterable[int]
 ) -> dict[int, CatenaryError]:
-    """Bring devices from INIT to SAFE-OP. Return the errors of those that failed."""
+    """Bring devices through INIT to SAFE-OP. Return the errors of those that failed."""
     started = {p: restart(_station(devices[p]), devices[p]) for p in positions}
     ready, failed = _parted(_run(runner, started))
     plan = make_plan([ready.get(device.position, device) for device in devices])

@@ -59,7 +59,11 @@ class SubDevice:
 
     @property
     def name(self) -> str:
-        """Name in the SII, such as "EL2004"; empty if there is none."""
+        """Name in the SII, such as "EL2004".
+
+        If the SII has no name, this is the order code, otherwise vendor and product. It is
+        "unknown" if the SII cannot be used, and empty after `passive_scan(names=False)`.
+        """
         return self.description.name
 
     @property
@@ -104,16 +108,17 @@ class SubDevice:
         return Station(self.position, self.description.station_address, self.name)
 
     def read_state(self) -> DeviceState:
-        """Read the EtherCAT state of the device."""
+        """Read the EtherCAT state of the device, and update `state`."""
         found = self.main.converse(read_state(self.station))
         self.state = found.state
         return found
 
     def request_state(self, state: AlState | str) -> DeviceState:
-        """Bring this device to a state, through all intermediate states, and leave it there.
+        """Bring this device to a state, leave it there, and update the attribute `state`.
 
-        For SAFE-OP, the device is configured with its current mapping. Do not call this while a
-        loop runs, because the loop configures its devices itself.
+        The device passes through all intermediate states. For SAFE-OP and OP, a device below
+        SAFE-OP passes through INIT and is configured with its current mapping. Do not call this
+        while a loop runs, because the loop configures its devices itself.
 
         Args:
             state: `State.SAFE_OP`, or its name: "SAFE_OP".
@@ -123,7 +128,7 @@ class SubDevice:
 
         Raises:
             StateError: The device refuses the state. The error gives the reason.
-            ValueError: The text is not the name of a state.
+            ValueError: The text or the number is not a state.
         """
         target = AlState.from_name(state) if isinstance(state, str) else AlState(state)
         outcome = self.main.request_states(self.main.subs, [self.position], target)[self.position]

@@ -19,7 +19,7 @@ JITTER_NS = 200  # sum over four time stamps: one tick of 10 ns each, more with 
 def cable_delays_ns(
     topology: Topology, times: Sequence[PortTimes | None]
 ) -> tuple[int | None, ...]:
-    """Return the one-way delay from its parent to each device [ns], by position.
+    """Return the one-way delay to each device from its parent [ns], by position.
 
     The delay includes cable and forwarding. It is None if one of the two devices has no clock,
     if there is no parent, or if the time stamps belong to different frames.

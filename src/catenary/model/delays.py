@@ -53,8 +53,9 @@ class _Head(NamedTuple):
 def delays_ns(latches: Sequence[Sequence[ClockPlace]]) -> tuple[int | None, ...]:
     """Return the delay from the first clock to every device [ns]; None if it has no clock.
 
-    The result is the mean over all latches. Single results are not rounded and may be negative.
-    The mean is therefore correct even if a cable delay is shorter than the jitter of the clocks.
+    The result is the mean over all latches, rounded, and at least 0. Single results are not rounded
+    and may be negative. The mean is therefore correct even if a cable delay is shorter than the
+    jitter of the clocks.
 
     Args:
         latches: The same devices, measured once or several times.

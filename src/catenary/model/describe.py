@@ -192,7 +192,10 @@ def _is_possible(area: MailboxArea) -> bool:
 
 
 def _sync_managers(sii: Sii, supported: int, notes: list[str]) -> tuple[SyncManager, ...]:
-    """Return the SyncManagers of the SII that the controller supports (0 means unknown)."""
+    """Return the SyncManagers of the SII that the controller supports.
+
+    Add a note if the SII has more. If `supported` is 0, the limit is SYNC_MANAGER_COUNT.
+    """
     count = min(supported or SYNC_MANAGER_COUNT, SYNC_MANAGER_COUNT)
     if len(sii.sync_managers) > count:
         notes.append(
@@ -214,7 +217,8 @@ def _sync_managers(sii: Sii, supported: int, notes: list[str]) -> tuple[SyncMana
 def _kind(entry: sii_categories.SyncManagerEntry) -> SyncManagerUse:
     """Return the use of a SyncManager.
 
-    Early images leave it at 0. It is then derived from the control byte, as in SOEM.
+    Early images leave it at 0. It is then derived from the control byte, as in SOEM. A SyncManager
+    without an address is unused.
     """
     if entry.use in (1, 2, 3, 4):
         return SyncManagerUse(entry.use)

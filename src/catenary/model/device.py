@@ -176,7 +176,7 @@ class ObjectInformation:
 
 @dataclass(frozen=True, slots=True)
 class ObjectValue:
-    """Value of a dictionary entry when it was read; None if it could not be read."""
+    """Value of a dictionary entry when it was read. `data` is None if it could not be read."""
 
     index: int
     subindex: int
@@ -204,14 +204,14 @@ class DeviceDescription:
     parent: int | None = None  # position of the device before it in the tree
     parent_port: int | None = None
     system_time: bool = False  # the device has a clock that can be synchronised (0x0910)
-    op_modes: tuple[OpMode, ...] = ()  # modes of distributed clocks; the first is the default
+    op_modes: tuple[OpMode, ...] = ()  # modes of distributed clocks, in the order of the SII
     group: str = ""
     order: str = ""
     device_type: int | None = None  # object 0x1000
     slots: tuple[int, ...] = ()  # CiA 402 axes: objects + 0x800·slot
     objects: tuple[ObjectInformation, ...] = ()  # dictionary entries that were read
     values: tuple[ObjectValue, ...] = ()  # present values of objects in a start-up list
-    mapping_source: str = "SII"  # or "CoE"
+    mapping_source: str = "SII"  # or "CoE", or "IgH master"
     notes: tuple[str, ...] = ()  # faults of its SII, or differences from its dictionary
 
     @property

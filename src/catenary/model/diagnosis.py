@@ -85,8 +85,8 @@ def judge(seen: Observation) -> tuple[Finding, ...]:
 def _power(seen: Observation) -> tuple[list[Finding], set[Cable]]:
     """Return the devices that lost their power, and the cables that this explains.
 
-    All neighbours of such a device have lost the link to it. The device itself has not counted a
-    lost link, because its counters restarted at 0 when the power returned.
+    All neighbours of such a device have lost the link to it. The device itself has counted no lost
+    link, or its counters are known to have restarted. They restart at 0 when the power returns.
     """
     found: list[Finding] = []
     explained: set[Cable] = set()
@@ -140,8 +140,10 @@ def _noisy(seen: Observation, cable: Cable) -> int:
 def _noise(seen: Observation) -> Iterator[Finding]:
     """Yield the causes of broken frames: cases 7 to 10, 12 and 16.
 
-    If most cables have broken frames, the cause is shared. If exactly the cables of one device
-    have broken frames, the cause is the device. Otherwise each cable is a cause.
+    A cable is noisy if it has broken frames or symbol errors, but no lost links. If at least half
+    of the cables are noisy (and at least WIDESPREAD), the cause is shared. If exactly the cables of
+    one device are noisy (at least two), the cause is the device. Otherwise each noisy cable is a
+    cause.
     """
     noisy = [
         cable

@@ -71,7 +71,8 @@ class Cable(NamedTuple):
 class Topology:
     """The tree of a segment. `ports` and `places` are indexed by position.
 
-    In a ring, `second_end` is the (position, port) wired to the MainDevice's second interface.
+    In a ring, `second_end` is the (position, port) wired to the MainDevice's second interface. It
+    is None if this port is not open or cannot be identified, and on a line.
     """
 
     ports: tuple[Ports, ...]

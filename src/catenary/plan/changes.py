@@ -45,7 +45,10 @@ def mapping_changes(
 def value_changes(
     device: DeviceDescription, start_up: Sequence[tuple[int, int, bytes]]
 ) -> list[Change]:
-    """Return the objects of a start-up list that differ from the values in the device."""
+    """Return the objects of a start-up list that change a value.
+
+    An object whose present value is unknown counts as a change.
+    """
     changes = []
     for index, subindex, data in start_up:
         old = device.known_value(index, subindex)

@@ -106,7 +106,8 @@ def choose_clocks(
         follow: "reference" or "main": see `ClockPlan`.
 
     Raises:
-        ConfigurationError: A device has no suitable clock, or precedes its reference.
+        ConfigurationError: A device does not exist, has no suitable clock, or precedes the
+            reference clock.
     """
     if not requests:
         return None
@@ -134,6 +135,10 @@ def make_sync(device: DeviceDescription, request: DistributedClock, period_ns: i
         device: Device.
         request: Clock request.
         period_ns: Period of the device's exchange [ns].
+
+    Raises:
+        ConfigurationError: The SII has no OpMode with the requested name, or a setting is
+            impossible.
     """
     mode = _op_mode(device, request)
     cycle_ns = _in_ns(request.sync0, mode.sync0_ns or _multiple(period_ns, mode.sync0_factor))
@@ -173,7 +178,8 @@ def make_clock_plan(
         burst: Number of frames for static drift compensation.
 
     Raises:
-        ConfigurationError: The frames do not fit into the period.
+        ConfigurationError: The frames and the margin do not fit into the period, or `margin` or
+            `burst` is negative.
     """
     if burst < 0:
         raise ConfigurationError(
@@ -249,7 +255,14 @@ def _no_clock(device: DeviceDescription, why: str) -> ConfigurationError:
 
 
 def _op_mode(device: DeviceDescription, request: DistributedClock) -> OpMode:
-    """Return the OpMode with the requested name, or the first one that starts a SYNC signal."""
+    """Return the OpMode with the requested name.
+
+    Without a name, return the first one that starts SYNC0 or, if there is none, SYNC1. If there is
+    none of these either, return a mode with SYNC0 in every period.
+
+    Raises:
+        ConfigurationError: The SII has no OpMode with this name.
+    """
     if request.op_mode is not None:
         return _named_mode(device, request.op_mode)
     for starts in (_starts_sync0, _starts_sync):
@@ -332,7 +345,10 @@ def _starts_sync(assign_activate: int) -> bool:
 
 
 def _multiple(period_ns: int, factor: int) -> int:
-    """Return a multiple or an integer fraction of the period: ETG.2000, CycleTimeSync0@Factor."""
+    """Return a multiple or an integer fraction of the period: ETG.2000, CycleTimeSync0@Factor.
+
+    A negative factor divides. 0 counts as 1.
+    """
     if factor < 0:
         return period_ns // -factor
     return period_ns * (factor or 1)

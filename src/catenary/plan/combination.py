@@ -24,6 +24,9 @@ def gather_requests(
     Args:
         requests: Process-data requests.
         period_ns: Period of the cycle [ns].
+
+    Raises:
+        ConfigurationError: Two requests for a device contradict each other.
     """
     gathered: dict[int, DeviceRequest] = {}
     for request in requests:

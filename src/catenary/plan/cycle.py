@@ -136,7 +136,7 @@ class SyncUnit:
 
 @dataclass(frozen=True, slots=True)
 class AxisLimits:
-    """Limits that the core enforces for all set-points. None: no limit."""
+    """Limits that the core enforces for all set-points. None: no limit, except for `step`."""
 
     position_min: float | None = None  # [rad]
     position_max: float | None = None  # [rad]

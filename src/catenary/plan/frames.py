@@ -82,7 +82,8 @@ def make_frames(
         exact_matching: True if every frame carries the cycle number.
 
     Raises:
-        ConfigurationError: One cycle needs more frames than there are indices.
+        ConfigurationError: One cycle needs more frames than the indices can identify, or all
+            cycles together need more than FRAMES_MAX.
     """
     pieces = [_al_status(device_count), *_of_clocks(clocks)]
     for number, unit in enumerate(units):
@@ -108,7 +109,9 @@ def cyclic_wire_time_ns(frames: Sequence[FramePlan]) -> int:
 
 
 def acyclic_wire_time_ns(cyclic_ns: int, period_ns: int) -> int:
-    """Return the wire time of one cycle that is left for acyclic frames [ns].
+    """Return the wire time of one cycle that is left for acyclic frames [ns]; 0 if there is none.
+
+    ACYCLIC_GUARD, a share of the period, is kept free.
 
     Args:
         cyclic_ns: Wire time of the cyclic frames [ns].

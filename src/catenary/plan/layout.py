@@ -168,6 +168,7 @@ def make_layout(devices: Sequence[DeviceData], unit_max: int = UNIT_MAX) -> Layo
 
     Raises:
         MappingError: The process data of a device does not fit into one unit.
+        ConfigurationError: A device has too few FMMUs, or no SyncManager for its PDOs.
     """
     units: list[UnitLayout] = []
     places: dict[int, DeviceLayout] = {}
@@ -326,7 +327,11 @@ def _fmmus(
     outputs_at: int,
     inputs_at: int,
 ) -> tuple[FmmuPlan, ...]:
-    """Return one FMMU per run of adjacent SyncManagers of a direction."""
+    """Return one FMMU per run of adjacent SyncManagers of a direction.
+
+    Raises:
+        ConfigurationError: The controller has too few FMMUs.
+    """
     plans: list[FmmuPlan] = []
     next_logical = {Direction.OUTPUT: outputs_at, Direction.INPUT: inputs_at}
     for manager in managers:

@@ -57,7 +57,9 @@ class MailboxArea:
 def with_mailboxes(
     layout: Layout, devices: Sequence[DeviceDescription]
 ) -> tuple[Layout, MailboxArea]:
-    """Return the layout with the mailbox bit of each device that has a mailbox and a spare FMMU.
+    """Return the layout with the mailbox bits at the end of the inputs, and their area.
+
+    Each device with a mailbox and a spare bit-wise FMMU has a bit.
 
     Args:
         layout: Layout of the process data.

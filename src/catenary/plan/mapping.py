@@ -51,12 +51,15 @@ def make_mapping(
     requested: Sequence[ObjectReference],
     written: Sequence[WrittenPdo] = (),
 ) -> Mapping:
-    """Return the mapping that carries all required objects and changes least.
+    """Return the mapping with the specified PDOs, or find one that carries all required objects.
+
+    The search prefers the mapping that changes least.
 
     Args:
         device: The device, with its present mapping.
         direction: Outputs or inputs.
-        requested: Requested objects. Optional ones that would need a rewrite are left out.
+        requested: Requested objects. Optional ones alone cause no change; those that are not mapped
+            are in `left_out`.
         written: PDOs of this direction that the application specified; empty to search for PDOs.
 
     Raises:

@@ -75,7 +75,7 @@ def find_number(
 ) -> Number | None:
     """Return the place of an object; None if it is not mapped.
 
-    If no place agrees with `which`, return the first one.
+    A field of `which` is ignored if no remaining place agrees with it.
     """
     found = [each for each in mapped if (each.index, each.subindex) == (index, subindex)]
     if not found:

@@ -27,7 +27,7 @@ class PlanOptions:
         receive_mode: "poll", "wait" or "busy".
         optional: Positions of devices whose loss does not make a cycle bad, in addition to the
             devices of optional requests. A device without a request is required if any requested
-            device is.
+            device is, or if there are no requests.
         watchdog: Watchdog time of process data [s]; 0: off. None: 0.1 s, or the longer of 10 ms and
             five exchanges for devices in CST.
         collect_share: If threaded, share of the period, from the wake-up on, in which frames may

@@ -39,6 +39,8 @@ def check_owners(
 ) -> None:
     """Check that no byte of the outputs is written by two requests, or by an axis and a column.
 
+    An axis and a column of one request may share the velocity offset.
+
     Raises:
         ConfigurationError: A byte has two writers. The error names them.
     """

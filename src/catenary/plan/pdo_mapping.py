@@ -103,6 +103,9 @@ def with_pdos(device: DeviceDescription, direction: Direction, pdos: Sequence[Pd
     """Return the mapping with these PDOs on the SyncManager for process data.
 
     Differences from the device's own mapping are marked as rewritten or reassigned.
+
+    Raises:
+        MappingError: The device has no SyncManager for the direction.
     """
     channel = check_channel(device, direction)
     now = {each.sync_manager: each for each in device.assignments(direction)}

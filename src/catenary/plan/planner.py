@@ -74,9 +74,11 @@ def make_plan(
         options: Options that do not belong to a single request, such as the period.
 
     Raises:
-        ConfigurationError: An object cannot be mapped, requests contradict each other, or the
-            frames do not fit into the period.
-        ValueError: An option is out of its range.
+        MappingError: An object cannot be mapped.
+        ConfigurationError: Requests contradict each other or the devices, or the frames do not fit
+            into the period.
+        ValueError: An option or a start-up value is out of its range.
+        TypeError: A start-up value does not agree with its type.
     """
     drafts = _drafts(devices, requests, options)
     layout, mailboxes = with_mailboxes(_layout(drafts, options), devices)

@@ -122,7 +122,7 @@ class DistributedClock:
 class DeviceRequest:
     """Objects that one device must exchange cyclically.
 
-    An existing mapping is only changed if a requested object is missing or `pdos` requires it.
+    An existing mapping is only changed if a required object is missing or `pdos` requires it.
     Several requests may name one device. Its divider is then the greatest common divisor of their
     dividers, and it is required if any of them requires it.
     """
@@ -174,7 +174,7 @@ class Mover(Protocol):
         """Write the targets of the next commit. `now` is the time of the cycle [s]."""
 
     def check(self) -> None:
-        """End the motions of stopped axes, after a bad cycle."""
+        """End the motions of stopped axes, after a cycle that reported a stop or a problem."""
 
     def end(self) -> None:
         """End all motions, because the loop ends."""

@@ -116,6 +116,8 @@ def make_device_plan(
 
     Raises:
         ConfigurationError: The device cannot have start-up objects, or the type of one is unknown.
+        ValueError: The value of a start-up object is out of range.
+        TypeError: The value of a start-up object does not agree with its type.
     """
     before, after = object_downloads(device, request.objects)
     of_sync = sync.objects if sync is not None and device.coe else ()
@@ -157,6 +159,8 @@ def object_downloads(
 
     Raises:
         ConfigurationError: The device has no CoE mailbox, or the type of an object is unknown.
+        ValueError: A value is out of range.
+        TypeError: A value does not agree with its type.
     """
     before: list[Download] = []
     after: list[Download] = []

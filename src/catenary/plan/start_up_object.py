@@ -28,7 +28,8 @@ class StartUp:
     Raises:
         ValueError: The index, the subindex or the value is out of range, or the object belongs to
             the PDO mapping.
-        TypeError: The value does not agree with the type.
+        TypeError: The value does not agree with the type, `type` is not a type, or an index is
+            text.
     """
 
     index: int
@@ -73,7 +74,12 @@ class StartUp:
         return self.type is None and not isinstance(self.value, bytes)
 
     def encode(self, kind: Scalar | None) -> bytes:
-        """Return the bytes to send. `kind` is the type of the value; None for untyped bytes."""
+        """Return the bytes to send. `kind` is the type of the value; None for untyped bytes.
+
+        Raises:
+            ValueError: The value is out of range.
+            TypeError: The value does not agree with the type, or needs one.
+        """
         if kind is None or (self.type is None and isinstance(self.value, bytes)):
             if not isinstance(self.value, bytes):
                 raise TypeError(f"start-up object {self.place}: {self.value!r} needs a type")

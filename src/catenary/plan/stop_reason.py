@@ -44,7 +44,8 @@ TEXTS: dict[StopReason, str] = {
     StopReason.COMMAND_TIMEOUT: "the last loop.update() is older than command_timeout",
 }
 
-# Unrequested stops, without a fault or a lost device as cause: the iteration raises.
+# Stops by the core itself: the iteration raises, unless on_axis_stopped is "event". Faults, lost
+# devices and drives that left operation by themselves are handled separately.
 UNASKED = frozenset(
     {
         StopReason.UNDERRUN,
