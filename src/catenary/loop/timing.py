@@ -95,7 +95,10 @@ def counts(counters: Mapping[str, int]) -> str:
 
 
 def verdict(timing: Timing) -> Iterator[str]:
-    """Yield one line for each kind of problem, or a line that states that there is none."""
+    """Yield one line for virtual time, and one for each kind of problem.
+
+    If no cycle was late, uncommitted, underrun or lost, a line states this.
+    """
     if timing.is_virtual:
         yield VIRTUAL
     lines = [*_late(timing), *_uncommitted(timing), *_underrun(timing), *_lost(timing)]

@@ -51,11 +51,13 @@ class MailboxWatch:
 
     @property
     def next_look_ns(self) -> int:
-        """Time of the next poll [ns]."""
+        """Time of the next poll [ns]; NEVER_NS if no device is polled."""
         return self._due_ns if self._polled else NEVER_NS
 
     def look(self, now_ns: int, cycle: int) -> None:
-        """Start reading every full mailbox, except those that other procedures are using.
+        """Start reading every full mailbox, and the next polled one when its time has come.
+
+        Mailboxes that other procedures are using are left out.
 
         Args:
             now_ns: Time of the link's clock [ns].
