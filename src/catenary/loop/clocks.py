@@ -99,7 +99,7 @@ class Clocks:
 
     @property
     def largest_phase_error(self) -> float:
-        """Largest phase error of a single cycle since the loop was entered or `reset` [s]."""
+        """Largest magnitude of the phase error in a cycle, since the entry or `reset` [s]."""
         return self._clock.figures()["worst_error"] * NS
 
     @property

@@ -180,7 +180,7 @@ class FaultReport:
     def _axis_error(
         self, stops: Sequence[StoppedAxis], *, raise_faults: bool
     ) -> CatenaryError | None:
-        """Stop all axes and return the error if required axes are in fault or stopped by themselves.
+        """Return the error for required axes in fault or stopped without a request; stop all axes.
 
         Return None if there are none, or if the policy only reports them. If a device may be out of
         OP during a fault, query the devices first, and return that error without a stop.

@@ -273,8 +273,8 @@ def cpus_for(count: int, cpu: int | Sequence[int] | None) -> list[int | None]:
 
     Args:
         count: Number of networks.
-        cpu: Requested CPU or CPUs. None: any CPU of the process; for several networks the last
-            CPUs, if there are more CPUs than networks.
+        cpu: Requested CPU, for all threads, or one CPU for each network. None: any CPU of the
+            process; for several networks the last CPUs, if there are more CPUs than networks.
 
     Raises:
         ValueError: The number of CPUs is not the number of networks, or `cpu` is a sequence for one

@@ -67,7 +67,7 @@ class Timing(Mapping[str, Mapping[str, float]]):
 
     @property
     def verdict(self) -> str:
-        """Late, uncommitted, underrun and lost cycles as text, one line each, with advice."""
+        """Bad cycles and long waits for the interpreter as text, one line per kind, with advice."""
         return "\n".join(verdict(self))
 
     def __str__(self) -> str:
