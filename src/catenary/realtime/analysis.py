@@ -228,7 +228,10 @@ def hyperperiod(demands: Sequence[Demand]) -> float:
 
 
 def longest_response(task: Load, above: Sequence[Load]) -> int | None:
-    """Return the longest response [ns]; None if overloaded, or not found within MOST_STEPS."""
+    """Return the longest response [ns].
+
+    Return None if the load exceeds 1, or if no bound is found within MOST_STEPS.
+    """
     loads = (task, *above)
     if not bounded(loads):
         return None
