@@ -85,7 +85,7 @@ class Clocks:
     def largest_differences(self) -> Mapping[int, float]:
         """Largest magnitude of a single reading, by position [s].
 
-        It counts from the entry of the loop or from `reset`.
+        This is the largest since the loop was entered or since `reset`.
         """
         return {position: worst * NS for position, (_, _, worst, _) in self._readings()}
 

@@ -227,8 +227,8 @@ class Loop:
         `StopPolicy.command_timeout`. After it, CSV and PV decelerate and CST is stopped.
 
         Raises:
-            RuntimeError: The loop does not run in the background (`next(loop)` commits), is closed,
-                or the block is inside another one.
+            RuntimeError: The loop does not run in the background (`next(loop)` commits) or is
+                closed, or the call is inside another `update` block.
             LoopError: Another thread has been inside its block for more than 5 s.
             CatenaryError: The error that ended the loop in the background.
         """

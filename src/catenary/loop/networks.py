@@ -99,7 +99,7 @@ class NetworksIteration:
         return self._cycle
 
     def _commit_if_free(self) -> None:
-        """Run the moves and commit, unless another thread is writing the targets."""
+        """Write the targets of moving axes and commit, unless another thread writes targets."""
         lock = self.commit_lock
         if lock is not None and not lock.acquire(blocking=False):
             for one in self._sessions:

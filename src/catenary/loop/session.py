@@ -338,7 +338,7 @@ class Session:
     def _stop_axes(self, guard: SignalGuard) -> None:
         """End the law, and request a quick stop of all axes (0x605A).
 
-        Run cycles until they are at rest, at most until the deadline. A second signal ends this.
+        Run cycles until the axes rest, at most until the deadline. A second signal ends the wait.
         """
         self.engine.stop_law()
         if not self.plan.cycle.axes:

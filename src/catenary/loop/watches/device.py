@@ -274,8 +274,8 @@ class Watch:
     ) -> Procedure[Charge | None]:
         """Give a returned device the address of its place, and return the state of this place.
 
-        Return None, without an address, if the device has no place here, is unreadable, or is a
-        replacement that is held.
+        If the device has no place here, is unreadable, or is a replacement that is held, remove its
+        address and return None.
         """
         found: Identity | None = None
         for charge in lost:

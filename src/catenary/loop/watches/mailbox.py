@@ -55,7 +55,7 @@ class MailboxWatch:
         return self._due_ns if self._polled else NEVER_NS
 
     def look(self, now_ns: int, cycle: int) -> None:
-        """Start reading every full mailbox, and the next polled one when its time has come.
+        """Start reading every full mailbox, and poll the next device if a poll is due.
 
         Mailboxes that other procedures are using are left out.
 
