@@ -58,9 +58,9 @@ class Service:
             self.step()
 
     def step(self) -> None:
-        """Do the work of the service thread between two cycles, in virtual time.
+        """Do the work of the service thread between two cycles, and deliver the events.
 
-        Usually there is no work, and the call returns at once.
+        This is for virtual time. Usually there is no work, and the call returns at once.
         """
         now = self._engine.now()
         if now >= self._quiet_until or self.runner.asked.is_set() or self._watch.sees_mail:
@@ -99,7 +99,7 @@ class Service:
         return [task.result() for task in tasks]
 
     def end(self) -> None:
-        """End the thread. Pending procedures fail with LoopError."""
+        """End the thread and wait for it. Pending procedures fail with LoopError."""
         self._ended.set()
         self.runner.asked.set()
         if self._thread is not None and self._thread.is_alive():
@@ -117,7 +117,7 @@ class Service:
                     self._engine.acyclic_wait(BUSY_NS)
                 else:
                     self.runner.asked.wait(IDLE)
-        except Exception as failure:  # a thread has no caller: the next `converse` raises it
+        except Exception as failure:  # a thread has no caller: a waiting `converse` reports it
             self._failure = failure
             self.runner.close()
 

@@ -56,11 +56,12 @@ class Background:
         self._thread = threading.Thread(target=self._iterate, name="catenary loop", daemon=True)
 
     def start(self) -> None:
-        """Start the thread.
+        """Run one step in the calling thread, then start the background thread.
 
         Raises:
             ValueError: The loop is inline and exchanges its frames in the thread of the program.
             LoopError: An axis is powered in CST, and this call commits no torque set-points.
+            CatenaryError: The first step failed.
         """
         if self._sessions[0].plan.cycle.execution == "inline":
             raise ValueError(
@@ -77,7 +78,13 @@ class Background:
         self._thread.start()
 
     def end(self) -> None:
-        """End the thread and wait for it. No effect in the thread itself, or in a forked child."""
+        """Refuse further updates, end the thread and wait for it. A no-op in a forked child.
+
+        If the thread itself calls this, it does not wait. It ends after the present step.
+
+        Raises:
+            LoopError: The thread does not end in time.
+        """
         if self._process != os.getpid():
             return
         self._end_updates()
@@ -96,13 +103,16 @@ class Background:
         return self._thread.is_alive() and not self._ended.is_set()
 
     def raise_error(self) -> None:
-        """Raise the error that ended the loop, if any."""
+        """Raise the error that ended the loop, if any, and mark it as raised."""
         if self.error is not None:
             self._was_raised = True
             raise self.error
 
     def unraised_error(self) -> Exception | None:
-        """Return the error that ended the loop, unless a call has already raised it."""
+        """Return the error that ended the loop, and mark it as raised.
+
+        Return None if there is no error, or if a call has already raised it.
+        """
         error = None if self._was_raised else self.error
         self._was_raised = True
         return error

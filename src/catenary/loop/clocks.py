@@ -83,7 +83,10 @@ class Clocks:
 
     @property
     def largest_differences(self) -> Mapping[int, float]:
-        """Largest single reading by position since the loop was entered or `reset` [s]."""
+        """Largest magnitude of a single reading, by position [s].
+
+        This is the largest since the loop was entered or since `reset`.
+        """
         return {position: worst * NS for position, (_, _, worst, _) in self._readings()}
 
     @property
@@ -96,7 +99,7 @@ class Clocks:
 
     @property
     def largest_phase_error(self) -> float:
-        """Largest phase error of a single cycle since the loop was entered or `reset` [s]."""
+        """Largest magnitude of the phase error in a cycle, since the entry or `reset` [s]."""
         return self._clock.figures()["worst_error"] * NS
 
     @property
@@ -132,6 +135,7 @@ class Clocks:
         Raises:
             ValueError: `within` is not positive.
             ClockError: The clocks are not locked after `timeout`.
+            CatenaryError: The error that `check` raised.
         """
         if not within > 0:
             raise ValueError(f"within={within} s: must be positive")
@@ -144,13 +148,20 @@ class Clocks:
             )
 
     def settle(self, check: Callable[[int], None]) -> None:
-        """Wait until the clocks are locked, at most SETTLE_TIMEOUT. A timeout raises nothing."""
+        """Run cycles until the clocks are locked, at most for SETTLE_TIMEOUT.
+
+        A timeout is not an error.
+
+        Args:
+            check: Function that gets the flags of each cycle. It raises the error of a bad cycle.
+        """
         self._run_until_locked(SETTLE_TIMEOUT, check)
 
     def rejoin(self, position: int, plan: DevicePlan) -> Procedure[None]:
         """Set the clock and start the SYNC signals of a device that was switched off.
 
-        It runs between PRE-OP and SAFE-OP. It is a no-op for a device without a clock.
+        The procedure runs between PRE-OP and SAFE-OP. It is a no-op if the device has no clock, or
+        if the delay of the device or of the reference is unknown.
 
         Args:
             position: Position of the device.
@@ -167,7 +178,7 @@ class Clocks:
         yield from rejoin(devices, position, plan.sync, peers, behind, epoch_ns)
 
     def announce(self) -> None:
-        """Put an event if the clocks were locked or unlocked since the last event."""
+        """Put an event if `locked` has changed since the last event; acknowledge all changes."""
         with self._announcing:
             _ = self._clock.changes  # acknowledged here: the event below covers all changes
             locked = self.locked

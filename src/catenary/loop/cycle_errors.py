@@ -72,7 +72,7 @@ def silence_error(
 
 
 def tight_period(wire_ns: int, period_ns: int) -> str:
-    """Return a hint if the cyclic frames take most of the period, otherwise an empty text.
+    """Return a hint if the cyclic frames take at least half of the period, otherwise "".
 
     Args:
         wire_ns: Wire time of the cyclic frames [ns].
@@ -89,7 +89,9 @@ def tight_period(wire_ns: int, period_ns: int) -> str:
 def state_error(
     answers: Sequence[Answer], log: Log | None, other_masters: Sequence[str] = ()
 ) -> StateError | None:
-    """Return the error for devices that left OP; None if all devices that answer are in OP.
+    """Return the error for devices that are out of OP or report an error; None if there are none.
+
+    Devices that do not answer are ignored.
 
     Args:
         answers: Answers of the devices to a read of the AL status.

@@ -20,7 +20,12 @@ class LoopRequest(ProcessDataRequest, Protocol):
 
 
 def main_device_of(requests: Sequence[LoopRequest]) -> MainDevice:
-    """Return the MainDevice that all requests share."""
+    """Return the MainDevice that all requests share.
+
+    Raises:
+        TypeError: See `by_network`.
+        ValueError: No request names a device, or the devices have several MainDevices.
+    """
     [(main, _)] = by_network(requests)
     return main
 
@@ -30,7 +35,7 @@ def by_network(requests: Sequence[LoopRequest]) -> list[tuple[MainDevice, list[L
 
     Raises:
         TypeError: An object is not a process-data request, or a device has another kind of master.
-        ValueError: There is no request, or one names devices of several MainDevices.
+        ValueError: No request names a device, or one names devices of several MainDevices.
     """
     networks: dict[int, tuple[MainDevice, list[LoopRequest]]] = {}
     for request in requests:

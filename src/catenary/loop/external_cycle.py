@@ -59,7 +59,10 @@ class CarriedExchange:
         return carrier
 
     def bring_to_op(self) -> list[Pending[None]]:
-        """Let the external master bring the devices to OP while the cycle runs."""
+        """Let the external master bring the required devices to OP while the cycle runs.
+
+        Then wait until all sync units answer, and start the watch. Return the running watch.
+        """
         required = [
             sub.position for sub in self._session.main.subs if self.watch.requires(sub.position)
         ]
@@ -94,7 +97,7 @@ class CarriedExchange:
 
 
 class CarriedWatch:
-    """Watch of the states of all devices. It puts an event for each change."""
+    """Watch of all devices. It puts events for devices that are lost, return or leave OP."""
 
     def __init__(
         self,
@@ -124,7 +127,10 @@ class CarriedWatch:
 
     @property
     def excuses(self) -> bool:
-        """True if all devices that are out of OP are optional, as of the last survey."""
+        """True if some devices are optional, and no required one answers out of OP.
+
+        The value is as of the last survey. Devices that do not answer are ignored.
+        """
         required = (a for a in self._answers if self.requires(a.station.position))
         return bool(self._optional) and not any(is_astray(answer) for answer in required)
 
@@ -139,7 +145,7 @@ class CarriedWatch:
         )
 
     def _report(self, answers: Sequence[Answer]) -> None:
-        """Put an event for each change since the last answers."""
+        """Put events for lost and returned devices and those that left OP; update `sub.state`."""
         before = {answer.station.position: answer.word for answer in self._answers}
         now = self._engine.now() * 1e-9
         for answer in answers:

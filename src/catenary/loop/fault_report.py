@@ -72,7 +72,8 @@ class FaultReport:
         """Put the events of a cycle, and return the exception that ends the loop, if any.
 
         The first cause found in this order counts: end of the cycle, missing answers, law, device
-        out of OP, drive.
+        out of OP, drive. The call can query the devices, which runs further cycles. For missing
+        answers and for drives, it also stops all axes.
 
         Args:
             flags: Flags of the cycle.
@@ -136,7 +137,7 @@ class FaultReport:
             explained: True if the call has another reason: see `AxisWatch.new_refusals`.
 
         Returns:
-            The new stops.
+            The new stops, including the requested ones.
         """
         stops = self._axis_watch.new_stops()
         refusals = self._axis_watch.new_refusals(explained=explained or bool(stops))
@@ -167,7 +168,7 @@ class FaultReport:
         ]
 
     def _out_of_op(self) -> StateError | None:
-        """Query the devices, and return the error if a required one is out of OP."""
+        """Query the devices. Return the error if a required one left OP or lost its address."""
         log, requires = self.log(), self._exchange.watch.requires
         found = self._exchange.query_states()
         required = [a for a in found.answers if requires(a.station.position)]
@@ -179,7 +180,11 @@ class FaultReport:
     def _axis_error(
         self, stops: Sequence[StoppedAxis], *, raise_faults: bool
     ) -> CatenaryError | None:
-        """Return the error for required axes in fault or stopped without a request."""
+        """Return the error for required axes in fault or stopped without a request; stop all axes.
+
+        Return None if there are none, or if the policy only reports them. If a device may be out of
+        OP during a fault, query the devices first, and return that error without a stop.
+        """
         requires = self._exchange.watch.requires
         states = map(state_of, self._views.statusword.tolist())
         in_fault = [axis for axis, state in enumerate(states) if state in IN_FAULT]

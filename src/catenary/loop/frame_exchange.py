@@ -40,7 +40,7 @@ class FrameExchange:
         return Engine(self._session.plan.cycle, self._session.main.link.capsule)
 
     def cycle_clock(self) -> CycleClock:
-        """Return the engine's clock."""
+        """Set the epoch of the engine's clock, and return the clock."""
         clock = self._session.engine.clock
         assert clock is not None  # a plan with clocks makes an engine with clocks
         clock.set_epoch(self._session.main.clock_epoch_ns)
@@ -74,7 +74,10 @@ class FrameExchange:
         return self._session.engine.counters["repeated"] + unassigned
 
     def bring_to_op(self) -> list[Pending[None]]:
-        """Wait for the clocks, then bring all devices to OP together."""
+        """Wait for all answers and for the clocks, then bring all devices to OP together.
+
+        Start the watches and return them.
+        """
         session = self._session
         session.settle()
         if session.clocks is not None:
@@ -111,8 +114,8 @@ class FrameExchange:
     def query_states(self) -> Evidence:
         """Query all devices for their states.
 
-        If a required device does not answer to its address in two surveys while others do, it has
-        lost the address.
+        A required device has lost its address if it is silent in two surveys while others answer.
+        This is not checked if a required device is out of OP, or if the cyclic AL status shows OP.
         """
         session = self._session
         others = session.main.other_masters

@@ -79,6 +79,8 @@ class Loop:
 
     Raises:
         ValueError: An option is impossible, or a request names devices of several MainDevices.
+        TypeError: A request, a law or a group of options has the wrong type.
+        LawError: A law has an argument with an unknown name.
     """
 
     def __init__(
@@ -179,9 +181,10 @@ class Loop:
         return self.__enter__()
 
     def close(self) -> None:
-        """Leave the loop: stop the axes, then the cycle. A no-op if it is closed.
+        """Leave the loop: stop the axes, then the cycle, and bring the devices to PRE-OP.
 
         Raises the error that ended the loop in the background, unless another call has raised it.
+        Otherwise, raises the first problem while leaving. A second call has no effect.
         """
         if not self._sessions:
             return
@@ -201,6 +204,7 @@ class Loop:
         Raises:
             ValueError: The loop is inline.
             LoopError: An axis is powered in CST.
+            RuntimeError: The loop is not open.
         """
         if self._background is not None:
             self._background.raise_error()
@@ -219,11 +223,13 @@ class Loop:
         """Return a context in which a program writes one consistent set of targets and requests.
 
         While the loop runs in the background, the whole set is committed when the block ends. If
-        the block raises, nothing is committed. In CSV and CST, the set is valid for
-        `StopPolicy.command_timeout`. After it, CSV decelerates and CST is stopped.
+        the block raises, nothing is committed. In CSV, PV and CST, the set is valid for
+        `StopPolicy.command_timeout`. After it, CSV and PV decelerate and CST is stopped.
 
         Raises:
-            RuntimeError: The loop does not run in the background: `next(loop)` commits.
+            RuntimeError: The loop does not run in the background (`next(loop)` commits) or is
+                closed, or the call is inside another `update` block.
+            LoopError: Another thread has been inside its block for more than 5 s.
             CatenaryError: The error that ended the loop in the background.
         """
         if self._background is None:
@@ -269,6 +275,7 @@ class Loop:
             MoveError: The move took too long or was replaced, or its axis was stopped.
             DriveError: A drive is in fault or was stopped. The iteration may raise other errors.
             TypeError: `move` is not a move.
+            RuntimeError: The loop is not open, or the call is inside `with loop.update():`.
         """
         require_move(move)
         if self._background is None:
@@ -314,9 +321,11 @@ class Loop:
             Handle of the running law.
 
         Raises:
-            LawError: The law cannot be compiled. The iteration raises it for an exception, a NaN or
-                infinite target, overruns, and a step that does not return.
-            ValueError: The budget leaves too little of the period for the frames.
+            LawError: The law cannot be compiled, or does not return. The iteration raises it for an
+                exception, a NaN or infinite target, overruns, and a step that does not return.
+            ValueError: An argument is impossible, the budget leaves too little of the period for
+                the frames, or the loop has several networks.
+            RuntimeError: The loop is not open, or an axis is in a move.
         """
         return self._only("a law").laws.start(made_law(law), memory, parameters, budget, overruns)
 
@@ -339,14 +348,16 @@ class Loop:
             budget: Longest time of one step [s]: see `start`.
             overruns: Number of consecutive steps over the budget: see `start`.
             compiled: False: run it as Python, in the thread of the caller. This is slow, but shows
-                Python's errors. Use it to find mistakes.
+                Python's errors. Use it to find mistakes. `budget` and `overruns` are then ignored.
 
         Returns:
             Memory of the law after its last step.
 
         Raises:
             LawError: The law cannot be compiled, or failed: see `start`.
-            ValueError: An argument is impossible.
+            ValueError: An argument is impossible, or the loop has several networks.
+            RuntimeError: The loop is not open, an axis is in a move, or a background thread
+                iterates the loop.
         """
         self._require_foreground()
         session = self._only("a law")
@@ -377,6 +388,10 @@ class Loop:
 
         Args:
             capacity: Number of rows that the stream can hold. One row is for one cycle.
+
+        Raises:
+            ValueError: `capacity` is out of range, or the loop has several networks.
+            RuntimeError: The loop is not open, or an axis is in a move.
         """
         self._only("a stream")
         return self._networks[0].stream(capacity)
@@ -447,7 +462,9 @@ class Loop:
         Raises:
             ClockError: The clocks are not locked after `timeout`.
             LoopError: An axis is powered in CST. Its torque would become stale during the wait.
-            RuntimeError: No request has `dc=`.
+            RuntimeError: No request has `dc=`, the loop is not open, or a background thread
+                iterates it.
+            ValueError: `within` is not positive.
         """
         self._require_foreground()
         with_clocks = [
@@ -463,7 +480,7 @@ class Loop:
             network.wait_locked(within, timeout)
 
     def _require_foreground(self) -> None:
-        """Raise RuntimeError if a thread iterates the loop already, or the loop is closed."""
+        """Raise RuntimeError if a background thread iterates the loop, or if it is closed."""
         if self._background is not None and self._background.is_alive:
             raise RuntimeError(
                 "the loop runs in the background, where a thread iterates it; write targets in "
@@ -476,7 +493,7 @@ class Loop:
 
         Raises:
             ValueError: The loop has several networks.
-            RuntimeError: Axes are moving.
+            RuntimeError: The loop has never been entered, or an axis is in a move.
         """
         if len(self._networks) > 1:
             raise ValueError(f"{what} works on one network: make a separate Loop for that network")
@@ -517,8 +534,8 @@ class Loop:
     def _leave(self) -> list[Exception]:
         """Stop every network, regardless of errors in the others; return the problems.
 
-        If another thread is already leaving the loop, the call first waits for it, at most
-        `LEAVE_TIMEOUT`.
+        Then restore the signal handlers. If another thread is already leaving the loop, the call
+        first waits for it, at most `LEAVE_TIMEOUT`.
         """
         is_ours = self._leaving.acquire(timeout=LEAVE_TIMEOUT)
         try:

@@ -40,6 +40,10 @@ def wait_for_move(cycles: Iterator[Cycle], move: Awaited, timeout: float | None)
         cycles: Iterator of the loop.
         move: Move to wait for.
         timeout: Longest wait [s]; None: the default of the move.
+
+    Raises:
+        MoveError: The move was not done in time. It has been stopped.
+        CatenaryError: The error of the move, or of a cycle.
     """
     limit = move.patience if timeout is None else timeout
     begun: float | None = None
@@ -54,7 +58,7 @@ def wait_for_move(cycles: Iterator[Cycle], move: Awaited, timeout: float | None)
 
 
 def stopped_late(move: Awaited, limit: float) -> MoveError:
-    """Stop a move that was not done in time, and return its error."""
+    """Request the stop of a move that was not done in time, and return its error."""
     error = move.timeout_error(limit)
     move.stop()
     return error

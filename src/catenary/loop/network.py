@@ -38,7 +38,12 @@ LOG_LIMIT = 2**24  # cycles, about a gigabyte
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Settings:
-    """Options of a loop that all of its networks share. Raises ValueError if one is impossible."""
+    """Options of a loop that all of its networks share.
+
+    Raises:
+        ValueError: An option is impossible.
+        TypeError: A group of options has the wrong type.
+    """
 
     period: float
     execution: ExecutionMode
@@ -173,7 +178,9 @@ class Network:
         return self.current_session
 
     def prepare(self, abandon: Callable[[], object]) -> Session:
-        """Bring all devices to SAFE-OP, compile the laws of the options, and return the session.
+        """Bring all devices to SAFE-OP, and return the session.
+
+        This also compiles the laws of the options and opens the sink.
 
         Args:
             abandon: Function that leaves the loop. It is called when the MainDevice is closed.
@@ -199,14 +206,16 @@ class Network:
         return session
 
     def _make_plan(self) -> Plan:
-        """Return the plan of the requests. Nothing is written to the devices."""
+        """Update the mappings from the devices, and return the plan of the requests."""
         its = self._settings
         self.main.read_mappings(*self._requests, period=its.period)
         devices = [sub.description for sub in self.main.subs]
         return make_plan(devices, self._requests, its.plan_options(self.main, self._cpu))
 
     def advance(self, flags: int) -> None:
-        """Step the acyclic queue after a cycle without an iteration; raise the error of the cycle.
+        """Judge a cycle that ran without an iteration, and raise its error, if any.
+
+        In virtual time, first step the acyclic queue.
 
         Args:
             flags: Flags of the cycle.

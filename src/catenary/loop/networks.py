@@ -57,7 +57,7 @@ class NetworksCycle(Cycle):
 
     @property
     def late(self) -> bool:
-        """True if any network had cycles that Python missed."""
+        """True if cycles of any network were skipped, or ran without new targets."""
         return any(network.late for network in self.networks)
 
     @property
@@ -99,7 +99,7 @@ class NetworksIteration:
         return self._cycle
 
     def _commit_if_free(self) -> None:
-        """Commit, unless another thread is writing the targets."""
+        """Write the targets of moving axes and commit, unless another thread writes targets."""
         lock = self.commit_lock
         if lock is not None and not lock.acquire(blocking=False):
             for one in self._sessions:
@@ -138,7 +138,7 @@ class NetworksIteration:
                 one.judge(mine)
 
     def _lives(self, one: Session, flags: int) -> bool:
-        """Return True if a network is alive.
+        """Update the set of failed networks. Return True if this network is alive.
 
         A failed network is alive again when its devices are in OP. Until then, the loop may
         continue although watchdogs have stopped these devices.
@@ -170,7 +170,8 @@ def make_networks(
         sink: Receiver of every cycle, or one for each network.
 
     Raises:
-        ValueError: An option is impossible for this number of networks.
+        ValueError: An option is impossible for this number of networks, or see `by_network`.
+        TypeError: See `by_network`.
     """
     groups = by_network(requests)
     count = len(groups)
@@ -215,7 +216,9 @@ def share_time(sessions: Sequence[Session]) -> None:
 
 
 def leave_all(sessions: Sequence[Session], guard: SignalGuard) -> list[Exception]:
-    """Stop every network, regardless of errors in the others; return the problems.
+    """End the background thread and stop every network; return the problems.
+
+    A problem in one network does not prevent the others from being stopped.
 
     Args:
         sessions: Sessions of the loop.
@@ -235,7 +238,9 @@ def leave_all(sessions: Sequence[Session], guard: SignalGuard) -> list[Exception
 
 
 def brake(sessions: Sequence[Session], guard: SignalGuard) -> None:
-    """Stop all axes of all networks together. Wait for standstill, at most until the deadline.
+    """Set all outputs to their safe values, and stop all axes of all networks together.
+
+    Wait for standstill, at most until the deadline.
 
     Args:
         sessions: Sessions of the loop.
@@ -272,8 +277,8 @@ def cpus_for(count: int, cpu: int | Sequence[int] | None) -> list[int | None]:
 
     Args:
         count: Number of networks.
-        cpu: Requested CPU or CPUs. None: any CPU of the process; for several networks the last
-            CPUs, if there are more CPUs than networks.
+        cpu: Requested CPU, for all threads, or one CPU for each network. None: any CPU of the
+            process; for several networks the last CPUs, if there are more CPUs than networks.
 
     Raises:
         ValueError: The number of CPUs is not the number of networks, or `cpu` is a sequence for one
@@ -294,7 +299,7 @@ def cpus_for(count: int, cpu: int | Sequence[int] | None) -> list[int | None]:
 
 
 def _have_one_clock(links: Sequence[Link]) -> bool:
-    """Return True if advancing the first clock advances all clocks."""
+    """Advance the first clock past all others. Return True if the others follow."""
     first, *others = links
     later = max(link.now() for link in links) + 1000
     first.wait_until(later, False)

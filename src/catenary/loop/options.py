@@ -152,6 +152,7 @@ class ClockOptions:
 
     Raises:
         ValueError: An option is impossible.
+        TypeError: `reference` is not a SubDevice.
     """
 
     lead: FollowedClock | None = None

@@ -143,7 +143,7 @@ def of_block(block: Block, places: Places, kinds: Sequence[bool] = ()) -> Iterat
 
 
 def unit_of(name: str, kinds: Sequence[bool] = ()) -> str:
-    """Return the unit of a field: "rad", "m" for linear axes, or "rad or m" for both kinds.
+    """Return the unit of a field. For a position: "rad", "m", or "rad or m" for both kinds.
 
     Empty if the field has no unit.
 
@@ -223,7 +223,7 @@ def one_sink_each(sinks: Sink | Sequence[Sink] | None, networks: int) -> list[Si
     """Return the sink of every network.
 
     Args:
-        sinks: One sink, or one for each network.
+        sinks: One sink, or one for each network; None: no sinks.
         networks: Number of networks.
 
     Raises:

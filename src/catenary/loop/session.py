@@ -172,6 +172,10 @@ class Session:
         """Reset faults and enable all axes.
 
         Position axes hold when this returns. Velocity and torque axes wait for their first targets.
+
+        Raises:
+            DriveError: A fault cannot be reset, or a position axis cannot be enabled in time.
+            CatenaryError: The cycle failed.
         """
         in_position = np.isin(self.views.mode_target, (Mode.CSP, Mode.PP))
         if (
@@ -222,7 +226,12 @@ class Session:
         )
 
     def settle(self) -> None:
-        """Run cycles until all units answer. The first cycles of a thread may have no answers."""
+        """Run cycles until all units answer. The first cycles of a thread may have no answers.
+
+        Raises:
+            WorkingCounterError: A unit is silent in each of SETTLE_CYCLES cycles.
+            LoopError: The cycle has ended.
+        """
         for _ in range(SETTLE_CYCLES):
             flags = self.cycle()
             self.raise_ended(flags)
@@ -248,6 +257,8 @@ class Session:
 
     def judge(self, flags: int, *, enabling: bool = False) -> None:
         """Put the events of a cycle, and raise the exception that ends the loop, if any.
+
+        Before this, end moves that cannot continue. See `FaultReport.error` for further effects.
 
         Args:
             flags: Flags of the cycle.
@@ -285,7 +296,7 @@ class Session:
     def leave(self, guard: SignalGuard) -> list[Exception]:
         """Stop the loop and return the problems. A failed step does not prevent the next ones.
 
-        No effect on a second call, or in a forked child.
+        A second call has no effect. In a forked child, the call only does `forget`.
         """
         if self._process != os.getpid():
             self.forget()
@@ -325,7 +336,10 @@ class Session:
             mover.end()
 
     def _stop_axes(self, guard: SignalGuard) -> None:
-        """Request a quick stop of all axes (0x605A), and run cycles until they are at rest."""
+        """End the law, and request a quick stop of all axes (0x605A).
+
+        Run cycles until the axes rest, at most until the deadline. A second signal ends the wait.
+        """
         self.engine.stop_law()
         if not self.plan.cycle.axes:
             return

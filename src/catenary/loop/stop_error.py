@@ -71,7 +71,7 @@ def stopped_error(stops: Sequence[StoppedAxis], cycle: CyclePlan, log: Log) -> D
 
 
 def _details(stop: StoppedAxis, cycle: CyclePlan, log: Log) -> str:
-    """Return the exceeded limit and the late source as text; empty for other reasons."""
+    """Return the exceeded time limit as text, with the late source of an underrun, or ""."""
     if stop.reason is StopReason.UNDERRUN:
         limit = _late_limit_ns(stop.mode, cycle) / 1e6
         return f" ({limit:g} ms in {mode_name(stop.mode)}), {_what_was_late(stop, log)}"

@@ -46,7 +46,7 @@ class Stream:
             Number of rows that were written. The remaining rows did not fit.
 
         Raises:
-            ValueError: The shapes differ, or a value is NaN or infinite.
+            ValueError: No quantity is given, the shapes differ, or a value is NaN or infinite.
         """
         rows = {
             name: self._checked(name, values)

@@ -67,7 +67,7 @@ class Timing(Mapping[str, Mapping[str, float]]):
 
     @property
     def verdict(self) -> str:
-        """Late, uncommitted, underrun and lost cycles as text, one line each, with advice."""
+        """Bad cycles and long waits for the interpreter as text, one line per kind, with advice."""
         return "\n".join(verdict(self))
 
     def __str__(self) -> str:
@@ -95,7 +95,10 @@ def counts(counters: Mapping[str, int]) -> str:
 
 
 def verdict(timing: Timing) -> Iterator[str]:
-    """Yield one line for each kind of problem, or a line that states that there is none."""
+    """Yield one line for virtual time, and one for each kind of problem.
+
+    If no cycle was late, uncommitted, underrun or lost, a line states this.
+    """
     if timing.is_virtual:
         yield VIRTUAL
     lines = [*_late(timing), *_uncommitted(timing), *_underrun(timing), *_lost(timing)]

@@ -23,7 +23,10 @@ class Timer:
         """Wait. Return True if the deadline has passed, False if `wake` ended the wait."""
 
     def spend(self, duration_ns: int) -> None:
-        """Spend execution time: simulated on a virtual clock, real on the machine's clock."""
+        """Spend execution time: simulated on a virtual clock, real on the machine's clock.
+
+        Raises ValueError for a negative duration.
+        """
 
     def wake(self) -> None:
         """End the current or the next wait."""
@@ -36,15 +39,18 @@ class VirtualTime:
 
     def __init__(self, memory: Buffer) -> None: ...
     def reset(self) -> None:
-        """Initialise the table. The memory must be all zeros."""
+        """Initialise the table. The memory must be all zeros. Raises OSError if this fails."""
 
     @property
     def now_ns(self) -> int: ...
     def join(self, priority: int, cpu: int) -> int:
-        """Return a slot for a new participant. Time stands still until it first waits."""
+        """Return a slot for a new participant. Time stands still until it first waits.
+
+        Raises ValueError if all slots are in use.
+        """
 
     def expect(self, slot: int) -> None:
-        """Reset the slot to its state after `join`, to restart its participant."""
+        """Mark the participant as restarted: time stands still until it first waits."""
 
     def run(self, slot: int) -> None:
         """Mark the participant as running: time stands still until it waits."""

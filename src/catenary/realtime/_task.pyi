@@ -23,10 +23,10 @@ class Block:
         """Initialise the block, and pre-fault its pages."""
 
     def restart(self) -> None:
-        """Reset the block, but keep the figures and the last release."""
+        """Reset the state, process, failure and `busy` for a restart. The rest is unchanged."""
 
     def start_at(self, origin_ns: int) -> None:
-        """Set the time of the first release."""
+        """Set the time of the first release, and end the wait in `wait_for_start`."""
 
     def wait_for_start(self, deadline_ns: int) -> bool:
         """Wait for `start_at` or `stop`. Return False at the deadline (CLOCK_MONOTONIC)."""
@@ -61,12 +61,15 @@ class Block:
         """Numbers of jobs released, deadlines missed, releases skipped and signals refused."""
 
     def stop(self) -> None:
-        """Request a stop: the task ends when it next waits. The caller also wakes its timer."""
+        """Request a stop: the task ends when it next waits.
+
+        A caller in another thread must also wake the timer of the task.
+        """
 
     def signal(self, now_ns: int) -> bool:
-        """Release a sporadic task once. The caller also wakes its timer.
+        """Release a sporadic task once. The caller must also wake the timer of the task.
 
-        Return False if too many releases are pending.
+        Return False if too many releases are pending. The new release is then dropped and counted.
         """
 
     def figure(self, number: int) -> tuple[int, float, int, int, float, float, float, float]:

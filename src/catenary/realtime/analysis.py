@@ -36,6 +36,9 @@ class Demand:
         priority: Priority; a larger number is higher. If all tasks have None, their priorities
             are deadline-monotonic.
         cpu: Processor of the task. If all tasks have None, they share one processor.
+
+    Raises:
+        ValueError: A time is negative, not finite or too long, or `period` or `deadline` is 0.
     """
 
     name: str
@@ -175,9 +178,9 @@ def check(demands: Sequence[Demand]) -> None:
 
 
 def with_priorities(demands: Sequence[Demand]) -> list[Demand]:
-    """Assign deadline-monotonic priorities if the tasks have none.
+    """Return the tasks with their priorities, or with deadline-monotonic ones if they have none.
 
-    This assignment is optimal if no deadline is longer than its period.
+    The deadline-monotonic assignment is optimal if no deadline is longer than its period.
     """
     if demands[0].priority is not None:
         return list(demands)
@@ -225,7 +228,10 @@ def hyperperiod(demands: Sequence[Demand]) -> float:
 
 
 def longest_response(task: Load, above: Sequence[Load]) -> int | None:
-    """Return the longest response [ns]; None if no bound is found within MOST_STEPS."""
+    """Return the longest response [ns].
+
+    Return None if the load exceeds 1, or if no bound is found within MOST_STEPS.
+    """
     loads = (task, *above)
     if not bounded(loads):
         return None

@@ -39,7 +39,7 @@ def read_demands(path: str | Path) -> list[Demand]:
     """Read the tasks of a TOML file.
 
     Raises:
-        ConfigurationError: the file is invalid; the message names the file, task and field.
+        ConfigurationError: the file is invalid; the message names the file and the cause.
         OSError: the file cannot be read.
     """
     try:

@@ -41,7 +41,10 @@ class Child:
         return self.process.poll() is None
 
     def read_line(self, seconds: float) -> str | None:
-        """Return the next line of output; None at the end of the output or after `seconds`."""
+        """Wait for the next line of output, and return it without its line feed.
+
+        Return None at the end of the output or after `seconds`.
+        """
         output = self.process.stdout
         assert output is not None
         deadline = time.monotonic() + seconds
@@ -56,7 +59,11 @@ class Child:
         return line.decode(errors="replace")
 
     def end(self, seconds: float = 3.0) -> int:
-        """Send SIGTERM, and SIGKILL after `seconds`. Return the exit status."""
+        """Send SIGTERM, and SIGKILL after `seconds`. A child that has ended receives neither.
+
+        Wait for the child, close the pipe, and return the exit status. It is negative for the
+        signal that killed the child.
+        """
         if self.running:
             with contextlib.suppress(ProcessLookupError):
                 self.process.terminate()
@@ -87,7 +94,10 @@ def wait_readable(output: IO[bytes], deadline: float) -> bool:
 
 
 def start_python(arguments: Sequence[str]) -> Child:
-    """Start a child that runs this interpreter with `-m module ...` or `script.py ...`."""
+    """Start a child that runs this interpreter with `-m module ...` or `script.py ...`.
+
+    Raises ValueError if the module or script is missing.
+    """
     if not arguments or (arguments[0] == "-m" and len(arguments) < 2):
         raise ValueError("arguments must be `-m module ...` or `script.py ...`")
     command = [sys.executable, "-m", "catenary.realtime.child", str(os.getpid()), *arguments]
@@ -95,7 +105,7 @@ def start_python(arguments: Sequence[str]) -> Child:
 
 
 def start_program(command: Sequence[str]) -> Child:
-    """Start any program as a child."""
+    """Start any program as a child. Raises ValueError for an empty command."""
     if not command:
         raise ValueError("the command is empty; give the name of a program")
     own = [sys.executable, "-m", "catenary.realtime.child", str(os.getpid()), "--exec", *command]
@@ -103,7 +113,7 @@ def start_program(command: Sequence[str]) -> Child:
 
 
 def end_with_parent(parent: int) -> None:
-    """Make the kernel send SIGTERM to this process when `parent` ends.
+    """Make the kernel send SIGTERM to this process when `parent` ends. Exit if it has ended.
 
     Call this in the child itself. Executing an interpreter with file capabilities, as recommended
     to ordinary users, clears a parent-death signal set earlier, prctl(2).

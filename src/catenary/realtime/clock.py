@@ -72,10 +72,10 @@ class Participant:
 
 
 class VirtualClock:
-    """Owner of a clock that advances only while all of its participants wait.
+    """Owner of a clock that advances only while all participants wait or spend execution time.
 
-    The thread that creates it participates from the start. Time passes in its `wait_until` and
-    `spend`, and in `Tasks.join`.
+    The thread that creates the clock participates from the start. Time passes in its `wait_until`
+    and `spend`, and in `Tasks.join`.
     """
 
     def __init__(self) -> None:

@@ -77,6 +77,7 @@ class Value:
 
         Raises:
             ValueError: the array has a size of 0 bytes.
+            TypeError: `dtype` is not a NumPy type, or contains Python objects.
         """
         self._bind(Form(dtype, shape), None)
 
@@ -101,7 +102,7 @@ class Value:
         """Publish an array. Readers never receive a partly written array.
 
         Raises:
-            ValueError: the shape differs.
+            ValueError: the shape differs, or the data cannot be converted to the type.
             RuntimeError: another running thread writes this value.
         """
         if not self._writes:
@@ -141,8 +142,9 @@ class Silence:
 class Queue:
     """A bounded queue of records, from one producer to one consumer.
 
-    If a producer is killed during `put`, the queue is unchanged. If a consumer is killed during
-    `take`, the record stays in the queue.
+    If a producer is killed during `put`, its record is not in the queue. If the queue was full and
+    overwrites, the oldest record may be lost. If a consumer is killed during `take`, the record
+    stays in the queue.
     """
 
     def __init__(
@@ -163,6 +165,7 @@ class Queue:
 
         Raises:
             ValueError: a record has a size of 0 bytes, or `length` or `full` is invalid.
+            TypeError: `dtype` is not a NumPy type, or contains Python objects.
         """
         if not 0 < length < 2**31:
             raise ValueError(f"a length of {length} records is not within 1 to 2**31 - 1")
@@ -200,7 +203,7 @@ class Queue:
         """Append a record. Return False if the queue is full and refuses the record.
 
         Raises:
-            ValueError: the shape differs.
+            ValueError: the shape differs, or the record cannot be converted to the type.
             RuntimeError: another running thread is the producer.
         """
         if not self._produces:
@@ -211,6 +214,7 @@ class Queue:
     def take(self) -> Array | None:
         """Remove and return the oldest record; None if the queue is empty.
 
+        Also return None if records are overwritten faster than they can be copied.
         Raises RuntimeError if another running thread is the consumer.
         """
         if not self._consumes:
@@ -221,7 +225,10 @@ class Queue:
 
 
 def claim(what: str, role: str, holder: int) -> int:
-    """Return the id of the calling thread. Raises RuntimeError if another thread has the role."""
+    """Return the id of the calling thread.
+
+    Raises RuntimeError if another thread that still runs has the role.
+    """
     thread = threading.get_native_id()
     if holder not in (0, thread) and os.path.exists(f"/proc/{holder}"):
         raise RuntimeError(

@@ -71,14 +71,20 @@ class Handle:
         self._timer.wake()
 
     def make_ready_again(self) -> None:
-        """Prepare a restart: skip all releases that have passed."""
+        """Reset the block for a restart, and skip all releases that have passed.
+
+        Virtual time stands still until the restarted task first waits.
+        """
         self.block.restart()
         self.block.skip_to(self._timer.now_ns)
         if self.place.participant is not None:
             self.place.participant.expect()
 
     def leave(self) -> None:
-        """Leave the clock, because the worker has ended or was never started."""
+        """Leave the clock, because the worker has ended or was never started.
+
+        Mark the task as failed if it has not ended.
+        """
         if self.place.participant is not None:
             self.place.participant.leave()
         if self.running:

@@ -53,7 +53,8 @@ def state() -> Private | Refused:
 def enter(command: Sequence[str] | None = None) -> Private | Refused:
     """Replace this process by `command` in a new namespace; the default restarts this program.
 
-    Return only if this process is already inside, or if the namespace is refused.
+    Return only if this process is already inside, or if the namespace is refused. A refusal is
+    stored in the environment, so that child processes do not probe again.
     """
     if VARIABLE in os.environ:
         return state()
@@ -68,7 +69,10 @@ def enter(command: Sequence[str] | None = None) -> Private | Refused:
 
 
 def find_namespace() -> list[str] | Refused:
-    """Return the `unshare` command that creates a working namespace, found by probing."""
+    """Probe for an `unshare` command that creates a working namespace, and return it.
+
+    Return `Refused` with the reasons if there is none.
+    """
     if sys.platform != "linux":
         return Refused("private network namespaces exist only on Linux")
     for tool, package in (("unshare", "util-linux"), ("ip", "iproute2")):
@@ -170,7 +174,10 @@ def run_ip(*arguments: str) -> str:
 
 
 def main(arguments: Sequence[str]) -> None:
-    """Run Python with `arguments` in a private network, or in the current one if refused."""
+    """Run Python with `arguments` in a private network, or in the current one if refused.
+
+    With "--probe", only send a frame in the current network. Exit with the reason if this fails.
+    """
     if list(arguments) == ["--probe"]:
         try:
             try_real_frames()

@@ -4,8 +4,8 @@
  * The record with ticket t is in slot t % length. The slot's stamp is t + 1 once the record is
  * complete. When the queue is full, the producer either refuses the newest record or overwrites the
  * oldest. In the latter case the consumer detects the changed stamp and skips the lost records. If
- * a producer is killed during a put, the queue is unchanged. If a consumer is killed during a take,
- * the record stays in the queue.
+ * a producer is killed during a put, its record is not in the queue, but the oldest one may already
+ * be overwritten. If a consumer is killed during a take, the record stays in the queue.
  */
 #ifndef CATENARY_RECORD_QUEUE_H
 #define CATENARY_RECORD_QUEUE_H

@@ -45,12 +45,18 @@ class Running:
             yield self._job
 
     def wait(self) -> bool:
-        """End the current job and wait for the next release. Return False on a stop request."""
+        """End the current job as in `finish`, and wait for the next release.
+
+        Return False on a stop request.
+        """
         self.finish()
         return self._releases.wait()
 
     def finish(self) -> None:
-        """End the current job, and apply `on_miss` if it missed its deadline."""
+        """End the current job, if any, and apply `on_miss` if it missed its deadline.
+
+        Raises TaskError for a miss with `on_miss="stop"`.
+        """
         if not self._releases.finish():
             return
         if callable(self._task.on_miss):

@@ -58,7 +58,10 @@ def read_figure(block: Block, number: int) -> Figure:
 
 
 def read_histogram(block: Block, figure: str) -> list[tuple[float, float, int]]:
-    """Return (lower edge, upper edge, jobs) of every non-empty bucket; times in [s]."""
+    """Return (lower edge, upper edge, jobs) of every non-empty bucket; times in [s].
+
+    Raises ValueError if `figure` is not one of FIGURE_NAMES.
+    """
     if figure not in FIGURE_NAMES:
         raise ValueError(f"unknown figure {figure!r}; use one of {', '.join(FIGURE_NAMES)}")
     scale = 1e-9 if figure in TIMES else 1

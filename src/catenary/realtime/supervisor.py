@@ -57,7 +57,7 @@ class Supervisor:
         return tuple(self._failures)
 
     def start(self) -> None:
-        """Start all workers."""
+        """Start all workers. For processes, the supervisor thread does this concurrently."""
         self._started = True
         if any(isinstance(worker, ProcessWorker) for worker in self._workers.values()):
             threading.Thread(target=self._monitor, name="task supervisor", daemon=True).start()
@@ -76,7 +76,10 @@ class Supervisor:
             raise self._fatal
 
     def thread_ended(self, name: str) -> None:
-        """Handle the end of a task's thread, which calls this as its last action."""
+        """Record the end of a task's thread, and restart the task if its policy requires this.
+
+        The thread calls this as its last action.
+        """
         if self._record_end(name):
             self._start(name)
 
@@ -87,7 +90,11 @@ class Supervisor:
             handle.stop()
 
     def end(self, seconds: float) -> None:
-        """Wait until all tasks have ended; kill the processes left after `seconds`."""
+        """Wait until all tasks have ended; kill the processes left after `seconds`.
+
+        Each task left after `seconds` is a failure. Threads cannot be killed, so they continue. If
+        no task was started, only remove the tasks from the clock.
+        """
         if not self._started:
             for handle in self._handles.values():
                 handle.leave()
@@ -127,7 +134,7 @@ class Supervisor:
                     to_start.append(name)
 
     def _start(self, name: str) -> Worker | None:
-        """Start a worker. If this fails, record the failure and return None."""
+        """Start a worker and return it. If this fails, record the failure and return None."""
         worker = self._workers[name]
         try:
             worker.start()
@@ -140,7 +147,10 @@ class Supervisor:
         return worker
 
     def _record_end(self, name: str, *, may_restart: bool = True) -> bool:
-        """Record the end of a task. Return True if the caller must start its new worker."""
+        """Record the end of a task. Return True if the caller must start its new worker.
+
+        If the failure policy of the task requires it, request the stop of all tasks.
+        """
         handle = self._handles[name]
         with self._lock:
             failure = handle.failure(self._workers[name].wait())

@@ -41,7 +41,13 @@ class Task:
             release, late or not. "skip": skip the releases that have passed. "stop": stop the task
             with an error. A function: call it with the late job.
         on_failure: Reaction if the task raises or its process ends. "stop": stop all tasks with an
-            error. "restart": restart the task at its next release. "continue": continue without it.
+            error. "restart": restart the task at its next release; the fourth failure stops all
+            tasks. "continue": continue without it.
+
+    Raises:
+        TypeError: `function` is not callable, `arguments` is not a tuple, or a time is not a
+            number.
+        ValueError: A time, the priority, processor, stack size or a reaction is invalid.
     """
 
     function: Callable[..., object]
@@ -84,7 +90,7 @@ def check_period(task: str, what: str, seconds: float) -> int:
 
     Raises:
         TypeError: `seconds` is not a number.
-        ValueError: `seconds` is not positive, too short or too long.
+        ValueError: `seconds` is not positive, less than 20 us or more than 1e6 s.
     """
     if isinstance(seconds, bool) or not isinstance(seconds, int | float):
         raise TypeError(f"task {task!r}: {what} must be a number of seconds, not {seconds!r}")

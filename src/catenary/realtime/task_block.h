@@ -90,7 +90,8 @@ static int64_t task_deadline(const task_block *b) {
     return deadline ? deadline : task_load(&b->period);
 }
 
-/* Return the release time of the next signal: at least one period after the last release. */
+/* Return the release time of the next signal: at least one period after the last release. Return
+ * CAT_CLOCK_FOREVER if no signal is pending. */
 static int64_t task_next_signal(const task_block *b) {
     if (cat_load_acquire64(&b->signalled) == b->taken) return CAT_CLOCK_FOREVER;
     int64_t signalled = task_load(&b->signal_times[b->taken % TASK_SIGNALS]);
@@ -159,7 +160,8 @@ static int task_finish(task_block *b, const cat_clock *clock) {
     return (int)b->missed;
 }
 
-/* Release a sporadic task once. Return 0 if too many signals are pending; this one is dropped. */
+/* Release a sporadic task once. Return 0 if too many signals are pending; the new one is
+ * then dropped and counted. */
 static int task_signal(task_block *b, int64_t now) {
     uint64_t waiting = cat_load_acquire64(&b->signalled) - cat_load_relaxed64(&b->taken);
     if (waiting >= TASK_SIGNALS) {

@@ -38,7 +38,10 @@ class Work:
 
 
 def run_in_process(work: Work, session: Session | None, parent: int) -> None:
-    """Run a task in its process. If it fails, store the reason in its block and exit with 1."""
+    """Run a task in its process, and exit with 0.
+
+    If the task fails, store the reason in its block and exit with 1.
+    """
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent handles Ctrl-C and stops its tasks
     signal.signal(signal.SIGTERM, end_now)
     libc.signal_on_parents_death(signal.SIGTERM)
@@ -75,7 +78,7 @@ def start_thread(work: Work, ended: Callable[[str], None]) -> threading.Thread:
 
 @contextlib.contextmanager
 def stack_size(size: int | None) -> Iterator[None]:
-    """Set the stack size of threads started in this block, because Python's setting is global."""
+    """Set the stack size of new threads during the block. Python's setting is global."""
     if size is None:
         yield
         return
@@ -119,7 +122,7 @@ def prepare(work: Work) -> str:
 
 
 def schedule(task: Task, best_effort: bool) -> Scheduling:
-    """Set priority and processor of this thread.
+    """Set priority and processor of this thread. Return the result, with the refusals.
 
     Raises:
         RealtimeError: The kernel refuses one of them, and `best_effort` is False.

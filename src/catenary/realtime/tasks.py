@@ -49,6 +49,11 @@ class Tasks:
         session: `realtime.session()` to enter in each process; for threads, in this process. None
             to change no settings of the process.
         best_effort: True to continue without refused priorities and processors.
+
+    Raises:
+        TypeError: An object is not a Task.
+        ValueError: There are no tasks, two have the same name or trigger, `workers` is invalid, or
+            a processor does not exist.
     """
 
     def __init__(
@@ -89,7 +94,17 @@ class Tasks:
         return self._supervisor.failures if self._supervisor else ()
 
     def start(self) -> None:
-        """Start all tasks, and release their first jobs at the same time."""
+        """Start all tasks, wait until all have started, and release their first jobs together.
+
+        If this fails, all tasks are stopped.
+
+        Raises:
+            TaskError: A task failed, or did not start within 60 s.
+            RealtimeError: The session was refused in this process.
+            RuntimeError: The tasks have already been started.
+            TypeError: A new process cannot import the function of a task.
+            ValueError: The virtual clock has too many participants.
+        """
         if self._supervisor is not None:
             raise RuntimeError("these tasks have already been started")
         if self.workers == "processes":
@@ -125,6 +140,7 @@ class Tasks:
 
         Raises:
             TaskError: the failure of a task stopped all tasks.
+            RuntimeError: the tasks have not been started.
         """
         supervisor = self._started()
         if self._clock is None:
@@ -140,14 +156,18 @@ class Tasks:
         return ended
 
     def stop(self, seconds: float = STOP_SECONDS, *, raising: bool = True) -> None:
-        """Stop all tasks. Each task ends when it next waits.
+        """Stop all tasks, and wait for their end. Each task ends when it next waits.
+
+        Then undo the changes to this process: the session and the processor binding.
 
         Args:
-            seconds: timeout [s]; after it, processes receive SIGTERM, then SIGKILL.
+            seconds: timeout [s]; after it, processes receive SIGTERM, then SIGKILL. Threads
+                continue.
             raising: raise the failure that stopped the tasks.
 
         Raises:
             TaskError: the failure of a task stopped all tasks, or a task did not end in time.
+            RuntimeError: the tasks have not been started.
         """
         supervisor = self._started()
         supervisor.request_stop()
@@ -189,6 +209,7 @@ class Tasks:
         Raises:
             TaskError: the failure of a task stopped all tasks. `failures` contains it as soon as it
                 occurs.
+            RuntimeError: the tasks have not been started.
         """
         supervisor = self._started()
         if self._clock is not None:
@@ -202,7 +223,8 @@ class Tasks:
     def verdict(self, *others: Demand) -> Verdict:
         """Analyse these tasks with their longest execution times measured so far.
 
-        `others` are additional demands on the processors, for example a loop.
+        `others` are additional demands on the processors, for example a loop. Raises ValueError if
+        a task has not ended a job yet, or if only some of the demands have a processor.
         """
         measured = [measured_demand(handle.task, handle.statistics) for handle in self]
         return analyse([*measured, *others])
@@ -267,7 +289,7 @@ def run_at(
     function: Callable[..., T],
     arguments: tuple[object, ...],
 ) -> T:
-    """Run the function in its own thread while virtual time passes."""
+    """Run the function in its own thread while virtual time passes; return its result."""
     place = clock.participate(priority=priority, cpu=cpu)
 
     def work() -> T:

@@ -1,6 +1,6 @@
 /* Virtual time: a discrete-event simulation of fixed priorities, for threads and processes alike.
  *
- * The table is in shared memory. Exactly one participant runs at a time, and virtual time stands
+ * The table is in shared memory. At most one participant has the turn, and virtual time stands
  * still while it runs. A participant blocks by waiting for a time or by spending execution time.
  * The participant that blocks last selects the next one:
  *  - a participant that has just spent its time runs before any release at the same time: a job
@@ -33,7 +33,7 @@
 
 enum {
     VT_FREE,                          /* the slot is unused */
-    VT_EXPECTED,                      /* will start: time stands still until then */
+    VT_EXPECTED,                      /* will start: time stands still until it waits */
     VT_WAITING,                       /* until `due` or a wake-up */
     VT_READY,                         /* needs its processor to spend `remaining`, then runs */
     VT_RUNNING,                       /* its code runs; time stands still */
@@ -175,8 +175,8 @@ static int vt_sleep(vt_participant *p) {
     return 0;
 }
 
-/* Return a slot for a participant that will start; time stands still until then. Return -ENOSPC if
- * all slots are taken. */
+/* Return a slot for a participant that will start; time stands still until it first waits. Return
+ * -ENOSPC if all slots are taken. */
 static int vt_join(virtual_time *v, int32_t priority, int32_t cpu) {
     int found = -ENOSPC;
     vt_lock(v);

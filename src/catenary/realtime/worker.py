@@ -26,7 +26,8 @@ class Worker(Protocol):
     def wait(self) -> int | None:
         """Join the worker, which has already ended.
 
-        Return its exit status, negative for the signal that killed it; None for a thread.
+        Return its exit status, negative for the signal that killed it. Return None for a thread,
+        or for a process that was never started.
         """
 
     def kill(self, number: signal.Signals) -> bool:

@@ -58,9 +58,9 @@ def cache_folder() -> Path:
 def private_folder(folder: Path) -> Path:
     """Create a folder that only this user can write, with mode 0700, and return its real path.
 
-    The folders above it, up to the home folder, are also checked, as in OpenSSH's StrictModes
-    (misc.c, safe_path). Each is checked before anything below it is created or changed, because
-    root can have the HOME of another user (sudo).
+    The folders above it, except those above the home folder, are also created or checked, as in
+    OpenSSH's StrictModes (misc.c, safe_path). Each is checked before anything below it is created
+    or changed, because root can have the HOME of another user (sudo).
 
     Raises:
         OSError: The folder cannot be created, or another user could replace it or a file in it.
@@ -93,7 +93,7 @@ def private_folder(folder: Path) -> Path:
 
 
 def _create(place: Path) -> None:
-    """Create a folder if it is missing; refuse one that another user has created."""
+    """Create a folder if it is missing; refuse one of another user, except root."""
     if not os.path.lexists(place):
         place.mkdir(0o700, exist_ok=True)
     _refuse_foreign(place, place.lstat())  # of a symbolic link itself, not of its target
@@ -117,7 +117,7 @@ def _cache_class(folder: Path) -> Any:
     caching: Any = import_module("numba.core.caching")
 
     class Files(caching.CompileResultCacheImpl):  # type: ignore[misc]
-        """The encoding of a compiled function, and the name of its files."""
+        """Encoding of a compiled function, and name of its files."""
 
         def __init__(self, function: Callable[..., Any]) -> None:
             self._lineno = function.__code__.co_firstlineno

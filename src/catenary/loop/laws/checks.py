@@ -15,8 +15,8 @@ def check_source(function: Callable[..., Any]) -> None:
     """Check the source of a law. A function without source (typed at a prompt) is not checked.
 
     Raises:
-        LawError: The law calls `print`, uses object mode, or raises an exception that it does not
-            handle. The message names the first such line.
+        LawError: The law calls `print`, uses object mode, or has a `raise` or `assert` outside of a
+            `try` block with a handler. The message names the first such line.
     """
     try:
         lines, first = inspect.getsourcelines(function)

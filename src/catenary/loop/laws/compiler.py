@@ -1,8 +1,8 @@
 """Compilation of a law and its records to a native function (native/law.h), by Numba.
 
-The law is compiled with bounds checks. Division by zero gives infinity, as in NumPy. A wrapper with
-C's calling convention turns any exception of the law into a status. Measured: 14 ns per call for a
-PD law on 12 axes.
+The law is compiled with bounds checks. Division by zero gives infinity or NaN, as in NumPy. A
+wrapper with C's calling convention turns any exception of the law into a status. Measured: 14 ns
+per call for a PD law on 12 axes.
 """
 
 from __future__ import annotations
@@ -60,8 +60,11 @@ def compile_law(law: Law, layout: LawLayout) -> CompiledLaw:
         law: Law to compile.
         layout: Records that the law reads and writes.
 
+    Returns:
+        Machine code of the law.
+
     Raises:
-        LawError: The law cannot be compiled; the message names the place.
+        LawError: The law cannot be compiled, or Numba is not installed.
     """
     check_source(law.function)
     numba = _numba(law)
@@ -118,7 +121,10 @@ def _inner(numba: Any, function: Callable[..., Any]) -> Any:
 
 
 def _returned(numba: Any, law: Law, inner: Any, layout: LawLayout) -> str:
-    """Return the kind of the law's result: "none" or "number"."""
+    """Compile the law, and return the kind of its result: "none" or "number".
+
+    Raises LawError for any other result.
+    """
     record = {name: numba.from_dtype(getattr(layout, name)) for name in ("actual", "target")}
     vector = numba.types.Array(numba.float64, 1, "C")
     enabled = numba.types.Array(numba.uint8, 1, "C")
@@ -164,7 +170,7 @@ def _shell(numba: Any, law: Law, inner: Any, layout: LawLayout, returned: str) -
 
 
 def _readable(error: Exception) -> str:
-    """Return the first lines of Numba's message, and the place that it names."""
+    """Return the first lines of Numba's message, and the last place that the message names."""
     text = re.sub(r"\x1b\[[0-9;]*m", "", str(error))
     said = [line.strip() for line in text.splitlines() if line.strip()]
     reasons = [line for line in said if not line.startswith(("Failed in", "During", "File", ">>>"))]

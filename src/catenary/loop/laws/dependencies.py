@@ -17,10 +17,11 @@ CONSTANTS = (bool, int, float, complex, str, bytes, tuple)
 
 
 def dependencies(function: Callable[..., Any]) -> tuple[str, ...]:
-    """Return everything that the machine code of a law depends on, as comparable texts.
+    """Return the dependencies of a law's machine code, as sorted texts.
 
-    These are the values of the globals that the law and its callees use. In addition, they are the
-    time stamps and sizes of the files of these callees and of the modules used.
+    These are the globals of the law and its callees that are constants, tuples or arrays, with
+    their values. In addition, they are the time stamps and sizes of the files of these callees and
+    of the modules used.
     """
     found: set[str] = set()
     waiting, seen = [function], {id(function)}
@@ -66,7 +67,7 @@ def _names(code: CodeType) -> Iterator[str]:
 
 
 def _stamps(module: ModuleType) -> Iterator[str]:
-    """Yield the stamp of a module's file, and for a package those of all files in its folder."""
+    """Yield the stamp of a module's file, and for a package those of its Python files."""
     for folder in getattr(module, "__path__", ()):
         yield from map(_stamp, Path(folder).glob("*.py"))
     if getattr(module, "__file__", None):

@@ -31,7 +31,7 @@ class Law:
     `target["Output 1"] = 1`), or all columns as the arrays reals, integers and bits. The axes are
     those of all Drives of the loop, in order.
 
-    The law returns True or another non-zero number when it has finished, otherwise False, 0 or
+    The law returns True or another non-zero integer when it has finished, otherwise False, 0 or
     None. A direct call of a Law runs the function as Python, with Python's errors.
     """
 
@@ -51,7 +51,14 @@ class Law:
 
 
 def law(function: LawFunction) -> Law:
-    """Make a control law from a function: see `Law`. Run it with `loop.run(pd, memory=[...])`."""
+    """Make a control law from a function: see `Law`. Run it with `loop.run(pd, memory=[...])`.
+
+    A Law is returned unchanged.
+
+    Raises:
+        TypeError: The object is not a plain function.
+        LawError: An argument of the function is not one of those of `Law`.
+    """
     return function if isinstance(function, Law) else Law(function)
 
 

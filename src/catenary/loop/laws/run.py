@@ -83,7 +83,10 @@ class LawRun:
         return self._native.figures["longest_ns"] * 1e-9
 
     def stop(self) -> None:
-        """Stop the law. From the next cycle on, the axes hold and Python sets the targets."""
+        """Stop the law; a no-op if it has ended. From the next cycle on, Python sets the targets.
+
+        Until the next commit, the axes hold. CST keeps its torque for `StopPolicy.handover`.
+        """
         if self.running:
             self._engine.stop_law()
 
@@ -130,7 +133,8 @@ def numbers(name: str, values: Any) -> list[float]:
         values: Sequence of numbers.
 
     Raises:
-        ValueError: The values are not numbers, or not one-dimensional.
+        TypeError: A value cannot be converted to a float.
+        ValueError: A text is not a number, or the sequence is not one-dimensional.
     """
     array = np.asarray(values, dtype=np.float64)
     if array.ndim != 1:

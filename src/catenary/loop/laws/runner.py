@@ -60,9 +60,14 @@ class LawRunner:
             budget: Longest time of one step [s]; None: a share of the period; 0: no check.
             overruns: Number of consecutive steps over the budget that end the law.
 
+        Returns:
+            Handle of the running law.
+
         Raises:
             LawError: The law cannot be compiled, or does not return.
+            TypeError: A value of `memory` or `parameters` cannot be converted to a float.
             ValueError: An argument is impossible.
+            OSError: The monitor thread cannot be started.
         """
         if budget is not None and not budget >= 0:
             raise ValueError(f"budget={budget} s: must be 0 or more")
@@ -85,9 +90,10 @@ class LawRunner:
         return run
 
     def _try(self, law: Law, native: core.Law) -> None:
-        """Run steps on copies of the present values.
+        """Run a few steps on copies of the present values, to load the code of the law.
 
-        This loads the code of the law before its first cycle, and finds errors of every step.
+        Warn if the law allocates memory. Raise LawError if it does not return. An exception of the
+        law is not an error here.
         """
         actual, target = self._engine.blocks()
         with counted_allocations() as allocated:
@@ -105,7 +111,7 @@ class LawRunner:
             )
 
     def run(self, run: LawRun, trouble: int, judge: Callable[[int], None]) -> None:
-        """Wait for the end of a law.
+        """Wait for the end of a law, and raise its error, if any.
 
         Args:
             run: Handle of the running law.
@@ -130,7 +136,7 @@ class LawRunner:
         return error
 
     def _replay(self, run: LawRun) -> str:
-        """Run the last step again as Python on copies; return its exception as text."""
+        """Run the last step again as Python on copies; return its exception as text, or ""."""
         try:
             time = (run.steps - 1) * self._period_ns * 1e-9
             self._step(run.law, run.memory, run.parameters, time, copies=True)

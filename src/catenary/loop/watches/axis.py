@@ -22,7 +22,7 @@ class StoppedAxis(NamedTuple):
     axis: int  # number in the plan
     name: str
     device: int
-    mode: int  # mode of operation that the drive reports
+    mode: int  # mode of operation that the drive reports; the planned one if it reports 0
     reason: StopReason
     cycle: int
     requested: bool  # True if the application or the loop requested it

@@ -60,7 +60,7 @@ class Standing(Enum):
     RUNNING = "running"
     LOST = "lost"  # does not answer
     ASTRAY = "astray"  # answers to its station address, but is out of OP
-    RETURNING = "returning"  # a procedure brings it back to OP
+    RETURNING = "returning"  # a procedure brings it to OP, or to PRE-OP to hold it
     HELD = "held"  # waits for `release`
 
 
@@ -180,7 +180,7 @@ class Watch:
         return (charge for charge in self._charges if not charge.required)
 
     def _judge(self, charge: Charge, answer: Answer) -> None:
-        """Update the state of a device from one answer.
+        """Update the state of a device from one answer, and report the change.
 
         Args:
             charge: State of the device.
@@ -272,7 +272,11 @@ class Watch:
     def _recognise(
         self, presence: restore.Presence, lost: Sequence[Charge]
     ) -> Procedure[Charge | None]:
-        """Give a returned device the address of its place. Return None if it has no place here."""
+        """Give a returned device the address of its place, and return the state of this place.
+
+        If the device has no place here, is unreadable, or is a replacement that is held, remove its
+        address and return None.
+        """
         found: Identity | None = None
         for charge in lost:
             if charge.sub.alias and charge.sub.alias != presence.alias:
@@ -309,7 +313,10 @@ class Watch:
     def _handle_replacement(
         self, charge: Charge, presence: restore.Presence, found: Identity
     ) -> Procedure[Charge | None]:
-        """Handle a replacement: the same product with another serial number."""
+        """Report a replacement: the same product with another serial number.
+
+        Return `charge` if it is accepted. Otherwise, remove its address and return None.
+        """
         self._report_replaced(charge, presence, found)
         if self._policy.on_replacement == "restore" or charge.released:
             charge.identity = found  # the place now belongs to this device

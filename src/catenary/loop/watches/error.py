@@ -45,8 +45,9 @@ class ErrorWatch:
             yield after(PERIOD)
 
     def look(self) -> Procedure[Sequence[Finding]]:
-        """Return the findings since the previous reading. The first call returns none.
+        """Read the counters, and return the findings since the previous reading.
 
+        The first call returns none, and neither does a call that cannot read the counters.
         `main.diagnose()` covers the counts from before the loop.
         """
         try:

@@ -41,7 +41,7 @@ class FrameWatch:
             self.look()
 
     def look(self) -> None:
-        """Put an event if enough frames were repeated since the last reading."""
+        """Put an event if enough frames were repeated since the last reading; see SILENCE."""
         now, count = self._now(), self._counted()
         repeated, interval = count - self._last_count, now - self._last_time
         self._last_count, self._last_time = count, now

@@ -51,11 +51,13 @@ class MailboxWatch:
 
     @property
     def next_look_ns(self) -> int:
-        """Time of the next poll [ns]."""
+        """Time of the next poll [ns]; NEVER_NS if no device is polled."""
         return self._due_ns if self._polled else NEVER_NS
 
     def look(self, now_ns: int, cycle: int) -> None:
-        """Start reading every full mailbox, except those that other procedures are using.
+        """Start reading every full mailbox, and poll the next device if a poll is due.
+
+        Mailboxes that other procedures are using are left out.
 
         Args:
             now_ns: Time of the link's clock [ns].

@@ -12,7 +12,9 @@ PR_SET_PDEATHSIG = 1
 
 
 def call(name: str, *arguments: int) -> int:
-    """Call a C function with arguments of type long. On failure, it returns -1 and sets errno.
+    """Call a C function with arguments of type long, and return its result.
+
+    The C function must return -1 and set errno on failure.
 
     Args:
         name: name of the function.

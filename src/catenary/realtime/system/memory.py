@@ -18,7 +18,7 @@ class Descriptor(Protocol):
 class SharedMemory:
     """Owner of pre-faulted memory that starts as zeros.
 
-    Pass it to a child process as an argument. It is freed when the last process that maps it ends.
+    Pass it to a child process as an argument. It is freed when no process maps it any more.
     """
 
     def __init__(self, size: int, *, descriptor: int | None = None) -> None:

@@ -123,7 +123,10 @@ def session(
 
 
 def attempt(what: str, step: Callable[[Undo], None], undo: Undo) -> tuple[str, str] | None:
-    """Run a step. If it fails, undo it and return its name and the reason."""
+    """Run a step, and return None.
+
+    If the step raises OSError, undo it and return its name and the reason.
+    """
     try:
         with contextlib.ExitStack() as own:
             step(own)

@@ -57,7 +57,7 @@ def request_scheduling(
 ) -> Scheduling:
     """Request SCHED_FIFO, locked memory and one CPU for the calling thread.
 
-    Threads that it starts afterwards inherit these settings.
+    Threads that the calling thread starts afterwards inherit these settings.
 
     Args:
         priority: SCHED_FIFO priority, 1..99.
@@ -95,7 +95,7 @@ def refusal(what: str, request: Callable[[], object]) -> list[str]:
 
 
 def lock_all_memory() -> None:
-    """Lock every present and future page in memory (mlockall)."""
+    """Lock every present and future page in memory (mlockall). Raises OSError if refused."""
     libc = ctypes.CDLL(None, use_errno=True)
     if libc.mlockall(MCL_CURRENT | MCL_FUTURE) != 0:
         number = ctypes.get_errno()
