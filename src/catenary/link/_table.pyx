@@ -3,7 +3,8 @@
 Compiled links derive from `TableLink`, fill its `table` and inherit the rest. `close` first replaces
 the functions of the table, so that later calls return -EBADF (`now`: 0). A native thread may still
 be inside an earlier call, or read a frame that it received. `close_table` must therefore keep the
-memory and descriptors of these functions valid. `__dealloc__` releases them after the last use of the table.
+memory and descriptors of these functions valid. `__dealloc__` releases them after the last use of
+the table.
 """
 
 from cpython.exc cimport PyErr_CheckSignals
