@@ -5,10 +5,10 @@ Theory of operation. An axis is a slot of a CiA 402 drive. The plan contains the
 quantity in the image; a quantity may be absent. `axes_read` runs after the inputs of a cycle. It
 decodes the actual values and unwraps position counters of any width to 64 bits (`counts`,
 `last_raw`); then _guard.pyx judges the axis. `axes_write` runs before the outputs: requests
-(_guard.pyx), set-points (_setpoints.pyx), controlword, bytes. A number is written only if it
-differs from the image (`put_t`). `axes_apply_late` applies late stop requests to outputs that a law
-has computed. `axes_report` reports the axes after the frames. `cycle_flags` collects the flags of
-the cycle, `handed_over` counts the cycles of a hand-over, and `stop_asked` counts stop requests of
+(_guard.pyx), set-points (_setpoints.pyx), controlword, bytes. A set-point is written only if it
+differs from the last one (`put_t`). `axes_apply_late` applies late stop requests to outputs that a
+law has computed. `axes_report` reports the axes after the frames. `cycle_flags` collects the flags
+of the cycle, `handed_over` counts the cycles of a hand-over, and `stop_asked` counts stop requests of
 any thread. Areas are bytes of an image that are copied without interpretation. _axes.pxd defines
 every field of an axis.
 
@@ -65,7 +65,7 @@ AXIS_FALLBACK = FALLBACK
 AXIS_MODE_REFUSED = MODE_REFUSED
 
 STILL_NS = 5_000_000                   # at rest for this long: the axis has stopped
-BEYOND_NS = 20_000_000                 # CSV: time outside a limit, moving away, until the axis is stopped
+BEYOND_NS = 20_000_000                 # CSV, PV: time outside a limit, moving away, until the stop
 CLIMBING_NS = 10_000_000_000           # a request to enable expires
 MUTE_NS = 1_000_000_000                # missing bit 12; longer than a brake takes to open
 KEEP_NS = 10_000_000                   # in an underrun, CSP keeps its velocity for this long
@@ -81,7 +81,10 @@ ON_LOSS = {"quick_stop": 0, "disable": 1, "csp_hold": 2}
 # ---- inputs
 
 cdef inline void read_position(axis_t *a, const uint8_t *inputs, double elapsed) noexcept nogil:
-    """Decode the position. `elapsed` [s]: time since the last reading."""
+    """Decode the position, and estimate a velocity that is not mapped.
+
+    `elapsed`: time since the last reading [s].
+    """
     cdef number_t *n = &a.actual_position
     cdef uint64_t raw
     cdef double before = a.position
@@ -104,7 +107,7 @@ cdef inline void read_position(axis_t *a, const uint8_t *inputs, double elapsed)
 
 
 cdef inline double demand_error(axis_t *a, const uint8_t *inputs) noexcept nogil:
-    """Return demanded minus actual position; both wrap at the width of their types."""
+    """Return demanded minus actual position [rad]; integers wrap at the width of their types."""
     cdef uint64_t raw
     if a.position_demand.kind == REAL_KIND or a.actual_position.kind == REAL_KIND:
         return number_value(&a.position_demand, inputs) - a.position
@@ -163,7 +166,8 @@ cdef inline void read_areas(const axes_t *x, actual_t *out) noexcept nogil:
 cdef void axes_read(axes_t *x, actual_t *out, uint64_t number, int64_t instant) noexcept nogil:
     """Decode the input image into the actual values of cycle `number`, after its collect.
 
-    `instant`: cycle start of this cycle [ns]. The post-processing calls `axes_report` later.
+    The state of each axis is updated, and a lost axis is stopped (`guard_observe`). `axes_report`
+    adds the other values later. `instant`: cycle start of this cycle [ns].
     """
     cdef const uint8_t *inputs = x.image.inputs
     cdef axis_t *a
@@ -186,7 +190,7 @@ cdef void axes_read(axes_t *x, actual_t *out, uint64_t number, int64_t instant) 
 
 
 cdef void axes_report(axes_t *x, actual_t *out) noexcept nogil:
-    """Add the state of the axes and the last outputs to the values of `axes_read`."""
+    """Add the state of the axes and the last outputs to the values of `axes_read`; set `moving`."""
     cdef const axis_t *a
     cdef uint32_t i
     x.moving = 0
@@ -280,10 +284,10 @@ cdef inline void write_areas(axes_t *x, const target_t *t) noexcept nogil:
 
 
 cdef void write_velocity_offsets(axes_t *x) noexcept nogil:
-    """Write 0x60B1 after the columns.
+    """Write 0x60B1 after the columns, for axes that do not follow their set-points.
 
-    While an axis does not follow its set-points, 0x60B1 is the velocity of its command in CSP. In
-    other modes it is 0.
+    It is the velocity of the command in CSP, and 0 in other modes. An axis that follows its
+    set-points keeps the value of the application.
     """
     cdef axis_t *a
     cdef uint32_t i
@@ -305,7 +309,7 @@ cdef inline bint update_counts(const target_t *t, uint64_t number, uint32_t time
 
 
 cdef void axes_write(axes_t *x, const target_t *target, bint fresh, uint64_t number) noexcept nogil:
-    """Write the valid part of the committed targets into the output image of cycle `number`.
+    """Process the requests, then write the outputs of cycle `number`: valid targets and columns.
 
     `fresh`: the targets were committed since the last cycle.
     """

@@ -8,7 +8,7 @@ class PhaseController:
 
     def __init__(self, plan: object, period_ns: int) -> None: ...
     def step(self, error_ns: int | None) -> int:
-        """Return the shift of the next cycle start [ns].
+        """Advance the controller by one cycle. Return the shift of the next cycle start [ns].
 
         Args:
             error_ns: Phase error of the last cycle start [ns], at most half a period; positive if
@@ -31,8 +31,9 @@ class Clock:
     def figures(self) -> dict[str, float]:
         """Return the figures of the clocks; all times in ns.
 
-        - locked: True if all clocks are within the bound. bound: the bound in force.
-        - following: True if the cycle starts are in phase.
+        - locked: True if clocks and phase error have been within the bound for a number of cycles.
+        - bound: the bound in force.
+        - following: True once the cycle starts were set in phase.
         - time: last system time of the reference clock.
         - time_sent: link time at which the frame that read it was sent.
         - error, mean_error, worst_error: phase error of the cycle starts. If the reference clock
@@ -54,7 +55,13 @@ class Clock:
         """Reset the largest phase error and the largest differences."""
 
     def keep_within(self, bound_ns: int) -> None:
-        """Set the bound for clock differences and phase error [ns]."""
+        """Set the bound for clock differences and phase error [ns], from the next cycle on.
+
+        A new bound unlocks the clocks until they have been within it for a number of cycles.
+
+        Raises:
+            ValueError: The bound is not positive.
+        """
 
     def set_epoch(self, epoch_ns: int) -> None:
         """Set the epoch, which is system time minus link time [ns]. Call it before `start`."""

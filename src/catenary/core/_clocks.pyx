@@ -71,7 +71,9 @@ cdef int64_t phase_coast(phase_t *p) noexcept nogil:
 
 
 cdef int64_t phase_seek(phase_t *p, int64_t error) noexcept nogil:
-    """Return the delay that sets the cycle starts in phase at once. No cycle starts early."""
+    """Change to FOLLOWING. Return the delay that sets the cycle starts in phase at once. No cycle
+    starts early.
+    """
     p.state = FOLLOWING
     p.hold = HOLD
     p.rejected = 0
@@ -190,8 +192,8 @@ cdef void take_probe(clock_t *k, uint32_t low) noexcept nogil:
 
 
 cdef void take_difference(clock_t *k, const uint8_t *data, uint16_t counter) noexcept nogil:
-    """Store a difference. 0x092C is a sign-magnitude number. If a device does not answer, its last
-    difference is kept; its process data reports the loss.
+    """Store a difference, or evaluate a probe. 0x092C is a sign-magnitude number. If a device does
+    not answer, its last difference is kept; its process data reports the loss.
     """
     cdef follower_t *f
     cdef uint32_t raw = word32(data)
@@ -219,7 +221,7 @@ cdef void take_difference(clock_t *k, const uint8_t *data, uint16_t counter) noe
 
 cdef void clock_take(clock_t *k, uint8_t command, const uint8_t *data,
                      uint16_t counter) noexcept nogil:
-    """Evaluate one datagram of a returned frame. The same frame may be passed again."""
+    """Evaluate one datagram of a returned frame; a no-op from `clock_close` to the next emit."""
     if not k.awaited:
         return
     if command == CAT_FRMW:
@@ -241,7 +243,9 @@ cdef int64_t follow_reference(clock_t *k) noexcept nogil:
 
 
 cdef int64_t lead_reference(clock_t *k) noexcept nogil:
-    """Set the cycle starts in phase with our own time; measure the error of the reference."""
+    """Return the shift that sets the cycle starts in phase with our own time; 0 afterwards. Measure
+    the error of the reference.
+    """
     if k.sampled:
         if k.phase.hold:
             k.phase.hold -= 1
@@ -254,7 +258,7 @@ cdef int64_t lead_reference(clock_t *k) noexcept nogil:
 
 
 cdef void take_bound(clock_t *k) noexcept nogil:
-    """Apply a new bound: evaluate all differences again."""
+    """Apply a new bound: evaluate all differences again, and clear `locked`."""
     cdef uint32_t i
     k.bound = k.bound_asked
     k.outside = 0
@@ -285,7 +289,9 @@ cdef void watch(clock_t *k) noexcept nogil:
 
 
 cdef int64_t clock_close(clock_t *k) noexcept nogil:
-    """Return the shift of the next cycle start [ns], after the frames of a cycle were collected."""
+    """Update the figures after the frames of a cycle were collected. Return the shift of the next
+    cycle start [ns]; 0 before the first emit.
+    """
     cdef int64_t move, magnitude
     if k.sent == 0:
         return 0
@@ -329,7 +335,7 @@ cdef class PhaseController:
         set_phase(&self.c, plan, period_ns)
 
     def step(self, error_ns):
-        """Return the shift of the next cycle start [ns].
+        """Advance the controller by one cycle. Return the shift of the next cycle start [ns].
 
         Args:
             error_ns: Phase error of the last cycle start [ns], at most half a period; positive if
@@ -377,8 +383,9 @@ cdef class Clock:
     def figures(self):
         """Return the figures of the clocks; all times in ns.
 
-        - locked: True if all clocks are within the bound. bound: the bound in force.
-        - following: True if the cycle starts are in phase.
+        - locked: True if clocks and phase error have been within the bound for a number of cycles.
+        - bound: the bound in force.
+        - following: True once the cycle starts were set in phase.
         - time: last system time of the reference clock.
         - time_sent: link time at which the frame that read it was sent.
         - error, mean_error, worst_error: phase error of the cycle starts. If the reference clock

@@ -76,7 +76,7 @@ cdef struct cycle_t:
     int64_t next               # next cycle start
     int64_t scheduled          # cycle start of this cycle
     int64_t wake
-    int64_t interval           # time since the last cycle start; -1: none
+    int64_t interval           # time since the last wake-up [ns]; -1: none
     int64_t usable             # time at which the inputs were available to Python; 0: unknown
     int64_t sent               # time at which the last cyclic frame was handed to the kernel
     int64_t turnaround         # wake-up → last frame received, in the last complete cycle

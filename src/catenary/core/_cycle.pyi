@@ -2,7 +2,7 @@
 
 from typing import Final
 
-# Flags that `next` and `run` return, and that `flags` keeps.
+# Flags that `next` and `run` return. `flags` keeps all but CYCLE_STOPPED and CYCLE_NONE.
 CYCLE_OK: Final[int]  # every required sync unit answered in this cycle
 CYCLE_LATE: Final[int]  # cycles were skipped before this one, or Python missed cycles
 CYCLE_LIMITED: Final[int]  # a set-point or an output column was limited

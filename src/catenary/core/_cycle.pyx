@@ -22,6 +22,8 @@ skips that cycle, because its frames cannot return in time. With clocks, frames 
 than the margin before SYNC0 are sent and counted (`missed_sync`).
 
 Phases, from → to:
+    period          last wake-up → wake-up
+    lateness        cycle start → wake-up
     receive         wake-up (inline) or last frame (threaded) → inputs usable
     process         begin → end of the application's body, or of the law's step
     send            wake-up (inline: end of the body) → last cyclic frame handed to the kernel
@@ -260,7 +262,7 @@ cdef void begin(cycle_t *c, int64_t wake) noexcept nogil:
 # ---- receive and send
 
 cdef void collect(cycle_t *c, actual_t *actual, int64_t deadline) noexcept nogil:
-    """Collect the frames of a cycle and decode them: frames → images → actual values."""
+    """Collect and decode the frames of a cycle, then update the next cycle start and the flags."""
     cdef int rc = c.image.collect(c.image.self, deadline)
     c.missing = rc if rc >= 0 else -1
     c.outstanding = 0
@@ -270,7 +272,7 @@ cdef void collect(cycle_t *c, actual_t *actual, int64_t deadline) noexcept nogil
 
 
 cdef inline void follow_clock(cycle_t *c) noexcept nogil:
-    """Adjust the cycle start after the frames of a cycle, before the next ones are stamped."""
+    """Adjust the next cycle start after the frames of a cycle, and set the flag of the clocks."""
     if c.clock != NULL:
         c.next += clock_close(c.clock)
         if c.clock.changes != c.clock.acknowledged:
@@ -340,7 +342,8 @@ cdef void send(cycle_t *c) noexcept nogil:
 
 cdef bint take_streamed(cycle_t *c, target_t *target, bint fresh, uint64_t number) noexcept nogil:
     """Take the next row of the stream for the outputs of cycle `number`. Return True for fresh
-    set-points. An empty stream is an underrun. After the stream was removed, a hand-over begins.
+    set-points. Once a row was taken, an empty stream is an underrun. After the stream was removed, a
+    hand-over begins.
     """
     cdef stream_t *stream
     if not cat_pointer_is_offered(&c.stream):
@@ -478,7 +481,10 @@ cdef void take_orders(cycle_t *c, const target_t *committed) noexcept nogil:
 
 
 cdef bint step_law(cycle_t *c, actual_t *actual, target_t *target) noexcept nogil:
-    """Run one step of the law; return True if its targets may be sent."""
+    """Run one step of the law; return True if its targets may be sent.
+
+    If the law has failed, restore the targets and stop all axes.
+    """
     cdef law_t *law = c.law
     cdef int64_t since = now(c)
     cdef bint goes_on

@@ -26,10 +26,10 @@ class Engine:
     def buffers(self) -> dict[str, memoryview]:
         """Private buffers, one per name of plan.request.Views.
 
-        They are typed ("d", "q", "I", "H", "b", "B"), for `numpy.asarray`. Read-only:
+        They are typed ("d", "q", "Q", "I", "H", "b", "B"), for `numpy.asarray`. Read-only:
         actual_position, actual_velocity, actual_torque, statusword, mode_actual, axis_state,
-        axis_flags, input_reals, input_integers, input_bits, input_bytes, and unit_valid ("B"),
-        unit_counter ("H") per sync unit. Writable: target_position, target_velocity, target_torque,
+        axis_flags, stop_reason, stop_cycle, input_reals, input_integers, input_bits, input_bytes,
+        and unit_valid ("B"), unit_counter ("H") per sync unit. Writable: target_position, target_velocity, target_torque,
         mode_target, requested_state, request, controlword_bits, output_reals, output_integers,
         output_bits, output_bytes.
 
@@ -43,11 +43,16 @@ class Engine:
     def start(self, origin_ns: int = 0) -> None:
         """Start the cycles: flush the link, set the first cycle start, start the native thread.
 
-        Until the first commit, drives stay disabled and outputs are zero. After `stop`, the grid of
-        cycle starts continues.
+        In real time, the memory of the cycle is locked if the system permits it. An inline loop
+        then also gives the calling thread the plan's priority and CPU until `stop`. Until the first commit, drives stay disabled and
+        outputs are zero. After `stop`, the grid of cycle starts continues.
+
+        Args:
+            origin_ns: First cycle start, which defines the grid [ns]; 0: one period from now.
 
         Raises:
             OSError: The native thread cannot be started.
+            RuntimeError: The engine is already running, or this is a forked child.
         """
 
     def next(self, timeout_ns: int = 0) -> int:
@@ -61,6 +66,7 @@ class Engine:
 
         Raises:
             OSError: The link has failed.
+            RuntimeError: The engine is not running.
             KeyboardInterrupt: Raised at once, like other exceptions of signal handlers.
         """
 
@@ -103,7 +109,10 @@ class Engine:
         """
 
     def take_turns(self) -> None:
-        """Allow a cycle to begin at any time in its period, for several engines in one thread."""
+        """Allow a cycle to begin at any time in its period, for several engines in one thread.
+
+        No effect if the engine has a native thread.
+        """
 
     def run(self, cycles: int) -> int:
         """Run cycles without an application (a hand-over), for start-up and shutdown.
@@ -113,7 +122,11 @@ class Engine:
         Afterwards the target buffers contain the last commanded values.
 
         Returns:
-            The flags of the last cycle.
+            The flags of the last cycle. With CYCLE_STOPPED or CYCLE_NONE, not all cycles have run.
+
+        Raises:
+            OSError: The link has failed.
+            RuntimeError: The engine is not running.
         """
 
     def spend(self, duration_ns: int) -> None:
@@ -121,6 +134,11 @@ class Engine:
 
         The cycles in this time run without it (threaded) or are missed (inline). In real time,
         compute for this long without the GIL.
+
+        Raises:
+            OSError: The link has failed.
+            RuntimeError: The engine is not running.
+            ValueError: The duration is negative.
         """
 
     def quick_stop_all(self) -> None:
@@ -134,10 +152,17 @@ class Engine:
 
         Returns:
             True if every axis is; False if `timeout_ns` passed or the cycles ended first.
+
+        Raises:
+            OSError: The link has failed.
+            RuntimeError: The engine is not running.
         """
 
     def stop(self) -> None:
-        """End the native thread; a no-op if the engine is not running."""
+        """End the native thread and restore the scheduling of the calling thread (inline).
+
+        A no-op if the engine is not running.
+        """
 
     def forget(self) -> None:
         """Release the parent's cycle in a forked child, without an effect on the parent.
@@ -215,7 +240,11 @@ class Engine:
         """
 
     def histogram_counts(self, phase: str) -> list[tuple[float, float, int]]:
-        """Return (lower [s], upper [s], count) for every bucket of a phase that is not empty."""
+        """Return (lower [s], upper [s], count) for every bucket of a phase that is not empty.
+
+        Raises:
+            ValueError: The phase is unknown.
+        """
 
     def reset_histograms(self) -> None:
         """Clear the histograms, for example after the start-up."""
@@ -248,7 +277,8 @@ class Engine:
             False if the queue (64 frames) is full.
 
         Raises:
-            ValueError: The frame is not EtherCAT, or its index belongs to the cycle.
+            ValueError: The frame is not EtherCAT, its size is not 60 to 1514 bytes, or its index
+                belongs to the cycle.
         """
 
     def acyclic_pop(self) -> bytes | None:
@@ -261,7 +291,8 @@ class Engine:
         start (threaded) or not at all (inline).
 
         Returns:
-            False if `timeout_ns` passed first.
+            True if a frame has returned. False after `timeout_ns`; earlier after a signal, or if
+            virtual time does not pass any further.
         """
 
     @property
@@ -316,6 +347,8 @@ class Engine:
         commanded values.
 
         Raises:
+            OSError: The monitor thread cannot be started.
+            RuntimeError: The engine is not running.
             ValueError: The budget leaves too little of the period for the frames.
         """
 
@@ -323,7 +356,9 @@ class Engine:
         """Stop the law; a hand-over follows until the application commits targets."""
 
     def run_law(self, duration_ns: int, trouble: int) -> int:
-        """Wait without the GIL until the law has ended.
+        """Wait without the GIL until the law has ended; a signal may end the wait early.
+
+        Without a native thread, the cycles run in the caller's thread meanwhile.
 
         Args:
             duration_ns: Longest wait [ns].
@@ -331,12 +366,17 @@ class Engine:
 
         Returns:
             The flags of the newest cycle.
+
+        Raises:
+            OSError: The link has failed.
+            RuntimeError: The engine is not running, or no law runs.
         """
 
     def set_stream(self, stream: Stream | None) -> None:
         """Use one row of a stream per cycle as set-points.
 
-        A running law receives the row in its targets. An empty stream is an underrun.
+        A running law receives the row in its targets. Once a row was taken, an empty stream is an
+        underrun. The target buffers are set to the last commanded values.
 
         Args:
             stream: The stream; None starts a hand-over until the application commits targets.

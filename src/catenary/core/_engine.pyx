@@ -435,7 +435,7 @@ cdef class Engine:
 
     cdef bint is_native_cycle(self, bint application) noexcept nogil:
         """Return True if the next cycle of the caller's thread is a threaded one. In the inline
-        mode, this is so only while a law runs. A law starts after Python's last outputs were sent.
+        mode, this is so only while a law runs. Before a law starts, send Python's last outputs.
         """
         cdef cycle_t *c = &self.e.cycle
         if c.execution != INLINE:
@@ -449,8 +449,9 @@ cdef class Engine:
     cdef void follow(self) noexcept:
         """Update Python's targets after new actual values.
 
-        Without a law, only the targets of axes that are not followed change. While a law runs, and
-        until Python has received the cycle in which it ended, all targets change.
+        Without a law or stream, only the targets of axes that are not followed change. While a
+        stream is set or a law runs, all targets change. This includes the cycle in which the law
+        ended. Then the law is released.
         """
         cdef actual_t *actual = &self.h.actual[PRIVATE]
         if self.law is None and self.stream is None:
@@ -491,7 +492,7 @@ cdef class Engine:
         return 0
 
     cdef int lockstep(self) except -1:
-        """Run one threaded cycle in the caller's thread (virtual time)."""
+        """Run one threaded cycle in the caller's thread (virtual time, or a law in an inline loop)."""
         cdef actual_header_t *header = self.h.actual[PRIVATE].header
         cdef uint64_t before = header.number
         cdef int rc

@@ -313,8 +313,10 @@ cdef int drain(frames_t *f, int budget) noexcept nogil:
 
 
 cdef int await_frames(frames_t *f, int64_t deadline, int budget) noexcept nogil:
-    """Wait until all frames are back or the deadline has passed. Return 0, or -errno of the
-    wait."""
+    """Receive frames until all are back, the deadline has passed or the budget is used up.
+
+    Return 0, or -errno of the wait.
+    """
     cdef const cat_link *link = f.link
     cdef int rc
     while f.missing > 0 and budget > 0:

@@ -7,8 +7,8 @@ Theory of operation. `guard_observe` runs after the inputs of a cycle, the other
 its outputs. `requested_state` is the requested state in force. `mode` is the mode of operation in
 force, `mode_wanted` the mode requested in 0x6060. The set-points of the application are valid only
 while the axis is *followed*: requested state enabled, OPERATION_ENABLED, the mode shown is the one
-in force, statusword bit 12 if the mode defines it, and its unit answers. `worked` is set once the
-axis was followed since OPERATION_ENABLED or since a mode change; `shows_following` once its drive
+in force, statusword bit 12 if the mode defines it, and its unit is not lost. `worked` is set once
+the axis was followed since OPERATION_ENABLED or since a mode change; `shows_following` once its drive
 has shown bit 12. `gap_cycles` counts the cycles since bit 12 was lost, `mute_cycles` those in which
 it was never shown, and `climbing_cycles` those since the request.
 
@@ -209,7 +209,7 @@ cdef uint16_t guard_lead(axes_t *x, axis_t *a, uint16_t bits) noexcept nogil:
 # ---- modes of operation
 
 cdef inline double demanded_torque(const axis_t *a) noexcept nogil:
-    """Return the torque that a powered drive applies now: 0x6074, else the actual torque."""
+    """Return the torque that a powered drive applies now: 0x6074, else the actual torque, else 0."""
     cdef double torque = a.demand_torque if a.torque_demand.present else a.torque
     return torque if isfinite(torque) else 0.0
 
@@ -282,7 +282,11 @@ cdef bint is_mapped(const axis_t *a) noexcept nogil:
 
 
 cdef bint is_trusted(axes_t *x, axis_t *a) noexcept nogil:
-    """Return True if the drive follows its targets, according to mode and bit 12."""
+    """Return True if the drive follows its targets, according to mode and bit 12.
+
+    Call it once per cycle, because it counts the cycles without bit 12. An axis that is followed is
+    stopped when its drive shows the bit for the first time.
+    """
     if (a.requested_state != ENABLED or a.state != OPERATION_ENABLED or a.lost or a.holding
             or a.mode_wanted != a.mode or not is_mapped(a) or not shows_mode(a)):
         if a.mute_cycles < x.mute_limit:
@@ -322,7 +326,9 @@ cdef void observe_requested_state(axes_t *x, axis_t *a, uint8_t state_before) no
 
 cdef void guard_observe(axes_t *x, axis_t *a, uint8_t state_before,
                         uint64_t number) noexcept nogil:
-    """Update requested state, mode in force and `followed` from the inputs of a cycle."""
+    """Update requested state, mode in force and `followed` from the inputs of a cycle. Stop an axis
+    that is lost, has a fault or has left OPERATION_ENABLED.
+    """
     if a.invalid_in_row > 0:
         if a.invalid_in_row >= x.lost_limit and not a.lost:
             a.lost = 1

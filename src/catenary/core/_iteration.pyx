@@ -100,7 +100,7 @@ cdef class Iteration:
         if self.beside is not None:
             self.beside()
         if self.cycle is None:
-            # The first cycle commits nothing: the body has not run yet.
+            # The first cycle commits no set-points: the body has not run yet.
             flags = self.engine.run(1)
             self.cycle = Cycle(self.engine)
         else:
@@ -114,7 +114,7 @@ cdef class Iteration:
         return self.cycle
 
     cdef int commit_if_free(self) except -1:
-        """Commit unless another thread is writing the targets; never wait for it."""
+        """Step the movers and commit, unless another thread is writing the targets; never wait."""
         if not self.commit_lock.acquire(False):
             self.engine.keep_targets()
             return 0

@@ -58,7 +58,6 @@ cdef class Law:
 
     Raises:
         ValueError: A number is out of range.
-        OSError: The monitor thread cannot be started.
     """
     cdef law_t c
     cdef cat_law_monitor rehearsal

@@ -31,7 +31,6 @@ class Law:
 
     Raises:
         ValueError: A number is out of range.
-        OSError: The monitor thread cannot be started.
     """
 
     def __init__(
@@ -50,7 +49,11 @@ class Law:
     def set_parameters(self, values: Sequence[float]) -> None: ...
     @property
     def memory(self) -> list[float]:
-        """Memory after the last step."""
+        """Memory after the last step.
+
+        If the law runs in a native thread, reading waits for its next step, for at most 0.2 s. After
+        this time, it is the last copy of the memory.
+        """
 
     @property
     def status(self) -> int: ...
@@ -65,10 +68,15 @@ class Law:
         """Counts of steps and overruns, and the longest step: steps, overruns, longest_ns."""
 
     def wait(self, timeout_ns: int) -> bool:
-        """Wait for the end of the law, without the GIL; return True if it has ended."""
+        """Wait for the end of the law, without the GIL; return True if it has ended.
+
+        A signal or a spurious wake-up ends the wait early.
+        """
 
     def rehearse(self, actual: bytes, target: bytes) -> int:
-        """Run a few steps on copies of the blocks and of the memory, to warm the caches.
+        """Run at most three steps on copies of the targets and of the memory, to warm the caches.
+
+        The time of each step is 0. A step that the monitor aborts is the last one.
 
         Args:
             actual: Block of the actual values.

@@ -81,7 +81,7 @@ cdef inline bint take(exchange_t *numbers, double *values) noexcept nogil:
 # ---- in the cycle
 
 cdef bint law_begin(law_t *law, cat_law_monitor *monitor, int64_t instant) noexcept nogil:
-    """Begin a law. Return False if the application has withdrawn it."""
+    """Begin a law and activate its monitor. Return False if the application has withdrawn it."""
     law.begun = instant
     if not cat_change32(&law.status, WAITING, RUNNING):
         return False
@@ -115,7 +115,10 @@ cdef int first_not_finite(const axes_t *axes, const target_t *target) noexcept n
 cdef bint law_run(law_t *law, cat_law_monitor *monitor, const axes_t *axes,
                   const actual_t *actual, target_t *target, int64_t instant,
                   uint64_t number) noexcept nogil:
-    """Run one step; return True if the law continues. Targets of a failed step must not be sent."""
+    """Run one step; end the law if it has finished or failed. Return True if it continues.
+
+    Targets of a failed step must not be sent.
+    """
     cdef int rc, axis
     take(&law.parameters_in, law.numbers.parameters)
     take(&law.memory_in, law.numbers.memory)
@@ -150,7 +153,10 @@ cdef void law_report(law_t *law) noexcept nogil:
 
 
 cdef bint law_took(law_t *law, int64_t duration, uint64_t number) noexcept nogil:
-    """Record the duration of a step; return True if the law may continue."""
+    """Record the duration of a step. End the law after `overrun_limit` overruns in a row.
+
+    Return True if it continues.
+    """
     law.longest = max(law.longest, duration)
     if law.budget == 0 or duration <= law.budget:
         law.overruns_in_row = 0

@@ -223,7 +223,10 @@ cdef bint is_leaving(const axis_t *a) noexcept nogil:
 
 
 cdef void limit_velocity(axes_t *x, axis_t *a) noexcept nogil:
-    """Bound the commanded velocity so that the axis stops before a position limit."""
+    """Limit the commanded velocity, so that the axis stops before a position limit.
+
+    Stop an axis that keeps moving away outside a limit.
+    """
     cdef double target = clamp(a, a.commanded_velocity, -a.velocity_limit, a.velocity_limit)
     if a.position_max < INFINITY:
         target = clamp(a, target, -INFINITY,
@@ -375,7 +378,10 @@ cdef void stopping(axes_t *x, axis_t *a) noexcept nogil:
 
 
 cdef void wait_for_mode(axes_t *x, axis_t *a) noexcept nogil:
-    """Fall back in the mode in force until the drive shows the requested mode."""
+    """Fall back in the mode in force until the drive shows the requested mode.
+
+    After the time limit, refuse that mode or stop the axis.
+    """
     fall_back(x, a, False)
     prepare_other_mode(a)
     if quantity_of(a.mode) == TORQUE:
@@ -392,7 +398,7 @@ cdef void wait_for_mode(axes_t *x, axis_t *a) noexcept nogil:
 
 
 cdef void wait_for_bit_12(axes_t *x, axis_t *a) noexcept nogil:
-    """Wait while bit 12 is lost: the drive ignores its targets."""
+    """Fall back while bit 12 is lost: the drive ignores its targets. Stop the axis after the limit."""
     if quantity_of(a.mode) == POSITION:
         a.flags |= FALLBACK
         a.command_velocity = 0.0

@@ -2,7 +2,7 @@
 """Set-points written in advance: a bounded ring with one row per cycle.
 
 One thread writes rows (`written`), the cycle takes them (`taken`). Neither waits for the other.
-`dry` counts the cycles without a row. Budget: 10 ns for three axes.
+`dry` counts the cycles without a row since the first row was taken. Budget: 10 ns for three axes.
 """
 
 from libc.stdint cimport uint32_t, uint64_t

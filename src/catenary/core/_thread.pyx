@@ -41,7 +41,7 @@ cdef extern from *:
     } stack_part;
 
     /* Fault in the pages now rather than in a cycle. Return those that are whole and below the
-     * frame of the caller. */
+     * frame of the caller; a forked child finds zeros in them. */
     static __attribute__((noinline)) stack_part touch_stack(void) {
         volatile char pages[STACK_TOUCHED];
         uintptr_t page = (uintptr_t)sysconf(_SC_PAGESIZE);
@@ -170,7 +170,7 @@ cdef int thread_start(thread_t *t) noexcept nogil:
 
 
 cdef void thread_join(thread_t *t) noexcept nogil:
-    """End the thread; a no-op in a forked child, which has no copy of it."""
+    """End the thread and wait for it; a no-op in a forked child, which has no copy of it."""
     if t.running and t.owner == getpid():
         cat_store_release32(&t.stop, 1)
         pthread_join(t.handle, NULL)

@@ -1,8 +1,8 @@
 """Fault injector for a link: loses, delays, duplicates or corrupts frames, deterministically.
 
-All received frames, and sent frames that are delayed, pass through one store in the order of their
-due times. The faults of a frame are selected once, when it enters. The cost is one copy of each
-received frame.
+Received frames that are not lost, and sent frames that are delayed, pass through one store in the
+order of their due times. The faults of a frame are selected once, when it enters. The cost is two
+copies of each received frame.
 """
 
 from libc.stdint cimport int64_t, uint8_t, uint32_t, uint64_t
@@ -75,7 +75,7 @@ ctypedef struct injector_state:
     cat_link *inner
     uint64_t random
     uint64_t order
-    uint32_t active                   # index of the valid table; the other one is being written
+    uint32_t active                   # index of the valid table; `inject` writes the other one
     rule_table tables[2]
     int64_t seen[2][3]                # number of frames, by direction and traffic
     uint64_t injected[KIND_COUNT]
@@ -105,7 +105,7 @@ cdef bint hits(injector_state *injector, const rule *fault, const int64_t *numbe
 cdef verdict judge(
     injector_state *injector, int direction, const uint8_t *frame, uint32_t length
 ) noexcept nogil:
-    """Number the frame and select its faults."""
+    """Number the frame, and select and count its faults."""
     cdef verdict result
     cdef int64_t numbers[3]
     cdef rule_table *table = &injector.tables[cat_load_acquire32(&injector.active) & 1]
@@ -193,7 +193,7 @@ cdef held_frame *earliest(injector_state *injector, int direction) noexcept nogi
 cdef int enter(
     injector_state *injector, int direction, const uint8_t *frame, uint32_t length
 ) noexcept nogil:
-    """Select the faults of a frame; send the frame, or store it until it is due."""
+    """Apply the faults of a frame: drop, send, or store it until it is due. Return 0 or -errno."""
     cdef verdict result = judge(injector, direction, frame, length)
     cdef int64_t now
     cdef int copies = 2 if result.duplicate else 1
@@ -227,7 +227,7 @@ cdef void send_due(injector_state *injector) noexcept nogil:
 
 
 cdef int take_in(injector_state *injector) noexcept nogil:
-    """Read the frames of the inner link and select their faults. Return 0 or -errno."""
+    """Receive frames from the inner link and store those that are not lost. Return 0 or -errno."""
     cdef const uint8_t *frame = NULL
     cdef int k, length
     for k in range(TAKEN_AT_ONCE):
@@ -274,7 +274,7 @@ cdef int64_t due_of(const held_frame *slot) noexcept nogil:
 
 
 cdef int injector_wait_until(void *self, int64_t deadline, int wake_on_frame) noexcept nogil:
-    """Wait like the inner link, but wake up for delayed frames and not for lost frames."""
+    """Wait like the inner link. Process delayed frames when they are due; ignore lost ones."""
     cdef injector_state *injector = <injector_state *> self
     cdef int64_t arrival, until
     cdef int status
@@ -312,7 +312,13 @@ cdef class FaultInjector(WrapperLink):
         self.table.wait_until = injector_wait_until
 
     def inject(self, *faults):
-        """Replace all faults, even during operation. Without arguments, remove all faults."""
+        """Replace all faults, even during operation. Without arguments, remove all faults.
+
+        The frame numbers continue.
+
+        Raises:
+            ValueError: There are more than 32 faults.
+        """
         if len(faults) > MAX_RULES:
             raise ValueError(f"cannot inject {len(faults)} faults, at most {MAX_RULES}")
         cdef uint32_t other = 1 - (self.injector.active & 1)
@@ -323,12 +329,12 @@ cdef class FaultInjector(WrapperLink):
         cat_store_release32(&self.injector.active, other)
 
     def seen(self, direction="received", *, traffic="all"):
-        """Return the number of frames so far, which is also the number of the next frame."""
+        """Return the number of frames so far in this direction and traffic."""
         return self.injector.seen[DIRECTIONS.index(direction)][TRAFFICS.index(traffic)]
 
     @property
     def injected(self):
-        """Number of injected faults, by kind."""
+        """Number of injected faults, by kind; "lose" includes frames lost in a full store."""
         return {kind: self.injector.injected[i] for i, kind in enumerate(KINDS)}
 
 

@@ -1,8 +1,8 @@
 """Raw link: AF_PACKET frames of one NIC, received through a ring in memory shared with the kernel.
 
 `interface.py` opens, checks and binds the socket. This file contains only the calls of a cycle. A
-send takes one system call, a receive none. With 50 queued frames on a veth, a receive takes 0.07 us
-per frame including the call from Python. With `recv`, if the kernel refuses the ring, it takes 0.7 us.
+send takes one system call, a receive from the ring none. With 50 queued frames on a veth, a receive
+takes 0.07 us per frame including the call from Python. Without the ring, `recv` takes 0.7 us.
 
 Closing: a native thread may be inside a call, or read a frame in the ring. `close` therefore replaces
 the ring by zero pages and the descriptor by a socket without a peer. Address and descriptor number
@@ -75,7 +75,7 @@ cdef extern from "<time.h>" nogil:
 
 cdef enum:
     SECOND = 1_000_000_000
-    ODD_FRAMES = 16                   # frames that are too long or too short, skipped in one call
+    ODD_FRAMES = 16                   # most frames of a wrong length that one call skips
 
 ctypedef struct raw_state:
     int fd
@@ -192,7 +192,7 @@ cdef int wait_for_frame(raw_state *raw, int64_t deadline) noexcept nogil:
 
 
 cdef int pending_error(raw_state *raw) noexcept nogil:
-    """Read and clear the error of the socket, such as ENETDOWN, so that poll() waits again."""
+    """Return and clear the error of the socket (ENETDOWN if none), so that poll() waits again."""
     cdef int number = 0
     cdef unsigned int size = sizeof(int)
     getsockopt(raw.fd, SOL_SOCKET, SO_ERROR, &number, &size)
@@ -202,7 +202,12 @@ cdef int pending_error(raw_state *raw) noexcept nogil:
 cdef class RawLink(TableLink):
     """Owner of an AF_PACKET socket and, unless `ring_size` is 0, of its mapped TPACKET_V2 ring.
 
-    `receive_path` describes how frames are received: "mapped ring", or "recv (reason)".
+    `receive_path` describes how frames are received: "mapped ring", or "recv (reason)". The
+    constructor takes the descriptor from `socket`.
+
+    Raises:
+        ValueError: The ring cannot hold one slot.
+        OSError: The ring cannot be mapped.
     """
     cdef raw_state raw
     cdef size_t ring_size

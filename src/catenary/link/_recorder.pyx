@@ -2,8 +2,8 @@
 
 The cycle copies each frame as a complete pcapng block into a ring (about 0.1 us). A separate thread
 writes the ring to the file. It never delays the cycle: if the ring is full, frames are dropped and
-counted. In virtual time, the caller's thread writes the file whenever the ring is half full, and no
-frame is dropped.
+counted. In virtual time, the caller's thread writes the file whenever the ring is half full. Frames
+are then dropped only after a write error.
 """
 
 from libc.errno cimport EINTR, errno
@@ -131,7 +131,7 @@ cdef void record(
 
 
 cdef void drain(recorder_state *recorder) noexcept nogil:
-    """Write the content of the ring to the file."""
+    """Write the content of the ring to the file; stop at the first error."""
     cdef uint64_t head = cat_load_acquire64(&recorder.head)
     cdef size_t at, size
     cdef ssize_t written
@@ -185,9 +185,12 @@ cdef int recorder_wait_until(void *self, int64_t deadline, int wake_on_frame) no
 cdef class Recorder(WrapperLink):
     """Wrapper that records the frames of `link` in a pcapng file, with timestamps in ns.
 
-    Timestamps are the time of day, or the virtual time of a link in virtual time. A frame is
-    recorded after it was sent, so an answer may precede its question by the duration of the call.
-    `dropped` counts frames that are missing in the file; if there are any, `close` issues a warning.
+    An existing file is overwritten. Timestamps are the time of day, or the virtual time of a link in
+    virtual time. A sent frame gets its timestamp after the call that sends it. If the file is
+    incomplete, `close` issues a warning.
+
+    Raises:
+        OSError: The file cannot be written, or the writer thread cannot be started.
     """
     cdef recorder_state recorder
     cdef cat_memory memory                # the ring
@@ -246,7 +249,7 @@ cdef class Recorder(WrapperLink):
 
     @property
     def dropped(self):
-        """Number of frames missing in the file because the disk was too slow or full."""
+        """Number of frames not recorded because the disk was too slow or a write has failed."""
         return cat_load_relaxed64(&self.recorder.dropped)
 
     cdef int stop_writer(self) except -1:

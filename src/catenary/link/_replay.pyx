@@ -181,11 +181,12 @@ cdef class Replay(TableLink):
     """Replay of a recording: a pcapng or pcap file, or pairs of (sent frame, answer).
 
     `unmatched` counts frames that have no answer in the recording. The replay treats them like lost
-    frames. `first_unmatched` is the first of them.
+    frames. `first_unmatched` is the first of them; None if there is none.
 
     Raises:
-        DecodeError: The file is damaged, or has no answers.
+        DecodeError: The file is damaged or has no answers, or a sent frame is not EtherCAT.
         ValueError: The pairs are invalid.
+        OSError: The file cannot be read.
     """
     cdef replay_state replay
     cdef object kept                  # owners of the bytes that the tables point to

@@ -5,8 +5,9 @@ No device processes the other copy. In a cut ring, both copies turn back at the 
 link on which they were sent. In both cases, the receiver gets one frame (native/ring_merge.h).
 
 After one copy has arrived, the ring waits `pair_wait` for the other. It does not wait if the other
-copy was missing several times in a row and the copy that has arrived passed all devices. The cost is
-a copy of each frame and two system calls per send.
+copy was missing three times in a row, unless a broadcast has reached fewer devices than before. A
+copy that no device has processed is not delivered alone. The cost is a few copies of each frame and
+two system calls per send.
 """
 
 from libc.errno cimport EINTR, EMSGSIZE, errno
@@ -97,8 +98,8 @@ ctypedef struct ring_t:
     uint32_t arrived_on[2]            # link on which the last copy returned; BOTH: none yet
     uint32_t counted[2]               # devices that answered the last broadcast of each copy
     uint32_t total                    # devices that answered the last broadcast that was delivered
-    uint64_t unpaired                 # frames delivered from one copy because the other was late
-    uint64_t alien                    # frames of other senders, or late frames
+    uint64_t unpaired                 # frames delivered from one copy: the other was late or lost
+    uint64_t alien                    # frames of other senders, late or repeated frames
     uint64_t send_errors[2]
     uint8_t pending[SLOTS]            # indices with a copy, in no order
     slot_t *slots
@@ -164,7 +165,7 @@ cdef int ring_send(void *self, const uint8_t *frame, uint32_t length) noexcept n
 
 
 cdef void take_in(ring_t *ring) noexcept nogil:
-    """Receive all frames that have returned on either link."""
+    """Receive the frames that have returned on either link, and store their copies."""
     cdef const uint8_t *frame = NULL
     cdef int arrived, length, k
     for arrived in range(2):
@@ -202,7 +203,7 @@ cdef void take(ring_t *ring, int arrived, const uint8_t *frame, uint32_t length)
 
 
 cdef bint is_copy(const slot_t *slot, const uint8_t *frame, uint32_t length) noexcept nogil:
-    """Return True if the frame has the EtherCAT header, datagrams and NOP of the sent frame.
+    """Return True if the frame has the EtherCAT header and the NOP of the sent frame.
 
     The NOP contains the cycle number, which identifies late frames (core/_frames.pyx).
     """
@@ -228,7 +229,7 @@ cdef inline bint lacks_devices(ring_t *ring, const slot_t *slot, int side) noexc
 
 
 cdef int64_t due_at(ring_t *ring, const slot_t *slot) noexcept nogil:
-    """Return the time at which a partly returned frame is delivered."""
+    """Return the time at which a returned frame is delivered [ns]; NEVER if it needs both copies."""
     cdef int missing
     if slot.back == slot.expected:
         return slot.since
@@ -241,7 +242,10 @@ cdef int64_t due_at(ring_t *ring, const slot_t *slot) noexcept nogil:
 
 
 cdef int next_due(ring_t *ring, int64_t *when) noexcept nogil:
-    """Return the position in `pending` of the frame to deliver first; -1 if there is none."""
+    """Return the position in `pending` of the frame to deliver first; -1 if there is none.
+
+    `when`: set to the time of its delivery [ns]; NEVER if there is none.
+    """
     cdef int best = -1
     cdef uint32_t i
     cdef int64_t due
@@ -349,6 +353,9 @@ cdef class RingLink(TableLink):
     """Owner of the two links of a ring.
 
     `pair_wait` is the maximum time to wait for the second copy of a frame after the first [s].
+
+    Raises:
+        ValueError: `pair_wait` is not from 0 to 1 s, or the two links cannot form a ring.
     """
     cdef ring_t ring
     cdef cat_memory memory            # the slots
@@ -423,7 +430,7 @@ cdef class RingLink(TableLink):
 
     @property
     def counts(self):
-        """Counts of unpaired frames (one copy was late), alien frames and send errors per link."""
+        """Counts of unpaired frames (a copy was late or lost), alien frames, send errors per link."""
         return {
             "unpaired": self.ring.unpaired,
             "alien": self.ring.alien,
@@ -450,7 +457,7 @@ cdef class RingLink(TableLink):
 
 
 def merge(bytes first not None, bytes second not None):
-    """Merge two copies into one frame.
+    """Return one frame, merged from two copies.
 
     Raises:
         ValueError: The arguments are not copies of the same frame.

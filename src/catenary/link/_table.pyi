@@ -4,7 +4,7 @@ from catenary.errors import LinkError
 from catenary.link.protocol import Link
 
 def capsule_in_virtual_time(capsule: object) -> bool:
-    """Return True if the clock of this table advances only while its user waits."""
+    """Return True if the clock of a link table advances only while its user waits."""
 
 class TableLink:
     @property

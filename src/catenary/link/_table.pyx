@@ -1,9 +1,10 @@
 """The Python methods of a link, over its C table (`native/link.h`).
 
 Compiled links derive from `TableLink`, fill its `table` and inherit the rest. `close` first replaces
-the functions of the table, so that later calls return -EBADF. A native thread may still be inside an
-earlier call, or read a frame that it received. `close_table` must therefore keep the memory and
-descriptors of these functions valid. `__dealloc__` releases them after the last use of the table.
+the functions of the table, so that later calls return -EBADF (`now`: 0). A native thread may still
+be inside an earlier call, or read a frame that it received. `close_table` must therefore keep the
+memory and descriptors of these functions valid. `__dealloc__` releases them after the last use of
+the table.
 """
 
 from cpython.exc cimport PyErr_CheckSignals
@@ -160,7 +161,7 @@ cdef class WrapperLink(TableLink):
     """Owner of another link, which it wraps and closes; base class of recorders and injectors."""
 
     cdef int wrap(self, object link) except -1:
-        """Open `link` if it is a source, and use its table, clock and flags."""
+        """Open `link` if it is a source; take over its table, its name and the flags of its clock."""
         opened = open_link(link)
         self.inner_capsule = opened.capsule
         self.inner = table_of(self.inner_capsule)

@@ -58,19 +58,20 @@ class _Seen(NamedTuple):
 def read_exchanges(path: str | os.PathLike[str]) -> list[Exchange]:
     """Return the exchanges in a capture, pcapng or pcap, in the order of the answers.
 
-    A truncated capture is read up to its end.
+    A truncated last packet is omitted.
 
     Raises:
         DecodeError: The file is not a pcapng or pcap capture.
+        OSError: The file cannot be read.
     """
     return pair(decode_capture(Path(path).read_bytes()).packets)
 
 
 def pair(packets: Iterable[Packet]) -> list[Exchange]:
-    """Pair each answer with the oldest unanswered frame that has the same datagrams and indices.
+    """Pair each answer with the oldest unanswered frame that has the same commands and indices.
 
-    Frames without an answer within `LOST_NS` count as lost. Lost frames and frames of other
-    protocols are omitted.
+    The lengths of the data must be equal as well. Frames without an answer within `LOST_NS` count
+    as lost. Lost frames and frames of other protocols are omitted.
     """
     seen = _ethercat(packets)
     conclusive = _conclusive_sources(seen)
@@ -134,7 +135,11 @@ def _came_back_uncounted(sent: _Seen, each: _Seen) -> bool:
 
 
 def by_question(exchanges: Sequence[Exchange]) -> dict[bytes, list[Exchange]]:
-    """Group exchanges by question, in order. Questions that differ only in indices are equal."""
+    """Group exchanges by question, in order. Questions that differ only in indices are equal.
+
+    Raises:
+        DecodeError: A sent frame is not an EtherCAT frame.
+    """
     found: dict[bytes, list[Exchange]] = defaultdict(list)
     for exchange in exchanges:
         found[question_of(exchange.sent)].append(exchange)

@@ -58,7 +58,8 @@ class Ownership:
             force: True to continue although another master uses an interface.
 
         Raises:
-            LinkError: Another master uses one of the interfaces, and `force` is False.
+            LinkError: Another master uses one of the interfaces, and `force` is False. Or a lock
+                cannot be taken for another reason.
         """
         self._locks: list[socket.socket] = []
         forget_in_child(self)
@@ -107,7 +108,7 @@ def _refused(others: Sequence[str]) -> LinkError:
 
 
 def raw_links(link: Link) -> tuple[RawLink, ...]:
-    """Return the raw links in a link: the link itself, or its parts."""
+    """Return the raw links that a link is, wraps or consists of; () if there are none."""
     if isinstance(link, RawLink):
         return (link,)
     if isinstance(link, RingLink):
@@ -117,7 +118,11 @@ def raw_links(link: Link) -> tuple[RawLink, ...]:
 
 
 def locked(name: str) -> socket.socket | None:
-    """Return the lock of an interface, or None if another MainDevice holds it."""
+    """Lock an interface. Return the lock, or None if another MainDevice holds it.
+
+    Raises:
+        LinkError: The lock cannot be taken for another reason.
+    """
     lock = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
     try:
         lock.bind(NAME + name)
@@ -156,7 +161,7 @@ def described(pid: int) -> str:
 
 
 def other_sockets(link: Link) -> tuple[str, ...]:
-    """Describe the EtherCAT packet sockets of other programs on the interfaces of a link."""
+    """Describe the EtherCAT packet sockets on the interfaces of a link, except its own."""
     return tuple(
         f"{_holder_of_socket(inode)} has an EtherCAT packet socket on {raw.name}"
         for raw in raw_links(link)
@@ -211,8 +216,9 @@ def _target(entry: os.DirEntry[str]) -> str:
 
 
 def foreign_frames(raws: Sequence[RawLink]) -> tuple[str, ...]:
-    """Describe the interfaces on which EtherCAT frames arrive while this process sends nothing.
+    """Listen for 0.1 s. Describe the interfaces on which EtherCAT frames arrive.
 
+    This process must not send meanwhile. The frames are discarded.
     One burst is not sufficient: late answers to a master that was just killed may still arrive.
     """
     _pause(raws[0], SETTLE_NS)

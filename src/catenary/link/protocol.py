@@ -28,7 +28,11 @@ class Link(Protocol):
         ...
 
     def receive(self) -> bytes | None:
-        """Return the oldest received frame, without waiting; None if no frame has arrived."""
+        """Return the oldest received frame, without waiting; None if no frame has arrived.
+
+        Raises:
+            LinkError: The link has failed or is closed.
+        """
         ...
 
     def now(self) -> int:
@@ -44,6 +48,9 @@ class Link(Protocol):
 
         Returns:
             True if a frame has arrived; always False without `wake_on_frame`.
+
+        Raises:
+            LinkError: The link has failed or is closed.
         """
         ...
 

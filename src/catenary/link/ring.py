@@ -20,9 +20,12 @@ class Ring:
     If a cable is cut, only the frames in transit are lost.
 
     Args:
-        first: The link of one end.
-        second: The link of the other end.
+        first: The link of one end, or its source.
+        second: The link of the other end, or its source.
         pair_wait: Maximum time to wait for the second copy of a frame after the first [s].
+
+    Raises:
+        ConfigurationError: Both ends are the same.
     """
 
     first: Link | LinkSource
@@ -37,7 +40,12 @@ class Ring:
             )
 
     def open_link(self) -> RingLink:
-        """Open both links as one."""
+        """Open both links as one.
+
+        Raises:
+            LinkError: A link cannot be opened.
+            ValueError: `pair_wait` is not from 0 to 1 s, or the two links cannot form a ring.
+        """
         return RingLink(self.first, self.second, self.pair_wait)
 
 

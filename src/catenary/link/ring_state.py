@@ -51,7 +51,7 @@ class RingState(NamedTuple):
     def cut_behind(self) -> int | None:
         """Position of the last device before the cut; -1 if the cable of the first link is cut.
 
-        None if the ring is closed or its state is unknown.
+        None if the shape is closed, unknown or dead.
         """
         if self.shape in (Shape.CUT, Shape.FIRST_ONLY, Shape.SECOND_ONLY):
             return self.first_devices - 1

@@ -3,7 +3,7 @@
  *
  * Every number below 512 has its own bucket. From 512 on, each octave has 256 buckets, so the
  * error of a percentile is at most 0.4 %. Adding a value takes a few nanoseconds and touches two
- * cache lines.
+ * cache lines. Values of 2^41 and above count in the last bucket.
  */
 #ifndef CATENARY_HISTOGRAM_H
 #define CATENARY_HISTOGRAM_H
@@ -52,8 +52,8 @@ static inline void cat_histogram_add(cat_histogram *h, int64_t value) {
     h->count++;
 }
 
-/* Return the middle of the bucket that contains the value of this rank, limited to the lowest
- * and highest values. */
+/* Return the percentile for a `fraction` from 0 to 1: the middle of its bucket, limited to the
+ * lowest and highest values. The histogram must not be empty. */
 static inline double cat_histogram_percentile(const cat_histogram *h, double fraction) {
     uint64_t rank = (uint64_t)(fraction * (double)(h->count - 1) + 0.5), below = 0;
     for (uint32_t k = 0; k < CAT_BUCKETS; k++) {

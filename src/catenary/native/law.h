@@ -1,13 +1,14 @@
 /* Control laws and their monitor. A law is a function that runs in the cycle thread. The monitor
  * aborts a law that never returns.
  *
- * `actual` and `target` point to blocks of the core with the layout of `law_fields`. Targets start
- * as the last commanded values. The core's limits apply to what the law leaves in them.
+ * `actual` and `target` point to blocks of the core with the layout of `law_fields`. The targets
+ * keep the values of the previous step. Before the first step, and for axes that are not followed,
+ * they are the last commanded values. The core's limits apply to what the law leaves in them.
  *
  * Theory of operation
  *   A guard belongs to one thread that calls laws (the runner). `under_way` is the number of the
  *   current call. A monitor is a thread that watches one guard. Every 5 ms it reads the processor
- *   time that the runner has used since the monitor first saw the call. If this exceeds `limit`, the
+ *   time that the runner has used since the monitor first saw the call. If this reaches `limit`, the
  *   monitor stores the number of the call in `condemned` and sends a signal to the runner. The
  *   handler leaves the call by siglongjmp if the same call is still running. Signals that arrive
  *   late or in another thread have no effect.
@@ -141,8 +142,9 @@ static void *cat_law_watch(void *argument) {
     }
 }
 
-/* Owner: start the thread in state PARKED. `priority` is its SCHED_FIFO priority, which must be
- * higher than that of the runner; 0 keeps the caller's scheduling. Return 0 or -errno. */
+/* Owner: install the signal handler and start the thread in state PARKED. No effect if the thread
+ * already runs. `priority` is its SCHED_FIFO priority, which must be higher than that of the runner;
+ * 0 keeps the caller's scheduling. Return 0 or -errno. */
 static inline int cat_law_monitor_start(cat_law_monitor *monitor, int priority) {
     struct sigaction action = {.sa_sigaction = cat_law_give_up, .sa_flags = SA_SIGINFO | SA_NODEFER};
     struct sched_param parameters = {.sched_priority = priority};
@@ -164,7 +166,8 @@ static inline int cat_law_monitor_start(cat_law_monitor *monitor, int priority) 
     return 0;
 }
 
-/* Owner: stop the thread after the last call of a law. */
+/* Owner: stop the thread after the last call of a law, and wait for its end. A forked child has no
+ * thread to stop. */
 static inline void cat_law_monitor_stop(cat_law_monitor *monitor) {
     if (monitor->started && monitor->owner == getpid()) {
         cat_store_release32(&monitor->state, CAT_LAW_ENDING);
@@ -174,7 +177,8 @@ static inline void cat_law_monitor_stop(cat_law_monitor *monitor) {
     monitor->started = 0;
 }
 
-/* Runner: start watching calls. This takes one system call; the first call of a law takes another. */
+/* Runner: start watching calls. This takes one system call; the first call of a law takes two
+ * more. */
 static inline void cat_law_monitor_activate(cat_law_monitor *monitor, int64_t limit) {
     monitor->guard.known = 0; /* a new thread may reuse the pthread_t of one that has ended */
     cat_store_release64(&monitor->guard.limit, (uint64_t)limit);

@@ -7,11 +7,11 @@
  * cat_memory_free    release everything; the kernel unlocks unmapped pages
  *
  * A memory is a list of chunks. A chunk is a mapping of whole pages: this header, then its parts. A
- * new chunk is allocated when the newest is full. A part cannot be freed alone; it lives as long as
- * the memory.
+ * new chunk is allocated when the newest is full, touched or locked. A part cannot be freed alone; it
+ * lives as long as the memory.
  *
  * state  RESERVED  mapped but not touched; sufficient for virtual time
- *        TOUCHED   every page has a page frame; `error` is the reason why it is not locked
+ *        TOUCHED   every page has a page frame; `error` is the errno of mlock if it failed
  *        LOCKED    touched, and never swapped out
  *
  * The kernel refuses a whole chunk that exceeds RLIMIT_MEMLOCK: memories that

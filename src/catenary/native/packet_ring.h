@@ -19,8 +19,8 @@ typedef struct cat_packet {
 } cat_packet;
 
 typedef struct cat_packet_ring {
-    uint32_t head __attribute__((aligned(64)));   /* next slot to write; used by the producer */
-    uint32_t tail __attribute__((aligned(64)));   /* next slot to read; used by the consumer */
+    uint32_t head __attribute__((aligned(64)));   /* next slot to write; changed by the producer */
+    uint32_t tail __attribute__((aligned(64)));   /* next slot to read; changed by the consumer */
     cat_packet slots[CAT_RING_SLOTS];
 } cat_packet_ring;
 

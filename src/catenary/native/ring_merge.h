@@ -38,7 +38,7 @@ static inline uint32_t cat_datagrams_end(const uint8_t *frame, uint32_t length) 
     return end <= length ? end : 0;
 }
 
-/* Return the offset and size of the data of the first NOP datagram; 0 if there is none. */
+/* Return the offset of the data of the first NOP datagram, and set *size; 0 if there is none. */
 static inline uint32_t cat_find_nop(const uint8_t *frame, uint32_t length, uint32_t *size) {
     uint32_t end = cat_datagrams_end(frame, length);
     for (uint32_t at = CAT_MERGE_HEADER; at < end;) {

@@ -37,7 +37,7 @@ static inline void cat_triple_publish(cat_triple *triple) {
     triple->back = cat_exchange32(&triple->offered, triple->back | CAT_TRIPLE_NEW) & 3u;
 }
 
-/* Set `front` to the newest slot. Return 1, or 0 if there is no new value. */
+/* Set `front` to the newest slot and return 1. If there is no new value, return 0. */
 static inline int cat_triple_take(cat_triple *triple) {
     if (!(cat_load_acquire32(&triple->offered) & CAT_TRIPLE_NEW)) return 0;
     triple->front = cat_exchange32(&triple->offered, triple->front) & 3u;
