@@ -66,6 +66,13 @@ def test_a_value_out_of_range_is_refused(
         Channel(0x7000, 1, kind).encode(value)
 
 
+@pytest.mark.parametrize("value", [float("inf"), float("nan")])
+@pytest.mark.parametrize("kind", [types.INT, types.REAL])
+def test_a_scaled_value_must_be_finite(kind: types.Integer | types.Real, value: float) -> None:
+    with pytest.raises(ValueError, match="is not finite"):
+        Channel(0x7000, 1, kind, 0.1).encode(value)
+
+
 def test_an_invalid_channel_is_named() -> None:
     with pytest.raises(
         TypeError, match=r"inputs\['force'\] is 5; give a Channel or \(index, subindex"

@@ -59,7 +59,8 @@ class Pending(Generic[T]):
         A procedure that has not started does not start. A transfer in progress continues to its
         end, because a device must not be left in the middle of one.
         """
-        self._cancelled = not self._finished.is_set()
+        if not self._finished.is_set():
+            self._cancelled = True
 
     def wait(self) -> None:
         """Wait for the end. Do not call this in the loop's thread."""

@@ -107,14 +107,14 @@ class Channel:
         Raises:
             TypeError: The type needs an integer.
             ValueError: The value is out of the range of the type, or is not finite.
-            OverflowError: The value is infinite, and the type is an integer with a scale.
         """
         number = value if self.scale is None else value / self.scale
         if isinstance(self.type, Boolean):
             return self.type.encode(bool(number) if self.scale else value)[0]  # type: ignore[arg-type]
-        if isinstance(self.type, Real):
+        if self.scale is not None or isinstance(self.type, Real):
             if not math.isfinite(number):
                 raise ValueError(f"{value} is not finite")
+        if isinstance(self.type, Real):
             return int.from_bytes(self.type.encode(number), "little")
         assert isinstance(self.type, Integer)  # __post_init__ rejects other types
         whole = operator.index(cast(SupportsIndex, number)) if self.scale is None else round(number)

@@ -30,7 +30,6 @@ class Place(NamedTuple):
         Raises:
             TypeError: The type needs an integer.
             ValueError: The value is out of the range of the type, or is not finite.
-            OverflowError: The value is infinite, and the type is an integer with a scale.
         """
         mask = (1 << self.channel.bit_length) - 1 << self.shift
         raw = int.from_bytes(image[self.first : self.end], "little") & ~mask

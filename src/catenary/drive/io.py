@@ -71,11 +71,11 @@ class Channels(Request):
     direction: Direction
 
     bits: BankArray[Bytes] = BankArray(Bank.BIT)
-    """Channels of one bit, 0 or 1, in the order of the process data (k,)."""
+    """Channels of one bit, 0 or 1, in the order of `names` (k,)."""
     integers: BankArray[Integers] = BankArray(Bank.INTEGER)
-    """Channels with raw integers, in the order of the process data (k,)."""
+    """Channels with raw integers, in the order of `names` (k,)."""
     reals: BankArray[Reals] = BankArray(Bank.REAL)
-    """Channels with a scale or of type REAL, in the order of the process data (k,)."""
+    """Channels with a scale or of type REAL, in the order of `names` (k,)."""
 
     def __init__(
         self,

@@ -172,7 +172,6 @@ class ProcessData(Request):
             KeyError: The name is unknown.
             TypeError: The name is that of an input or not a string, or the object needs an integer.
             ValueError: The value is out of the range of the type, or is not finite.
-            OverflowError: The value is infinite, and the type is an integer with a scale.
             RuntimeError: No loop has been opened yet.
         """
         direction, place = self._place(name)
