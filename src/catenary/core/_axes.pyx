@@ -8,8 +8,8 @@ decodes the actual values and unwraps position counters of any width to 64 bits 
 (_guard.pyx), set-points (_setpoints.pyx), controlword, bytes. A set-point is written only if it
 differs from the last one (`put_t`). `axes_apply_late` applies late stop requests to outputs that a
 law has computed. `axes_report` reports the axes after the frames. `cycle_flags` collects the flags
-of the cycle, `handed_over` counts the cycles of a hand-over, and `stop_asked` counts stop requests of
-any thread. Areas are bytes of an image that are copied without interpretation. _axes.pxd defines
+of the cycle, `handed_over` counts the cycles of a hand-over, and `stop_asked` counts stop requests
+of any thread. Areas are bytes of an image that are copied without interpretation. _axes.pxd defines
 every field of an axis.
 
 Budget: 60 ns per axis and direction.

@@ -342,8 +342,8 @@ cdef void send(cycle_t *c) noexcept nogil:
 
 cdef bint take_streamed(cycle_t *c, target_t *target, bint fresh, uint64_t number) noexcept nogil:
     """Take the next row of the stream for the outputs of cycle `number`. Return True for fresh
-    set-points. Once a row was taken, an empty stream is an underrun. After the stream was removed, a
-    hand-over begins.
+    set-points. Once a row was taken, an empty stream is an underrun. After the stream was removed,
+    a hand-over begins.
     """
     cdef stream_t *stream
     if not cat_pointer_is_offered(&c.stream):

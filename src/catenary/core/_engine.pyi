@@ -29,9 +29,9 @@ class Engine:
         They are typed ("d", "q", "Q", "I", "H", "b", "B"), for `numpy.asarray`. Read-only:
         actual_position, actual_velocity, actual_torque, statusword, mode_actual, axis_state,
         axis_flags, stop_reason, stop_cycle, input_reals, input_integers, input_bits, input_bytes,
-        and unit_valid ("B"), unit_counter ("H") per sync unit. Writable: target_position, target_velocity, target_torque,
-        mode_target, requested_state, request, controlword_bits, output_reals, output_integers,
-        output_bits, output_bytes.
+        and unit_valid ("B"), unit_counter ("H") per sync unit. Writable: target_position,
+        target_velocity, target_torque, mode_target, requested_state, request, controlword_bits,
+        output_reals, output_integers, output_bits, output_bytes.
 
         A quantity that is not mapped reads NaN; a velocity is then estimated from the position. A
         requested state takes effect when `request` of its axis changes: requested_state[i] = 1;
@@ -44,8 +44,9 @@ class Engine:
         """Start the cycles: flush the link, set the first cycle start, start the native thread.
 
         In real time, the memory of the cycle is locked if the system permits it. An inline loop
-        then also gives the calling thread the plan's priority and CPU until `stop`. Until the first commit, drives stay disabled and
-        outputs are zero. After `stop`, the grid of cycle starts continues.
+        then also gives the calling thread the plan's priority and CPU until `stop`. Until the first
+        commit, drives stay disabled and outputs are zero. After `stop`, the grid of cycle starts
+        continues.
 
         Args:
             origin_ns: First cycle start, which defines the grid [ns]; 0: one period from now.

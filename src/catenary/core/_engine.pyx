@@ -492,7 +492,7 @@ cdef class Engine:
         return 0
 
     cdef int lockstep(self) except -1:
-        """Run one threaded cycle in the caller's thread (virtual time, or a law in an inline loop)."""
+        """Run one threaded cycle in the caller's thread: in virtual time, or inline with a law."""
         cdef actual_header_t *header = self.h.actual[PRIVATE].header
         cdef uint64_t before = header.number
         cdef int rc

@@ -8,9 +8,9 @@ its outputs. `requested_state` is the requested state in force. `mode` is the mo
 force, `mode_wanted` the mode requested in 0x6060. The set-points of the application are valid only
 while the axis is *followed*: requested state enabled, OPERATION_ENABLED, the mode shown is the one
 in force, statusword bit 12 if the mode defines it, and its unit is not lost. `worked` is set once
-the axis was followed since OPERATION_ENABLED or since a mode change; `shows_following` once its drive
-has shown bit 12. `gap_cycles` counts the cycles since bit 12 was lost, `mute_cycles` those in which
-it was never shown, and `climbing_cycles` those since the request.
+the axis was followed since OPERATION_ENABLED or since a mode change; `shows_following` once its
+drive has shown bit 12. `gap_cycles` counts the cycles since bit 12 was lost, `mute_cycles` those in
+which it was never shown, and `climbing_cycles` those since the request.
 
 A stop (`stop_axis`) needs a new request afterwards; `stop_reason` and `stop_cycle` keep its cause.
 It sends quick stop, then disable operation, then disable voltage (`stop_command`, `stop_cycles`).
@@ -209,7 +209,9 @@ cdef uint16_t guard_lead(axes_t *x, axis_t *a, uint16_t bits) noexcept nogil:
 # ---- modes of operation
 
 cdef inline double demanded_torque(const axis_t *a) noexcept nogil:
-    """Return the torque that a powered drive applies now: 0x6074, else the actual torque, else 0."""
+    """Return the torque that a powered drive applies now: 0x6074 if mapped, else the actual torque;
+    0 if it is not finite.
+    """
     cdef double torque = a.demand_torque if a.torque_demand.present else a.torque
     return torque if isfinite(torque) else 0.0
 

@@ -70,8 +70,9 @@ class Iteration:
     It calls `judge(flags)` if one of the CYCLE_* flags of `trouble` is set, or if the OR of the AL
     states differs from `al_status`. An exception of `judge` ends the iteration. The first step
     commits no set-points. `beside` is called before every step. Each mover of the list `movers`
-    computes targets before every step that commits, with the time of the cycle [s]. With a `commit_lock`, a
-    step that finds it taken commits nothing, because another thread is writing the targets.
+    computes targets before every step that commits, with the time of the cycle [s]. With a
+    `commit_lock`, a step that finds it taken commits nothing, because another thread is writing the
+    targets.
     """
 
     def __init__(

@@ -51,8 +51,8 @@ class Law:
     def memory(self) -> list[float]:
         """Memory after the last step.
 
-        If the law runs in a native thread, reading waits for its next step, for at most 0.2 s. After
-        this time, it is the last copy of the memory.
+        If the law runs in a native thread, reading waits for its next step, for at most 0.2 s.
+        After this time, it is the last copy of the memory.
         """
 
     @property

@@ -398,7 +398,7 @@ cdef void wait_for_mode(axes_t *x, axis_t *a) noexcept nogil:
 
 
 cdef void wait_for_bit_12(axes_t *x, axis_t *a) noexcept nogil:
-    """Fall back while bit 12 is lost: the drive ignores its targets. Stop the axis after the limit."""
+    """Fall back while bit 12 is lost (the drive ignores its targets); stop the axis after a limit."""
     if quantity_of(a.mode) == POSITION:
         a.flags |= FALLBACK
         a.command_velocity = 0.0

@@ -185,8 +185,8 @@ cdef int recorder_wait_until(void *self, int64_t deadline, int wake_on_frame) no
 cdef class Recorder(WrapperLink):
     """Wrapper that records the frames of `link` in a pcapng file, with timestamps in ns.
 
-    An existing file is overwritten. Timestamps are the time of day, or the virtual time of a link in
-    virtual time. A sent frame gets its timestamp after the call that sends it. If the file is
+    An existing file is overwritten. Timestamps are the time of day, or the virtual time of a link
+    in virtual time. A sent frame gets its timestamp after the call that sends it. If the file is
     incomplete, `close` issues a warning.
 
     Raises:

@@ -229,7 +229,7 @@ cdef inline bint lacks_devices(ring_t *ring, const slot_t *slot, int side) noexc
 
 
 cdef int64_t due_at(ring_t *ring, const slot_t *slot) noexcept nogil:
-    """Return the time at which a returned frame is delivered [ns]; NEVER if it needs both copies."""
+    """Return the time at which a returned frame is delivered [ns]; NEVER: only with its other copy."""
     cdef int missing
     if slot.back == slot.expected:
         return slot.since
@@ -430,7 +430,7 @@ cdef class RingLink(TableLink):
 
     @property
     def counts(self):
-        """Counts of unpaired frames (a copy was late or lost), alien frames, send errors per link."""
+        """Counts: unpaired frames (a copy was late or lost), alien frames, send errors per link."""
         return {
             "unpaired": self.ring.unpaired,
             "alien": self.ring.alien,

@@ -161,7 +161,7 @@ cdef class WrapperLink(TableLink):
     """Owner of another link, which it wraps and closes; base class of recorders and injectors."""
 
     cdef int wrap(self, object link) except -1:
-        """Open `link` if it is a source; take over its table, its name and the flags of its clock."""
+        """Open `link` if it is a source; use its table, its name and the flags of its clock."""
         opened = open_link(link)
         self.inner_capsule = opened.capsule
         self.inner = table_of(self.inner_capsule)

@@ -31,9 +31,6 @@ class Fault:
         delay: Delay [s]; only for kind "delay".
         offset: Offset of the byte to invert, only for kind "corrupt"; None inverts a random bit of
             the EtherCAT part.
-
-    Raises:
-        ValueError: A value is invalid, or does not apply to this kind.
     """
 
     kind: Kind

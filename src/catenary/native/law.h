@@ -143,8 +143,8 @@ static void *cat_law_watch(void *argument) {
 }
 
 /* Owner: install the signal handler and start the thread in state PARKED. No effect if the thread
- * already runs. `priority` is its SCHED_FIFO priority, which must be higher than that of the runner;
- * 0 keeps the caller's scheduling. Return 0 or -errno. */
+ * already runs. `priority` is its SCHED_FIFO priority, which must be higher than that of the
+ * runner; 0 keeps the caller's scheduling. Return 0 or -errno. */
 static inline int cat_law_monitor_start(cat_law_monitor *monitor, int priority) {
     struct sigaction action = {.sa_sigaction = cat_law_give_up, .sa_flags = SA_SIGINFO | SA_NODEFER};
     struct sched_param parameters = {.sched_priority = priority};

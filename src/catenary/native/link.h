@@ -17,7 +17,7 @@
 #define CAT_FRAME_MIN 60u             /* shorter frames are padded before they are sent */
 
 /* flags */
-#define CAT_LINK_VIRTUAL_TIME 1u      /* `now` advances only in `wait_until` and `spend`; cycles run in the caller's thread */
+#define CAT_LINK_VIRTUAL_TIME 1u      /* `now` advances only in a wait or `spend`; cycles run in the caller's thread */
 #define CAT_LINK_SHARED_TIME 2u       /* other participants share the virtual time: release the GIL to wait */
 #define CAT_LINK_SPENDS 4u            /* `spend` is implemented */
 #define CAT_LINK_POLLS 8u             /* `fd` is valid: readable when a frame can be received */

@@ -7,8 +7,8 @@
  * cat_memory_free    release everything; the kernel unlocks unmapped pages
  *
  * A memory is a list of chunks. A chunk is a mapping of whole pages: this header, then its parts. A
- * new chunk is allocated when the newest is full, touched or locked. A part cannot be freed alone; it
- * lives as long as the memory.
+ * new chunk is allocated when the newest is full, touched or locked. A part cannot be freed alone;
+ * it lives as long as the memory.
  *
  * state  RESERVED  mapped but not touched; sufficient for virtual time
  *        TOUCHED   every page has a page frame; `error` is the errno of mlock if it failed

@@ -8,8 +8,8 @@
  * user claims a pointer before it reads the object, and checks afterwards that it is still offered
  * (a hazard pointer: Michael, IEEE TPDS 15(6), 2004). The owner keeps an
  * offered or claimed object alive.
- * Offers, claims and checks use sequentially consistent order: each side stores one word, then loads
- * the other.
+ * Offers, claims and checks use sequentially consistent order: each side stores one word, then
+ * loads the other.
  *
  * Two uses: `claim` reads a pointer that stays offered. `take` removes a request from the word, so
  * that each request is served at most once and the newest one replaces older ones.
