@@ -111,9 +111,8 @@ class Channel:
         number = value if self.scale is None else value / self.scale
         if isinstance(self.type, Boolean):
             return self.type.encode(bool(number) if self.scale else value)[0]  # type: ignore[arg-type]
-        if self.scale is not None or isinstance(self.type, Real):
-            if not math.isfinite(number):
-                raise ValueError(f"{value} is not finite")
+        if (self.scale is not None or isinstance(self.type, Real)) and not math.isfinite(number):
+            raise ValueError(f"{value} is not finite")
         if isinstance(self.type, Real):
             return int.from_bytes(self.type.encode(number), "little")
         assert isinstance(self.type, Integer)  # __post_init__ rejects other types
