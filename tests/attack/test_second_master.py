@@ -64,7 +64,7 @@ def test_a_second_one_in_the_same_process(veth: tuple[str, str]) -> None:
     expected = rf"this process \(PID {os.getpid()}\) has {veth[0]} open"
     with cat.MainDevice(veth[0]), pytest.raises(LinkError, match=expected) as refused:
         cat.MainDevice(veth[0]).open()
-    assert "close() it first" in refused.value.hint
+    assert "call its close() first" in refused.value.hint
 
 
 def test_another_process_is_named(veth: tuple[str, str], tmp_path: Path) -> None:
