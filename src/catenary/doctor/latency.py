@@ -1,7 +1,7 @@
 """Wake-up latency of this machine, measured with absolute times as cyclictest does.
 
 The thread is a `realtime.Task` in a `realtime.session()`, as in a user's program: SCHED_FIFO,
-locked memory, no deep sleep. `scheduling` lists the settings that were refused.
+locked memory, no deep sleep. `scheduling` has the policy and the refused settings.
 """
 
 from __future__ import annotations

@@ -107,6 +107,9 @@ def make_channels(layout: Layout, format_: str = FORMAT) -> list[Channel]:
     Args:
         layout: layout of the rows.
         format_: version of the file format.
+
+    Raises:
+        RecordingError: A field has a type or shape that cannot be recorded.
     """
     joints = [
         _joint_channel(layout, name, fields)

@@ -63,8 +63,8 @@ class RecordingFile:
             force: replace an existing file.
 
         Raises:
-            RecordingError: The file exists (without `force`), another recorder is writing it, or
-                the extra is not installed.
+            RecordingError: The file exists (without `force`), another recorder is writing it, a
+                field cannot be recorded, or the extra is not installed.
             OSError: The file cannot be created or written.
         """
         library: Any = require("mcap.writer")

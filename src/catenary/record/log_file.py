@@ -33,7 +33,8 @@ def read_csv(path: str | os.PathLike[str], *, start: float = 0.0, end: float = n
         end: end of the part [s], as `cycle.time`.
 
     Raises:
-        RecordingError: The file is not the CSV file of a log, or a line is damaged.
+        RecordingError: The file is not the CSV file of a log, a line is damaged, or there are
+            fewer than two cycles.
         OSError: The file cannot be read.
     """
     columns = _columns(Path(path))

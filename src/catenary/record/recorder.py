@@ -120,7 +120,8 @@ class Recorder:
 
         Args:
             seconds: maximum duration [s]; None sets no limit.
-            stop: event that another thread or a signal handler sets to end the recording.
+            stop: event that another thread or a signal handler sets to end the recording. `run`
+                sets it when `seconds` have passed.
 
         Raises:
             RecordingError: The disk is full or fails, as for `take`.
@@ -141,7 +142,9 @@ class Recorder:
             alarm.cancel()
 
     def close(self) -> None:
-        """Write the remaining cycles and finish the file.
+        """Write the remaining cycles, finish the file, and close the share that `__init__` opened.
+
+        A no-op if the recorder is closed.
 
         Raises:
             RecordingError: The disk is full or fails, as for `take`.
@@ -193,7 +196,7 @@ class Recorder:
         self._on_disk(RecordingFile.write_event, event)
 
     def _on_disk(self, write: Callable[[RecordingFile, T], None], value: T) -> None:
-        """Run a write. If it fails, repair the file and raise RecordingError."""
+        """Run a write. If it fails, close and repair the file, and raise RecordingError."""
         assert self._file is not None, "the recorder is closed"
         try:
             write(self._file, value)

@@ -110,11 +110,12 @@ def read(path: str | os.PathLike[str], *, start: float = 0.0, end: float = np.in
 
     Args:
         path: the file.
-        start: start of the part [s], counted from the first cycle.
+        start: start of the part [s], counted from the first cycle; 0 includes earlier events.
         end: end of the part [s], counted from the first cycle.
 
     Raises:
-        RecordingError: The file is not a recording of Catenary, or it is damaged.
+        RecordingError: The file is not a recording of Catenary, it is damaged, or the extra is not
+            installed.
         ValueError: `start` or `end` is not a valid time.
         OSError: The file cannot be read.
     """

@@ -29,8 +29,8 @@ def of_axes(recording: Recording, field: str | None) -> Floats | None:
 def reference_of(recording: Recording) -> str | None:
     """Return the field to compare positions with; None if it is unknown.
 
-    If any drive is in CSP, this is the commanded position. In other modes, only the application
-    knows the reference.
+    If any drive is in CSP, or if the modes were not recorded, this is the commanded position. In
+    other modes, only the application knows the reference.
     """
     sent = recording.layout.of_axes("commanded_position")
     in_csp = recording.layout.field("mode") is None or (recording["mode"] == CSP).any()
@@ -52,7 +52,7 @@ def tracking_error(recording: Recording, reference: str | None) -> Floats | None
 
 
 def rms(values: Floats) -> Floats:
-    """Return the RMS of each column, without NaN."""
+    """Return the RMS of each column, ignoring NaN and infinities; 0 if nothing is left."""
     known = np.isfinite(values)
     count = np.maximum(known.sum(axis=0), 1)
     return np.asarray(np.sqrt(np.square(values).sum(axis=0, where=known) / count))

@@ -64,7 +64,7 @@ class Summary:
         return float((self.chunks[-1].index.message_end_time - self.first_ns) * 1e-9)
 
     def drop_last_chunk(self) -> None:
-        """Remove the last chunk and everything after it."""
+        """Remove the last chunk and everything after it from the summary, not from the file."""
         self.missing, self.complete = b"", False
         self.end = self.chunks.pop().index.chunk_start_offset
         self.metadata = [each for each in self.metadata if each.offset < self.end]
@@ -117,9 +117,10 @@ def groups(found: Iterable[Place]) -> Iterator[list[Place]]:
 
 
 def _add_chunk(summary: Summary, stream: BinaryIO, place: Place, indexes: list[Place]) -> bool:
-    """Add a chunk. Return False if the chunk or its index is incomplete.
+    """Add a chunk to the summary. Return False if the complete part of the file ends here.
 
-    The complete part of the file then ends here.
+    A damaged chunk is not added. If only its index is incomplete, the chunk is added, and
+    `summary.missing` receives a new index.
     """
     records: Any = require("mcap.records")
     chunk = read_record(stream, place)
@@ -170,7 +171,7 @@ def _make_index(data: bytes, start: int) -> tuple[dict[int, int], bytes]:
 
 
 def _first_cycle(summary: Summary, data: bytes) -> int | None:
-    """Return the log time of the first message that is not an event."""
+    """Return the log time of the first message that is not an event; None if there is none."""
     cycles = {each.id for each in summary.channels.values() if not is_event(each.topic)}
     times = (each.time_ns for each in chunk_messages(data) if each.channel in cycles)
     return next(times, None)
@@ -200,7 +201,8 @@ def encode_end(summary: Summary, entries: dict[str, str]) -> bytes:
 
     Args:
         summary: contents of the complete part.
-        entries: entries of the end record, unless the recorder has written one.
+        entries: entries of the end record; ignored if the recorder has written both this record
+            and the end of the data section.
     """
     records: Any = require("mcap.records")
     metadata, data = list(summary.metadata), summary.missing

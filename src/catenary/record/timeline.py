@@ -67,7 +67,7 @@ def stop_text(recording: Recording, axes: list[int]) -> str:
 
 
 def draw_marks(plot: Any, marks: list[Mark]) -> None:
-    """Draw the marks as vertical lines."""
+    """Draw at most MARKED marks as vertical lines."""
     for mark in marks[:MARKED]:
         plot.axvline(mark.time, color=mark.color, lw=0.9, ls=(0, mark.dashes), zorder=1.5)
 
@@ -100,7 +100,10 @@ def draw_timeline(plot: Any, recording: Recording, marks: list[Mark], points: in
 
 
 def _name_marks(plot: Any, marks: list[Mark]) -> None:
-    """Write names next to the lines, on alternating levels, so that they do not overlap."""
+    """Enlarge the plot at the top, and write at most NAMED names next to the lines.
+
+    The names are on alternating levels, so that they do not overlap.
+    """
     margin = 1.0 + LEVEL_HEIGHT * (1 + min(len(marks), LEVELS)) if marks else 1.0
     low, high = plot.get_ylim()
     plot.set_ylim(min(low, 0.0), max(high, 1.0) * margin)

@@ -45,7 +45,7 @@ cdef extern from "sink.h" nogil:
 cdef class Ring:
     """A ring of `count` rows (a power of two) of `size` bytes, at byte `offset` of a buffer.
 
-    Raises ValueError if it does not fit in the buffer.
+    Raises ValueError if the ring does not fit in the buffer, or if a value is invalid.
     """
     cdef Py_buffer buffer
     cdef ring_view view

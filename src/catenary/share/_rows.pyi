@@ -9,7 +9,7 @@ def row_parts(record_size: int, actual_size: int, target_size: int) -> tuple[int
 class Ring:
     """A ring of `count` rows (a power of two) of `size` bytes, at byte `offset` of a buffer.
 
-    Raises ValueError if it does not fit in the buffer.
+    Raises ValueError if the ring does not fit in the buffer, or if a value is invalid.
     """
 
     def __init__(
@@ -39,10 +39,16 @@ class Ring:
         """
 
     def write(self, row: bytes) -> None:
-        """Append a row, padded with zeros. Only one thread may call this at a time."""
+        """Append a row, padded with zeros. Only one thread may call this at a time.
+
+        Raises ValueError if the row is too long or the memory is read-only.
+        """
 
     def end(self) -> None:
-        """Mark the ring as ended and wake all readers. No more rows will come."""
+        """Mark the ring as ended and wake all readers. No more rows will come.
+
+        Raises ValueError if the memory is read-only.
+        """
 
 class CycleWriter(Ring):
     """A ring whose rows are the cycles of an engine.

@@ -159,7 +159,10 @@ class Desk:
         )
 
     def reason(self, place: int, serial: int) -> Reason:
-        """Return the reason why a lease of this place has ended; EXPIRED if it was not recorded."""
+        """Return the reason why a lease of this place has ended.
+
+        Return LOOP_ENDED after `end_all`, and EXPIRED if no reason was recorded.
+        """
         if self._closed.load(0):
             return Reason.LOOP_ENDED
         is_recorded = serial in (self.ended.load(place), int(self.places[place]["last"]))
@@ -211,8 +214,8 @@ def open_desk(layout: ShareLayout, path: Path, owner: int) -> Desk:
         owner: user id of the owner of the share.
 
     Raises:
-        ShareError: the loop does not accept commands from this user, or the desk is damaged or
-            belongs to another loop.
+        ShareError: the loop does not accept commands from this user or does not answer, or the
+            desk is damaged or belongs to another loop.
     """
     try:
         descriptor = request_descriptor(path, owner)

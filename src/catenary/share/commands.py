@@ -83,7 +83,10 @@ class CommandReader:
         self._next_check_ns = 0
 
     def commands(self) -> list[AxisCommand]:
-        """Return the new commands of valid leases, grouped by client, oldest first."""
+        """Read the new commands of valid leases, and end the leases that are over.
+
+        Return the commands, grouped by client, oldest first.
+        """
         self._follow_leases()
         return [
             command for place, known in self._known.items() for command in self._read(place, known)

@@ -30,7 +30,10 @@ class DeskSocket:
     """Owner of a listening socket and of the thread that sends a descriptor to each client."""
 
     def __init__(self, folder: Path, descriptor: int, mode: int) -> None:
-        """Take ownership of the descriptor. `publish` names the socket and starts the thread."""
+        """Create a listening socket at a draft path, and take ownership of the descriptor.
+
+        `publish` names the socket and starts the thread.
+        """
         self._descriptor = descriptor
         self._ended = threading.Event()
         self._listening = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
@@ -54,7 +57,10 @@ class DeskSocket:
         self._thread.start()
 
     def close(self) -> None:
-        """Remove the socket from its folder, then end the thread."""
+        """Remove the socket from its folder, end the thread, and close the descriptor.
+
+        If the thread does not end within TIMEOUT, the socket and the descriptor stay open.
+        """
         self._ended.set()
         self.path.unlink(missing_ok=True)
         with suppress(OSError):  # if the socket never listened
@@ -92,7 +98,8 @@ def request_descriptor(path: Path, owner: int) -> int:
     Raises:
         FileNotFoundError: the socket does not exist.
         PermissionError: this user must not connect to the socket.
-        ShareError: no process answers, or the process belongs to another user.
+        ShareError: no process answers in time, or it belongs to another user or sends no
+            descriptor.
     """
     flags = socket.SOCK_SEQPACKET | socket.SOCK_CLOEXEC
     with socket.socket(socket.AF_UNIX, flags) as connection:

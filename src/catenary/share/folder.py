@@ -67,12 +67,15 @@ def user_folder(uid: int) -> Path:
 def prepare(folder: Path, mode: int) -> None:
     """Create the folder of this user if it is missing, and set its mode.
 
+    A no-op for /run/catenary.
+
     Args:
         folder: the folder.
         mode: mode of the files to be created in it, which determines the mode of the folder.
 
     Raises:
-        ShareError: another user has created the folder; all users can write to /dev/shm.
+        ShareError: the path is not a folder, or another user has created it; all users can write
+            to /dev/shm.
     """
     if folder == GROUP_FOLDER:
         return

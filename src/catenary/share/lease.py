@@ -64,7 +64,8 @@ class Lease:
             torque: torques [N·m].
 
         Raises:
-            LeaseError: the lease has ended, or the loop does not read commands.
+            LeaseError: the lease has ended, the loop does not read commands, or the desk is locked
+                for too long.
             ValueError: a value has the wrong shape or is not finite, or no value is given.
         """
         row = np.zeros((), self._desk.row)
@@ -80,11 +81,17 @@ class Lease:
         self._renew(row.tobytes())
 
     def renew(self) -> None:
-        """Renew the lease for its full duration. Raises LeaseError if it has ended."""
+        """Renew the lease for its full duration.
+
+        Raises LeaseError if the lease has ended, or if the desk is locked for too long.
+        """
         self._renew(None)
 
     def release(self) -> None:
-        """Release the axes. A no-op if the lease has ended, or in a forked child."""
+        """Release the axes. A no-op if the lease has ended, or in a forked child.
+
+        Raises LeaseError if the desk is locked for too long.
+        """
         if os.getpid() != self._pid:
             return
         with locked(self._desk):
@@ -103,7 +110,10 @@ class Lease:
         self.release()
 
     def _renew(self, row: bytes | None) -> None:
-        """Renew the lease and write a row. The mutex protects the place against reassignment."""
+        """Renew the lease, and write a row unless it is None.
+
+        The mutex protects the place against reassignment.
+        """
         desk, place = self._desk, self._place
         with locked(desk):
             now = time.monotonic_ns()
@@ -148,7 +158,10 @@ class Lease:
         return values
 
     def _take_place(self) -> int:
-        """Return a free place, or one whose lease has ended. The caller holds the mutex."""
+        """Free the places and axes of leases that have ended, then return a free place.
+
+        The caller holds the mutex. Raises LeaseError if no place is free.
+        """
         desk, now = self._desk, time.monotonic_ns()
         for place, serial in enumerate(desk.leases.load_all()):
             if serial and not desk.is_valid(place, serial):
@@ -165,7 +178,10 @@ class Lease:
         )
 
     def _take_axes(self) -> int:
-        """Take the axes and return the serial of the new lease. The caller holds the mutex."""
+        """Take the axes and return the serial of the new lease. The caller holds the mutex.
+
+        Raises LeaseError if an axis is already leased.
+        """
         desk = self._desk
         for axis in self._numbers:
             if holder := desk.holders[axis]:
@@ -188,7 +204,10 @@ class Lease:
 
 @contextmanager
 def locked(desk: Desk) -> Iterator[None]:
-    """Lock the desk for a block. Raises LeaseError if the lock is not free in time."""
+    """Lock the desk for a block.
+
+    Raises LeaseError if the lock is not free in time, or if the mutex is damaged.
+    """
     try:
         taken = desk.mutex.lock(LOCK_TIMEOUT_NS)
     except OSError as error:
@@ -209,12 +228,15 @@ def free(desk: Desk, place: int, reason: Reason) -> None:
     entry, serial = desk.places[place], desk.leases.load(place)
     entry["reason"] = reason
     entry["last"] = serial
-    desk.leases.store(place, 0)  # before the holders, because the loop reads it after them
+    desk.leases.store(place, 0)  # before the holders: the loop reads the lease after them
     desk.holders[desk.holders == serial] = 0
 
 
 def axis_numbers(layout: ShareLayout, axes: Sequence[str | int] | None) -> list[int]:
-    """Return the indices of axes in the layout. Raises ValueError if one is unknown or repeated."""
+    """Return the indices of axes in the layout; None selects all axes.
+
+    Raises ValueError if an axis is unknown or repeated, or if `axes` is empty or a string.
+    """
     if axes is None:
         return list(range(len(layout.axes)))
     if isinstance(axes, str):

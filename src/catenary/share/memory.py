@@ -23,7 +23,10 @@ SEALS = fcntl.F_SEAL_SHRINK | fcntl.F_SEAL_GROW | fcntl.F_SEAL_SEAL
 
 
 class Segment:
-    """Owner of the mapping of a file, with the file's size, inode and user id."""
+    """Owner of the mapping of a file, with the file's size, inode and user id.
+
+    The constructor maps the whole file and closes the descriptor.
+    """
 
     def __init__(self, path: Path, descriptor: int, *, writable: bool) -> None:
         try:
@@ -52,7 +55,7 @@ class Segment:
         self.path = under
 
     def unlink(self) -> None:
-        """Remove the file if the path still refers to it."""
+        """Lock the folder, and remove the file if the path still refers to it."""
         # If another process holds the lock for too long, the file remains, as after a kill.
         with suppress(ShareError), deciding(self.path.parent):
             if self.is_published:
@@ -177,7 +180,7 @@ def map_sealed(descriptor: int, size: int) -> mmap.mmap:
         size: expected size [bytes].
 
     Raises:
-        ShareError: the memory is not sealed or has another size.
+        ShareError: the memory is not sealed, has another size, or cannot be mapped.
     """
     try:
         seals = fcntl.fcntl(descriptor, fcntl.F_GET_SEALS)

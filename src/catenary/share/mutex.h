@@ -42,7 +42,7 @@ static int mutex_is_ours(const share_mutex *m) {
 }
 
 /* Wait at most `timeout` [ns]. Return 0 if acquired, 1 if acquired from an owner that died,
- * -ETIMEDOUT, -EDEADLK (this thread already holds it) or -ENOTRECOVERABLE. */
+ * -ETIMEDOUT, -EDEADLK (this thread already holds it) or another -errno (the mutex is damaged). */
 static int mutex_lock(share_mutex *m, int64_t timeout) {
     struct timespec until;
     int rc = pthread_mutex_trylock(&m->mutex);

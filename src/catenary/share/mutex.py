@@ -30,7 +30,8 @@ class Mutex:
     Args:
         name: name of the mutex.
         mode: permissions as for chmod.
-        uid: the user whose existing mutex to open; None: this user.
+        uid: the user whose existing mutex to open; None: open the mutex of this user, or create
+            it.
 
     Raises:
         ShareError: another user owns the mutex, more users can write to it than `mode` grants, or
@@ -57,7 +58,7 @@ class Mutex:
     def acquire(self, timeout: float | None = None) -> bool:
         """Acquire the lock. Return False if `timeout` [s] passes first; None waits without a limit.
 
-        Raises RuntimeError if this thread already holds it.
+        Raises RuntimeError if this thread already holds it, and OSError if the mutex is damaged.
         """
         recovered = self._mutex.lock(NO_TIMEOUT_NS if timeout is None else round(timeout * 1e9))
         if recovered is None:

@@ -38,8 +38,8 @@ def attach(
         stale: accept a share whose writer has died, to read its last cycles.
         uid: owner of the share; None: this user or root. Shares of others are refused, because the
             owner of a share can crash its readers.
-        patience: retry once for each item of this iterable, for example the jobs of a task:
-            `attach(name, patience=task)`.
+        patience: after a ShareError, retry once for each item of this iterable, for example the
+            jobs of a task: `attach(name, patience=task)`.
 
     Returns:
         The reader of the share.
@@ -47,6 +47,7 @@ def attach(
     Raises:
         ShareError: the share does not exist, cannot be read, belongs to another user, has a dead
             writer, or was written by another version.
+        ValueError: the name is invalid.
     """
     waiting = iter(patience)
     while True:
@@ -151,7 +152,8 @@ class Reader:
     def wait(self, timeout: float | None = None) -> bool:
         """Wait for a cycle after the last one that `read` or `wait` has reported.
 
-        Return False after `timeout` [s], or if no more cycles will come (see `alive`).
+        Return False after `timeout` [s], or if no more cycles will come (see `alive`). None sets no
+        limit.
         """
         deadline = NO_DEADLINE_NS if timeout is None else time.monotonic_ns() + round(timeout * 1e9)
         while not self._has_news(min(deadline, time.monotonic_ns() + ALIVE_CHECK_NS)):
@@ -188,20 +190,22 @@ class Reader:
         """Return the events after serial `after` that still exist, oldest first.
 
         Also return how many events between `after` and the last returned event were overwritten.
+        Raises ShareError if an event is damaged.
         """
         rows, lost = self._ring(EVENTS).copy_after(after)
         size = self.layout.events.size
         return [decode_event(rows[at : at + size]) for at in range(0, len(rows), size)], lost
 
     def lease(self, axes: Sequence[str | int] | None = None, *, for_: float = 0.5) -> Lease:
-        """Return a lease: the right to command some axes.
+        """Take a lease: the right to command some axes.
 
         Args:
             axes: names or numbers of the axes; None: all axes.
-            for_: time until the lease expires, counted from the last command [s].
+            for_: time until the lease expires, counted from the last renewal [s].
 
         Raises:
-            LeaseError: another client has leased one of the axes.
+            LeaseError: another client has leased one of the axes, there are too many clients, or
+                the desk is locked for too long or damaged.
             ShareError: the loop has ended, or does not accept commands from this user.
             ValueError: unknown axes, or `for_` out of range.
         """
@@ -212,7 +216,7 @@ class Reader:
         return lease_of(self._desk, self.layout, axes, for_)
 
     def _has_news(self, deadline_ns: int) -> bool:
-        """Wait for a new cycle. Return False at the deadline."""
+        """Wait for a new cycle. Return False at the deadline, or when the ring has ended."""
         if not self._ring(CYCLES).wait(self._seen, deadline_ns):
             return False
         self._seen = self.number

@@ -80,8 +80,8 @@ static inline int ring_copy(const ring_view *v, uint64_t number, uint8_t *bytes)
     return __atomic_load_n(slot, __ATOMIC_RELAXED) == whole;
 }
 
-/* Copy the newest row. Return its number, or 0 before the first row. A second attempt is necessary
- * only if the writer writes `count` rows during one copy. */
+/* Copy the newest row. Return its number. Return 0 before the first row, or if all attempts fail. A
+ * second attempt is necessary only if the writer writes `count` rows during one copy. */
 static inline uint64_t ring_copy_newest(const ring_view *v, uint8_t *bytes) {
     for (int k = 0; k < RING_TRIES; k++) {
         uint64_t number = ring_newest(v);
@@ -107,7 +107,7 @@ static inline uint64_t ring_copy_rows(const ring_view *v, uint64_t first, uint64
 }
 
 /* Wait for a row after row `seen`, until `deadline` [ns, CLOCK_MONOTONIC]. Return 1 if it exists, 0
- * if the deadline has passed or no more rows will come, or -EINTR. */
+ * if the deadline has passed or no more rows will come, or -errno (-EINTR after a signal). */
 static inline int ring_wait(const ring_view *v, uint64_t seen, int64_t deadline) {
     for (;;) {
         uint32_t tick = __atomic_load_n(&v->ring->tick, __ATOMIC_SEQ_CST);

@@ -44,7 +44,7 @@ class Share:
             0o660: the group can read and command. Only this user can ever write to the cycles.
 
     Raises:
-        ShareError: on entry, if the name belongs to a running process.
+        ShareError: on entry, if the name belongs to a running process or another user.
         ValueError: an argument is out of range.
     """
 
@@ -108,9 +108,9 @@ class Share:
         return ended
 
     def commands(self) -> list[AxisCommand]:
-        """Return the new commands of valid leases, grouped by client, oldest first.
+        """Read the new commands of valid leases, and end the leases that are over.
 
-        Never blocks.
+        Return the commands, grouped by client, oldest first. Never blocks.
         """
         return self._reader().commands()
 
@@ -126,7 +126,10 @@ class Share:
         return self._commands
 
     def _commanded_position(self) -> Values:
-        """Return the commanded positions of the newest cycle [rad], shape (axes,)."""
+        """Return the commanded positions of the newest cycle [rad], shape (axes,).
+
+        They are NaN if the loop has closed.
+        """
         if self._cycles is None:
             return np.full(len(self.layout.axes), np.nan)
         _, row = self._cycles.copy()
@@ -143,7 +146,12 @@ class Share:
     # plan.sink.Sink
 
     def open(self, layout: SinkLayout) -> object:
-        """Create the segment of a loop and return its sink capsule. Called by the loop."""
+        """Create and publish the segment of a loop. Return its sink capsule. Called by the loop.
+
+        Raises:
+            RuntimeError: the share is not entered, or already belongs to a loop.
+            ShareError: the name is taken, or the memory is full.
+        """
         if not self._entered:
             raise RuntimeError(
                 f"the share is not entered; use a with block: with cat.Share({self.name!r}) ..."
@@ -174,16 +182,16 @@ class Share:
         return cycles.capsule
 
     def report(self, incident: Incident) -> None:
-        """Append an event. Called by the loop from any thread."""
+        """Append an event; a no-op if no loop is open. Called by the loop from any thread."""
         with self._reporting:
             if self._events is not None and self._cycles is not None:
                 number = self._events.newest + 1
                 self._events.write(encode_event(incident, number, self._cycles.newest))
 
     def close(self) -> None:
-        """End the segment. Called by the loop.
+        """End the segment and all leases. Called by the loop. A no-op in a forked child.
 
-        Its data remains readable until the next loop opens or the `with` block ends.
+        The data remains readable until the next loop opens or the `with` block ends.
         """
         if self._is_a_copy():
             return
@@ -233,7 +241,11 @@ class Share:
             raise
 
     def _refuse_taken(self) -> None:
-        """Raise ShareError if a running writer uses the name. A dead writer may be replaced."""
+        """Raise ShareError if the name is taken. A share of this user's dead writer is replaced.
+
+        The name is taken if its file belongs to a running writer or another user, or is not a
+        valid share.
+        """
         if self._segment is not None and self._segment.is_published:
             return
         path = folder.own_folder() / self._file
