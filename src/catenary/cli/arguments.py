@@ -43,7 +43,9 @@ def entry(text: str) -> Entry:
         )
     index, subindex = number(index_text), number(subindex_text or "0")
     if not 0 <= index <= 0xFFFF or not 0 <= subindex <= 0xFF:
-        raise argparse.ArgumentTypeError(f"{text!r} is outside 0xFFFF:255")
+        raise argparse.ArgumentTypeError(
+            f"{text!r} is out of range: the maximum index is 0xFFFF, the maximum subindex 255"
+        )
     if index < FIRST_OBJECT:
         raise argparse.ArgumentTypeError(f"index 0x{index:04X} is below the first object 0x1000")
     return Entry(index, subindex)

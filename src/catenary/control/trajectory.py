@@ -205,7 +205,15 @@ class _Bounds:
         self._check_position("goal", q)
 
     def check_path(self, lowest: Row, highest: Row) -> None:
-        """Raise ValueError if the motion exceeds a position limit."""
+        """Check the range of a motion against the position limits.
+
+        Args:
+            lowest: Lowest position of each axis during the motion.
+            highest: Highest position of each axis during the motion.
+
+        Raises:
+            ValueError: The motion exceeds a position limit.
+        """
         self._check_position("lowest position of the motion", lowest)
         self._check_position("highest position of the motion", highest)
 

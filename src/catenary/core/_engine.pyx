@@ -553,7 +553,7 @@ cdef class Engine:
         target.header.hold = hold
         target.header.seen = self.h.actual[PRIVATE].header.number
         target.header.stamp = target.header.seen + 1
-        if self.writing:  # an axis followed since the update began keeps its written target
+        if self.writing:  # no position target for axes that became followed since the update began
             target.header.seen = self.writing_since
         target.header.process_ns = -1
         target.header.input_age_ns = -1

@@ -187,8 +187,9 @@ class Machine:
         if not self.drives and not self.process_data:
             raise self._file.error(
                 (),
-                "the machine has no drives and no process data",
-                hint="add a [drives.NAME] table: docs/reference/machine_file.md",
+                "no drives or process data have all their devices present",
+                hint="connect the missing devices, or add a [drives.NAME] table: "
+                "docs/reference/machine_file.md",
             )
         reference = self._file.tables.clocks.reference
         return loop_options(self._file, None if reference is UNSET else self.subs[reference])

@@ -69,7 +69,7 @@ def make_frames(
     *,
     exact_matching: bool = False,
 ) -> tuple[FramePlan, ...]:
-    """Return the frames of one cycle, in the order they are sent.
+    """Return the cyclic frames of all dividers and phases, in the order they are sent.
 
     Frame 0 begins with the BRD of AL status, which every device answers. It also carries the time.
     Units with a divider have their own frames, so that the other cycles do not carry them.
