@@ -106,7 +106,7 @@ class Minute:
             self._expected: list[Identity | tuple[int, int] | None] = [
                 (sub.identity.vendor, sub.identity.product) for sub in main.scan()
             ]
-            # A session that fails at the end of the time gets the same further attempts as any other.
+            # A session that fails at the end of the time gets further attempts, as any other.
             while (self.segment.time < self._seconds or failures) and failures < FAILURES_MAX:
                 failures = 0 if self._session() else failures + 1
                 self._wait_until_over()
