@@ -128,11 +128,11 @@ class Share:
     def _commanded_position(self) -> Values:
         """Return the commanded positions of the newest cycle [rad], shape (axes,).
 
-        They are NaN if the loop has closed.
+        They are NaN before the first cycle and after the loop has closed.
         """
-        if self._cycles is None:
+        number, row = self._cycles.copy() if self._cycles is not None else (0, b"")
+        if number == 0:
             return np.full(len(self.layout.axes), np.nan)
-        _, row = self._cycles.copy()
         commanded: Values = np.frombuffer(row, self._dtype)[0]["commanded_position"]
         return commanded
 
