@@ -26,6 +26,7 @@ COE_HEADER = 2
 SDO_HEADER = 8  # command, index, subindex, size or data
 SEGMENT_HEADER = 1
 DOWNLOAD_SEGMENT, DOWNLOAD, UPLOAD, UPLOAD_SEGMENT, ABORT = 0, 1, 2, 3, 4
+UNSUPPORTED_ACCESS = 0x06010000
 OUT_OF_MEMORY = 0x05040005
 DOWNLOAD_MAX = 1 << 20
 
@@ -93,7 +94,9 @@ class SdoServer:
             return [_aborted(index, subindex, abort.code)]
 
     def _check_complete(self, complete: bool, subindex: int) -> None:
-        if complete and (subindex > 1 or not self._complete_access):
+        if complete and not self._complete_access:
+            raise Abort(UNSUPPORTED_ACCESS)
+        if complete and subindex > 1:
             raise Abort(NO_COMPLETE_ACCESS)
 
     def _store(self, index: int, subindex: int, complete: bool, data: bytes) -> None:
