@@ -13,6 +13,7 @@ from pathlib import Path
 from catenary.errors import ConfigurationError
 from catenary.esi.default_modules import with_default_modules
 from catenary.esi.device import EsiDevice
+from catenary.esi.reader import read_esi
 from catenary.esi.selection import select_device
 from catenary.esi.sii import assemble_sii
 from catenary.model.device import Direction
@@ -183,10 +184,21 @@ def from_esi(
         ConfigurationError: The file has no such device, or gives no valid SII.
     """
     if not isinstance(source, EsiDevice):
-        from catenary.esi.reader import read_esi
-
-        source = select_device(read_esi(Path(source)), device)
+        source = esi_device(source, device)
     return DescribedDevice(source, name=name, alias=alias, serial=serial, crystal=crystal)
+
+
+def esi_device(path: str | PathLike[str], wanted: str = "") -> EsiDevice:
+    """Return a device from an ESI file.
+
+    Args:
+        path: Path of the file.
+        wanted: Order code, name, or PRODUCT[:REVISION]; needed if the file has several devices.
+
+    Raises:
+        ConfigurationError: The file cannot be read, or has no such device.
+    """
+    return select_device(read_esi(Path(path)), wanted)
 
 
 def _ports(physics: str) -> tuple[int, ...]:
