@@ -110,13 +110,13 @@ def test_a_small_eeprom_may_leave_names_out(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     esi, path = tmp_path / "drives.xml", tmp_path / "x.bin"
-    esi.write_text(ESI.format(size=256), encoding="utf-8")
+    esi.write_text(ESI.format(size=242), encoding="utf-8")
     status, _, err = call(f"sii build {esi} --device DR10 -o {path}", capsys)
     assert status != 0
     assert "--no-pdo-names" in err
     assert not path.exists()
     assert call(f"sii build {esi} --device DR10 --no-pdo-names -o {path}", capsys)[0] == 0
-    assert len(path.read_bytes()) == 256
+    assert len(path.read_bytes()) == 242
 
 
 def test_a_serial_number_out_of_range_is_refused(

@@ -12,17 +12,18 @@ from catenary.virtual import Segment, from_esi
 OP = 8
 # file, device, bytes of outputs and inputs in the default configuration
 DEVICES = (
-    ("bogus_io.xml", "", 1, 0),  # its TxPDO names SyncManager 2, but it has only two
+    ("bogus_io.xml", "", 1, 1),
     ("bogus_servo.xml", "0xB0905030", 0, 0),  # no PDO is assigned, and the mailbox has no size
     ("bogus_servo.xml", "0xB0905031", 0, 0),
-    ("hpm_ECAT_CIA402.xml", "", 0, 0),
+    ("hpm_ECAT_CIA402.xml", "", 8, 8),  # the default module of its first slot
     ("hpm_ECAT_EOE.xml", "", 4, 4),
     ("hpm_ECAT_FOE.xml", "", 4, 4),
     ("hpm_ECAT_IO.xml", "", 4, 4),
-    ("metalmusings_EaserCAT_2000.xml", "", 0, 0),
-    ("metalmusings_EaserCAT_6000.xml", "", 0, 0),
-    ("pollen_LeftElbowOrbita2d_fw1.0.xml", "", 0, 0),
-    ("pollen_Orbita2d.xml", "", 0, 0),
+    ("metalmusings_EaserCAT_2000.xml", "", 16, 34),
+    ("metalmusings_EaserCAT_6000.xml", "", 1, 12),
+    # Without its PDO 0x1700: the control byte 0x22 of SyncManager 1 is that of a mailbox.
+    ("pollen_LeftElbowOrbita2d_fw1.0.xml", "", 43, 35),
+    ("pollen_Orbita2d.xml", "", 43, 66),
 )
 
 
