@@ -147,7 +147,7 @@ class ClockOptions:
             networks "main", the only possible value.
         reference: Device with the reference clock. None: the first device with a clock.
         margin: Latest time of the frames after the cycle start [s]. None: 20 % of the period when
-            threaded and for laws, 50 % when inline.
+            threaded, 50 % when inline.
         burst: Number of frames that synchronise the clocks before the cycle begins.
 
     Raises:
