@@ -59,7 +59,8 @@ class MachineFileError(ConfigurationError):
 
 
 class EsiError(CatenaryError):
-    """An ESI file that cannot be used. `file` and `line` locate the fault.
+    """An ESI file that cannot be used. `file` and `line` locate the fault, `reason` describes
+    it without the place.
 
     `line` is None if the fault concerns the whole file.
     """
@@ -67,6 +68,7 @@ class EsiError(CatenaryError):
     def __init__(self, message: str, *, file: str, line: int | None = None, hint: str = ""):
         place = ":".join(str(part) for part in (file, line) if part is not None)
         super().__init__(f"{place}: {message}", hint=hint)
+        self.reason = message
         self.file = file
         self.line = line
 
