@@ -13,7 +13,8 @@ from pathlib import Path
 import pytest
 
 from catenary.errors import EsiError, EsiLookupError
-from catenary.esi.library import Library, default_folder
+from catenary.esi.folders import default_folder
+from catenary.esi.library import Library
 from catenary.esi.lookup import Rule
 from tests.esi.esi_file import VENDOR, device, esi, module, write
 
@@ -265,6 +266,14 @@ def test_a_damaged_index_is_made_again(library: Library, tmp_path: Path, damage:
     assert len(library.sources) == 1
 
 
+def test_an_index_that_fails_while_open_is_reported(library: Library, tmp_path: Path) -> None:
+    library.add(write(tmp_path / "a.xml", device()))
+    library._files()._store.close()  # SQLite then raises an error for every request
+    for use in (lambda: library.search("x"), lambda: library.files, library.check):
+        with pytest.raises(EsiError, match=r"index\.sqlite: the index cannot be used"):
+            use()
+
+
 def test_a_damaged_list_is_reported_and_kept(library: Library) -> None:
     library.path.mkdir()
     (library.path / "library.json").write_text("{")
@@ -320,7 +329,7 @@ def test_the_same_description_twice_is_reported(library: Library, tmp_path: Path
     (warning,) = found.warnings
     assert f"{tmp_path}/b.xml:7 has the same description of 0x00005A5A:0x00000001" in str(warning)
     assert str(warning).startswith(f"{found.source}: ")
-    assert len(library.duplicates()) == 1
+    assert len(library._duplicates()) == 1
 
 
 def test_different_descriptions_of_one_device_are_reported(
@@ -482,7 +491,7 @@ def test_the_index_of_a_large_folder_is_cached(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
-    monkeypatch.setattr("catenary.esi.library.SMALL", 100)
+    monkeypatch.setattr("catenary.esi.folders.SMALL", 100)
     write(tmp_path / "esi/a.xml", device())
     assert found(Library.of(tmp_path / "esi")) == "Drive"
     monkeypatch.setattr("catenary.esi.indexed_files.index_file", None)
@@ -509,5 +518,5 @@ def test_the_shared_files(shared_data: Path) -> None:
             assert choice is not None
             assert choice.rule is Rule.EXACT
             assert library.find(*record.key) is not None
-        assert len(library.duplicates()) == 1  # two versions of pollen's Orbita2d
-        assert json.dumps([str(each) for each in library.duplicates()])
+        assert len(library._duplicates()) == 1  # two versions of pollen's Orbita2d
+        assert json.dumps([str(each) for each in library._duplicates()])

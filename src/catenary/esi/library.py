@@ -6,7 +6,6 @@ import hashlib
 import os
 import re
 import shutil
-from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from difflib import get_close_matches
 from pathlib import Path
@@ -18,6 +17,7 @@ from catenary.esi.archive import extract
 from catenary.esi.assembly import Assembly
 from catenary.esi.device import DeviceKey, EsiDevice
 from catenary.esi.duplicates import warning_of
+from catenary.esi.folders import cache_folder, default_folder, is_small
 from catenary.esi.indexed_files import IndexedFiles
 from catenary.esi.lookup import Choice, Rule, choose, hidden_keys
 from catenary.esi.record import FileIndex, Kind, Record
@@ -25,8 +25,6 @@ from catenary.esi.source import EsiWarning
 from catenary.esi.sources import locked, read_sources, write_sources
 from catenary.esi.store import MEMORY
 
-VARIABLE = "CATENARY_ESI"
-SMALL = 4 << 20  # [bytes]; files of a temporary library up to this size are indexed in 0.5 s
 ADD_HINT = "add the vendor's ESI file: catenary esi add FILE"
 MAX_NAMES = 20_000  # compared with a name that was not found
 
@@ -232,8 +230,8 @@ class Library:
                 if self.path.is_dir()
                 else (MEMORY, None)
             )
-        folder = _cache_folder()
-        if folder is None or _is_small(self.path):
+        folder = cache_folder()
+        if folder is None or is_small(self.path):
             return MEMORY, None
         name = hashlib.sha256(os.fsencode(self.path)).hexdigest()[:16]
         return str(folder / f"{name}.sqlite"), folder / f"{name}.lock"
@@ -341,9 +339,9 @@ class Library:
         """
         files = self._files()
         files.refresh(all_hashes=True)
-        return [*files.problems, *(str(each) for each in self.duplicates())]
+        return [*files.problems, *(str(each) for each in self._duplicates())]
 
-    def duplicates(self) -> list[EsiWarning]:
+    def _duplicates(self) -> list[EsiWarning]:
         """Return a warning for each further description of the same device."""
         first: dict[DeviceKey, Record] = {}
         found = []
@@ -378,53 +376,5 @@ class Library:
             return Assembly(self._files()).device(now[0])
 
 
-def default_folder() -> Path:
-    """Return the folder of the user's library."""
-    given = os.environ.get(VARIABLE)
-    if given:
-        return Path(os.path.abspath(os.path.expanduser(given)))
-    return _user_folder("XDG_DATA_HOME", ".local/share") / "catenary" / "esi"
-
-
-def _user_folder(variable: str, fallback: str) -> Path:
-    """Return a folder of the XDG base directory specification; it ignores relative paths."""
-    given = os.environ.get(variable, "")
-    return Path(given) if os.path.isabs(given) else Path.home() / fallback
-
-
-def _cache_folder() -> Path | None:
-    folder = _user_folder("XDG_CACHE_HOME", ".cache") / "catenary" / "esi"
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError:  # the index is then made in memory
-        return None
-    return folder
-
-
-def _is_small(path: Path) -> bool:
-    if path.is_file():
-        return path.stat().st_size <= SMALL
-    total = 0
-    for place, _folders, names in os.walk(path):
-        total += sum(_size(os.path.join(place, each)) for each in names if each.endswith("xml"))
-        if total > SMALL:
-            return False
-    return True
-
-
-def _size(path: str) -> int:
-    return os.stat(path).st_size if os.path.isfile(path) else 0
-
-
 def _words(record: Record) -> str:
     return " ".join(f"{record.entry.type} {record.entry.name}".split()).casefold()
-
-
-def newest(records: Iterable[Record]) -> list[Record]:
-    """Return the newest revision of each product."""
-    found: dict[tuple[int, int], Record] = {}
-    for each in records:
-        old = found.setdefault((each.entry.vendor, each.entry.product), each)
-        if each.entry.revision > old.entry.revision:
-            found[each.entry.vendor, each.entry.product] = each
-    return list(found.values())

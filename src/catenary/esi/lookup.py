@@ -128,3 +128,13 @@ def _newest(ranked: Sequence[Record]) -> tuple[Rule, Record]:
 def hidden_keys(records: Iterable[Record]) -> frozenset[DeviceKey]:
     """Return the keys that newer descriptions hide. A description cannot hide itself."""
     return frozenset(key for each in records for key in each.entry.hides if key != each.key)
+
+
+def newest(records: Iterable[Record]) -> list[Record]:
+    """Return the newest revision of each product."""
+    found: dict[tuple[int, int], Record] = {}
+    for each in records:
+        old = found.setdefault((each.entry.vendor, each.entry.product), each)
+        if each.entry.revision > old.entry.revision:
+            found[each.entry.vendor, each.entry.product] = each
+    return list(found.values())
