@@ -13,9 +13,13 @@ from pathlib import Path
 import pytest
 
 from catenary.errors import EsiError, EsiLookupError
+from catenary.esi.duplicates import differences
 from catenary.esi.folders import default_folder
 from catenary.esi.library import Library
 from catenary.esi.lookup import Rule
+from catenary.esi.reader import read_esi
+from catenary.esi.record import Record
+from tests.esi import corpus
 from tests.esi.esi_file import VENDOR, device, esi, module, write
 
 
@@ -296,6 +300,7 @@ def test_an_index_that_cannot_be_written_is_used_in_memory(
 
 PROGRAM = """
 import sys
+from catenary.esi.duplicates import differences
 from catenary.esi.library import Library
 for path in sys.argv[2:]:
     Library(sys.argv[1]).add(path)
@@ -520,3 +525,29 @@ def test_the_shared_files(shared_data: Path) -> None:
             assert library.find(*record.key) is not None
         assert len(library._duplicates()) == 1  # two versions of pollen's Orbita2d
         assert json.dumps([str(each) for each in library._duplicates()])
+
+
+@pytest.mark.parametrize("name", [*corpus.FILES, *corpus.FAULTY_FILES])
+def test_a_device_from_its_place_is_that_of_the_whole_file(tmp_path: Path, name: str) -> None:
+    path = tmp_path / "a.xml"
+    path.write_bytes({**corpus.FILES, **corpus.FAULTY_FILES}[name])
+    with Library.of(path) as library:
+        records = library.records()
+        try:
+            whole = read_esi(path)
+        except EsiError:
+            assert not any(readable(library, record) for record in records)
+            return
+        assert [each.key for each in records] == [each.key for each in whole.devices]
+        for record, device in zip(records, whole.devices, strict=True):
+            found = library.read(record)
+            assert differences(found, device) == []
+            assert found.source == device.source == record.source
+            assert set(device.warnings) <= set(found.warnings)
+
+
+def readable(library: Library, record: Record) -> bool:
+    try:
+        return bool(library.read(record))
+    except EsiError:
+        return False
