@@ -355,6 +355,19 @@ def test_different_descriptions_of_one_device_are_reported(
     assert found.source.file == f"{tmp_path}/esi/b.xml"
 
 
+def test_a_duplicate_that_cannot_be_read_is_a_warning(
+    library: Library, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    library.add(write(tmp_path / "b.xml", device()))
+    library.add(write(tmp_path / "a.xml", device()))
+    (tmp_path / "b.xml").unlink()  # after the library was opened
+    monkeypatch.setattr("catenary.esi.indexed_files.IndexedFiles.refresh", lambda *_, **__: None)
+    found = library.find(VENDOR, 1, 1)
+    assert found is not None
+    assert "b.xml:7 has the same key" in str(found.warnings[0])
+    assert "cannot be compared: " in str(found.warnings[0])
+
+
 # lookup
 
 
@@ -490,6 +503,34 @@ def test_a_library_of_a_folder_or_file_writes_nothing(tmp_path: Path) -> None:
     with Library.of(path) as library:
         assert (found(library), found(library, 2)) == ("Drive", "nothing")
     assert sorted(os.listdir(tmp_path / "esi")) == ["a.xml", "b.xml"]
+
+
+def test_a_temporary_library_cannot_be_changed(tmp_path: Path) -> None:
+    path = write(tmp_path / "esi/a.xml", device())
+    with Library.of(tmp_path / "esi") as library:
+        for change in (library.add, library.remove):
+            with pytest.raises(ValueError, match="temporary library"):
+                change(path)
+    assert os.listdir(tmp_path / "esi") == ["a.xml"]
+
+
+@pytest.mark.parametrize("limit", ["MAX_FILES", "MAX_FOLDERS"])
+def test_a_folder_that_is_too_large_is_refused(
+    library: Library, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, limit: str
+) -> None:
+    monkeypatch.setattr(f"catenary.esi.sources.{limit}", 2)
+    for name in "abc":
+        write(tmp_path / "esi" / name / "a.xml", device())
+    with pytest.raises(EsiError, match="more than 2"):
+        library.add(tmp_path / "esi")
+    assert library.sources == ()
+    assert "more than 2" in Library.of(tmp_path / "esi").problems[0]
+
+
+def test_a_folder_that_is_nested_too_deeply_is_reported(library: Library, tmp_path: Path) -> None:
+    write(tmp_path / "esi" / "/".join("abcdefghijklmnopqrst") / "a.xml", device())
+    (problem,) = library.add(tmp_path / "esi").problems
+    assert "nested too deeply" in problem
 
 
 def test_the_index_of_a_large_folder_is_cached(

@@ -54,6 +54,7 @@ def print_added(added: Added) -> int:
     if added.devices + added.modules + added.dictionaries:
         return 0
     print(f"catenary: {escaped(added.path)}: no description found", file=sys.stderr)
+    print("  hint: check the path; to remove it: catenary esi remove PATH", file=sys.stderr)
     return 1
 
 

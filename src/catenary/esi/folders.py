@@ -7,6 +7,7 @@ from pathlib import Path
 
 VARIABLE = "CATENARY_ESI"
 SMALL = 4 << 20  # [bytes]; XML files of this size are indexed in 0.2 s
+MANY = 1000  # folders
 
 
 def default_folder() -> Path:
@@ -38,9 +39,10 @@ def is_small(path: Path) -> bool:
     if path.is_file():
         return path.stat().st_size <= SMALL
     total = 0
-    for place, _folders, names in os.walk(path):
-        total += sum(_size(os.path.join(place, each)) for each in names if each.endswith("xml"))
-        if total > SMALL:
+    for count, (place, _folders, names) in enumerate(os.walk(path)):
+        files = (os.path.join(place, each) for each in names if each.lower().endswith(".xml"))
+        total += sum(_size(each) for each in files)
+        if total > SMALL or count > MANY:
             return False
     return True
 
