@@ -40,7 +40,9 @@ def preemption(machine: Machine) -> Check:
     if model == "rt":
         return passed(id, f"PREEMPT_RT ({release})")
     if model in ("full", "lazy"):  # both preempt system calls for real-time threads at once
-        return warned(id, f"{model} preemption, not PREEMPT_RT ({release})", realtime_kernel(machine))
+        return warned(
+            id, f"{model} preemption, not PREEMPT_RT ({release})", realtime_kernel(machine)
+        )
     if model:
         return failed(id, f"preemption model: {model} ({release})", realtime_kernel(machine))
     return warned(
