@@ -10,11 +10,18 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from catenary.errors import EsiError
-from catenary.esi import read_device, read_esi, read_module
 from catenary.esi.device import DeviceKey, EsiDevice, EsiFile, RevisionCheck
 from catenary.esi.devices import Vendor
 from catenary.esi.document import Document, make_document
-from catenary.esi.reader import DEVICE_PATHS, MODULE_PATHS, read_document, with_modules
+from catenary.esi.reader import (
+    DEVICE_PATHS,
+    MODULE_PATHS,
+    read_device,
+    read_document,
+    read_esi,
+    read_module,
+    with_modules,
+)
 from catenary.esi.xml import find_elements
 from tests.esi import corpus
 
@@ -183,6 +190,12 @@ def faulty(name: str) -> Document:
     return make_document(b"<html/>", name)
 
 
+def truncated(name: str) -> Document:
+    found = references(name)
+    assert found is not None
+    return make_document(found.data[:-20], name)
+
+
 def test_references_that_cannot_be_used_become_warnings() -> None:
     document = make_document(corpus.FILES["references"], NAME)
     missing = read_document(document, references=lambda name: None)
@@ -191,6 +204,18 @@ def test_references_that_cannot_be_used_become_warnings() -> None:
     unusable = read_document(document, references=faulty)
     assert ["is not an ESI" in str(each) for each in unusable.warnings] == [True, False]
     assert str(unusable.warnings[1]).startswith("Sub/Dict.xml:")
+    faults = read_document(document, references=truncated).warnings
+    assert [each.source.file for each in faults] == ["Sub/Modules.xml", "Sub/Dict.xml"]
+    assert all("the referenced file is ignored" in each.message for each in faults)
+
+
+def test_a_dictionary_that_several_devices_name_is_read_once() -> None:
+    part = "<Profile><DictionaryFile>Sub\\Dict.xml</DictionaryFile></Profile>"
+    names: list[str] = []
+    document = make_document(corpus.esi(*[corpus.device(part)] * 3).encode(), NAME)
+    file = read_document(document, references=lambda name: names.append(name) or references(name))
+    assert names == ["Sub/Dict.xml"]
+    assert all(device.dictionary is not None for device in file.devices)
 
 
 def test_modules_and_dictionaries_as_roots() -> None:
