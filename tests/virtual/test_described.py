@@ -289,3 +289,16 @@ def test_a_device_may_map_more_objects_than_the_model_has() -> None:
         with cat.Loop(data, period=2e-3) as loop:
             next(loop)
             assert (model.state, len(data.inputs)) == (8, 400)
+
+
+def test_a_mailbox_without_coe_reaches_op() -> None:
+    device = replace(DRIVE, mailbox=EsiMailbox(MailboxProtocol.FOE | MailboxProtocol.EOE))
+    with opened(device) as (main, model):
+        sub = main.subs[0]
+        assert sub.description.mapping_source == "SII"
+        data = cat.ProcessData(sub)
+        with cat.Loop(data, period=2e-3) as loop:
+            next(loop)
+            assert (model.state, len(data.outputs), len(data.inputs)) == (8, 4, 6)
+        with pytest.raises(CatenaryError):
+            sub.sdo.read(0x1000)
