@@ -29,11 +29,12 @@ from catenary.plan.layout import (
 )
 from catenary.plan.mailboxes import MailboxArea, with_mailboxes
 from catenary.plan.mapping import make_mapping
+from catenary.plan.op_mode import mode_pdos
 from catenary.plan.options import PlanOptions
 from catenary.plan.output_owners import check_owners
 from catenary.plan.pdo_mapping import Mapping
 from catenary.plan.report import report
-from catenary.plan.request import DeviceRequest, ProcessDataRequest, RequestTables
+from catenary.plan.request import DeviceRequest, ProcessDataRequest, RequestTables, WrittenPdo
 from catenary.plan.start_up import DevicePlan, make_device_plan
 from catenary.plan.watchdog import choose_watchdog
 from catenary.wire.cia402 import Mode
@@ -93,8 +94,10 @@ def make_plan(
     cycle = _make_cycle(layout, mailboxes, frames, tables, options)
     if choice is not None:
         cycle = replace(cycle, clock=_make_clock(choice, cycle, options))
+    clock = cycle.clock
+    lead_ns = 0 if clock is None else clock.wire_ns + clock.allowance_ns
     plans = tuple(
-        draft.plan(place, options.period_ns)
+        draft.plan(place, options.period_ns, lead_ns)
         for draft, place in zip(drafts, layout.devices, strict=True)
     )
     return Plan(cycle, plans, layout, tables, mailboxes)
@@ -119,7 +122,7 @@ class _Draft(NamedTuple):
             watchdog_ns=self.watchdog_ns,
         )
 
-    def plan(self, place: DeviceLayout, period_ns: int) -> DevicePlan:
+    def plan(self, place: DeviceLayout, period_ns: int, lead_ns: int) -> DevicePlan:
         clock = self.request.clock
         return make_device_plan(
             self.device,
@@ -130,7 +133,7 @@ class _Draft(NamedTuple):
             self.watchdog_ns if place.output_size else 0,
             None
             if clock is None
-            else make_sync(self.device, clock, period_ns * self.request.divider),
+            else make_sync(self.device, clock, period_ns * self.request.divider, lead_ns),
         )
 
 
@@ -147,8 +150,7 @@ def _drafts(
     for device in devices:
         request = combined.get(device.position, DeviceRequest(required=required))
         watchdog_ns = choose_watchdog(device, request, options.watchdog, options.period_ns)
-        outputs = request.written(Direction.OUTPUT)
-        inputs = request.written(Direction.INPUT)
+        outputs, inputs = (_written(device, request, direction) for direction in Direction)
         drafts.append(
             _Draft(
                 device,
@@ -159,6 +161,13 @@ def _drafts(
             )
         )
     return drafts
+
+
+def _written(
+    device: DeviceDescription, request: DeviceRequest, direction: Direction
+) -> tuple[WrittenPdo, ...]:
+    """Return the PDOs that the application specified; without them, those of the OpMode."""
+    return request.written(direction) or mode_pdos(device, request.clock, direction)
 
 
 def _check_positions(
