@@ -14,7 +14,7 @@ from catenary.esi.device import (
     EsiWatchdog,
     RevisionCheck,
 )
-from catenary.esi.objects import data_type_index
+from catenary.esi.object_descriptions import data_type_index
 from catenary.esi.units import unit_text
 from catenary.model.device import DeviceDescription, Direction, Entry, Identity, OpMode, Pdo
 from tests.esi import devices as esi

@@ -31,7 +31,12 @@ from catenary.procedure.configure import configure_process_data
 from catenary.procedure.exchange import Procedure
 from catenary.procedure.mailbox import MailboxChannel
 from catenary.procedure.names import name_entries
-from catenary.procedure.pdo import read_mapping, verify_mapping, write_downloads
+from catenary.procedure.pdo import (
+    read_mapping,
+    verify_mapping,
+    write_downloads,
+    write_in_safe_op,
+)
 from catenary.procedure.pdo_offers import read_offers, read_values
 from catenary.procedure.profile import read_object
 from catenary.procedure.station import within
@@ -118,6 +123,8 @@ def bring_to_safe_op(
             )
         )
     runner.run_all([request_state(sub.station, AlState.SAFE_OP) for sub in subs])
+    planned = zip(subs, plan.devices, strict=True)
+    runner.run_all([_finish(sub, device) for sub, device in planned if device.in_safe_op])
     for sub in subs:
         sub.state = AlState.SAFE_OP
     return measured
@@ -143,6 +150,8 @@ def _describe(sub: SubDevice, request: DeviceRequest) -> Procedure[DeviceDescrip
     device = yield from name_entries(channel, device)
     written = [(index, subindex) for index, subindex, _ in request.start_up]
     written += [(each.index, each.subindex) for each in request.objects]
+    commands = [each for each in device.init_commands if not each.complete_access]
+    written += [(each.index, each.subindex) for each in commands]
     if request.clock is not None:
         written += [(index, subindex) for index in SYNC_OBJECTS for subindex in (1, 2)]
     device = yield from read_values(channel, device, written)
@@ -192,6 +201,11 @@ def _prepare(sub: SubDevice, plan: DevicePlan) -> Procedure[None]:
         writing = _write(_channel(sub), device, plan)
         yield from within(WRITE_TIMEOUT, sub.station, writing, "its configuration was")
     yield from configure_process_data(sub.station, device, plan)
+
+
+def _finish(sub: SubDevice, plan: DevicePlan) -> Procedure[None]:
+    writing = write_in_safe_op(_channel(sub), plan)
+    yield from within(WRITE_TIMEOUT, sub.station, writing, "its configuration was")
 
 
 def _write(channel: MailboxChannel, device: DeviceDescription, plan: DevicePlan) -> Procedure[None]:

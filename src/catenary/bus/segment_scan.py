@@ -19,7 +19,7 @@ from catenary.procedure.pdo_offers import read_first_mapping
 from catenary.procedure.profile import read_profile
 from catenary.procedure.sii import read_image
 from catenary.procedure.sii_owner import hand_over
-from catenary.procedure.station import Station, within
+from catenary.procedure.station import Station, station_of, within
 from catenary.procedure.stations import StationRegisters
 from catenary.wire.al import AlState
 
@@ -42,7 +42,8 @@ def find(registers: StationRegisters) -> Procedure[ScannedDevice]:
     try:
         device = yield from within(READ_TIMEOUT, station, identify(registers))
         station = station_of(device)
-        return (yield from within(BRING_UP_TIMEOUT, station, bring_to_pre_op(device)))
+        patience = BRING_UP_TIMEOUT + (device.timeouts.pre_op or 0.0)
+        return (yield from within(patience, station, bring_to_pre_op(device)))
     except (DecodeError, ValueError) as error:  # the device sent invalid data
         return ScannedDevice(device, error=_unreadable(station, error))
     except CatenaryError as error:
@@ -54,11 +55,6 @@ def _unreadable(station: Station, error: Exception) -> SegmentError:
         f"{station}: cannot use the data of the device: {error}",
         hint="its EEPROM or its firmware is faulty; please report it",
     )
-
-
-def station_of(device: DeviceDescription) -> Station:
-    """Return the station of a device, with its name for error messages."""
-    return Station(device.position, device.station_address, device.name)
 
 
 def bring_to_pre_op(device: DeviceDescription) -> Procedure[ScannedDevice]:

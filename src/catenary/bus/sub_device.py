@@ -11,7 +11,7 @@ from catenary.errors import CatenaryError
 from catenary.model.device import DeviceDescription, Identity
 from catenary.procedure.al_state import DeviceState, read_state
 from catenary.procedure.mailbox import MailboxChannel
-from catenary.procedure.station import Station
+from catenary.procedure.station import Station, station_of
 from catenary.wire.al import AlState
 from catenary.wire.coe import Emergency
 
@@ -105,7 +105,7 @@ class SubDevice:
     @property
     def station(self) -> Station:
         """Station address, with position and name for messages."""
-        return Station(self.position, self.description.station_address, self.name)
+        return station_of(self.description)
 
     def read_state(self) -> DeviceState:
         """Read the EtherCAT state of the device, and update `state`."""

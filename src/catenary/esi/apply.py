@@ -14,7 +14,7 @@ from dataclasses import replace
 
 from catenary.errors import IdentityError
 from catenary.esi.device import EsiDevice, RevisionCheck
-from catenary.esi.objects import documented_objects
+from catenary.esi.object_descriptions import documented_objects
 from catenary.esi.process_data import with_process_data
 from catenary.esi.revision import revision_accepted
 from catenary.esi.settings import with_settings

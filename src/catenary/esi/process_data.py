@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from catenary.esi.device import EsiDevice, EsiEntry, EsiPdo, EsiSyncManager
-from catenary.esi.objects import data_type_index, enumeration_of
+from catenary.esi.object_descriptions import data_type_index, enumeration_of
 from catenary.esi.units import unit_text
 from catenary.model.describe import assignments
 from catenary.model.device import (

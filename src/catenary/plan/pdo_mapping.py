@@ -26,6 +26,7 @@ class Mapping:
     reassigned: tuple[int, ...] = ()  # SyncManagers with another list of PDOs
     rejected: tuple[str, ...] = ()  # alternatives that change less, and their obstacles
     left_out: tuple[ObjectReference, ...] = ()  # optional objects that are not mapped
+    source: str = ""  # of the OpMode or the named mapping that chose the PDOs
 
     @property
     def changed(self) -> bool:

@@ -84,7 +84,7 @@ def write_down(
     """
     known = {pdo.index: pdo for pdo in device.pdos(direction)}
     lists: dict[int, list[Pdo]] = {}
-    copies = set()
+    copies: set[int] = set()
     for each in written:
         pdo = _written_pdo(device, direction, each, known)
         pdos = lists.setdefault(_channel(device, direction, each, pdo), [])
@@ -92,9 +92,16 @@ def write_down(
         copies.update(range(pdo.index + 1, pdo.index + each.copies))
     mapping = with_lists(device, direction, lists)
     rewritten = tuple(pdo for pdo in mapping.rewritten if pdo.index not in copies)
+    mapping = replace(mapping, source=_source(written), rewritten=rewritten)
     if not device.coe and all(each.source for each in written):
         return replace(mapping, rewritten=(), reassigned=())
-    return replace(mapping, rewritten=rewritten)
+    return mapping
+
+
+def _source(written: Sequence[WrittenPdo]) -> str:
+    """Return the sources of PDOs that an OpMode or a named mapping chose."""
+    found = dict.fromkeys(each.source for each in written if each.source)
+    return ", ".join(f"ESI {source}" for source in found)
 
 
 def _written_pdo(
@@ -174,8 +181,7 @@ def _entry(device: DeviceDescription, reference: ObjectReference) -> Entry:
     """Return the entry, with its name and type if the dictionary or a PDO contains them."""
     known = device.documented_object(reference.index, reference.subindex)
     if known is not None:
-        facts = known.name, known.data_type, known.unit, known.enumeration
-        return Entry(*reference.place, *facts)
+        return Entry(*reference.place, known.name, known.data_type, known.unit, known.enumeration)
     for pdo in (*device.output_pdos, *device.input_pdos):
         for entry in pdo.entries:
             if entry.place == reference.place:

@@ -10,6 +10,7 @@ from typing import NamedTuple
 from catenary import notebook
 from catenary.errors import ConfigurationError
 from catenary.model.device import DeviceDescription, Direction
+from catenary.plan.clock_report import Clocks
 from catenary.plan.clocks import ClockChoice, choose_clocks, make_clock_plan, make_sync
 from catenary.plan.combination import gather_requests
 from catenary.plan.cycle import ClockPlan, CyclePlan, FramePlan, SyncUnit
@@ -53,6 +54,11 @@ class Plan:
     layout: Layout
     tables: tuple[RequestTables, ...]
     mailboxes: MailboxArea
+
+    @property
+    def clocks(self) -> Clocks:
+        """SYNC signals of all devices, with the sources of their settings."""
+        return Clocks(self.devices, self.cycle.clock, self.cycle.period_ns)
 
     def __str__(self) -> str:
         axes = [axis for table in self.tables for axis in table.axis_reports]
@@ -111,6 +117,7 @@ class _Draft(NamedTuple):
     outputs: Mapping
     inputs: Mapping
     watchdog_ns: int
+    watchdog_source: str
 
     def data(self, *, optional: bool) -> DeviceData:
         return DeviceData(
@@ -134,6 +141,7 @@ class _Draft(NamedTuple):
             None
             if clock is None
             else make_sync(self.device, clock, period_ns * self.request.divider, lead_ns),
+            self.watchdog_source if place.output_size else "",
         )
 
 
@@ -149,7 +157,9 @@ def _drafts(
     drafts = []
     for device in devices:
         request = combined.get(device.position, DeviceRequest(required=required))
-        watchdog_ns = choose_watchdog(device, request, options.watchdog, options.period_ns)
+        watchdog_ns, watchdog_source = choose_watchdog(
+            device, request, options.watchdog, options.period_ns
+        )
         outputs, inputs = (_written(device, request, direction) for direction in Direction)
         drafts.append(
             _Draft(
@@ -158,6 +168,7 @@ def _drafts(
                 make_mapping(device, Direction.OUTPUT, request.outputs, outputs),
                 make_mapping(device, Direction.INPUT, request.inputs, inputs),
                 watchdog_ns,
+                watchdog_source,
             )
         )
     return drafts

@@ -73,9 +73,9 @@ class DistributedClock:
     """Distributed clocks of a device: SYNC signals, in phase with those of all other devices.
 
     Options that are None come from an OpMode of the device's ESI or SII: the one named `op_mode`.
-    Without a name, it is the first one that starts SYNC0 or, if there is none, SYNC1. If there is none of
-    these either, SYNC0 fires every period, without a shift and without SYNC1 (AssignActivate
-    0x0300).
+    Without a name, it is the first one that starts SYNC0 or, if there is none, SYNC1. If there is
+    none of these either, SYNC0 fires every period, without a shift and without SYNC1
+    (AssignActivate 0x0300).
 
     Args:
         op_mode: Name or description of the OpMode, as in the ESI file; case is ignored.
