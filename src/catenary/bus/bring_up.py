@@ -20,6 +20,7 @@ from catenary.link import RingLink
 from catenary.model.device import DeviceDescription, Direction, mapped_pdos
 from catenary.plan.clocks import SYNC_OBJECTS
 from catenary.plan.combination import gather_requests
+from catenary.plan.op_mode import mode_pdos
 from catenary.plan.pdo_search import any_carries
 from catenary.plan.planner import Plan
 from catenary.plan.request import DeviceRequest, ObjectReference, ProcessDataRequest
@@ -160,7 +161,8 @@ def _describe(sub: SubDevice, request: DeviceRequest) -> Procedure[DeviceDescrip
         (Direction.INPUT, request.inputs),
     ):
         missing = _unmapped(device, direction, references)
-        if missing or request.written(direction):
+        chosen = request.written(direction) or mode_pdos(device, request.clock, direction)
+        if missing or chosen:
             device = yield from read_offers(channel, device, direction)
         required = [each for each in missing if each.required]
         device = yield from _with_objects(channel, device, required)

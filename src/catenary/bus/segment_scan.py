@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
+from catenary.bus.esi_source import unchanged
 from catenary.errors import CatenaryError, DecodeError, IdentityError, SegmentError
 from catenary.model.describe import describe
 from catenary.model.device import DeviceDescription, Identity
@@ -35,12 +36,20 @@ class ScannedDevice(NamedTuple):
     error: CatenaryError | None = None
 
 
-def find(registers: StationRegisters) -> Procedure[ScannedDevice]:
-    """Bring one device to PRE-OP, or return its error. Other devices are not affected."""
+def find(
+    registers: StationRegisters,
+    complete: Callable[[DeviceDescription], DeviceDescription] = unchanged,
+) -> Procedure[ScannedDevice]:
+    """Bring one device to PRE-OP, or return its error. Other devices are not affected.
+
+    Args:
+        registers: Registers of the device.
+        complete: Function that adds the facts of its ESI to the description from its SII.
+    """
     device = unread(registers)
     station = Station(registers.position, registers.station_address)  # its name is not known yet
     try:
-        device = yield from within(READ_TIMEOUT, station, identify(registers))
+        device = complete((yield from within(READ_TIMEOUT, station, identify(registers))))
         station = station_of(device)
         patience = BRING_UP_TIMEOUT + (device.timeouts.pre_op or 0.0)
         return (yield from within(patience, station, bring_to_pre_op(device)))

@@ -17,6 +17,7 @@ from catenary.wire.coe import Emergency
 
 if TYPE_CHECKING:  # plan imports NumPy, which a scan does not need
     from catenary.bus.states import Outcome
+    from catenary.esi.device import EsiDevice
 
 
 class DeviceOwner(Conversations, Protocol):
@@ -50,6 +51,7 @@ class SubDevice:
         self.error: CatenaryError | None = None  # of the last scan, if PRE-OP was not reached
         # 0x1C32:01 and 0x1C33:01 before the first loop with clocks, to restore them
         self.sync_types: dict[int, bytes] = {}
+        self.esi: EsiDevice | None = None  # ESI that the last scan used for it
         self.sdo = Sdo(self)
 
     @property

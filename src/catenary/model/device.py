@@ -131,6 +131,7 @@ class Pdo:
     name: str = ""
     excludes: frozenset[int] = frozenset()  # PDOs that cannot be assigned together with it (ESI)
     excluded_sync_managers: frozenset[int] = frozenset()  # it cannot be assigned to these (ESI)
+    missing: bool = False  # its ESI has it, but its dictionary does not
     source: str = ""
 
     @property

@@ -79,7 +79,9 @@ def available_pdos(device: DeviceDescription, direction: Direction) -> Available
     taken = {pdo.index for pdo in elsewhere}
     return AvailablePdos(
         assigned=mapped_pdos(each for each in assignments if each.sync_manager == channel),
-        offered=tuple(pdo for pdo in device.pdos(direction) if pdo.index not in taken),
+        offered=tuple(
+            pdo for pdo in device.pdos(direction) if pdo.index not in taken and not pdo.missing
+        ),
         elsewhere=elsewhere,
     )
 

@@ -111,6 +111,13 @@ def _written_pdo(
     known: dict[int, Pdo],
 ) -> Pdo:
     pdo = known.get(written.index, Pdo(written.index, (), None))
+    if pdo.missing:
+        raise MappingError(
+            f"{device}: its ESI has PDO 0x{pdo.index:04X} {pdo.name!r} ({pdo.source}), but its "
+            "dictionary does not",
+            hint="the ESI file is for another firmware: get the one of this revision, or choose "
+            "another PDO",
+        )
     if written.entries is not None:
         return replace(pdo, entries=tuple(_entry(device, entry) for entry in written.entries))
     if written.index in known:
