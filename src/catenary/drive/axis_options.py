@@ -112,7 +112,6 @@ def make_axes(
     units, limits = options.units(n), options.limits(n)
     names = axis_names(sources, common.names)
     measured = known(tuple(MEASURED) if common.measured is None else common.measured)
-    written = written_pdos(common.pdos, common.columns)
     axes = tuple(
         Axis(
             name=names[k],
@@ -127,7 +126,7 @@ def make_axes(
             divider=cycles_between("divider", common.divider),
             required=common.required,
             homing=options.each("homing", n)[k],
-            pdos=written,
+            pdos=written_pdos(common.pdos, common.columns, sub.description),
             objects=start_up_list(common.start_up),
         )
         for k, (sub, slot) in enumerate(sources)
