@@ -32,6 +32,15 @@ def test_the_preemption_model(tmp_path, files, model):
 
 
 @pytest.mark.parametrize(
+    ("model", "status"),
+    [("full", "WARN"), ("lazy", "WARN"), ("voluntary", "FAIL"), ("none", "FAIL")],
+)
+def test_a_model_that_real_time_threads_preempt_is_no_failure(tmp_path, model, status):
+    files = {"/sys/kernel/debug/sched/preempt": f"none ({model})"}
+    assert preemption(make(tmp_path, {**RELEASE, **files})).status == status
+
+
+@pytest.mark.parametrize(
     ("files", "words"),
     [
         ({"/etc/os-release": "ID=debian"}, "sudo apt install linux-image-rt-arm64"),

@@ -15,6 +15,8 @@ from catenary.wire.drive_error import error_text
         (0x8210, "process data too short"),
         (0xA001, "leaving SAFE-OP was not successful"),
         (0xB123, "unknown error"),
+        (0x0123, "unknown error"),
+        (0x0000, "no error"),
     ],
 )
 def test_a_code_has_its_own_text_or_that_of_its_group(code: int, text: str) -> None:

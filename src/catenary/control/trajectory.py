@@ -56,7 +56,7 @@ class Trajectory:
     `duration` is the time of the motion [s]. The motion ends within the last period.
 
     The first access to `position`, `velocity` or `acceleration` computes all rows. Each row takes
-    about 10 us. A task with a deadline calls `row` to compute one row at a time.
+    a few microseconds. A task with a deadline calls `row` to compute one row at a time.
     """
 
     def __init__(self, pieces: Sequence[Any], goal: Row, period: float) -> None:

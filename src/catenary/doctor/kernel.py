@@ -39,8 +39,10 @@ def preemption(machine: Machine) -> Check:
     model = preemption_model(machine)
     if model == "rt":
         return passed(id, f"PREEMPT_RT ({release})")
-    if model == "full":
-        return warned(id, f"full preemption, not PREEMPT_RT ({release})", realtime_kernel(machine))
+    if model in ("full", "lazy"):  # both preempt system calls for real-time threads at once
+        return warned(
+            id, f"{model} preemption, not PREEMPT_RT ({release})", realtime_kernel(machine)
+        )
     if model:
         return failed(id, f"preemption model: {model} ({release})", realtime_kernel(machine))
     return warned(
