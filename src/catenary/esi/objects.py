@@ -169,9 +169,7 @@ def _entries(
             entry,
             name=name or entry.name,
             access=entry.access or whole.access,
-            pdo_mapping=entry.pdo_mapping or (whole.pdo_mapping if part.subindex else "")
-            if len(parts) > 1
-            else entry.pdo_mapping,
+            pdo_mapping=entry.pdo_mapping or (whole.pdo_mapping if part.subindex else ""),
             unit=whole_unit if entry.unit is None else entry.unit,
         )
 

@@ -163,6 +163,8 @@ class _Parser:
         self._place = (0, 0)  # offset of the present tree, and of the end of its start tag
         self._elements = self._tree_elements = self._text_length = 0
         self._base = document.mark
+        self._line_offset = document.line - 1
+        self._decode = document.encoding.text
         self._expat = parser = expat.ParserCreate(document.encoding.transport)
         parser.buffer_text = True
         parser.buffer_size = 65_536
@@ -192,7 +194,7 @@ class _Parser:
 
     @property
     def _line(self) -> int:
-        return self._expat.CurrentLineNumber + self.document.line - 1
+        return self._expat.CurrentLineNumber + self._line_offset
 
     def _document_type(self, *_: object) -> None:
         self._refuse("a document type is not allowed", "remove the DOCTYPE from the file")
@@ -239,19 +241,17 @@ class _Parser:
         self._tree_elements += 1
         if self._tree_elements > self.limits.tree_elements:
             self._refuse(f"more than {self.limits.tree_elements} elements in one {self._tree}")
-        self._check_depth()
+        if len(self._path) + len(self._open) >= self.limits.depth:
+            self._refuse(f"elements are nested deeper than {self.limits.depth}")
         if attributes:
             attributes = self._decoded(attributes)
         self._text_length = 0
-        self._open.append(_Open(tag, attributes, self._line))
+        line = self._expat.CurrentLineNumber + self._line_offset
+        self._open.append(_Open(tag, attributes, line))
 
     @property
     def _tree(self) -> str:
         return self._open[0].tag
-
-    def _check_depth(self) -> None:
-        if len(self._path) + len(self._open) >= self.limits.depth:
-            self._refuse(f"elements are nested deeper than {self.limits.depth}")
 
     def _decoded(self, attributes: dict[str, str]) -> dict[str, str]:
         """Return the attributes with local names and decoded values."""
@@ -259,9 +259,8 @@ class _Parser:
             self._refuse(f"more than {self.limits.attributes} attributes")
         if any(len(value) > self.limits.attribute_length for value in attributes.values()):
             self._refuse(f"an attribute is longer than {self.limits.attribute_length} characters")
-        text = self.document.encoding.text
         return {
-            name.rpartition(":")[2]: text(value)
+            name.rpartition(":")[2]: self._decode(value)
             for name, value in attributes.items()
             if not name.startswith("xmlns")
         }
@@ -283,19 +282,13 @@ class _Parser:
             return
         last = self._open.pop()
         text = "".join(last.texts)
-        element = Element(
-            last.tag,
-            last.attributes,
-            text if text.isascii() else self.document.encoding.text(text),
-            tuple(last.children),
-            last.line,
-        )
-        if self._open:
-            self._add(self._open[-1].children, element)
-        else:
+        if not text.isascii():
+            text = self._decode(text)
+        element = Element(last.tag, last.attributes, text, tuple(last.children), last.line)
+        if not self._open:
             self._finish(element)
-
-    def _add(self, children: list[Element], element: Element) -> None:
+            return
+        children = self._open[-1].children
         if len(children) >= self.limits.children:
             self._refuse(f"more than {self.limits.children} children")
         children.append(element)
