@@ -153,9 +153,9 @@ def written_pdos(
         MappingError: The name of a PDO is unknown or ambiguous.
     """
     pdos = [pdos] if isinstance(pdos, str) else pdos
-    if not isinstance(pdos, Iterable) or not all(isinstance(each, int | str) for each in pdos):
+    if not isinstance(pdos, Iterable) or not all(map(_is_pdo, pdos)):
         raise TypeError(
-            f"pdos={pdos!r}: give PDO numbers or names, [0x1A00], or PDOs with entries, "
+            f"pdos={pdos!r}: give PDO numbers, [0x1A00], names, ['Inputs'], or PDOs with entries, "
             "{0x1A00: entries}"
         )
     found: list[WrittenPdo] = []
@@ -166,6 +166,11 @@ def written_pdos(
             chosen = tuple(replace(pdo, entries=entries) for pdo in chosen)
         found += [pdo for pdo in chosen if pdo not in found]
     return tuple(found)
+
+
+def _is_pdo(given: object) -> bool:
+    """Return True for a number or a name; a number in quotes is neither."""
+    return isinstance(given, int) or (isinstance(given, str) and not given.startswith("0x"))
 
 
 def _numbered(index: int) -> WrittenPdo:
