@@ -75,7 +75,7 @@ def write_downloads(
             or refuse the value are skipped.
         ConfigurationError: The value of a start-up object differs after it was written.
     """
-    for step in (*plan.init_commands, *plan.before_mapping):
+    for step in (*plan.commands.in_pre_op, *plan.before_mapping):
         yield from _write_object(channel, step)
     for step in plan.mapping:
         try:
@@ -99,7 +99,7 @@ def write_in_safe_op(channel: MailboxChannel | None, plan: DevicePlan) -> Proced
     """
     if channel is None:
         return
-    for step in plan.in_safe_op:
+    for step in plan.commands.in_safe_op:
         yield from _write_object(channel, step)
 
 
