@@ -8,7 +8,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Literal, TypeAlias
 
 from catenary.errors import EsiError, EsiLookupError, IdentityError
-from catenary.esi.user_folder import default_folder
+from catenary.esi.folders import default_folder
 from catenary.model.device import DeviceDescription, Identity
 
 if TYPE_CHECKING:  # a scan without ESI files imports neither sqlite nor a parser
