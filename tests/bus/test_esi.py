@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -17,6 +18,7 @@ from catenary.plan import DeviceRequest
 from catenary.plan.request import DistributedClock
 from catenary.types import SINT, UDINT, UINT, USINT
 from catenary.wire.al import AlState
+from catenary.wire.sdo_information import ListType
 from tests.esi import servo_file
 from tests.plan.devices import Asking
 
@@ -269,3 +271,57 @@ def test_an_unknown_name_lists_similar_ones(tmp_path: Path) -> None:
         with pytest.raises(MappingError, match="has the name 'Inputs shrt'") as caught:
             cat.ProcessData(sub, pdos=["Inputs shrt"])
         assert "'Inputs short'" in str(caught.value)
+
+
+# -- objects -----------------------------------------------------------------------------------
+
+PROFILE = """<Profile><ProfileNo>402</ProfileNo><Dictionary>
+  <DataTypes>
+    <DataType><Name>MODE</Name><BaseType>SINT</BaseType><BitSize>8</BitSize>
+      <EnumInfo><Text>CSP</Text><Enum>8</Enum></EnumInfo></DataType>
+    <DataType><Name>SINT</Name><BitSize>8</BitSize></DataType>
+    <DataType><Name>UDINT</Name><BitSize>32</BitSize></DataType>
+  </DataTypes>
+  <Objects>
+    <Object><Index>#x6060</Index><Name>Mode</Name><Type>MODE</Type><BitSize>8</BitSize>
+      <Flags><Access>rw</Access><PdoMapping>R</PdoMapping></Flags></Object>
+    <Object><Index>#x6065</Index><Name>Window</Name><Type>UDINT</Type><BitSize>32</BitSize>
+      <Flags><Access>rw</Access></Flags></Object>
+  </Objects></Dictionary></Profile>"""
+
+
+def test_types_and_named_values_come_from_the_dictionary_of_the_esi(tmp_path: Path) -> None:
+    servo_file.write(tmp_path, profile=PROFILE)
+    with MainDevice(servo_file.segment()) as main:
+        sub = main.scan(esi=tmp_path)[1]
+        [mode] = [row for row in sub.pdos if row.index == 0x6060]
+        assert mode.enumeration == ((8, "CSP"),)
+        assert "8 = CSP" in str(sub.pdos)
+        known = sub.description.documented_object(0x6065, 0)
+        assert known is not None
+        assert (known.name, known.data_type) == ("Window", UDINT.index)
+
+
+def test_objects_of_the_esi_replace_missing_sdo_information(tmp_path: Path) -> None:
+    path = servo_file.write(tmp_path, profile=PROFILE)
+    with MainDevice(servo_file.segment()) as main:
+        sub = main.scan(esi=tmp_path)[1]
+        assert sub.channel is not None
+        sub.channel.layout = replace(sub.channel.layout, sdo_information=False)
+        assert [each.index for each in sub.sdo.list()] == [0x6060, 0x6065]
+        assert [each.index for each in sub.sdo.list(ListType.RXPDO_MAPPABLE)] == [0x6060]
+        assert str(path) in sub.sdo.notes[0]
+        [entry] = sub.sdo.describe(0x6065).entries
+        assert (entry.data_type, entry.bit_length, entry.name) == (UDINT.index, 32, "Window")
+
+
+def test_start_up_values_take_their_type_from_the_esi(tmp_path: Path) -> None:
+    servo_file.write(tmp_path, profile=PROFILE)
+    with MainDevice(servo_file.segment()) as main:
+        sub = main.scan(esi=tmp_path)[1]
+        assert sub.description.mailbox is not None
+        silent = replace(sub.description.mailbox, sdo_information=False)
+        sub.description = replace(sub.description, mailbox=silent)
+        plan = main.plan(cat.ProcessData(sub, start_up=[cat.StartUp(0x6065, 0, 77)]))
+        assert [each.data for each in plan.devices[1].downloads] == [b"M\0\0\0"]
+        assert "77 (UDINT)" in str(plan)
