@@ -64,10 +64,9 @@ def test_names_come_from_the_esi_and_the_mapping_from_the_device(tmp_path: Path)
 
 def test_a_scan_without_esi_files_imports_neither_sqlite_nor_a_parser() -> None:
     program = (
-        "import sys; from catenary.bus import MainDevice; from tests.esi import servo_file\n"
-        "with MainDevice(servo_file.segment()) as main:\n"
-        "    assert main.scan()[1].esi is None\n"
-        "found = {'sqlite3', 'catenary.esi.xml', 'catenary.esi.library', 'catenary.esi.reader'}\n"
+        "import sys; import catenary.bus; from catenary.bus.esi_source import open_source\n"
+        "assert open_source(None) is open_source(False) is None\n"
+        "found = {'sqlite3', 'pyexpat', 'catenary.esi.library', 'catenary.esi.reader'}\n"
         "print(sorted(found & set(sys.modules)))"
     )
     environment = {"CATENARY_ESI": "/nonexistent", "PATH": "/usr/bin:/bin"}
@@ -230,14 +229,10 @@ def test_a_command_for_the_mode_does_not_override_the_chosen_mode(tmp_path: Path
 
 
 def choices(folder: Path) -> Path:
-    exclude = "<Exclude>#x1a00</Exclude>"
-    pdos = servo_file.PDOS + servo_file.pdo(
-        "TxPdo", 0x1A01, "Inputs short", servo_file.TX[:1], "", exclude
-    )
     mapping = """<VendorSpecific><TwinCAT><AlternativeSmMapping><Name>Short</Name>
       <Sm No="2"><Pdo>#x1600</Pdo></Sm><Sm No="3"><Pdo>#x1A01</Pdo></Sm>
       </AlternativeSmMapping></TwinCAT></VendorSpecific>"""
-    return servo_file.write(folder, pdos=pdos, info=mapping)
+    return servo_file.write(folder, pdos=servo_file.choices(), info=mapping)
 
 
 def test_pdos_by_the_name_of_a_pdo_or_a_mapping(tmp_path: Path) -> None:

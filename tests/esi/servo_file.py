@@ -54,6 +54,12 @@ def command(index: int, data: str, transition: str = "PS", attributes: str = "")
             <Comment>from the ESI</Comment></InitCmd>"""
 
 
+def choices() -> str:
+    """Return PDOs with one more, which cannot be assigned together with the inputs."""
+    exclude = "<Exclude>#x1a00</Exclude>"
+    return PDOS + pdo("TxPdo", 0x1A01, "Inputs short", TX[:1], "", exclude)
+
+
 PDOS = pdo("RxPdo", 0x1600, "Outputs", RX, 'Sm="2"') + pdo("TxPdo", 0x1A00, "Inputs", TX, 'Sm="3"')
 
 
