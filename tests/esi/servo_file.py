@@ -73,12 +73,13 @@ def text(
     number: int | None = None,
     check: str = "",
     product: int = PRODUCT,
+    vendor: int = VENDOR_ID,
 ) -> str:
     """Return the file. Each option is the content of one element."""
     known = revision() if number is None else number
     return f"""<?xml version="1.0" encoding="utf-8"?>
 <EtherCATInfo>
-  <Vendor><Id>#x{VENDOR_ID:x}</Id><Name>Catenary</Name></Vendor>
+  <Vendor><Id>#x{vendor:x}</Id><Name>Catenary</Name></Vendor>
   <Descriptions><Groups><Group><Type>G</Type><Name>Drives</Name></Group></Groups>
     <Devices><Device Physics="YY">
         <Type ProductCode="#x{product:x}" RevisionNo="#x{known:x}" {check}>SERVO</Type>
