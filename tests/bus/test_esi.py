@@ -320,3 +320,18 @@ def test_start_up_values_take_their_type_from_the_esi(tmp_path: Path) -> None:
         plan = main.plan(cat.ProcessData(sub, start_up=[cat.StartUp(0x6065, 0, 77)]))
         assert [each.data for each in plan.devices[1].downloads] == [b"M\0\0\0"]
         assert "77 (UDINT)" in str(plan)
+
+
+def test_a_loop_runs_with_the_commands_and_clocks_of_the_esi(tmp_path: Path) -> None:
+    commands = servo_file.command(0x6065, "10270000") + servo_file.command(0x6084, "e8030000", "SO")
+    servo_file.write(tmp_path, commands=commands)
+    with MainDevice(servo_file.segment()) as main:
+        sub = main.scan(esi=tmp_path)[1]
+        clock = cat.DistributedClock(op_mode="DC-Synchron")
+        data = cat.ProcessData(sub, dc=clock)
+        with cat.Loop(data, period=1e-3) as loop:
+            for _ in range(10):
+                next(loop)
+            assert data.present
+        assert sub.sdo.read(0x6065, type=UDINT) == 10_000
+        assert sub.sdo.read(0x6084, type=UDINT) == 1000
