@@ -270,23 +270,9 @@ def test_an_unknown_name_lists_similar_ones(tmp_path: Path) -> None:
 
 # -- objects -----------------------------------------------------------------------------------
 
-PROFILE = """<Profile><ProfileNo>402</ProfileNo><Dictionary>
-  <DataTypes>
-    <DataType><Name>MODE</Name><BaseType>SINT</BaseType><BitSize>8</BitSize>
-      <EnumInfo><Text>CSP</Text><Enum>8</Enum></EnumInfo></DataType>
-    <DataType><Name>SINT</Name><BitSize>8</BitSize></DataType>
-    <DataType><Name>UDINT</Name><BitSize>32</BitSize></DataType>
-  </DataTypes>
-  <Objects>
-    <Object><Index>#x6060</Index><Name>Mode</Name><Type>MODE</Type><BitSize>8</BitSize>
-      <Flags><Access>rw</Access><PdoMapping>R</PdoMapping></Flags></Object>
-    <Object><Index>#x6065</Index><Name>Window</Name><Type>UDINT</Type><BitSize>32</BitSize>
-      <Flags><Access>rw</Access></Flags></Object>
-  </Objects></Dictionary></Profile>"""
-
 
 def test_types_and_named_values_come_from_the_dictionary_of_the_esi(tmp_path: Path) -> None:
-    servo_file.write(tmp_path, profile=PROFILE)
+    servo_file.write(tmp_path, profile=servo_file.PROFILE)
     with MainDevice(servo_file.segment()) as main:
         sub = main.scan(esi=tmp_path)[1]
         [mode] = [row for row in sub.pdos if row.index == 0x6060]
@@ -298,7 +284,7 @@ def test_types_and_named_values_come_from_the_dictionary_of_the_esi(tmp_path: Pa
 
 
 def test_objects_of_the_esi_replace_missing_sdo_information(tmp_path: Path) -> None:
-    path = servo_file.write(tmp_path, profile=PROFILE)
+    path = servo_file.write(tmp_path, profile=servo_file.PROFILE)
     with MainDevice(servo_file.segment()) as main:
         sub = main.scan(esi=tmp_path)[1]
         assert sub.channel is not None
@@ -311,7 +297,7 @@ def test_objects_of_the_esi_replace_missing_sdo_information(tmp_path: Path) -> N
 
 
 def test_start_up_values_take_their_type_from_the_esi(tmp_path: Path) -> None:
-    servo_file.write(tmp_path, profile=PROFILE)
+    servo_file.write(tmp_path, profile=servo_file.PROFILE)
     with MainDevice(servo_file.segment()) as main:
         sub = main.scan(esi=tmp_path)[1]
         assert sub.description.mailbox is not None

@@ -20,6 +20,21 @@ MODES = """
           <CycleTimeSync0 Factor="1">0</CycleTimeSync0></OpMode>"""
 
 
+PROFILE = """<Profile><ProfileNo>402</ProfileNo><Dictionary>
+  <DataTypes>
+    <DataType><Name>MODE</Name><BaseType>SINT</BaseType><BitSize>8</BitSize>
+      <EnumInfo><Text>CSP</Text><Enum>8</Enum></EnumInfo></DataType>
+    <DataType><Name>SINT</Name><BitSize>8</BitSize></DataType>
+    <DataType><Name>UDINT</Name><BitSize>32</BitSize></DataType>
+  </DataTypes>
+  <Objects>
+    <Object><Index>#x6060</Index><Name>Mode</Name><Type>MODE</Type><BitSize>8</BitSize>
+      <Flags><Access>rw</Access><PdoMapping>R</PdoMapping></Flags></Object>
+    <Object><Index>#x6065</Index><Name>Window</Name><Type>UDINT</Type><BitSize>32</BitSize>
+      <Flags><Access>rw</Access></Flags></Object>
+  </Objects></Dictionary></Profile>"""
+
+
 def segment(**options: object) -> Segment:
     return Segment([Coupler(), Servo(**options)])  # type: ignore[arg-type]
 
