@@ -30,6 +30,7 @@ class IndexEntry:
     product: int = 0
     revision: int = 0
     ident: int = 0  # of a module
+    module_class: str = ""
     type: str = ""
     name: str = ""
     revision_check: RevisionCheck = RevisionCheck.NONE
