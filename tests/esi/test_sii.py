@@ -219,9 +219,16 @@ def test_an_entry_of_more_than_255_bits_keeps_its_length() -> None:
 
 def test_unknown_uses_and_lost_settings_are_noted() -> None:
     mode = EsiOpMode("DC", sync1_ns=1000, sync_managers=(EsiModeSyncManager(2, 1),))
-    build = assemble_sii(replace(DRIVE, fmmus=("OrbitaIn",), op_modes=(mode,)))
-    assert decode_sii(build.image).fmmus == (0, 0xFF)
+    build = assemble_sii(replace(DRIVE, fmmus=("OrbitaIn", "Inputs"), op_modes=(mode,)))
+    assert decode_sii(build.image).fmmus == (0, 2)
     assert [note.split(":")[0] for note in build.notes] == ["OpMode 'DC'", "FMMU 0"]
+
+
+def test_without_a_known_use_the_fmmus_are_left_out() -> None:
+    """As in Pollen's images: masters would take unused FMMUs for missing ones."""
+    build = assemble_sii(replace(DRIVE, fmmus=("OrbitaIn", "OrbitaOut")))
+    assert decode_sii(build.image).fmmus == ()
+    assert "left out" in build.notes[0]
 
 
 def test_an_image_that_exceeds_the_eeprom_is_refused() -> None:

@@ -21,8 +21,7 @@ DEVICES = (
     ("hpm_ECAT_IO.xml", "", 4, 4),
     ("metalmusings_EaserCAT_2000.xml", "", 16, 34),
     ("metalmusings_EaserCAT_6000.xml", "", 1, 12),
-    # Without its PDO 0x1700: the control byte 0x22 of SyncManager 1 is that of a mailbox.
-    ("pollen_LeftElbowOrbita2d_fw1.0.xml", "", 43, 35),
+    ("pollen_LeftElbowOrbita2d_fw1.0.xml", "", 43, 66),
     ("pollen_Orbita2d.xml", "", 43, 66),
 )
 

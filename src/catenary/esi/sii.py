@@ -272,13 +272,14 @@ def _ports(physics: str) -> int:
 
 
 def _fmmus(texts: Sequence[str], notes: list[str]) -> list[int]:
-    uses = []
-    for number, text in enumerate(texts):
-        use = FMMU_USES.get(text.lower())
+    """Return the uses of the FMMUs; empty if the file names none that ETG.2000 defines."""
+    uses = [FMMU_USES.get(text.lower()) for text in texts]
+    known = any(uses)
+    for number, (text, use) in enumerate(zip(texts, uses, strict=True)):
         if use is None:
-            notes.append(f"FMMU {number}: the use {text!r} has no number; it is written as unused")
-        uses.append(int(use or FmmuUse.UNUSED))
-    return uses
+            result = "it is written as unused" if known else "the category is left out"
+            notes.append(f"FMMU {number}: the use {text!r} has no number; {result}")
+    return [int(use or FmmuUse.UNUSED) for use in uses] if known else []
 
 
 def _sync_managers(device: EsiDevice) -> list[SyncManagerEntry]:
