@@ -10,11 +10,18 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from catenary.errors import EsiError
-from catenary.esi import read_device, read_esi, read_module
 from catenary.esi.device import DeviceKey, EsiDevice, EsiFile, RevisionCheck
 from catenary.esi.devices import Vendor
 from catenary.esi.document import Document, make_document
-from catenary.esi.reader import DEVICE_PATHS, MODULE_PATHS, read_document, with_modules
+from catenary.esi.reader import (
+    DEVICE_PATHS,
+    MODULE_PATHS,
+    read_device,
+    read_document,
+    read_esi,
+    read_module,
+    with_modules,
+)
 from catenary.esi.xml import find_elements
 from tests.esi import corpus
 

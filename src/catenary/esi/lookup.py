@@ -75,14 +75,16 @@ def accepts(check: RevisionCheck, device: int, file: int) -> bool:
     return RULES[check](device, file)
 
 
-def choose(records: Iterable[Record], revision: int | None) -> Choice | None:
+def choose(records: Iterable[Record], revision: int | None, order: str = "") -> Choice | None:
     """Choose among the descriptions of one product; None if there are none.
 
     Args:
         records: All descriptions of the product.
         revision: Revision of the device; None for the newest one that is not hidden.
+        order: Order code that is preferred among descriptions of one revision.
     """
     ranked = sorted(records, key=_newest_first)
+    ranked.sort(key=lambda each: (-each.entry.revision, each.entry.type != order))  # stable
     if not ranked:
         return None
     rule, best = _newest(ranked) if revision is None else _for_device(ranked, revision)
@@ -126,3 +128,13 @@ def _newest(ranked: Sequence[Record]) -> tuple[Rule, Record]:
 def hidden_keys(records: Iterable[Record]) -> frozenset[DeviceKey]:
     """Return the keys that newer descriptions hide. A description cannot hide itself."""
     return frozenset(key for each in records for key in each.entry.hides if key != each.key)
+
+
+def newest(records: Iterable[Record]) -> list[Record]:
+    """Return the newest revision of each product."""
+    found: dict[tuple[int, int], Record] = {}
+    for each in records:
+        old = found.setdefault((each.entry.vendor, each.entry.product), each)
+        if each.entry.revision > old.entry.revision:
+            found[each.entry.vendor, each.entry.product] = each
+    return list(found.values())
