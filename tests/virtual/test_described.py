@@ -29,6 +29,7 @@ from catenary.model.device import Direction
 from catenary.virtual import DescribedDevice, Segment, from_esi
 from catenary.wire.sii import MailboxProtocol
 from catenary.wire.sii_categories import SyncManagerUse
+from tests.virtual.main_device import SM0, STATION, MainDevice
 
 
 def variable(index: int, name: str, bits: int, **facts: object) -> EsiObject:
@@ -229,3 +230,17 @@ def test_an_unknown_object_is_a_lookup_error() -> None:
             model.read_object(0x5000)
         with pytest.raises(LookupError, match="not in a PDO"):
             model.write_object(0x6083, 0, bytes(4))
+
+
+@pytest.mark.parametrize(("length", "status"), [(5, 0x04), (6, 0x12)])
+def test_a_sync_manager_without_pdos_may_keep_the_length_of_the_sii(
+    length: int, status: int
+) -> None:
+    """SOEM does so, for example with the ESI of the NI 9144."""
+    manager = EsiSyncManager(0, SyncManagerUse.OUTPUTS, 0x1200, 5, control=0x64)
+    device = replace(DRIVE, sync_managers=(manager,), pdos=(), mailbox=None, dictionary=None)
+    main = MainDevice(Segment([from_esi(device)]))
+    main.number_stations()
+    main.request(STATION, 2)
+    main.write(STATION, SM0, struct.pack("<HHBBBB", 0x1200, length, 0x64, 0, 1, 0))
+    assert main.request(STATION, 4)[0] == status

@@ -48,7 +48,7 @@ class Axis:
     measured: tuple[str, ...] = tuple(MEASURED)
     measured_required: bool = False  # True if the drive must map all of `measured`
     columns: Mapping[str, AxisObject] = field(default_factory=dict)
-    divider: int = 1  # n: exchange in every n-th cycle
+    divider: int = 1  # n: exchanged in every n-th cycle
     required: bool = True  # if True, a cycle without its device is an error
     homing: HomingMethod | None = None
     pdos: tuple[WrittenPdo, ...] = ()  # PDOs from the application

@@ -28,8 +28,8 @@ class StopPolicy:
     """Conditions that stop axes or end a loop, and the handling of devices that return.
 
     Args:
-        late_limit: Time without fresh set-points before a quick stop [s]. None: 50 ms in CSP and
-            CSV, 10 ms in CST. 0: never; refused for axes that use CST.
+        late_limit: Time without fresh set-points before a quick stop [s]. None: 50 ms in CSP, CSV
+            and PV, 10 ms in CST. 0: never; refused for axes that use CST.
         handover: Time for which CST keeps its torque after a law or stream ended, before a quick
             stop [s].
         command_timeout: In the background, time for which the targets of an update are valid [s].
@@ -147,7 +147,7 @@ class ClockOptions:
             networks "main", the only possible value.
         reference: Device with the reference clock. None: the first device with a clock.
         margin: Latest time of the frames after the cycle start [s]. None: 20 % of the period when
-            threaded and for laws, 50 % when inline.
+            threaded, 50 % when inline.
         burst: Number of frames that synchronise the clocks before the cycle begins.
 
     Raises:

@@ -131,7 +131,7 @@ class SyncUnit:
     name: str
     devices: tuple[int, ...]  # positions
     optional: bool = False  # True if its loss does not make the cycle bad
-    divider: int = 1  # n: exchange in every n-th cycle
+    divider: int = 1  # n: exchanged in every n-th cycle
 
 
 @dataclass(frozen=True, slots=True)

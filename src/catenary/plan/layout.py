@@ -91,7 +91,7 @@ class UnitLayout:
     name: str
     devices: tuple[int, ...]
     optional: bool
-    divider: int  # n: exchange in every n-th cycle
+    divider: int  # n: exchanged in every n-th cycle
     phase: int
     logical_read_write: bool
     logical_start: int
@@ -110,7 +110,7 @@ class DeviceData:
     description: DeviceDescription
     outputs: tuple[Assignment, ...]
     inputs: tuple[Assignment, ...]
-    divider: int = 1  # n: exchange in every n-th cycle
+    divider: int = 1  # n: exchanged in every n-th cycle
     optional: bool = False
     watchdog_ns: int = 0  # watchdog time of process data; 0: off
 

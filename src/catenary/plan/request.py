@@ -131,7 +131,7 @@ class DeviceRequest:
     inputs: tuple[ObjectReference, ...] = ()  # device → MainDevice (TxPDO)
     start_up: tuple[tuple[int, int, bytes], ...] = ()  # SDOs in PRE-OP: index, subindex, data
     clock: DistributedClock | None = None
-    divider: int = 1  # n: exchange in every n-th cycle
+    divider: int = 1  # n: exchanged in every n-th cycle
     required: bool = True  # True if a cycle without it is bad
     pdos: tuple[WrittenPdo, ...] = ()  # PDOs to use in their directions, without a search
     objects: tuple[StartUp, ...] = ()  # start-up objects of the application, in their order
