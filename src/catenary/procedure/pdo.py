@@ -143,7 +143,7 @@ def _refused_mapping(
         f"{channel.station}: {what}: {refusal}"
         + (f"\n  alternatives that change less:{alternatives}" if alternatives else ""),
         hint="its SII allows the change, but the device does not; request only objects that it "
-        "maps, or choose other PDOs with pdos= (`catenary scan` shows the mapping)",
+        "maps, or choose other PDOs with pdos= (print(sub.pdos) shows the mapping)",
     )
 
 
