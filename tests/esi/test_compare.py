@@ -169,10 +169,15 @@ CHANGES = {
         "",
         "warning object 0x6065:00 (Window), length",
     ),
-    "access to an object": (
+    "further access to an object": (
         with_object(DRIVE, variable(0x6065, "Window", "UDINT", 32, "ro")),
         "",
-        "warning object 0x6065:00 (Window), access",
+        "info object 0x6065:00 (Window), access",
+    ),
+    "missing access to an object": (
+        with_object(DRIVE, variable(0x1000, "Device type", "UDINT", 32, "rw")),
+        "",
+        "warning object 0x1000:00 (Device type), access",
     ),
     "missing object": (
         with_object(DRIVE, variable(0x6066, "Timeout", "UINT", 16)),

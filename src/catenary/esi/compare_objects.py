@@ -6,6 +6,7 @@ PDO objects (0x1600 to 0x1BFF) are compared as PDOs.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 
 from catenary.esi.device import EsiDevice
 from catenary.esi.dictionary import EsiDictionary, EsiObject, EsiObjectEntry
@@ -16,6 +17,8 @@ from catenary.types import by_index
 
 PDO_OBJECTS = range(0x1600, 0x1C00)
 FIRST_DECLARED_TYPE = 0x0040  # types from here on belong to the device, ETG.1000.6 table 64
+RIGHTS = {"ro": "r", "wo": "w", "rw": "rw"}
+NAMES = {right: name for name, right in RIGHTS.items()}
 SHOWN = 8  # places that a summary lists
 EACH_MAX = 20  # differences of entries that are reported one by one
 FIRMWARE = "check whether the ESI belongs to this firmware"
@@ -42,6 +45,7 @@ def compare_objects(esi: EsiDevice, coe: CoeFacts) -> Iterator[Difference]:
         entries = coe.objects.get(index)
         if entries is not None:
             found += _entries(each, entries, dictionary)
+    found.sort(key=lambda each: each.severity is Severity.INFO)  # warnings first
     yield from found[:EACH_MAX]
     if len(found) > EACH_MAX:
         yield _rest(found[EACH_MAX:])
@@ -126,11 +130,23 @@ def _entry(
             f"{own.bit_length} bits",
             "a write with the length of the ESI is refused",
         )
-    given, actual = _rights(entry.access), _access(own)
-    if actual != "-" and given != actual:
-        yield _difference(
-            each, entry, "access", given, actual, "reading or writing it may be refused"
-        )
+    yield from _access_difference(each, entry, own)
+
+
+def _access_difference(
+    each: EsiObject, entry: EsiObjectEntry, own: EntryFacts
+) -> Iterator[Difference]:
+    """Yield the difference of the access rights. Further rights of the device do no harm."""
+    given = entry.access if entry.access in RIGHTS else "ro"
+    actual = "r" * own.readable + "w" * own.writable
+    if not actual or set(RIGHTS[given]) == set(actual):
+        return
+    lacking = set(RIGHTS[given]) - set(actual)
+    reason = "the device refuses this access" if lacking else "the device allows more than its ESI"
+    yield replace(
+        _difference(each, entry, "access", given, NAMES[actual], reason),
+        severity=Severity.WARNING if lacking else Severity.INFO,
+    )
 
 
 def _difference(
@@ -169,16 +185,6 @@ def _type_name(number: int) -> str:
         return by_index(number).name
     except ValueError:
         return f"type 0x{number:04X}"
-
-
-def _rights(access: str) -> str:
-    return access if access in ("ro", "wo", "rw") else "ro"
-
-
-def _access(own: EntryFacts) -> str:
-    if own.readable and own.writable:
-        return "rw"
-    return "ro" if own.readable else "wo" if own.writable else "-"
 
 
 def _rest(found: Sequence[Difference]) -> Difference:

@@ -21,7 +21,6 @@ PART_BITS = 248  # an SII divides entries above 255 bits, see `sii_process_data`
 BITS_MAX = 255
 SHOWN = 8
 MEANING = "the process data have another meaning than the ESI gives them"
-PDOS = {Direction.OUTPUT: range(0x1600, 0x1800), Direction.INPUT: range(0x1A00, 0x1C00)}
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,6 +45,7 @@ class Views(NamedTuple):
     esi: Mapping[int, EsiPdo]
     sii: Mapping[int, SiiPdo] | None  # None if the SII lists no PDO of this direction
     coe: CoeFacts | None  # None if no PDO object of this direction can be read
+    assigned: frozenset[int]  # PDOs that the device has assigned, if known
     modular: bool
     configurable: bool  # the entries can be changed
     assignable: bool  # the assignment can be changed
@@ -67,11 +67,10 @@ class Views(NamedTuple):
     def is_assigned(self, index: int) -> bool:
         """Return True if the ESI, the SII or the device assigns the PDO."""
         given, own = self.esi.get(index), self.sii.get(index) if self.sii is not None else None
-        lists = self.coe.assignments.values() if self.coe is not None else ()
         return (
             (given is not None and given.sync_manager is not None)
             or (own is not None and own.sync_manager != NOT_ASSIGNED)
-            or any(index in each for each in lists if each is not None)
+            or index in self.assigned
         )
 
 
@@ -125,18 +124,28 @@ def _views(esi: EsiDevice, sii: Sii | None, coe: CoeFacts | None, direction: Dir
     listed: tuple[SiiPdo, ...] = ()
     if sii is not None:
         listed = sii.receive_pdos if direction is Direction.OUTPUT else sii.transmit_pdos
-    readable = coe is not None and any(
-        index in PDOS[direction] and entries is not None for index, entries in coe.mappings.items()
-    )
+    own = {pdo.index: pdo for pdo in esi.pdos_of(direction)}
+    assigned = _assigned(esi, coe, direction)
+    indices = {*own, *(pdo.index for pdo in listed), *assigned}
+    readable = coe is not None and any(coe.mappings.get(i) is not None for i in indices)
     mailbox = esi.mailbox
     return Views(
-        {pdo.index: pdo for pdo in esi.pdos_of(direction)},
+        own,
         {pdo.index: pdo for pdo in listed} if listed else None,
         coe if readable else None,
+        assigned,
         modular=esi.slots is not None,
         configurable=mailbox is not None and mailbox.pdo_configuration,
         assignable=mailbox is not None and mailbox.pdo_assign,
     )
+
+
+def _assigned(esi: EsiDevice, coe: CoeFacts | None, direction: Direction) -> frozenset[int]:
+    """Return the PDOs that the device has assigned to the SyncManagers of a direction."""
+    if coe is None:
+        return frozenset()
+    managers = (each.index for each in esi.sync_managers if each.use is direction.use)
+    return frozenset(index for each in managers for index in coe.assignments.get(each) or ())
 
 
 def _kind(direction: Direction) -> str:
@@ -261,11 +270,9 @@ def _text(own: Layout | None, expected: Layout, *others: Layout | None) -> str |
 
 def _undescribed(views: Views, direction: Direction, esi: EsiDevice) -> Iterator[Difference]:
     """Yield PDOs of the device that the ESI does not describe."""
-    present = {} if views.sii is None else dict.fromkeys(views.sii)
-    if views.coe is not None:
-        lists = [each for each in views.coe.assignments.values() if each is not None]
-        present |= {i: None for each in lists for i in each if i in PDOS[direction]}
-    for index in (each for each in present if each not in views.esi):
+    known = {pdo.index for pdo in esi.pdos}
+    present = dict.fromkeys((*(views.sii or ()), *sorted(views.assigned)))
+    for index in (each for each in present if each not in known):
         fixed = not (views.assignable and views.coe is not None)
         error = views.is_assigned(index) and fixed and not views.modular
         yield Difference(

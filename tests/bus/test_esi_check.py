@@ -1,0 +1,112 @@
+"""Comparison of virtual devices with their ESI: what is reported, and what is not changed."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+import catenary as cat
+from catenary.bus.esi_check import Comparison, Depth, check_device
+from catenary.esi.device import EsiDevice
+from catenary.virtual import Segment, from_esi
+from catenary.wire.al import AlState
+from tests.esi.compared import (
+    DRIVE,
+    STATUSWORD,
+    variable,
+    with_mailbox,
+    with_manager,
+    with_object,
+    with_pdo,
+)
+
+FULL = Depth(objects=True)
+# A device that differs from DRIVE in one fact, and the differences that are reported.
+DEVICES = {
+    "none": (DRIVE, []),
+    "mailbox size": (
+        with_manager(DRIVE, 1, default_size=192),
+        ["warning mailbox, send: size SII"],
+    ),
+    "SyncManager start": (
+        with_manager(DRIVE, 3, start=0x1600),
+        ["error SyncManager 3, start "],
+    ),
+    "PDO entry": (
+        with_pdo(DRIVE, 0x1A00, entries=(STATUSWORD,)),
+        ["error TxPDO 0x1A00 (Inputs), entry 2 SII"],
+    ),
+    "missing PDO": (
+        replace(DRIVE, pdos=(DRIVE.pdos[0], DRIVE.pdos[2])),
+        ["error TxPDO 0x1A00 (Inputs) SII"],
+    ),
+    "OpMode": (
+        replace(DRIVE, op_modes=(DRIVE.op_modes[0],)),
+        ["warning OpMode 'DC' "],
+    ),
+    "object type": (
+        with_object(DRIVE, variable(0x6065, "Following error window", "DINT", 32, "rw")),
+        ["warning 0x6065:00 (Following error window), type neither"],
+    ),
+    "SDO information": (
+        with_mailbox(DRIVE, sdo_information=False),
+        ["warning SDO information SII"],
+    ),
+    "complete access": (
+        with_mailbox(DRIVE, complete_access=False),
+        ["warning complete access SII"],
+    ),
+    "PDO assignment": (
+        with_mailbox(DRIVE, pdo_assign=False),
+        ["warning PDO assignment SII"],
+    ),
+}
+
+
+def check(main: cat.MainDevice, esi: EsiDevice, depth: Depth = FULL) -> Comparison:
+    [sub] = main.passive_scan()
+    return check_device(main, sub.description, esi, depth, lambda done, total: None)
+
+
+@pytest.mark.parametrize(("own", "expected"), DEVICES.values(), ids=DEVICES)
+def test_one_fact_of_the_device_is_the_only_difference(own: EsiDevice, expected: list[str]) -> None:
+    with cat.MainDevice(Segment([from_esi(own)])) as main:
+        differences, notes = (found := check(main, DRIVE)).differences, found.notes
+    serious = [each for each in differences if each.severity != "info"]
+    assert [f"{each.severity} {each.what} {each.follows}" for each in serious] == expected
+    assert notes == ()
+
+
+@pytest.mark.parametrize("state", [AlState.INIT, AlState.PRE_OP])
+def test_the_state_is_restored(state: AlState) -> None:
+    model = from_esi(DRIVE)
+    with cat.MainDevice(Segment([model])) as main:
+        main.request_states(main.passive_scan(), [0], state)
+        assert check(main, DRIVE).notes == ()
+        assert model.state == state
+
+
+def test_a_device_in_safe_op_is_not_touched() -> None:
+    model = from_esi(DRIVE)
+    with cat.MainDevice(Segment([model])) as main:
+        subs = main.passive_scan()
+        main.request_states(subs, [0], AlState.SAFE_OP)
+        found = check(main, with_manager(DRIVE, 3, start=0x1600))
+        assert model.state == AlState.SAFE_OP
+    assert [each.what for each in found.differences] == ["SyncManager 3, start"]
+    assert "is in SAFE-OP; its state was not changed" in found.notes[0]
+
+
+def test_a_passive_comparison_reads_no_objects() -> None:
+    with cat.MainDevice(Segment([from_esi(DRIVE)])) as main:
+        found = check(main, DRIVE, Depth(coe=False, reason="--passive"))
+    assert found.differences == ()
+    assert found.notes == ("its object dictionary was not read: --passive",)
+
+
+def test_another_device_is_not_read() -> None:
+    other = replace(DRIVE, key=DRIVE.key._replace(product=1))
+    with cat.MainDevice(Segment([from_esi(other)])) as main:
+        [difference] = check(main, DRIVE).differences
+    assert difference.what == "vendor and product"
