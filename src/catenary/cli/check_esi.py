@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 from catenary.bus import MainDevice, SubDevice
 from catenary.bus.esi_check import Comparison, Depth, check_device
-from catenary.cli import check
+from catenary.cli import check_machine
 from catenary.cli.devices import device_at
 from catenary.cli.esi_commands import open_library
 from catenary.cli.failure import one_line
@@ -61,7 +61,7 @@ def run(arguments: argparse.Namespace) -> int:
     from catenary.machine import compare
     from catenary.target import MainDevice
 
-    source, expected = check.source_and_machine(arguments.file, arguments.target)
+    source, expected = check_machine.source_and_machine(arguments.file, arguments.target)
     with _library(arguments.against) as library, MainDevice(source, force=True) as main:
         note_other_masters(main)
         subs = main.passive_scan()
@@ -72,14 +72,14 @@ def run(arguments: argparse.Namespace) -> int:
         depth = _depth(arguments, main)
         results = [_result(main, sub, library, depth, single=len(chosen) == 1) for sub in chosen]
     if arguments.json:
-        values = None if machine is None else check.as_values(machine)
+        values = None if machine is None else check_machine.as_values(machine)
         print(json.dumps({"machine": values, "devices": [*map(_values, results)]}, indent=2))
     else:
         if machine is not None:
-            print(check.as_table(machine))
+            print(check_machine.as_table(machine))
         print("\n".join(_lines(results)))
-    status = check.SAME if machine is None else check.status_of(machine)
-    return max(status, check.DIFFERENT if _failed(results) else check.SAME)
+    status = check_machine.SAME if machine is None else check_machine.status_of(machine)
+    return max(status, check_machine.DIFFERENT if _failed(results) else check_machine.SAME)
 
 
 def _failed(results: Sequence[Result]) -> bool:
