@@ -10,6 +10,8 @@ import catenary as cat
 from catenary.bus.esi_check import Comparison, Depth, check_device
 from catenary.esi.device import EsiDevice
 from catenary.virtual import Segment, from_esi
+from catenary.virtual.coe.quirks import MailboxQuirks
+from catenary.virtual.devices.described import DescribedDevice
 from catenary.wire.al import AlState
 from tests.esi.compared import (
     DRIVE,
@@ -110,3 +112,47 @@ def test_another_device_is_not_read() -> None:
     with cat.MainDevice(Segment([from_esi(other)])) as main:
         [difference] = check(main, DRIVE).differences
     assert difference.what == "vendor and product"
+
+
+@pytest.mark.parametrize(
+    ("quirks", "expected", "note"),
+    [
+        (MailboxQuirks(error_reply="unsupported"), [], "reading ended after 3 failures in a row"),
+        (MailboxQuirks(missing_descriptions=(0x1000,)), ["SDO information"], "cannot be read"),
+        (MailboxQuirks(malformed_descriptions=(0x6065,)), [], "0x6065"),
+    ],
+)
+def test_a_mailbox_with_faults_ends_with_notes(
+    quirks: MailboxQuirks, expected: list[str], note: str
+) -> None:
+    with cat.MainDevice(Segment([DescribedDevice(DRIVE, mailbox_quirks=quirks)])) as main:
+        found = check(main, DRIVE)
+    serious = [each.what for each in found.differences if each.severity != "info"]
+    assert serious == expected
+    assert note in "\n".join(found.notes)
+
+
+def test_a_truncated_list_of_objects_is_not_a_difference() -> None:
+    large = DRIVE
+    for index in range(0x2000, 0x2100):
+        large = with_object(large, variable(index, "Value", "UINT", 16))
+    quirks = MailboxQuirks(object_list="missing")
+    with cat.MainDevice(Segment([DescribedDevice(large, mailbox_quirks=quirks)])) as main:
+        found = check(main, large)
+    assert found.differences == ()
+    assert "the list of objects is truncated" in found.notes[0]
+
+
+def test_a_device_without_a_mailbox() -> None:
+    simple = replace(
+        DRIVE,
+        mailbox=None,
+        dictionary=None,
+        sync_managers=tuple(replace(each, default_size=0) for each in DRIVE.sync_managers),
+    )
+    with cat.MainDevice(Segment([from_esi(simple)])) as main:
+        assert check(main, simple) == Comparison(())
+        found = check(main, DRIVE)
+    texts = [each.what for each in found.differences]
+    assert "mailbox, receive" in texts
+    assert "mailbox protocol CoE" in texts
