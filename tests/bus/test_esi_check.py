@@ -29,7 +29,7 @@ DEVICES = {
     "none": (DRIVE, []),
     "mailbox size": (
         with_manager(DRIVE, 1, default_size=192),
-        ["warning mailbox, send: size SII"],
+        ["warning send mailbox, size SII"],
     ),
     "SyncManager start": (
         with_manager(DRIVE, 3, start=0x1600),
@@ -154,5 +154,5 @@ def test_a_device_without_a_mailbox() -> None:
         assert check(main, simple) == Comparison(())
         found = check(main, DRIVE)
     texts = [each.what for each in found.differences]
-    assert "mailbox, receive" in texts
+    assert "receive mailbox" in texts
     assert "mailbox protocol CoE" in texts

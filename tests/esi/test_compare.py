@@ -66,18 +66,18 @@ CHANGES = {
     ),
     "mailbox size": (
         with_manager(DRIVE, 0, default_size=192),
-        "warning mailbox mailbox, receive: size",
-        "warning mailbox mailbox, receive: size",
+        "warning mailbox receive mailbox, size",
+        "warning mailbox receive mailbox, size",
     ),
     "allowed mailbox size": (
         with_manager(DRIVE, 1, default_size=512, min_size=64, max_size=512),
-        "info mailbox mailbox, send: size",
-        "info mailbox mailbox, send: size",
+        "info mailbox send mailbox, size",
+        "info mailbox send mailbox, size",
     ),
     "mailbox start": (
         with_manager(DRIVE, 1, start=0x1100),
-        "error mailbox mailbox, send: start",
-        "error mailbox mailbox, send: start",
+        "error mailbox send mailbox, start",
+        "error mailbox send mailbox, start",
     ),
     "SyncManager start": (
         with_manager(DRIVE, 2, start=0x1800),

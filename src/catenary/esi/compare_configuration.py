@@ -76,7 +76,7 @@ def _bootstrap(esi: EsiDevice, eeprom: EsiEeprom, header: Header) -> Iterator[Di
             yield Difference(
                 Severity.WARNING,
                 Subject.MAILBOX,
-                f"bootstrap mailbox, {name}",
+                f"bootstrap {name} mailbox",
                 Sides(area_text(offset, size), area_text(area.offset, area.size)),
                 esi.source,
                 "a firmware update in BOOT may fail",

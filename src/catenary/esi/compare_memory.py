@@ -100,7 +100,7 @@ def _mailbox(
         yield Difference(
             Severity.INFO,
             Subject.MAILBOX,
-            f"mailbox, {name}: SyncManager {manager.index} and header of the SII",
+            f"{name} mailbox, SyncManager {manager.index} and header of the SII",
             Sides(
                 area_text(manager.start, manager.default_size), area_text(own.address, own.length)
             ),
@@ -117,7 +117,7 @@ def _mailbox(
         yield Difference(
             Severity.ERROR,
             Subject.MAILBOX,
-            f"mailbox, {name}: start",
+            f"{name} mailbox, start",
             Sides(f"0x{manager.start:04X}", sii_text, sii_text if works else None),
             manager.source,
             START,
@@ -131,7 +131,7 @@ def _only_one(manager: EsiSyncManager, area: MailboxArea, name: str) -> Differen
     return Difference(
         Severity.WARNING,
         Subject.MAILBOX,
-        f"mailbox, {name}",
+        f"{name} mailbox",
         Sides(area_text(manager.start, manager.default_size), area_text(area.offset, area.size)),
         manager.source,
         "without a mailbox in the SII, Catenary does not use the mailbox of the device",
@@ -151,7 +151,7 @@ def _mailbox_size(manager: EsiSyncManager, area: MailboxArea, name: str, works: 
     return Difference(
         Severity.INFO if allowed else Severity.WARNING,
         Subject.MAILBOX,
-        f"mailbox, {name}: size",
+        f"{name} mailbox, size",
         Sides(f"{manager.default_size} bytes", sii_text, sii_text if works else None),
         manager.source,
         reason,

@@ -83,8 +83,10 @@ class Difference:
 
 def _values(sides: Sides) -> str:
     """Return the values with their sources. Equal values are named once."""
-    own = "its SII" if sides.coe is not None else "the device"
-    given = (("the device", sides.coe), (own, sides.sii), ("the ESI", sides.esi))
+    esi, sii, coe = sides
+    given = [("the device", sii), ("the ESI", esi)]
+    if coe not in (None, sii):
+        given = [("the device", coe), ("its SII", sii), ("the ESI", esi)]
     sources: dict[str, list[str]] = {}
     for source, value in given:
         if value is not None:
