@@ -1,4 +1,4 @@
-"""What the commands of `catenary esi` do."""
+"""Actions of the commands of `catenary esi`."""
 
 from __future__ import annotations
 
