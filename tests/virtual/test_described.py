@@ -244,3 +244,61 @@ def test_a_sync_manager_without_pdos_may_keep_the_length_of_the_sii(
     main.request(STATION, 2)
     main.write(STATION, SM0, struct.pack("<HHBBBB", 0x1200, length, 0x64, 0, 1, 0))
     assert main.request(STATION, 4)[0] == status
+
+
+def test_outputs_in_the_digital_output_register() -> None:
+    """The SyncManager of Beckhoff's digital output terminals is at 0x0F00 (SII of the EL2004)."""
+    entry = EsiEntry(0x7000, 1, 1, "Output", "BOOL")
+    pdos = tuple(
+        EsiPdo(Direction.OUTPUT, 0x1600 + k, "Channel", (replace(entry, index=0x7000 + k),), 0)
+        for k in range(4)
+    )
+    manager = EsiSyncManager(0, SyncManagerUse.OUTPUTS, 0x0F00, 1, control=0x44, op_only=True)
+    eeprom = EsiEeprom(2048, bytes.fromhex("040100000000000F"))
+    device = replace(
+        DRIVE, sync_managers=(manager,), pdos=pdos, mailbox=None, dictionary=None, eeprom=eeprom
+    )
+    with opened(device) as (main, model):
+        data = cat.ProcessData(main.subs[0])
+        with cat.Loop(data, period=2e-3) as loop:
+            data.outputs[0] = 5
+            for _ in range(4):
+                next(loop)
+            assert model.state == 8
+            assert [model.read_object(0x7000 + k, 1)[0] for k in range(4)] == [1, 0, 1, 0]
+            assert model.core.peek(0, 0x0F00, 1) == b"\x05"
+
+
+def test_the_first_of_assigned_pdos_that_exclude_each_other_is_used() -> None:
+    both = (DRIVE.pdos[0], DRIVE.pdos[1], replace(DRIVE.pdos[2], sync_manager=3))
+    with opened(replace(DRIVE, pdos=both)) as (main, model):
+        data = cat.ProcessData(main.subs[0])
+        with cat.Loop(data, period=2e-3) as loop:
+            next(loop)
+            assert (model.state, len(data.inputs)) == (8, 6)
+
+
+def test_a_device_may_map_more_objects_than_the_model_has() -> None:
+    entries = tuple(EsiEntry(0x6000 + k // 200, k % 200 + 1, 8, "", "USINT") for k in range(200))
+    more = tuple(replace(each, index=0x6100) for each in entries)
+    pdos = tuple(
+        EsiPdo(Direction.INPUT, 0x1A00 + k, "", part, 3) for k, part in enumerate((entries, more))
+    )
+    with opened(replace(DRIVE, pdos=pdos)) as (main, model):
+        data = cat.ProcessData(main.subs[0])
+        with cat.Loop(data, period=2e-3) as loop:
+            next(loop)
+            assert (model.state, len(data.inputs)) == (8, 400)
+
+
+def test_a_mailbox_without_coe_reaches_op() -> None:
+    device = replace(DRIVE, mailbox=EsiMailbox(MailboxProtocol.FOE | MailboxProtocol.EOE))
+    with opened(device) as (main, model):
+        sub = main.subs[0]
+        assert sub.description.mapping_source == "SII"
+        data = cat.ProcessData(sub)
+        with cat.Loop(data, period=2e-3) as loop:
+            next(loop)
+            assert (model.state, len(data.outputs), len(data.inputs)) == (8, 4, 6)
+        with pytest.raises(CatenaryError):
+            sub.sdo.read(0x1000)

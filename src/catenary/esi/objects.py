@@ -162,13 +162,15 @@ def _entries(
 ) -> Iterator[EsiObjectEntry]:
     info = element.find("Info")
     infos = _infos_of(parts, info)
+    unit = findings.number(info.find("Unit")) if info is not None else None  # of all elements
     seen: set[int] = set()
     for part, (name, each) in zip(parts, infos, strict=True):
         if part.subindex in seen:
             findings.warn(element, f"subindex {part.subindex} of 0x{index:04X} occurs again")
             continue
         seen.add(part.subindex)
-        yield _entry(index, whole, part, types, findings, each, name)
+        entry = _entry(index, whole, part, types, findings, each, name)
+        yield replace(entry, unit=unit) if unit and part.subindex and not entry.unit else entry
 
 
 def _entry(
