@@ -15,15 +15,15 @@ from catenary.drive.arguments import (
     start_up_list,
     written_pdos,
 )
-from catenary.drive.channel import ChannelSpec, make_channels
+from catenary.drive.channel import Channel, ChannelSpec, make_channels
 from catenary.drive.device_channels import (
     chosen_channels,
     column,
     mapped_channels,
-    with_written,
+    with_chosen,
 )
 from catenary.drive.request import Request
-from catenary.model.device import Direction
+from catenary.model.device import DeviceDescription, Direction
 from catenary.plan.cycle import Bank
 from catenary.plan.request import (
     Bytes,
@@ -34,6 +34,7 @@ from catenary.plan.request import (
     Reals,
     RequestTables,
     Views,
+    WrittenPdo,
 )
 from catenary.plan.start_up_object import StartUp
 
@@ -90,8 +91,7 @@ class Channels(Request):
     ) -> None:
         super().__init__(subs)
         named = make_channels("channels", channels or {})
-        written = written_pdos(pdos, named)
-        self._pdos = tuple(pdo for pdo in written if pdo.direction is self.direction)
+        self._pdos = {sub.position: self._chosen_pdos(sub, pdos, named) for sub in subs}
         self._required = required
         self._divider = cycles_between("divider", divider)
         self._clock = clock_request(dc)
@@ -112,9 +112,21 @@ class Channels(Request):
                 )
             self._channels = chosen_channels(subs[0], named)
         else:
-            devices = [with_written(sub.description, self.direction, self._pdos) for sub in subs]
+            devices = [self._described(sub) for sub in subs]
             self._channels = mapped_channels(devices, self.direction, scale or {})
         self._places: dict[str, tuple[Reals | Integers | Bytes, int]] = {}
+
+    def _chosen_pdos(
+        self, sub: SubDevice, pdos: PdoList, named: Mapping[str, Channel]
+    ) -> tuple[WrittenPdo, ...]:
+        if not pdos:
+            return ()
+        written = written_pdos(pdos, named, sub.description)
+        return tuple(pdo for pdo in written if pdo.direction is self.direction)
+
+    def _described(self, sub: SubDevice) -> DeviceDescription:
+        """Return the description of a device with the PDOs of this request."""
+        return with_chosen(sub.description, self._pdos[sub.position], self._clock, [self.direction])
 
     def array(self, bank: Bank) -> Reals | Integers | Bytes:
         """Return the array of a bank. Raises RuntimeError before a loop is open."""
@@ -157,7 +169,7 @@ class Channels(Request):
                 clock=self._clock,
                 divider=self._divider,
                 required=self._required,
-                pdos=self._pdos,
+                pdos=self._pdos[sub.position],
                 objects=self._start_up,
             )
         return requests

@@ -6,7 +6,7 @@ import ctypes
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-from catenary.errors import SdoAbort
+from catenary.errors import ConfigurationError, SdoAbort
 from catenary.igh import abi
 from catenary.igh._ecrt import Exchange
 from catenary.igh.address import Address, addresses
@@ -14,9 +14,10 @@ from catenary.igh.reservation import Reservation
 from catenary.model.device import DeviceDescription, Direction, Pdo
 from catenary.plan.clocks import SyncPlan
 from catenary.plan.cycle import ClockPlan
+from catenary.plan.download import Download
 from catenary.plan.layout import UnitLayout
 from catenary.plan.planner import Plan
-from catenary.plan.start_up import WATCHDOG_DIVIDER, DevicePlan, Download
+from catenary.plan.start_up import WATCHDOG_DIVIDER, DevicePlan
 from catenary.procedure.pdo import OPTIONAL_ABORTS
 
 EMERGENCIES = 16  # largest number that the master stores for each device
@@ -136,7 +137,7 @@ def _device(
     if not config:
         raise _no_handle(f"{label}: no configuration")
     _configure_process_data(master, plan, config, label)
-    for download in (*plan.before_mapping, *plan.start_up):
+    for download in _downloads(plan, label):
         data = ctypes.create_string_buffer(download.data, len(download.data))
         if download.optional:
             # Write it now: the master stops configuring a device that refuses a start-up SDO.
@@ -154,6 +155,20 @@ def _device(
     register = library.ecrt_slave_config_create_reg_request(config, REGISTER_SIZE)
     requests = sdo or 0, register or 0
     return DeviceConfiguration(plan.position, address, config, *requests, plan.sync)
+
+
+def _downloads(plan: DevicePlan, label: str) -> tuple[Download, ...]:
+    """Return the start-up SDOs. The master writes all of them in PRE-OP, also those for SAFE-OP.
+
+    Raises:
+        ConfigurationError: A download of the ESI needs complete access.
+    """
+    before = (*plan.commands.in_pre_op, *plan.before_mapping)
+    downloads = (*before, *plan.start_up, *plan.commands.in_safe_op)
+    for each in downloads:
+        if each.complete_access:
+            raise _no_complete_access(label, each)
+    return downloads
 
 
 def _download_if_there(master: Reservation, position: int, download: Download) -> None:
@@ -234,6 +249,14 @@ def _register(
             copies = domain.outputs if output else domain.inputs
             copies.append((found, offset, assignment.byte_length))
             offset += assignment.byte_length
+
+
+def _no_complete_access(label: str, download: Download) -> ConfigurationError:
+    return ConfigurationError(
+        f"{label}: start-up object {download.place} (ESI {download.source}) needs complete access, "
+        "which is not available with libethercat",
+        hint="give its entries as start_up= objects; they replace it",
+    )
 
 
 def _no_handle(what: str) -> MemoryError:
