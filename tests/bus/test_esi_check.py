@@ -89,6 +89,18 @@ def test_the_state_is_restored(state: AlState) -> None:
         assert model.state == state
 
 
+def test_an_interruption_restores_the_state() -> None:
+    def interrupted(done: int, total: int) -> None:
+        raise KeyboardInterrupt
+
+    model = from_esi(DRIVE)
+    with cat.MainDevice(Segment([model])) as main:
+        [sub] = main.passive_scan()
+        with pytest.raises(KeyboardInterrupt):
+            check_device(main, sub.description, DRIVE, FULL, interrupted)
+        assert model.state == AlState.INIT
+
+
 def test_a_device_in_safe_op_is_not_touched() -> None:
     model = from_esi(DRIVE)
     with cat.MainDevice(Segment([model])) as main:

@@ -159,6 +159,17 @@ def test_a_machine_file_gives_both_comparisons(
     assert values["devices"][1]["differences"] == []
 
 
+def test_the_files_of_a_machine_file_are_used_without_a_value(
+    segment: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert call(capsys, "init", segment, "-o", "machine.toml")[0] == 0
+    path = Path("machine.toml")
+    path.write_text(f'esi = "own.xml"\n{path.read_text()}')
+    status, out, _ = call(capsys, "check", "machine.toml", "--against")
+    assert status == 0
+    assert "own.xml:7, exact revision: no difference" in out
+
+
 @pytest.mark.parametrize(
     ("words", "text"),
     [

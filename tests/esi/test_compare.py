@@ -6,7 +6,10 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
+from catenary.errors import DecodeError
 from catenary.esi.compare import compare
 from catenary.esi.device import (
     DeviceKey,
@@ -17,8 +20,9 @@ from catenary.esi.device import (
     RevisionCheck,
 )
 from catenary.esi.reader import read_esi
+from catenary.esi.sii import build_sii
 from catenary.model.device import Direction, Identity
-from catenary.wire.sii import MailboxProtocol, decode_sii
+from catenary.wire.sii import CHECKSUM_DISABLED, MailboxProtocol, decode_sii
 from tests.esi.compared import (
     DRIVE,
     FILE,
@@ -353,3 +357,32 @@ def test_an_image_built_from_any_file_agrees_with_it(shared_data: Path) -> None:
         for esi in read_esi(path).devices:
             differences = found(esi).against(esi, coe=False)
             assert [str(each) for each in differences if each.severity != "info"] == [], path
+
+
+def test_any_two_devices_can_be_compared(shared_data: Path) -> None:
+    """A wrong file with the right numbers gives a bounded number of differences."""
+    files = sorted((shared_data / "esi").glob("*.xml"))
+    devices = [esi for path in files for esi in read_esi(path).devices]
+    for one in devices:
+        device = found(one)
+        for other in devices:
+            differences = device.against(replace(other, key=one.key))
+            assert len(differences) < 150
+            assert all(each.sides.differ for each in differences)
+
+
+@given(st.data())
+def test_any_image_can_be_compared(data: st.DataObject) -> None:
+    image = bytearray(build_sii(DRIVE))
+    image[14:16] = CHECKSUM_DISABLED.to_bytes(2, "little")
+    for _ in range(data.draw(st.integers(1, 8))):
+        place = data.draw(st.integers(0, 700))
+        image[place] = data.draw(st.integers(0, 255))
+    image[14:24] = build_sii(DRIVE)[14:24]
+    image[14:16] = CHECKSUM_DISABLED.to_bytes(2, "little")
+    try:
+        sii = decode_sii(bytes(image))
+    except DecodeError:
+        return
+    for each in compare(described(bytes(image)), DRIVE, sii, found(DRIVE).coe):
+        assert str(each)

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Protocol, TypeVar
 
-from catenary.bus.segment_scan import station_of
 from catenary.errors import CatenaryError, DecodeError
 from catenary.esi.compare import another_device, compare
 from catenary.esi.default_modules import with_default_modules
@@ -13,10 +13,13 @@ from catenary.esi.device import EsiDevice
 from catenary.esi.difference import Difference
 from catenary.model.coe_facts import CoeFacts
 from catenary.model.device import DeviceDescription
+from catenary.procedure.al_state import read_state, request_state
 from catenary.procedure.coe_facts import Progress, Question, in_pre_op, read_coe_facts
 from catenary.procedure.exchange import Procedure
 from catenary.procedure.sii import read_image
 from catenary.procedure.sii_owner import with_eeprom
+from catenary.procedure.station import station_of
+from catenary.wire.al import AlState
 from catenary.wire.sii import CHECKSUM_DISABLED, CHECKSUM_WORD, Sii, decode_sii
 from catenary.wire.sii_categories import CoeDetails, SyncManagerUse
 
@@ -122,14 +125,20 @@ def _coe_facts(
     progress: Progress,
 ) -> CoeFacts | None:
     """Return the facts; None with a note if the mailbox of the device cannot be used."""
+    station = station_of(device)
     try:
-        facts = main.converse(
-            in_pre_op(
-                station_of(device),
-                device,
-                lambda channel: read_coe_facts(channel, question, progress),
+        before = main.converse(read_state(station)).state
+        try:
+            facts = main.converse(
+                in_pre_op(
+                    station, device, lambda channel: read_coe_facts(channel, question, progress)
+                )
             )
-        )
+        except KeyboardInterrupt:
+            if before is AlState.INIT:
+                with suppress(CatenaryError):
+                    main.converse(request_state(station, before))
+            raise
     except CatenaryError as error:
         hint = f" ({error.hint})" if error.hint else ""
         notes.append(f"{NOT_READ}{error.message}{hint}")

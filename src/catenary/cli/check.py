@@ -50,8 +50,8 @@ def _add_esi_options(parser: argparse.ArgumentParser) -> None:
         metavar="ESI",
         nargs="?",
         const="",
-        help="compare with an ESI file or a folder; without a value, with your library "
-        "(`catenary esi`)",
+        help="compare with an ESI file or a folder; without a value, with those of the machine "
+        "file, or with your library (`catenary esi`)",
     )
     parser.add_argument(
         "--position",

@@ -7,34 +7,21 @@ import json
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
-from typing import NamedTuple
 
 from catenary.bus import MainDevice, SubDevice
 from catenary.bus.esi_check import Comparison, Depth, check_device
 from catenary.cli import check_machine
+from catenary.cli.check_descriptions import Descriptions
 from catenary.cli.devices import device_at
-from catenary.cli.esi_commands import open_library
 from catenary.cli.failure import one_line
 from catenary.cli.parsers import note_other_masters
 from catenary.cli.progress import Progress
 from catenary.cli.text import escaped
-from catenary.errors import CatenaryError, EsiError
+from catenary.errors import CatenaryError
 from catenary.esi.device import EsiDevice
 from catenary.esi.difference import Difference, Severity
-from catenary.esi.library import ADD_HINT, Library
-from catenary.esi.record import Record
 
-SHOWN = 5  # descriptions that a message lists
 WIDTH = len("warning")
-
-
-class Description(NamedTuple):
-    """Place of the description for a device, the rule that chose it, and notes about the choice."""
-
-    record: Record
-    rule: str
-    notes: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,10 +46,15 @@ class Result:
 def run(arguments: argparse.Namespace) -> int:
     """Compare the devices with their ESIs, and with a machine file if one is given."""
     from catenary.machine import compare
+    from catenary.machine.esi_files import esi_places
     from catenary.target import MainDevice
 
     source, expected = check_machine.source_and_machine(arguments.file, arguments.target)
-    with _library(arguments.against) as library, MainDevice(source, force=True) as main:
+    places = None if expected is None else esi_places(expected)
+    with (
+        Descriptions.of(arguments.against, places) as descriptions,
+        MainDevice(source, force=True) as main,
+    ):
         note_other_masters(main)
         subs = main.passive_scan()
         machine = None if expected is None else compare(expected.tables.device, subs)
@@ -70,7 +62,8 @@ def run(arguments: argparse.Namespace) -> int:
         if arguments.position is not None:
             chosen = type(subs)([device_at(subs, arguments.position)])
         depth = _depth(arguments, main)
-        results = [_result(main, sub, library, depth, single=len(chosen) == 1) for sub in chosen]
+        single = len(chosen) == 1
+        results = [_result(main, sub, descriptions, depth, single=single) for sub in chosen]
     if arguments.json:
         values = None if machine is None else check_machine.as_values(machine)
         print(json.dumps({"machine": values, "devices": [*map(_values, results)]}, indent=2))
@@ -87,35 +80,6 @@ def _failed(results: Sequence[Result]) -> bool:
     return any(each.failed for each in results) or all(each.found is None for each in results)
 
 
-def _library(path: str) -> Library:
-    """Return the library of an option; the user's own if it is empty.
-
-    Raises:
-        EsiError: The path does not exist, or contains no description.
-    """
-    if not path:
-        return open_library(None)
-    library = open_library(path) if Path(path).exists() else Library.of(path)
-    if not library.records():
-        raise _empty(library)
-    return library
-
-
-def _empty(library: Library) -> EsiError:
-    """Return the error for files without a description: the first fault of these files."""
-    faults = [fault for file in library.files for fault in file.warnings]
-    library.close()
-    if not faults:
-        return EsiError("no device description found", file=str(library.path), hint=ADD_HINT)
-    fault = faults[0]
-    return EsiError(
-        fault.message,
-        file=fault.source.file,
-        line=fault.source.line,
-        hint="ask the vendor for an intact ESI file",
-    )
-
-
 def _depth(arguments: argparse.Namespace, main: MainDevice) -> Depth:
     if arguments.passive:
         return Depth(coe=False, reason="--passive")
@@ -126,7 +90,7 @@ def _depth(arguments: argparse.Namespace, main: MainDevice) -> Depth:
 
 
 def _result(
-    main: MainDevice, sub: SubDevice, library: Library, depth: Depth, *, single: bool
+    main: MainDevice, sub: SubDevice, descriptions: Descriptions, depth: Depth, *, single: bool
 ) -> Result:
     """Compare one device. A fault of it does not affect the others."""
     identity = sub.identity
@@ -134,45 +98,16 @@ def _result(
         notes = "".join(f": {note}" for note in sub.description.notes)
         return Result(sub, problem=f"its EEPROM has no identity{notes}")
     try:
-        chosen = _description(library, sub, single=single)
+        chosen = descriptions.find(sub, single=single)
         if chosen is None:
-            return Result(sub, problem=_no_description(library, sub), required=single)
-        esi = library.read(chosen.record)
+            return Result(sub, problem=descriptions.missing(sub), required=single)
         with Progress(f"device {sub.position}", "objects") as progress:
-            found = check_device(main, sub.description, esi, depth, progress)
+            found = check_device(main, sub.description, chosen.esi, depth, progress)
         found = replace(found, notes=(*chosen.notes, *found.notes))
-        return Result(sub, esi, chosen.rule, found)
+        return Result(sub, chosen.esi, chosen.rule, found)
     except CatenaryError as error:
         hint = f" ({error.hint})" if error.hint else ""
         return Result(sub, problem=f"{error.message}{hint}")
-
-
-def _description(library: Library, sub: SubDevice, *, single: bool) -> Description | None:
-    """Return the description for a device; None if there is none.
-
-    A single device is compared with the only product of a file even if the product differs.
-    """
-    identity = sub.identity
-    choice = library.choose(*identity[:3], order=sub.order)
-    if choice is not None:
-        record = choice.record or choice.candidates[-1]
-        others = tuple(f"{each.source} also describes it" for each in choice.records[1:])
-        return Description(record, str(choice.rule), others[:SHOWN])
-    records = library.records()
-    if single and len({each.key[:2] for each in records}) == 1:
-        return Description(records[0], "the only product")
-    return None
-
-
-def _no_description(library: Library, sub: SubDevice) -> str:
-    vendor, product = sub.identity.vendor, sub.identity.product
-    listed = [f"{each.entry.type} ({each.key})" for each in library.records()]
-    more = f" and {len(listed) - SHOWN} more" if len(listed) > SHOWN else ""
-    contents = f"it describes {', '.join(listed[:SHOWN])}{more}" if listed else "it is empty"
-    return (
-        f"no description of 0x{vendor:08X}:0x{product:08X} in {library.path}, {contents} "
-        f"({ADD_HINT})"
-    )
 
 
 def _lines(results: Sequence[Result]) -> Iterator[str]:
