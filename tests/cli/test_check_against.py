@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from catenary.bus import MainDevice
 from catenary.cli.main import main
 from tests.esi.esi_file import device, esi, write
 
@@ -216,3 +217,19 @@ def test_real_files_in_a_segment(
         0,
         "1 device of 1 compared: 0 errors, 0 warnings, 0 info",
     )
+
+
+def test_another_master_keeps_the_states(
+    segment: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = Path("own.xml")
+    mailbox = """<Mailbox><CoE SdoInfo="1"/></Mailbox>"""
+    text = path.read_text().replace("</TxPdo>", f"</TxPdo>{mailbox}")
+    sizes = """<Sm DefaultSize="128" StartAddress="#x1400" ControlByte="#x26">MBoxOut</Sm>
+        <Sm DefaultSize="128" StartAddress="#x1480" ControlByte="#x22">MBoxIn</Sm>"""
+    path.write_text(text.replace("<TxPdo ", f"{sizes}<TxPdo ", 1))
+    monkeypatch.setattr(MainDevice, "other_masters", ("another program",))
+    status, out, err = call(capsys, "check", segment, "--against", path)
+    assert status == 0
+    assert "note: another program; this command only reads" in err
+    assert "was not read: another master uses the segment (another program)" in out
