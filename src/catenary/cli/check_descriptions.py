@@ -85,22 +85,25 @@ class Descriptions:
             return Description(library.read(record), "the only product")
         return None
 
-    def missing(self, sub: SubDevice) -> str:
-        """Return the message for a device without a description."""
+    def missing(self, sub: SubDevice, *, single: bool) -> str:
+        """Return the message for a device without a description.
+
+        Args:
+            sub: The device.
+            single: True to list what the files describe.
+        """
         vendor, product = sub.identity.vendor, sub.identity.product
+        places = ", ".join(str(each.path) for each in self._libraries)
+        text = f"no description of 0x{vendor:08X}:0x{product:08X} in {places}"
         names = [
             f"{each.entry.type} ({each.key})"
             for library in self._libraries
             for each in library.records()
         ]
+        if not names:
+            return f"{text}: it is empty ({ADD_HINT})"
         more = f" and {len(names) - SHOWN} more" if len(names) > SHOWN else ""
-        contents = (
-            f"the files describe {', '.join(names[:SHOWN])}{more}" if names else "it is empty"
-        )
-        places = ", ".join(str(each.path) for each in self._libraries)
-        return (
-            f"no description of 0x{vendor:08X}:0x{product:08X} in {places}: {contents} ({ADD_HINT})"
-        )
+        return f"{text}, which describes {', '.join(names[:SHOWN])}{more}" if single else text
 
 
 def _opened(path: str) -> Library:

@@ -100,7 +100,7 @@ def _result(
     try:
         chosen = descriptions.find(sub, single=single)
         if chosen is None:
-            return Result(sub, problem=descriptions.missing(sub), required=single)
+            return Result(sub, problem=descriptions.missing(sub, single=single), required=single)
         with Progress(f"device {sub.position}", "objects") as progress:
             found = check_device(main, sub.description, chosen.esi, depth, progress)
         found = replace(found, notes=(*chosen.notes, *found.notes))

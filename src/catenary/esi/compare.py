@@ -96,9 +96,10 @@ def _key(vendor: int, product: int) -> str:
 
 
 def _revision(found: Identity, esi: EsiDevice) -> Iterator[Difference]:
-    """Yield the verdict on the revision: equal is good, otherwise `CheckRevisionNo` decides.
+    """Yield the verdict on the revision: if it is not equal, `CheckRevisionNo` decides.
 
-    Without a rule, Beckhoff's holds: a newer device replaces an older one (see `esi.lookup`).
+    Without a rule, a newer device may replace an older one, as Beckhoff states (see `esi.lookup`).
+    KickCAT accepts only an equal revision (leducp/KickCAT#430).
     """
     device, file = found.revision, esi.key.revision
     rule = esi.revision_check

@@ -41,7 +41,7 @@ def compare_clocks(
 
 def _missing_category(esi: EsiDevice, sii: Sii) -> Iterator[Difference]:
     if not esi.op_modes:
-        return  # an ESI without Dc says nothing about the SII
+        return  # without Dc in the ESI, there is nothing to compare with
     yield Difference(
         Severity.INFO,
         Subject.CLOCK,

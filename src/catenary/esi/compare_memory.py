@@ -105,7 +105,7 @@ def _mailbox(
                 area_text(manager.start, manager.default_size), area_text(own.address, own.length)
             ),
             manager.source,
-            f"the header of the SII has {area_text(area.offset, area.size)}; masters use either",
+            f"the header of the SII has {area_text(area.offset, area.size)}; masters use one or the other",
         )
     if not area.size or not manager.default_size:
         if area.size or manager.default_size:
@@ -200,7 +200,10 @@ def _sync_manager(manager: EsiSyncManager, own: SyncManagerEntry) -> Iterator[Di
 def _control(manager: EsiSyncManager, own: SyncManagerEntry, name: str) -> Difference:
     changed = manager.control ^ own.control
     if changed & TRANSFER_BITS:
-        severity, reason = Severity.ERROR, "buffering or direction differ; the device refuses them"
+        severity, reason = (
+            Severity.ERROR,
+            "buffering or direction differs, which the device refuses",
+        )
     elif changed & WATCHDOG_BIT:
         severity, reason = Severity.WARNING, "one of them disables the process-data watchdog"
     else:

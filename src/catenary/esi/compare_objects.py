@@ -136,17 +136,15 @@ def _entry(
 def _access_difference(
     each: EsiObject, entry: EsiObjectEntry, own: EntryFacts
 ) -> Iterator[Difference]:
-    """Yield the difference of the access rights. Further rights of the device do no harm."""
+    """Yield the difference of the access rights. Additional rights of the device are harmless."""
     given = entry.access if entry.access in RIGHTS else "ro"
     actual = "r" * own.readable + "w" * own.writable
     if not actual or set(RIGHTS[given]) == set(actual):
         return
     lacking = set(RIGHTS[given]) - set(actual)
     reason = "the device refuses this access" if lacking else "the device allows more than its ESI"
-    yield replace(
-        _difference(each, entry, "access", given, NAMES[actual], reason),
-        severity=Severity.WARNING if lacking else Severity.INFO,
-    )
+    found = _difference(each, entry, "access", given, NAMES[actual], reason)
+    yield found if lacking else replace(found, severity=Severity.INFO, advice="")
 
 
 def _difference(
@@ -194,6 +192,6 @@ def _rest(found: Sequence[Difference]) -> Difference:
         f"{len(found)} further differences of entries",
         Sides(", ".join(each.what.split(" ")[0] for each in found[:SHOWN]) + " ...", None, ""),
         found[0].source,
-        "the dictionary of the device is another one than that of the ESI",
+        "the dictionary of the device differs from that of the ESI",
         FIRMWARE,
     )

@@ -15,7 +15,7 @@ from catenary.model.device import Direction
 from catenary.wire.sii import Sii
 
 SHOWN = 8
-MEANING = "the process data have another meaning than the ESI gives them"
+MEANING = "the device and the ESI interpret the process data differently"
 
 
 def compare_pdos(esi: EsiDevice, sii: Sii | None, coe: CoeFacts | None) -> Iterator[Difference]:
@@ -122,7 +122,7 @@ def _severity(pdo: EsiPdo, views: Views, expected: Layout, coe: Layout | None) -
 
 def _reason(expected: Layout, coe: Layout | None) -> str:
     if coe == expected:
-        return "masters that use only the SII give the process data another meaning"
+        return "masters that use only the SII interpret the process data differently"
     return MEANING
 
 
