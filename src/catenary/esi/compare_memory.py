@@ -105,7 +105,7 @@ def _mailbox(
                 area_text(manager.start, manager.default_size), area_text(own.address, own.length)
             ),
             manager.source,
-            f"the header of the SII has {area_text(area.offset, area.size)}; a master uses only one",
+            f"the header of the SII has {area_text(area.offset, area.size)}",
         )
     if not area.size or not manager.default_size:
         if area.size or manager.default_size:
