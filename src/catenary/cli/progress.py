@@ -9,13 +9,15 @@ from typing import Self
 class Progress:
     """Progress line on stderr. It stays empty if stderr is not a terminal."""
 
-    def __init__(self, verb: str) -> None:
+    def __init__(self, verb: str, unit: str = "words") -> None:
         self._verb = verb
+        self._unit = unit
         self._shown = sys.stderr.isatty()
 
     def __call__(self, done: int, total: int) -> None:
         if self._shown:
-            print(f"\r{self._verb}: {done} of {total} words", end="", file=sys.stderr, flush=True)
+            line = f"\r{self._verb}: {done} of {total} {self._unit}"
+            print(line, end="", file=sys.stderr, flush=True)
 
     def __enter__(self) -> Self:
         return self
