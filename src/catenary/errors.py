@@ -58,6 +58,21 @@ class MachineFileError(ConfigurationError):
         self.key = key
 
 
+class EsiError(CatenaryError):
+    """An ESI file that cannot be used. `file` and `line` locate the fault, `reason` describes
+    it without the place.
+
+    `line` is None if the fault concerns the whole file.
+    """
+
+    def __init__(self, message: str, *, file: str, line: int | None = None, hint: str = ""):
+        place = ":".join(str(part) for part in (file, line) if part is not None)
+        super().__init__(f"{place}: {message}", hint=hint)
+        self.reason = message
+        self.file = file
+        self.line = line
+
+
 class LinkError(CatenaryError):
     """A network interface that cannot be used: unknown, down, without permission, or in use by
     another master."""

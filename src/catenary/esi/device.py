@@ -55,6 +55,7 @@ class EsiSyncManager:
     enabled: bool = True
     virtual: bool = False
     op_only: bool = False
+    fixed_assignment: bool = False  # the list of its PDOs cannot be changed
     name: str = ""  # text of the element: MBoxOut, Outputs ...
     source: Source = NO_SOURCE
 
@@ -262,6 +263,7 @@ class EsiModule:
     pdos: tuple[EsiPdo, ...] = ()
     init_commands: tuple[EsiInitCommand, ...] = ()
     dictionary: EsiDictionary | None = None
+    dictionary_file: str = ""  # file that contains the dictionary (`DictionaryFile`)
     source: Source = NO_SOURCE
 
 
@@ -277,6 +279,8 @@ class EsiDevice:
     physics: str = ""  # one letter per port: Y MII, K E-bus, H, blank
     revision_check: RevisionCheck = RevisionCheck.NONE
     hides: tuple[DeviceKey, ...] = ()  # older revisions that it replaces (`HideType`)
+    alternatives: tuple[DeviceKey, ...] = ()  # compatible devices (`AlternativeType`)
+    sub_devices: tuple[str, ...] = ()  # order codes of the devices inside it (`SubDevice`)
     profile: int | None = None  # `ProfileNo` of the first profile
     profile_channels: tuple[int, ...] = ()  # `ProfileNo` of each channel
     fmmus: tuple[str, ...] = ()  # texts: Outputs, Inputs, MBoxState ...
@@ -286,6 +290,7 @@ class EsiDevice:
     has_clock: bool = False  # True if the file has a `Dc` element
     op_modes: tuple[EsiOpMode, ...] = ()
     dictionary: EsiDictionary | None = None
+    dictionary_file: str = ""  # file that contains the dictionary (`DictionaryFile`)
     alternative_mappings: tuple[EsiMapping, ...] = ()
     slots: EsiSlots | None = None
     modules: tuple[EsiModule, ...] = ()  # modules that its slots accept, and that were found
@@ -320,4 +325,6 @@ class EsiFile:
     devices: tuple[EsiDevice, ...] = ()
     modules: tuple[EsiModule, ...] = ()
     groups: dict[str, str] = field(default_factory=dict)  # name by type
+    references: tuple[str, ...] = ()  # files with further modules (`InfoReference`)
+    dictionary: EsiDictionary | None = None  # of a file with the root EtherCATDict
     warnings: tuple[EsiWarning, ...] = ()

@@ -25,7 +25,7 @@ class EsiSubItem:
     bit_length: int
     bit_offset: int
     subindex: int | None = None  # None: counted from the order of the members
-    access: str = "ro"  # "ro", "rw" or "wo"
+    access: str = ""  # "ro", "rw" or "wo"; empty: that of the object
     pdo_mapping: str = ""  # "R" (RxPDO), "T" (TxPDO), "RT", or empty
     category: str = ""  # "m" (mandatory), "o" (optional), "c" (conditional), or empty
 
