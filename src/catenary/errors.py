@@ -73,6 +73,19 @@ class EsiError(CatenaryError):
         self.line = line
 
 
+class EsiLookupError(EsiError):
+    """A device without a suitable description in a library, or a name that several devices have.
+
+    `candidates` lists the descriptions that could be meant.
+    """
+
+    def __init__(
+        self, message: str, *, file: str, candidates: tuple[str, ...] = (), hint: str = ""
+    ) -> None:
+        super().__init__(message, file=file, hint=hint)
+        self.candidates = candidates
+
+
 class LinkError(CatenaryError):
     """A network interface that cannot be used: unknown, down, without permission, or in use by
     another master."""

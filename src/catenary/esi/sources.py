@@ -1,0 +1,148 @@
+"""Files and folders of a library, in the order in which they were added, and its lock."""
+
+from __future__ import annotations
+
+import fcntl
+import json
+import os
+import time
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import NamedTuple
+
+from catenary.errors import EsiError
+from catenary.esi.references import inside
+
+MAX_FILES = 20_000  # of one folder
+MAX_DEPTH = 16
+LOCK_TIMEOUT = 60.0  # [s]; an index of 45 MB takes 5 s
+POLL = 0.02  # [s]
+
+
+class Found(NamedTuple):
+    """XML file of a source."""
+
+    path: str
+    root: str  # folder that its references cannot leave
+    order: int  # of the source
+
+
+class Listing(NamedTuple):
+    """XML files of all sources, by path, and the sources that cannot be read."""
+
+    files: dict[str, Found]
+    problems: tuple[str, ...]
+
+
+def list_files(sources: Sequence[Path]) -> Listing:
+    """Return the XML files of files and folders.
+
+    A file that several sources contain belongs to the last one.
+
+    Args:
+        sources: Absolute paths.
+
+    Raises:
+        EsiError: A folder has too many files.
+    """
+    files: dict[str, Found] = {}
+    problems: list[str] = []
+    for order, source in enumerate(sources):
+        if source.is_dir():
+            for path in _walk(source, problems):
+                files[path] = Found(path, str(source), order)
+        elif source.is_file():
+            files[str(source)] = Found(str(source), str(source.parent), order)
+        else:
+            problems.append(f"{source}: missing; add it again, or remove it from the library")
+    return Listing(files, tuple(problems))
+
+
+def _walk(folder: Path, problems: list[str]) -> Iterator[str]:
+    def failed(error: OSError) -> None:
+        problems.append(f"{error.filename}: {error.strerror}")
+
+    count = 0
+    for place, folders, names in os.walk(folder, onerror=failed):
+        if len(Path(place).relative_to(folder).parts) >= MAX_DEPTH:
+            folders.clear()
+        folders[:] = sorted(each for each in folders if not each.startswith("."))
+        for name in sorted(each for each in names if each.lower().endswith(".xml")):
+            count += 1
+            if count > MAX_FILES:
+                raise EsiError(
+                    f"more than {MAX_FILES} XML files",
+                    file=str(folder),
+                    hint="add a smaller folder",
+                )
+            path = Path(place, name)
+            if path.is_file() and inside(path, folder):  # not a link that leaves the folder
+                yield str(path)
+
+
+def read_sources(file: Path) -> list[Path]:
+    """Return the sources that a library file lists; none if it does not exist.
+
+    Raises:
+        EsiError: The file is invalid.
+    """
+    try:
+        found = json.loads(file.read_text(encoding="utf-8"))["sources"]
+        return [Path(str(each)) for each in found]
+    except (FileNotFoundError, NotADirectoryError):
+        return []
+    except (ValueError, KeyError, TypeError) as error:
+        raise EsiError(
+            f"the list of ESI files is damaged: {error}",
+            file=str(file),
+            hint=f"delete {file} and add your files again: catenary esi add FOLDER",
+        ) from error
+
+
+def write_sources(file: Path, sources: Sequence[Path]) -> None:
+    """Replace the list of sources. A reader sees the old or the new one, never a part.
+
+    Args:
+        file: File of the library.
+        sources: Absolute paths.
+    """
+    text = json.dumps({"sources": [str(each) for each in sources]}, indent=1)
+    new = file.with_suffix(f".{os.getpid()}")
+    new.write_text(text + "\n", encoding="utf-8")
+    os.replace(new, file)
+
+
+@contextmanager
+def locked(file: Path | None, timeout: float = LOCK_TIMEOUT) -> Iterator[None]:
+    """Hold the lock of a library. Other processes that change it wait.
+
+    Args:
+        file: Lock file, created if needed; None for a library of this process alone.
+        timeout: Longest wait [s].
+
+    Raises:
+        EsiError: Another process holds the lock for longer.
+    """
+    if file is None:
+        yield
+        return
+    with open(file, "a", encoding="utf-8") as opened:
+        end = time.monotonic() + timeout
+        while not _try_lock(opened.fileno()):
+            if time.monotonic() > end:
+                raise EsiError(
+                    f"another process has changed the ESI library for {timeout:.0f} s",
+                    file=str(file),
+                    hint="wait for its `catenary esi add`, or end it",
+                )
+            time.sleep(POLL)
+        yield  # closing the file releases the lock
+
+
+def _try_lock(descriptor: int) -> bool:
+    try:
+        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return False
+    return True
