@@ -20,6 +20,7 @@ from catenary.link import RingLink
 from catenary.model.device import DeviceDescription, Direction, mapped_pdos
 from catenary.plan.clocks import SYNC_OBJECTS
 from catenary.plan.combination import gather_requests
+from catenary.plan.op_mode import mode_pdos
 from catenary.plan.pdo_search import any_carries
 from catenary.plan.planner import Plan
 from catenary.plan.request import DeviceRequest, ObjectReference, ProcessDataRequest
@@ -31,7 +32,12 @@ from catenary.procedure.configure import configure_process_data
 from catenary.procedure.exchange import Procedure
 from catenary.procedure.mailbox import MailboxChannel
 from catenary.procedure.names import name_entries
-from catenary.procedure.pdo import read_mapping, verify_mapping, write_downloads
+from catenary.procedure.pdo import (
+    read_mapping,
+    verify_mapping,
+    write_downloads,
+    write_in_safe_op,
+)
 from catenary.procedure.pdo_offers import read_offers, read_values
 from catenary.procedure.profile import read_object
 from catenary.procedure.station import within
@@ -118,6 +124,8 @@ def bring_to_safe_op(
             )
         )
     runner.run_all([request_state(sub.station, AlState.SAFE_OP) for sub in subs])
+    planned = zip(subs, plan.devices, strict=True)
+    runner.run_all([_finish(sub, device) for sub, device in planned if device.in_safe_op])
     for sub in subs:
         sub.state = AlState.SAFE_OP
     return measured
@@ -143,6 +151,8 @@ def _describe(sub: SubDevice, request: DeviceRequest) -> Procedure[DeviceDescrip
     device = yield from name_entries(channel, device)
     written = [(index, subindex) for index, subindex, _ in request.start_up]
     written += [(each.index, each.subindex) for each in request.objects]
+    commands = [each for each in device.init_commands if not each.complete_access]
+    written += [(each.index, each.subindex) for each in commands]
     if request.clock is not None:
         written += [(index, subindex) for index in SYNC_OBJECTS for subindex in (1, 2)]
     device = yield from read_values(channel, device, written)
@@ -151,7 +161,8 @@ def _describe(sub: SubDevice, request: DeviceRequest) -> Procedure[DeviceDescrip
         (Direction.INPUT, request.inputs),
     ):
         missing = _unmapped(device, direction, references)
-        if missing or request.written(direction):
+        chosen = request.written(direction) or mode_pdos(device, request.clock, direction)
+        if missing or chosen:
             device = yield from read_offers(channel, device, direction)
         required = [each for each in missing if each.required]
         device = yield from _with_objects(channel, device, required)
@@ -192,6 +203,11 @@ def _prepare(sub: SubDevice, plan: DevicePlan) -> Procedure[None]:
         writing = _write(_channel(sub), device, plan)
         yield from within(WRITE_TIMEOUT, sub.station, writing, "its configuration was")
     yield from configure_process_data(sub.station, device, plan)
+
+
+def _finish(sub: SubDevice, plan: DevicePlan) -> Procedure[None]:
+    writing = write_in_safe_op(_channel(sub), plan)
+    yield from within(WRITE_TIMEOUT, sub.station, writing, "its configuration was")
 
 
 def _write(channel: MailboxChannel, device: DeviceDescription, plan: DevicePlan) -> Procedure[None]:

@@ -7,7 +7,7 @@ from functools import partial
 from typing import TYPE_CHECKING
 
 from catenary.bus import event_types
-from catenary.bus.master import MasterOwner
+from catenary.bus.master import Complete, MasterOwner
 from catenary.bus.runner import BlockingRunner
 from catenary.bus.sdo import Objects, read_each
 from catenary.bus.segment_scan import ScannedDevice, find, oddities, with_places
@@ -45,11 +45,14 @@ class FrameMaster:
     def forget(self) -> None:
         """Do nothing: a forked child only holds the link, which the MainDevice releases."""
 
-    def scan(self) -> tuple[Sequence[SubDevice], tuple[str, ...]]:
+    def scan(self, complete: Complete) -> tuple[Sequence[SubDevice], tuple[str, ...]]:
         """Reset all devices, bring them to PRE-OP and read their descriptions.
 
         Return the handles of the devices, and notes about the segment. If a device cannot be
         brought to PRE-OP, its handle has the error.
+
+        Args:
+            complete: Function that adds the facts of ESI files to a description.
 
         Raises:
             LinkError: Another master refreshes the outputs of a device, unless `force`.
@@ -62,7 +65,7 @@ class FrameMaster:
         running_notes = self._judge_running(runner, device_count, states)
         runner.run(reset(device_count))
         registers, ring_notes = self._addressed(runner, device_count)
-        found = runner.run_all([find(each) for each in registers])
+        found = runner.run_all([find(each, complete) for each in registers])
         descriptions = with_places([each.description for each in found])
         subs = [
             self._handle(each._replace(description=description))

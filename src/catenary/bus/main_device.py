@@ -9,6 +9,7 @@ from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Self, TypeVar
 
 from catenary.bus import event_types
+from catenary.bus.esi_source import EsiPlace, EsiSource, open_source, unchanged
 from catenary.bus.event_queue import Callback, Callbacks, Events
 from catenary.bus.external_master import Carrier
 from catenary.bus.frame_master import FrameMaster
@@ -19,7 +20,7 @@ from catenary.bus.sdo import Objects
 from catenary.bus.segment_scan import check_identity
 from catenary.bus.sub_device import SubDevice
 from catenary.bus.sub_devices import SubDevices
-from catenary.errors import CatenaryError, SegmentError
+from catenary.errors import CatenaryError, EsiError, SegmentError
 from catenary.link import (
     Link,
     LinkSource,
@@ -228,6 +229,7 @@ class MainDevice:
         *,
         expected: Sequence[Identity | tuple[int, int] | None] | None = None,
         strict: bool = True,
+        esi: EsiPlace = None,
     ) -> SubDevices:
         """Find all devices, bring them to PRE-OP, and update `subs` and `notes`.
 
@@ -240,6 +242,9 @@ class MainDevice:
             strict: If True, raise the first error of a device, with further errors as notes; `subs`
                 still has all handles. If False, store each error in `SubDevice.error`, and raise it
                 when the device is used.
+            esi: ESI file, folder of ESI files, or a `Library`. None: the user's library
+                (`catenary esi`), if it exists. False: no ESI files. `SubDevice.esi` has the
+                description of each device; `notes` has contradictions to the device.
 
         Returns:
             All devices, by position.
@@ -250,10 +255,13 @@ class MainDevice:
             NoDeviceError: No device answers.
             IdentityError: A device is not the expected one.
             SegmentError: The number of devices is not the expected one.
+            EsiError: `esi` cannot be read, or describes none of the devices.
         """
         self.require_no_loop()
-        subs, self.notes = self.master.scan()
+        source = open_source(esi)
+        subs, self.notes = self.master.scan(unchanged if source is None else source.complete)
         self.subs = SubDevices(subs)
+        self._keep_esi(source, strict=strict)
         self._note_further_errors()
         self.deliver_events()
         if strict:
@@ -261,6 +269,20 @@ class MainDevice:
         if expected is not None:
             self._check_expected(expected)
         return self.subs
+
+    def _keep_esi(self, source: EsiSource | None, *, strict: bool) -> None:
+        """Store the ESI of each device. Check that given ESI files were used."""
+        for sub in self.subs:
+            sub.esi = None if source is None else source.found.get(sub.position)
+        if source is None:
+            return
+        self.notes += source.notes
+        try:
+            source.check_used([sub.description for sub in self.subs])
+        except EsiError as error:
+            if strict:
+                raise
+            self.notes += (error.message,)
 
     def passive_scan(self, *, names: bool = True) -> SubDevices:
         """Read the devices without changing a state or mapping, for diagnosis.

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Protocol, runtime_checkable
+from collections.abc import Callable, Mapping, Sequence
+from typing import TYPE_CHECKING, Protocol, TypeAlias, runtime_checkable
 
 from catenary.bus.event_queue import Events
 from catenary.bus.external_master import Carrier
@@ -19,6 +19,9 @@ if TYPE_CHECKING:  # plan imports NumPy, which a scan does not need
     from catenary.bus.states import Outcome
     from catenary.plan.planner import Plan
     from catenary.plan.request import ProcessDataRequest
+
+
+Complete: TypeAlias = Callable[[DeviceDescription], DeviceDescription]
 
 
 class MasterOwner(DeviceOwner, Protocol):
@@ -48,8 +51,12 @@ class Master(Protocol):
     def carrier(self) -> Carrier | None:
         """External master that exchanges the images; None if the loop sends its own frames."""
 
-    def scan(self) -> tuple[Sequence[SubDevice], tuple[str, ...]]:
-        """Bring all devices to PRE-OP. Return their handles, and notes about the segment."""
+    def scan(self, complete: Complete) -> tuple[Sequence[SubDevice], tuple[str, ...]]:
+        """Bring all devices to PRE-OP. Return their handles, and notes about the segment.
+
+        Args:
+            complete: Function that adds the facts of ESI files to a description.
+        """
 
     def passive_scan(self, *, names: bool) -> Sequence[DeviceDescription]: ...
 

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
+from catenary.bus.esi_source import unchanged
 from catenary.errors import CatenaryError, DecodeError, IdentityError, SegmentError
 from catenary.model.describe import describe
 from catenary.model.device import DeviceDescription, Identity
@@ -19,7 +20,7 @@ from catenary.procedure.pdo_offers import read_first_mapping
 from catenary.procedure.profile import read_profile
 from catenary.procedure.sii import read_image
 from catenary.procedure.sii_owner import hand_over
-from catenary.procedure.station import Station, within
+from catenary.procedure.station import Station, station_of, within
 from catenary.procedure.stations import StationRegisters
 from catenary.wire.al import AlState
 
@@ -35,14 +36,23 @@ class ScannedDevice(NamedTuple):
     error: CatenaryError | None = None
 
 
-def find(registers: StationRegisters) -> Procedure[ScannedDevice]:
-    """Bring one device to PRE-OP, or return its error. Other devices are not affected."""
+def find(
+    registers: StationRegisters,
+    complete: Callable[[DeviceDescription], DeviceDescription] = unchanged,
+) -> Procedure[ScannedDevice]:
+    """Bring one device to PRE-OP, or return its error. Other devices are not affected.
+
+    Args:
+        registers: Registers of the device.
+        complete: Function that adds the facts of its ESI to the description from its SII.
+    """
     device = unread(registers)
     station = Station(registers.position, registers.station_address)  # its name is not known yet
     try:
-        device = yield from within(READ_TIMEOUT, station, identify(registers))
+        device = complete((yield from within(READ_TIMEOUT, station, identify(registers))))
         station = station_of(device)
-        return (yield from within(BRING_UP_TIMEOUT, station, bring_to_pre_op(device)))
+        patience = BRING_UP_TIMEOUT + (device.timeouts.pre_op or 0.0)
+        return (yield from within(patience, station, bring_to_pre_op(device)))
     except (DecodeError, ValueError) as error:  # the device sent invalid data
         return ScannedDevice(device, error=_unreadable(station, error))
     except CatenaryError as error:
@@ -54,11 +64,6 @@ def _unreadable(station: Station, error: Exception) -> SegmentError:
         f"{station}: cannot use the data of the device: {error}",
         hint="its EEPROM or its firmware is faulty; please report it",
     )
-
-
-def station_of(device: DeviceDescription) -> Station:
-    """Return the station of a device, with its name for error messages."""
-    return Station(device.position, device.station_address, device.name)
 
 
 def bring_to_pre_op(device: DeviceDescription) -> Procedure[ScannedDevice]:

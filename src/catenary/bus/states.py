@@ -12,7 +12,7 @@ from catenary.plan.planner import make_plan
 from catenary.procedure.al_state import DeviceState, read_state, request_state
 from catenary.procedure.exchange import Procedure
 from catenary.procedure.state_path import bring_to_safe_op, climb, restart
-from catenary.procedure.station import Station
+from catenary.procedure.station import Station, station_of
 from catenary.wire.al import AlState
 
 T = TypeVar("T")
@@ -103,4 +103,4 @@ def _climb(device: DeviceDescription, target: AlState) -> Procedure[DeviceState]
 
 
 def _station(device: DeviceDescription) -> Station:
-    return Station(device.position, device.station_address, device.name)
+    return station_of(device)

@@ -11,12 +11,13 @@ from catenary.errors import CatenaryError
 from catenary.model.device import DeviceDescription, Identity
 from catenary.procedure.al_state import DeviceState, read_state
 from catenary.procedure.mailbox import MailboxChannel
-from catenary.procedure.station import Station
+from catenary.procedure.station import Station, station_of
 from catenary.wire.al import AlState
 from catenary.wire.coe import Emergency
 
 if TYPE_CHECKING:  # plan imports NumPy, which a scan does not need
     from catenary.bus.states import Outcome
+    from catenary.esi.device import EsiDevice
 
 
 class DeviceOwner(Conversations, Protocol):
@@ -50,6 +51,7 @@ class SubDevice:
         self.error: CatenaryError | None = None  # of the last scan, if PRE-OP was not reached
         # 0x1C32:01 and 0x1C33:01 before the first loop with clocks, to restore them
         self.sync_types: dict[int, bytes] = {}
+        self.esi: EsiDevice | None = None  # ESI that the last scan used for it
         self.sdo = Sdo(self)
 
     @property
@@ -105,7 +107,7 @@ class SubDevice:
     @property
     def station(self) -> Station:
         """Station address, with position and name for messages."""
-        return Station(self.position, self.description.station_address, self.name)
+        return station_of(self.description)
 
     def read_state(self) -> DeviceState:
         """Read the EtherCAT state of the device, and update `state`."""

@@ -6,7 +6,7 @@ import ctypes
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-from catenary.errors import SdoAbort
+from catenary.errors import ConfigurationError, SdoAbort
 from catenary.igh import abi
 from catenary.igh._ecrt import Exchange
 from catenary.igh.address import Address, addresses
@@ -14,9 +14,10 @@ from catenary.igh.reservation import Reservation
 from catenary.model.device import DeviceDescription, Direction, Pdo
 from catenary.plan.clocks import SyncPlan
 from catenary.plan.cycle import ClockPlan
+from catenary.plan.download import Download
 from catenary.plan.layout import UnitLayout
 from catenary.plan.planner import Plan
-from catenary.plan.start_up import WATCHDOG_DIVIDER, DevicePlan, Download
+from catenary.plan.start_up import WATCHDOG_DIVIDER, DevicePlan
 from catenary.procedure.pdo import OPTIONAL_ABORTS
 
 EMERGENCIES = 16  # largest number that the master stores for each device
@@ -136,7 +137,15 @@ def _device(
     if not config:
         raise _no_handle(f"{label}: no configuration")
     _configure_process_data(master, plan, config, label)
-    for download in (*plan.before_mapping, *plan.start_up):
+    # The master writes SDOs only in PRE-OP, also those that an ESI requires in SAFE-OP.
+    for download in (
+        *plan.init_commands,
+        *plan.before_mapping,
+        *plan.start_up,
+        *plan.in_safe_op,
+    ):
+        if download.complete_access:
+            raise _no_complete_access(label, download)
         data = ctypes.create_string_buffer(download.data, len(download.data))
         if download.optional:
             # Write it now: the master stops configuring a device that refuses a start-up SDO.
@@ -234,6 +243,14 @@ def _register(
             copies = domain.outputs if output else domain.inputs
             copies.append((found, offset, assignment.byte_length))
             offset += assignment.byte_length
+
+
+def _no_complete_access(label: str, download: Download) -> ConfigurationError:
+    return ConfigurationError(
+        f"{label}: start-up object {download.place} (ESI {download.source}) needs complete access, "
+        "which is not available with libethercat",
+        hint="give its entries as start_up= objects; they replace it",
+    )
 
 
 def _no_handle(what: str) -> MemoryError:

@@ -56,15 +56,18 @@ class KernelMaster:
         """The reserved master."""
         return self._kernel.reservation
 
-    def scan(self) -> tuple[Sequence[SubDevice], tuple[str, ...]]:
+    def scan(self, complete: Complete) -> tuple[Sequence[SubDevice], tuple[str, ...]]:
         """Return the devices that the master has found and brought to PRE-OP.
+
+        Args:
+            complete: Function that adds the facts of ESI files to a description.
 
         Raises:
             NoDeviceError: The master found no device.
         """
         count = self.reservation.device_count()
         self.reservation.wait_preop()
-        found = [describe(self.reservation, position) for position in range(count)]
+        found = [complete(describe(self.reservation, position)) for position in range(count)]
         if not found:
             raise NoDeviceError(
                 f"{self.reservation.name}: the master found no device",
@@ -73,7 +76,8 @@ class KernelMaster:
         subs = [self._handle(description) for description in found]
         for sub in subs:
             sub.read_state()
-        return subs, ()
+        notes = tuple(f"{each}: {note}" for each in found for note in each.notes)
+        return subs, notes
 
     def read_mappings(self, requests: Sequence[ProcessDataRequest], period_ns: int) -> None:
         """Read the mapped PDOs, and the lengths of requested objects that are not mapped.
@@ -88,6 +92,8 @@ class KernelMaster:
         for sub in self.main.subs:
             renewed = describe(self.reservation, sub.position)
             _check_same(sub.description, renewed)
+            if sub.esi is not None:
+                renewed = applied(renewed, sub.esi)
             objects = [
                 object_information(self.reservation, sub.position, index, subindex)
                 for index, subindex in _unmapped(renewed, asked.get(sub.position))

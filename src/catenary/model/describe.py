@@ -180,6 +180,7 @@ def _mailbox(sii: Sii, notes: list[str]) -> MailboxLayout | None:
         sdo_information=CoeDetails.SDO_INFORMATION in coe,
         pdo_assign=unknown or CoeDetails.PDO_ASSIGN in coe,
         pdo_configuration=unknown or CoeDetails.PDO_CONFIGURATION in coe,
+        stated=not unknown,
     )
 
 

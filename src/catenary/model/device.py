@@ -1,7 +1,8 @@
 """Description of a SubDevice: identity, memory, mailbox, SyncManagers, PDOs.
 
 The sources are its registers (ETG.1000.4 §6.1), its SII (ETG.1000.6 §5.4, ETG.2010) and, if
-present, its object dictionary (ETG.1000.6 §5.6.7.4). This module does not access the network.
+present, its object dictionary (ETG.1000.6 §5.6.7.4) and its ESI file (ETG.2000). This module does
+not access the network. A `source` is file and line of a fact from an ESI file; empty for others.
 """
 
 from __future__ import annotations
@@ -11,6 +12,15 @@ from dataclasses import dataclass, replace
 from enum import IntEnum
 from typing import NamedTuple
 
+from catenary.model.esi_settings import (
+    NO_TIMEOUTS,
+    NO_WATCHDOG_VALUES,
+    InitCommand,
+    ModeAssignment,
+    NamedMapping,
+    Timeouts,
+    WatchdogValues,
+)
 from catenary.wire.features import Information
 from catenary.wire.sii import MailboxProtocol
 from catenary.wire.sii_categories import SyncManagerUse
@@ -65,6 +75,8 @@ class MailboxLayout:
     sdo_information: bool = False
     pdo_assign: bool = False  # 0x1C1x can be written
     pdo_configuration: bool = False  # 0x16xx and 0x1Axx can be written
+    stated: bool = True  # False if the SII does not state the four properties
+    source: str = ""
 
     @property
     def coe(self) -> bool:
@@ -82,6 +94,7 @@ class SyncManager:
     length: int  # [bytes]; for process data, the size of the default mapping
     control: int  # register 0x0804 + 8·index
     enabled: bool = True
+    source: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,6 +106,8 @@ class Entry:
     bit_length: int
     name: str = ""
     data_type: int = 0  # ETG.1000.6 table 64; 0 if unknown
+    unit: str = ""  # from an ESI file
+    enumeration: tuple[tuple[int, str], ...] = ()  # values with texts, from an ESI file
 
     @property
     def place(self) -> tuple[int, int, int]:
@@ -115,6 +130,9 @@ class Pdo:
     mandatory: bool = False  # cannot be removed from the assignment
     name: str = ""
     excludes: frozenset[int] = frozenset()  # PDOs that cannot be assigned together with it (ESI)
+    excluded_sync_managers: frozenset[int] = frozenset()  # it cannot be assigned to these (ESI)
+    missing: bool = False  # its ESI has it, but its dictionary does not
+    source: str = ""
 
     @property
     def bit_length(self) -> int:
@@ -157,6 +175,11 @@ class OpMode:
     shift_ns: int = 0
     sync1_factor: int = 0
     sync1_shift_ns: int = 0
+    shift_factor: int = 0  # multiple of SYNC0 that is added to the shift
+    shift_of_inputs: bool = False  # the shift counts from the start of the frames
+    sync1_ns: int = 0  # cycle time of SYNC1; if it is 0, `sync1_factor` applies
+    assignments: tuple[ModeAssignment, ...] = ()  # empty: the mode keeps the assignment
+    source: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -172,6 +195,8 @@ class ObjectInformation:
     name: str = ""
     note: str = ""  # the reason if the dictionary does not describe it
     readable: bool = True  # False if it is write-only according to the dictionary
+    unit: str = ""  # from an ESI file
+    enumeration: tuple[tuple[int, str], ...] = ()  # values with texts, from an ESI file
 
 
 @dataclass(frozen=True, slots=True)
@@ -204,15 +229,21 @@ class DeviceDescription:
     parent: int | None = None  # position of the device before it in the tree
     parent_port: int | None = None
     system_time: bool = False  # the device has a clock that can be synchronised (0x0910)
-    op_modes: tuple[OpMode, ...] = ()  # modes of distributed clocks, in the order of the SII
+    op_modes: tuple[OpMode, ...] = ()  # modes of distributed clocks, in the order of ESI or SII
     group: str = ""
     order: str = ""
     device_type: int | None = None  # object 0x1000
     slots: tuple[int, ...] = ()  # CiA 402 axes: objects + 0x800·slot
     objects: tuple[ObjectInformation, ...] = ()  # dictionary entries that were read
     values: tuple[ObjectValue, ...] = ()  # present values of objects in a start-up list
-    mapping_source: str = "SII"  # or "CoE", or "IgH master"
+    mapping_source: str = "SII"  # or "CoE", "IgH master", "ESI FILE:LINE"
     notes: tuple[str, ...] = ()  # faults of its SII, or differences from its dictionary
+    esi: str = ""  # file and line of its ESI; empty without one
+    documented: tuple[ObjectInformation, ...] = ()  # dictionary of its ESI
+    init_commands: tuple[InitCommand, ...] = ()
+    named_mappings: tuple[NamedMapping, ...] = ()
+    timeouts: Timeouts = NO_TIMEOUTS
+    watchdog: WatchdogValues = NO_WATCHDOG_VALUES
 
     @property
     def profile(self) -> int | None:
@@ -279,6 +310,24 @@ class DeviceDescription:
             if (known.index, known.subindex) == (index, subindex):
                 return known
         return None
+
+    def documented_object(self, index: int, subindex: int) -> ObjectInformation | None:
+        """Return the description of a dictionary entry, from the device or its ESI.
+
+        That of the device counts, unless it has no data type.
+
+        Args:
+            index: The index of the object.
+            subindex: The subindex of the entry.
+        """
+        read = self.known_object(index, subindex)
+        if read is not None and read.data_type:
+            return read
+        for each in self.documented:
+            if (each.index, each.subindex) == (index, subindex):
+                agrees = read is None or read.bit_length in (0, each.bit_length)
+                return each if agrees else read
+        return read
 
     def known_value(self, index: int, subindex: int) -> bytes | None:
         """Return the value of a dictionary entry; None if it was not or could not be read.

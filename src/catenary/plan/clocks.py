@@ -14,19 +14,19 @@ from __future__ import annotations
 import math
 import struct
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 from catenary.errors import ConfigurationError
 from catenary.model.device import DeviceDescription, OpMode
 from catenary.plan.cycle import ClockPlan, ExecutionMode, FollowedClock, FramePlan
+from catenary.plan.op_mode import SYNC_BY_ECAT, choose_mode, starts_sync
 from catenary.wire.clock import Activation
 from catenary.wire.frame import wire_time_ns
 
 if TYPE_CHECKING:  # request.py imports NumPy, which a scan does not need
     from catenary.plan.request import DistributedClock
 
-SYNC_BY_ECAT = 0x0300  # AssignActivate: cyclic operation and SYNC0, controlled by EtherCAT
 BURST = 15_000  # frames: ESC data sheet I §9.1.5; KickCAT uses 15 000, ethercrab 10 000
 START_DELAY_NS = 100_000_000  # until the first SYNC pulse, as in SOEM (`SyncDelay`) and IgH
 HOP_NS = 1000  # delay of a device and its cable: 0.3 µs by E-bus, up to 1 µs by Ethernet PHYs
@@ -56,7 +56,9 @@ class SyncPlan:
     cycle_ns: int  # of SYNC0
     sync1_ns: int  # from SYNC0 to SYNC1
     shift_ns: int  # of SYNC0 after the common SYNC0 time
-    op_mode: str = ""  # name of the OpMode in the SII that it follows
+    op_mode: str = ""  # name of the OpMode in the ESI or SII that it follows
+    # Source of the OpMode: "ESI drive.xml:12" or "SII"; empty without an OpMode
+    source: str = field(default="", compare=False)
 
     @property
     def activation(self) -> Activation:
@@ -128,19 +130,22 @@ def choose_clocks(
     )
 
 
-def make_sync(device: DeviceDescription, request: DistributedClock, period_ns: int) -> SyncPlan:
-    """Return the settings of a device's SYNC unit, as requested or from the OpMode in its SII.
+def make_sync(
+    device: DeviceDescription, request: DistributedClock, period_ns: int, lead_ns: int = 0
+) -> SyncPlan:
+    """Return the settings of a device's SYNC unit, as requested or from its OpMode.
 
     Args:
         device: Device.
         request: Clock request.
         period_ns: Period of the device's exchange [ns].
+        lead_ns: Time from the start of the frames to the common SYNC0 time [ns].
 
     Raises:
-        ConfigurationError: The SII has no OpMode with the requested name, or a setting is
+        ConfigurationError: The device has no OpMode with the requested name, or a setting is
             impossible.
     """
-    mode = _op_mode(device, request)
+    mode = choose_mode(device, request)
     cycle_ns = _in_ns(request.sync0, mode.sync0_ns or _multiple(period_ns, mode.sync0_factor))
     assign = mode.assign_activate if request.assign_activate is None else request.assign_activate
     if request.sync1 is not None:
@@ -151,7 +156,10 @@ def make_sync(device: DeviceDescription, request: DistributedClock, period_ns: i
         _in_ns(request.sync1, _sync1_ns(mode, cycle_ns, period_ns)),
         _in_ns(request.shift, mode.shift_ns),
         mode.name,
+        _source(device, mode),
     )
+    if request.shift is None and (mode.shift_factor or mode.shift_of_inputs):
+        plan = replace(plan, shift_ns=_derived_shift_ns(mode, plan, lead_ns))
     _check_sync(device, request, plan, period_ns)
     return plan
 
@@ -254,45 +262,17 @@ def _no_clock(device: DeviceDescription, why: str) -> ConfigurationError:
     )
 
 
-def _op_mode(device: DeviceDescription, request: DistributedClock) -> OpMode:
-    """Return the OpMode with the requested name.
-
-    Without a name, return the first one that starts SYNC0 or, if there is none, SYNC1. If there is
-    none of these either, return a mode with SYNC0 in every period.
-
-    Raises:
-        ConfigurationError: The SII has no OpMode with this name.
-    """
-    if request.op_mode is not None:
-        return _named_mode(device, request.op_mode)
-    for starts in (_starts_sync0, _starts_sync):
-        for mode in device.op_modes:
-            if starts(mode.assign_activate):
-                return mode
-    return OpMode(assign_activate=SYNC_BY_ECAT)
-
-
-def _named_mode(device: DeviceDescription, name: str) -> OpMode:
-    for mode in device.op_modes:
-        if mode.name.casefold() == name.casefold():
-            return mode
-    known = ", ".join(repr(mode.name) for mode in device.op_modes)
-    raise ConfigurationError(
-        f"{device}: its EEPROM has no OpMode {name!r}; it has {known or 'none'}",
-        hint="choose one of these" * bool(known)
-        or "use the values of its ESI file: cat.DistributedClock(assign_activate=..., sync0=...)",
-    )
-
-
 def _check_sync(
     device: DeviceDescription, request: DistributedClock, plan: SyncPlan, period_ns: int
 ) -> None:
     """Raise ConfigurationError for impossible values.
 
-    The error names the EEPROM if a value comes from it, because the program does not show it.
+    The error names the ESI or EEPROM if a value comes from it, as the program does not show it.
     """
-    eeprom = f"{device}: its EEPROM (OpMode {plan.op_mode!r})"
-    if not _starts_sync(plan.assign_activate):
+    esi = plan.source.removeprefix("ESI ") if plan.source.startswith("ESI ") else ""
+    eeprom = f"{device}: {esi or 'its EEPROM'} (OpMode {plan.op_mode!r})"
+    file = "ESI" if esi else "EEPROM"
+    if not starts_sync(plan.assign_activate):
         own = request.assign_activate is None
         raise ConfigurationError(
             f"{eeprom if own else device}: AssignActivate 0x{plan.assign_activate:04X} does "
@@ -312,7 +292,7 @@ def _check_sync(
             f"{eeprom if own else device}: SYNC0 every {plan.cycle_ns / 1e3:g} us does not fit "
             f"a period of {period_ns / 1e3:g} us",
             hint="one must be a multiple of the other: change the period"
-            + f", or override the EEPROM: {replace(request, sync0=period_ns / 1e9)}" * own,
+            + f", or override the {file}: {replace(request, sync0=period_ns / 1e9)}" * own,
         )
     if abs(plan.shift_ns) >= plan.span_ns:
         own = request.shift is None
@@ -320,7 +300,7 @@ def _check_sync(
             f"{eeprom if own else device}: a shift of {_time(plan.shift_ns)} is not less than the "
             f"cycle of {_time(plan.span_ns)}",
             hint="use a shift of less than one cycle"
-            + f"; override the EEPROM: {replace(request, shift=0.0)}" * own,
+            + f"; override the {file}: {replace(request, shift=0.0)}" * own,
         )
 
 
@@ -330,18 +310,6 @@ def _time(ns: int) -> str:
 
 def _in_ns(seconds: float | None, default_ns: int) -> int:
     return default_ns if seconds is None else round(seconds * 1e9)
-
-
-def _starts_sync0(assign_activate: int) -> bool:
-    """Return True if SYNC0 runs. Otherwise, shifts are meaningless (pollen_Orbita2d.bin: 1.9 s)."""
-    return assign_activate & SYNC_BY_ECAT == SYNC_BY_ECAT
-
-
-def _starts_sync(assign_activate: int) -> bool:
-    """Return True if SYNC0 or SYNC1 runs. SYNC1 alone: 0x0500, robert-burger/libethercat#21."""
-    signals = Activation(assign_activate >> 8)
-    running = Activation.CYCLIC_OPERATION in signals
-    return running and bool(signals & (Activation.SYNC0 | Activation.SYNC1))
 
 
 def _multiple(period_ns: int, factor: int) -> int:
@@ -354,6 +322,25 @@ def _multiple(period_ns: int, factor: int) -> int:
     return period_ns * (factor or 1)
 
 
+def _derived_shift_ns(mode: OpMode, plan: SyncPlan, lead_ns: int) -> int:
+    """Return the time of SYNC0 after the common SYNC0 time.
+
+    ETG.2000, Dc/OpMode/ShiftTimeSync0: @Factor adds SYNC0 cycles, and @Input counts from the start
+    of the frames instead of the outputs. Inputs are then ready for the next frame: an EL3702 has
+    -10 us and the factor 1, so SYNC0 fires 10 us before the frames.
+    """
+    shift_ns = mode.shift_ns + mode.shift_factor * plan.cycle_ns
+    if mode.shift_of_inputs:
+        shift_ns -= lead_ns
+    return shift_ns % plan.span_ns if plan.cycle_ns else shift_ns
+
+
+def _source(device: DeviceDescription, mode: OpMode) -> str:
+    if mode.source:
+        return f"ESI {mode.source}"
+    return "SII" if mode in device.op_modes else ""
+
+
 def _sync1_ns(mode: OpMode, cycle_ns: int, period_ns: int) -> int:
     """Return register 0x09A4: the time from SYNC0 to the SYNC1 that follows it.
 
@@ -364,6 +351,8 @@ def _sync1_ns(mode: OpMode, cycle_ns: int, period_ns: int) -> int:
     notes on DC clocks).
     """
     span_ns = -mode.sync1_factor * period_ns
-    if mode.sync1_factor >= 0:
+    if mode.sync1_ns:
+        span_ns = mode.sync1_ns
+    elif mode.sync1_factor >= 0:
         span_ns = (mode.sync1_factor or 1) * cycle_ns
     return max(0, span_ns - cycle_ns + mode.sync1_shift_ns)

@@ -10,8 +10,9 @@ Order of preference:
 
 An optional object alone never causes a write. The device may refuse it although its SII allows it,
 and the bring-up would fail for an object that is not needed. A mapping that the application
-specifies is tried regardless of the SII, because the permission bits of SIIs are often wrong. IgH
-(fsm_pdo.c) also honours both bits, but warns and continues.
+specifies by numbers is tried regardless of the SII, because the permission bits of SIIs are often
+wrong. IgH (fsm_pdo.c) also honours both bits, but warns and continues. PDOs that the application
+chooses by their names follow the rules of the ESI (`named_pdos.py`).
 """
 
 from __future__ import annotations
@@ -22,6 +23,7 @@ from typing import TYPE_CHECKING, NoReturn
 
 from catenary.errors import MappingError
 from catenary.model.device import DeviceDescription, Direction, mapped_entries
+from catenary.plan.named_pdos import check_rules
 from catenary.plan.pdo_mapping import (
     Mapping,
     assignment_refusal,
@@ -67,6 +69,7 @@ def make_mapping(
     """
     requested = tuple(dict.fromkeys(requested))
     if written:
+        check_rules(device, direction, written)
         mapping = write_down(device, direction, written)
         _check_written(device, direction, mapping, requested)
     else:

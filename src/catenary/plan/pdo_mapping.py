@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping as Lists
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, NamedTuple
@@ -25,6 +26,7 @@ class Mapping:
     reassigned: tuple[int, ...] = ()  # SyncManagers with another list of PDOs
     rejected: tuple[str, ...] = ()  # alternatives that change less, and their obstacles
     left_out: tuple[ObjectReference, ...] = ()  # optional objects that are not mapped
+    source: str = ""  # of the OpMode or the named mapping that chose the PDOs
 
     @property
     def changed(self) -> bool:
@@ -77,7 +79,9 @@ def available_pdos(device: DeviceDescription, direction: Direction) -> Available
     taken = {pdo.index for pdo in elsewhere}
     return AvailablePdos(
         assigned=mapped_pdos(each for each in assignments if each.sync_manager == channel),
-        offered=tuple(pdo for pdo in device.pdos(direction) if pdo.index not in taken),
+        offered=tuple(
+            pdo for pdo in device.pdos(direction) if pdo.index not in taken and not pdo.missing
+        ),
         elsewhere=elsewhere,
     )
 
@@ -107,16 +111,35 @@ def with_pdos(device: DeviceDescription, direction: Direction, pdos: Sequence[Pd
     Raises:
         MappingError: The device has no SyncManager for the direction.
     """
-    channel = check_channel(device, direction)
+    return with_lists(device, direction, {check_channel(device, direction): pdos})
+
+
+def with_lists(
+    device: DeviceDescription, direction: Direction, lists: Lists[int, Sequence[Pdo]]
+) -> Mapping:
+    """Return the mapping with other lists of PDOs on some SyncManagers.
+
+    Differences from the device's own mapping are marked as rewritten or reassigned.
+
+    Args:
+        device: The device, with its present mapping.
+        direction: Outputs or inputs.
+        lists: PDOs by SyncManager.
+    """
     now = {each.sync_manager: each for each in device.assignments(direction)}
-    before = now.get(channel, Assignment(channel, ()))
-    now[channel] = replace(before, pdos=tuple(pdos))
+    reassigned = []
+    for channel, pdos in lists.items():
+        before = now.get(channel, Assignment(channel, ()))
+        if [pdo.index for pdo in before.pdos] != [pdo.index for pdo in pdos]:
+            reassigned.append(channel)
+        now[channel] = replace(before, pdos=tuple(pdos))
     known = {pdo.index: shape(pdo) for pdo in device.pdos(direction)}
-    same = [pdo.index for pdo in before.pdos] == [pdo.index for pdo in pdos]
     return Mapping(
         tuple(now[channel] for channel in sorted(now)),
-        rewritten=tuple(pdo for pdo in pdos if known.get(pdo.index) != shape(pdo)),
-        reassigned=() if same else (channel,),
+        rewritten=tuple(
+            pdo for pdos in lists.values() for pdo in pdos if known.get(pdo.index) != shape(pdo)
+        ),
+        reassigned=tuple(reassigned),
     )
 
 

@@ -8,7 +8,14 @@ from typing import TYPE_CHECKING
 
 from catenary.errors import MappingError
 from catenary.model.device import DeviceDescription, Direction, Entry, Pdo, mapped_entries
-from catenary.plan.pdo_mapping import Mapping, assignment_refusal, available_pdos, with_pdos
+from catenary.plan.pdo_mapping import (
+    Mapping,
+    assignment_refusal,
+    available_pdos,
+    check_channel,
+    with_lists,
+    with_pdos,
+)
 from catenary.plan.pdo_search import carries, pdo_names
 
 if TYPE_CHECKING:  # request.py imports NumPy, which a scan does not need
@@ -69,23 +76,70 @@ def write_down(
 ) -> Mapping:
     """Return the mapping of exactly these PDOs, in this order.
 
+    The PDOs of an OpMode for a device without CoE only change the lengths of its SyncManagers.
+
     Raises:
         MappingError: The entries of a PDO are neither specified nor known, or the device has no
             SyncManager for them.
     """
     known = {pdo.index: pdo for pdo in device.pdos(direction)}
-    pdos = []
+    lists: dict[int, list[Pdo]] = {}
+    copies: set[int] = set()
     for each in written:
-        pdo = known.get(each.index, Pdo(each.index, (), None))
-        if each.entries is not None:
-            pdo = replace(pdo, entries=tuple(_entry(device, entry) for entry in each.entries))
-        elif each.index not in known:
-            raise MappingError(
-                f"{device}: neither its dictionary nor its SII has PDO 0x{each.index:04X}",
-                hint=f"specify its entries; the device has {pdo_names(device.pdos(direction))}",
-            )
-        pdos.append(pdo)
-    return with_pdos(device, direction, pdos)
+        pdo = _written_pdo(device, direction, each, known)
+        pdos = lists.setdefault(_channel(device, direction, each, pdo), [])
+        pdos += [replace(pdo, index=pdo.index + k) for k in range(each.copies)]
+        copies.update(range(pdo.index + 1, pdo.index + each.copies))
+    mapping = with_lists(device, direction, lists)
+    rewritten = tuple(pdo for pdo in mapping.rewritten if pdo.index not in copies)
+    mapping = replace(mapping, source=_source(written), rewritten=rewritten)
+    if not device.coe and all(each.source for each in written):
+        return replace(mapping, rewritten=(), reassigned=())
+    return mapping
+
+
+def _source(written: Sequence[WrittenPdo]) -> str:
+    """Return the sources of PDOs that an OpMode or a named mapping chose."""
+    found = dict.fromkeys(each.source for each in written if each.source)
+    return ", ".join(f"ESI {source}" for source in found)
+
+
+def _written_pdo(
+    device: DeviceDescription,
+    direction: Direction,
+    written: WrittenPdo,
+    known: dict[int, Pdo],
+) -> Pdo:
+    pdo = known.get(written.index, Pdo(written.index, (), None))
+    if pdo.missing:
+        raise MappingError(
+            f"{device}: its ESI has PDO 0x{pdo.index:04X} {pdo.name!r} ({pdo.source}), but its "
+            "dictionary does not",
+            hint="the ESI file is for another firmware: get the one of this revision, or choose "
+            "another PDO",
+        )
+    if written.entries is not None:
+        return replace(pdo, entries=tuple(_entry(device, entry) for entry in written.entries))
+    if written.index in known:
+        return pdo
+    raise MappingError(
+        f"{device}: neither its dictionary nor its {'ESI' if device.esi else 'SII'} has PDO "
+        f"0x{written.index:04X}" + f" ({written.source})" * bool(written.source),
+        hint=f"specify its entries; the device has {pdo_names(device.pdos(direction))}",
+    )
+
+
+def _channel(device: DeviceDescription, direction: Direction, written: WrittenPdo, pdo: Pdo) -> int:
+    """Return the SyncManager for a PDO: the specified one, or the first that may carry it."""
+    if written.sync_manager is not None:
+        return written.sync_manager
+    first = check_channel(device, direction)
+    if first not in pdo.excluded_sync_managers:
+        return first
+    for manager in device.sync_managers:
+        if manager.use is direction.use and manager.index not in pdo.excluded_sync_managers:
+            return manager.index
+    return first
 
 
 def _changeable(device: DeviceDescription, direction: Direction) -> Pdo | None:
@@ -132,9 +186,9 @@ def _other_length(
 
 def _entry(device: DeviceDescription, reference: ObjectReference) -> Entry:
     """Return the entry, with its name and type if the dictionary or a PDO contains them."""
-    known = device.known_object(reference.index, reference.subindex)
+    known = device.documented_object(reference.index, reference.subindex)
     if known is not None:
-        return Entry(*reference.place, known.name, known.data_type)
+        return Entry(*reference.place, known.name, known.data_type, known.unit, known.enumeration)
     for pdo in (*device.output_pdos, *device.input_pdos):
         for entry in pdo.entries:
             if entry.place == reference.place:

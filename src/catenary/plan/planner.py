@@ -10,6 +10,7 @@ from typing import NamedTuple
 from catenary import notebook
 from catenary.errors import ConfigurationError
 from catenary.model.device import DeviceDescription, Direction
+from catenary.plan.clock_report import Clocks
 from catenary.plan.clocks import ClockChoice, choose_clocks, make_clock_plan, make_sync
 from catenary.plan.combination import gather_requests
 from catenary.plan.cycle import ClockPlan, CyclePlan, FramePlan, SyncUnit
@@ -29,11 +30,12 @@ from catenary.plan.layout import (
 )
 from catenary.plan.mailboxes import MailboxArea, with_mailboxes
 from catenary.plan.mapping import make_mapping
+from catenary.plan.op_mode import mode_pdos
 from catenary.plan.options import PlanOptions
 from catenary.plan.output_owners import check_owners
 from catenary.plan.pdo_mapping import Mapping
 from catenary.plan.report import report
-from catenary.plan.request import DeviceRequest, ProcessDataRequest, RequestTables
+from catenary.plan.request import DeviceRequest, ProcessDataRequest, RequestTables, WrittenPdo
 from catenary.plan.start_up import DevicePlan, make_device_plan
 from catenary.plan.watchdog import choose_watchdog
 from catenary.wire.cia402 import Mode
@@ -52,6 +54,11 @@ class Plan:
     layout: Layout
     tables: tuple[RequestTables, ...]
     mailboxes: MailboxArea
+
+    @property
+    def clocks(self) -> Clocks:
+        """SYNC signals of all devices, with the sources of their settings."""
+        return Clocks(self.devices, self.cycle.clock, self.cycle.period_ns)
 
     def __str__(self) -> str:
         axes = [axis for table in self.tables for axis in table.axis_reports]
@@ -93,8 +100,10 @@ def make_plan(
     cycle = _make_cycle(layout, mailboxes, frames, tables, options)
     if choice is not None:
         cycle = replace(cycle, clock=_make_clock(choice, cycle, options))
+    clock = cycle.clock
+    lead_ns = 0 if clock is None else clock.wire_ns + clock.allowance_ns
     plans = tuple(
-        draft.plan(place, options.period_ns)
+        draft.plan(place, options.period_ns, lead_ns)
         for draft, place in zip(drafts, layout.devices, strict=True)
     )
     return Plan(cycle, plans, layout, tables, mailboxes)
@@ -108,6 +117,7 @@ class _Draft(NamedTuple):
     outputs: Mapping
     inputs: Mapping
     watchdog_ns: int
+    watchdog_source: str
 
     def data(self, *, optional: bool) -> DeviceData:
         return DeviceData(
@@ -119,7 +129,7 @@ class _Draft(NamedTuple):
             watchdog_ns=self.watchdog_ns,
         )
 
-    def plan(self, place: DeviceLayout, period_ns: int) -> DevicePlan:
+    def plan(self, place: DeviceLayout, period_ns: int, lead_ns: int) -> DevicePlan:
         clock = self.request.clock
         return make_device_plan(
             self.device,
@@ -130,7 +140,8 @@ class _Draft(NamedTuple):
             self.watchdog_ns if place.output_size else 0,
             None
             if clock is None
-            else make_sync(self.device, clock, period_ns * self.request.divider),
+            else make_sync(self.device, clock, period_ns * self.request.divider, lead_ns),
+            self.watchdog_source if place.output_size else "",
         )
 
 
@@ -146,9 +157,10 @@ def _drafts(
     drafts = []
     for device in devices:
         request = combined.get(device.position, DeviceRequest(required=required))
-        watchdog_ns = choose_watchdog(device, request, options.watchdog, options.period_ns)
-        outputs = request.written(Direction.OUTPUT)
-        inputs = request.written(Direction.INPUT)
+        watchdog_ns, watchdog_source = choose_watchdog(
+            device, request, options.watchdog, options.period_ns
+        )
+        outputs, inputs = (_written(device, request, direction) for direction in Direction)
         drafts.append(
             _Draft(
                 device,
@@ -156,9 +168,17 @@ def _drafts(
                 make_mapping(device, Direction.OUTPUT, request.outputs, outputs),
                 make_mapping(device, Direction.INPUT, request.inputs, inputs),
                 watchdog_ns,
+                watchdog_source,
             )
         )
     return drafts
+
+
+def _written(
+    device: DeviceDescription, request: DeviceRequest, direction: Direction
+) -> tuple[WrittenPdo, ...]:
+    """Return the PDOs that the application specified; without them, those of the OpMode."""
+    return request.written(direction) or mode_pdos(device, request.clock, direction)
 
 
 def _check_positions(

@@ -9,15 +9,17 @@ from catenary.model.device import Assignment, Direction
 from catenary.plan.axis_report import AxisReport
 from catenary.plan.clocks import SyncPlan
 from catenary.plan.cycle import ClockPlan, CyclePlan, DatagramKind, DatagramPlan, FramePlan
+from catenary.plan.download import Download
 from catenary.plan.frames import ACYCLIC_GUARD
 from catenary.plan.layout import Layout
 from catenary.plan.numbers import entry_places
-from catenary.plan.start_up import DevicePlan, Download
+from catenary.plan.start_up import DevicePlan
 from catenary.wire.cia402 import Mode
 from catenary.wire.clock import Activation
 from catenary.wire.datagram import OVERHEAD, EcatCommand
 from catenary.wire.frame import HEADER_SIZE, wire_time_ns
 
+COMMON_SOURCES = ("SII", "CoE", "IgH master")  # of mappings, not printed
 _ARROW = {Direction.OUTPUT: "out", Direction.INPUT: "in "}
 
 
@@ -35,7 +37,7 @@ def report(
         layout: Places of the process data.
         axes: Reports of all axes, in order.
     """
-    clocks = [] if cycle.clock is None else _clocks(cycle.clock, cycle.period_ns, devices)
+    clocks = [] if cycle.clock is None else list(clock_lines(cycle.clock, cycle.period_ns, devices))
     return "\n".join(
         [
             *_heading(cycle),
@@ -61,7 +63,9 @@ def _devices(devices: Sequence[DevicePlan]) -> Iterator[str]:
     for device in devices:
         place = device.layout
         off = ", watchdog off" if place.output_size else ""
-        watchdog = f", watchdog {device.watchdog_ns / 1e6:g} ms" if device.watchdog_ns else off
+        origin = f" ({device.watchdog_source})" * bool(device.watchdog_source)
+        on = f", watchdog {device.watchdog_ns / 1e6:g} ms{origin}"
+        watchdog = on if device.watchdog_ns else off
         yield (
             f"device {device.position:>3}  {device.name}  station 0x{device.station_address:04X}  "
             f"{place.output_size} out, {place.input_size} in{watchdog}"
@@ -83,7 +87,9 @@ def _devices(devices: Sequence[DevicePlan]) -> Iterator[str]:
         if place.mailbox is not None:
             yield f"    FMMU {place.mailbox.index} in   mailbox full, 1 bit"
         if device.sync is not None:
-            yield f"    {_sync(device.sync)}"
+            yield f"    {sync_text(device.sync)}"
+        if device.mapping_source not in COMMON_SOURCES and (device.outputs or device.inputs):
+            yield f"    mapping from {device.mapping_source}"
         yield from _entries(Direction.OUTPUT, device.outputs, place.output_offset)
         yield from _entries(Direction.INPUT, device.inputs, place.input_offset)
         if device.left_out:
@@ -92,14 +98,13 @@ def _devices(devices: Sequence[DevicePlan]) -> Iterator[str]:
 
 def _start_up(devices: Sequence[DevicePlan]) -> Iterator[str]:
     """Yield the SDO downloads in the order of writing, with old and new values."""
-    if not any(device.downloads for device in devices):
-        return
-    yield "start-up: SDOs written in PRE-OP, in this order"
-    for device in devices:
-        if not device.downloads:
-            continue
+    chosen = [each for each in devices if each.downloads or each.in_safe_op]
+    if chosen:
+        yield "start-up: SDOs written in PRE-OP, in this order"
+    for device in chosen:
         yield f"    device {device.position}  {device.name}"
         old = {change.what: change.old or "(not read)" for change in device.changes}
+        yield from (_download("ESI", each, old) for each in device.init_commands)
         yield from (_download("before mapping", each, old) for each in device.before_mapping)
         for change in device.changes:
             if ":" not in change.what:  # a list of PDOs or of entries
@@ -107,6 +112,8 @@ def _start_up(devices: Sequence[DevicePlan]) -> Iterator[str]:
                 yield f"        {'mapping':<15} {change.what}  {before} → {change.new}"
         for each in device.start_up:
             yield _download("yours" if each.text else "Catenary", each, old)
+        yield from (_download("ESI, in SAFE-OP", each, old) for each in device.in_safe_op)
+        yield from (f"        {'ESI, omitted':<15} {each}" for each in device.omitted_commands)
 
 
 def _download(owner: str, download: Download, old: Mapping[str, str]) -> str:
@@ -115,7 +122,8 @@ def _download(owner: str, download: Download, old: Mapping[str, str]) -> str:
     value = download.text or download.data.hex(" ")
     unverified = ", not verified" if download.text and not download.verify else ""
     change = f"{value} (unchanged)" if before is None else f"{before} → {value}"
-    return f"        {owner:<15} {download.place}  {change}{unverified}"
+    source = f"  {download.source}" * bool(download.source)
+    return f"        {owner:<15} {download.place}  {change}{unverified}{source}"
 
 
 def _axes(cycle: CyclePlan, axes: Sequence[AxisReport]) -> Iterator[str]:
@@ -141,11 +149,12 @@ def _axes(cycle: CyclePlan, axes: Sequence[AxisReport]) -> Iterator[str]:
         yield from (f"        {line}" for line in axis.lines)
 
 
-def _sync(sync: SyncPlan) -> str:
+def sync_text(sync: SyncPlan) -> str:
     """Return one device's SYNC signals and the related settings, as text."""
     second = f", SYNC1 {sync.sync1_ns / 1e3:g} us later" * (Activation.SYNC1 in sync.activation)
     hidden = "" if Activation.SYNC0 in sync.activation else " (not signalled to the device)"
     mode = f", OpMode {sync.op_mode!r}" * bool(sync.op_mode)
+    mode += f" ({sync.source})" * bool(sync.source)
     return (
         f"SYNC0 every {sync.cycle_ns / 1e3:g} us{hidden}, "
         f"{sync.shift_ns / 1e3:+g} us after the common SYNC0 time{second}, "
@@ -153,7 +162,14 @@ def _sync(sync: SyncPlan) -> str:
     )
 
 
-def _clocks(clock: ClockPlan, period_ns: int, devices: Sequence[DevicePlan]) -> Iterator[str]:
+def clock_lines(clock: ClockPlan, period_ns: int, devices: Sequence[DevicePlan]) -> Iterator[str]:
+    """Yield the reference clock, the time of the cycle starts, and the phase controller.
+
+    Args:
+        clock: Synchronisation of the cycle.
+        period_ns: Period of the cycle [ns].
+        devices: Plans of the devices.
+    """
     name = devices[clock.reference].name
     follows = {
         "reference": "the cycle start follows it",

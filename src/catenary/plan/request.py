@@ -51,10 +51,17 @@ class ObjectReference:
 
 @dataclass(frozen=True, slots=True)
 class WrittenPdo:
-    """PDO that the application specified. If `entries` is None, the device keeps its entries."""
+    """PDO that the application or an OpMode specified.
+
+    If `entries` is None, the device keeps its entries.
+    """
 
     index: int
     entries: tuple[ObjectReference, ...] | None = None
+    sync_manager: int | None = None  # None: the SyncManager for process data of its direction
+    copies: int = 1  # with oversampling: PDOs with consecutive indices, one per sample
+    name: str = ""  # by which the application chose it, or its mapping; empty for a number
+    source: str = ""  # of the OpMode or the named mapping
 
     @property
     def direction(self) -> Direction:
@@ -65,13 +72,13 @@ class WrittenPdo:
 class DistributedClock:
     """Distributed clocks of a device: SYNC signals, in phase with those of all other devices.
 
-    Options that are None come from an OpMode of the device's SII: the one named `op_mode`. Without
-    a name, it is the first one that starts SYNC0 or, if there is none, SYNC1. If there is none of
-    these either, SYNC0 fires every period, without a shift and without SYNC1 (AssignActivate
-    0x0300).
+    Options that are None come from an OpMode of the device's ESI or SII: the one named `op_mode`.
+    Without a name, it is the first one that starts SYNC0 or, if there is none, SYNC1. If there is
+    none of these either, SYNC0 fires every period, without a shift and without SYNC1
+    (AssignActivate 0x0300).
 
     Args:
-        op_mode: Name of the OpMode, as in the ESI file; case is ignored.
+        op_mode: Name or description of the OpMode, as in the ESI file; case is ignored.
         sync0: Period of SYNC0 [s], a multiple or an integer fraction of the loop's period.
         sync1: Time from SYNC0 to SYNC1 [s].
         shift: Time of SYNC0 after the common SYNC0 time [s], less than a cycle. It may be negative.

@@ -1,7 +1,8 @@
 """Data that is written to one device between PRE-OP and SAFE-OP: SDOs, then registers.
 
-The SDOs are written in this order: start-up objects of the application with `before_mapping`, the
-mapping, the objects of Catenary, and the other start-up objects of the application.
+The SDOs are written in this order: commands of the ESI (`init_commands.py`), start-up objects of
+the application with `before_mapping`, the mapping, the objects of Catenary, and the other start-up
+objects of the application. Commands of the ESI for the step to OP follow in SAFE-OP.
 
 A changed mapping is written in the order of ETG.1020 §"PDO mapping": empty the assignment, empty
 and fill the mapping, fill the assignment. Only differences are written. An assignment that
@@ -21,13 +22,15 @@ from catenary.model.device import (
     Assignment,
     DeviceDescription,
     Direction,
-    Entry,
     Identity,
     ObjectInformation,
     Pdo,
+    mapped_entries,
 )
 from catenary.plan.changes import Change, mapping_changes, value_changes
 from catenary.plan.clocks import SyncPlan
+from catenary.plan.download import Download
+from catenary.plan.init_commands import choose_commands
 from catenary.plan.layout import DeviceLayout
 from catenary.plan.pdo_mapping import ASSIGNMENT_BASE, Mapping, shape
 from catenary.plan.start_up_object import StartUp
@@ -39,24 +42,6 @@ if TYPE_CHECKING:  # request.py imports NumPy, which a scan does not need
 
 WATCHDOG_DIVIDER = 2498  # the controller's reset value
 WATCHDOG_UNIT_NS = watchdog_unit_ns(WATCHDOG_DIVIDER)  # 100 µs
-
-
-@dataclass(frozen=True, slots=True)
-class Download:
-    """One SDO download. `entry` is the entry that it maps, if any, for error messages."""
-
-    index: int
-    subindex: int
-    data: bytes
-    entry: Entry | None = None
-    optional: bool = False  # True to ignore that the object is absent, read-only or refuses this
-    verify: bool = False  # read back and compared, unless it is write-only
-    text: str = ""  # value as the application gave it; empty for objects of Catenary
-
-    @property
-    def place(self) -> str:
-        """Index and subindex as text."""
-        return f"0x{self.index:04X}:{self.subindex:02X}"
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,11 +64,16 @@ class DevicePlan:
     changes: tuple[Change, ...] = ()  # changes by the downloads, with old and new values
     rejected: tuple[str, ...] = ()  # mappings that change less, and their obstacles
     left_out: tuple[str, ...] = ()  # optional objects that are not exchanged
+    init_commands: tuple[Download, ...] = ()  # of the ESI, written first in PRE-OP
+    in_safe_op: tuple[Download, ...] = ()  # of the ESI, written in SAFE-OP
+    omitted_commands: tuple[str, ...] = ()  # commands of the ESI that are not written, and why
+    watchdog_source: str = ""  # file and line; empty if it is not from an ESI
+    mapping_source: str = ""  # "CoE", "SII", "ESI FILE:LINE", or of the OpMode or named mapping
 
     @property
     def downloads(self) -> tuple[Download, ...]:
-        """All downloads in the order of writing."""
-        return (*self.before_mapping, *self.mapping, *self.start_up)
+        """All downloads in PRE-OP, in the order of writing."""
+        return (*self.init_commands, *self.before_mapping, *self.mapping, *self.start_up)
 
     @property
     def watchdog_count(self) -> int:
@@ -102,6 +92,7 @@ def make_device_plan(
     layout: DeviceLayout,
     watchdog_ns: int,
     sync: SyncPlan | None = None,
+    watchdog_source: str = "",
 ) -> DevicePlan:
     """Return the plan of one device.
 
@@ -113,6 +104,7 @@ def make_device_plan(
         layout: Place of the device's process data.
         watchdog_ns: Watchdog time of the process data [ns]; 0: off.
         sync: Settings of the SYNC unit; None: no SYNC signals.
+        watchdog_source: File and line of the watchdog time; empty if it is not from an ESI.
 
     Raises:
         ConfigurationError: The device cannot have start-up objects, or the type of one is unknown.
@@ -126,7 +118,17 @@ def make_device_plan(
         *(Download(*each, optional=True) for each in of_sync),
         *after,
     )
-    written = [(each.index, each.subindex, each.data) for each in (*before, *start_up)]
+    commands = choose_commands(
+        device,
+        request.objects,
+        {(each.index, each.subindex) for each in start_up if not each.text},
+        mapped_entries(outputs.assignments),
+    )
+    written = [
+        (each.index, each.subindex, each.data)
+        for each in (*commands.in_pre_op, *before, *start_up, *commands.in_safe_op)
+        if not each.complete_access
+    ]
     left_out = outputs.left_out + inputs.left_out
     return DevicePlan(
         position=device.position,
@@ -149,7 +151,18 @@ def make_device_plan(
         ),
         rejected=outputs.rejected + inputs.rejected,
         left_out=tuple(f"0x{each.index:04X}:{each.subindex:02X}" for each in left_out),
+        init_commands=commands.in_pre_op,
+        in_safe_op=commands.in_safe_op,
+        omitted_commands=commands.omitted,
+        watchdog_source=watchdog_source,
+        mapping_source=_mapping_source(device, outputs, inputs),
     )
+
+
+def _mapping_source(device: DeviceDescription, outputs: Mapping, inputs: Mapping) -> str:
+    """Return the source of the mapping: of its names or its OpMode, else of the description."""
+    chosen = dict.fromkeys(filter(None, (outputs.source, inputs.source)))
+    return ", ".join(chosen) or device.mapping_source
 
 
 def object_downloads(
@@ -177,7 +190,7 @@ def _object_download(device: DeviceDescription, requested: StartUp) -> Download:
             hint="give start_up= only to devices with an object dictionary",
         )
     kind = requested.type
-    known = device.known_object(requested.index, requested.subindex)
+    known = device.documented_object(requested.index, requested.subindex)
     if requested.needs_type:
         kind = _dictionary_type(device, requested, known)
     return Download(
@@ -204,7 +217,7 @@ def _dictionary_type(
     raise ConfigurationError(
         f"{device}: the type of start-up object {requested.place} is unknown: {why}",
         hint="give the type from the manual, StartUp(..., type=types.UDINT), or bytes; "
-        "`catenary sdo` lists the objects of a device",
+        "`catenary sdo` lists the objects of a device; an ESI file may have its type",
     )
 
 

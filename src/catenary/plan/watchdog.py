@@ -3,14 +3,18 @@
 After a crash of the MainDevice a drive uses its last outputs until the watchdog expires. In CSP and
 CSV its own control loops hold the axis until then. In CST it applies a stale torque, so the default
 is short.
+
+The watchdog time of an ESI replaces the default of 100 ms, but not the short one in CST. An ESI
+never disables the watchdog; only the application does.
 """
 
 from __future__ import annotations
 
 from catenary.model.device import DeviceDescription
 from catenary.plan.request import DeviceRequest
-from catenary.plan.start_up import WATCHDOG_UNIT_NS
+from catenary.plan.start_up import WATCHDOG_DIVIDER, WATCHDOG_UNIT_NS
 from catenary.wire.cia402 import SLOT_OFFSET, Object
+from catenary.wire.register import watchdog_unit_ns
 
 DEFAULT_NS = 100_000_000
 TORQUE_NS = 10_000_000  # shortest default in CST
@@ -23,8 +27,8 @@ TARGET_TORQUES = frozenset(Object.TARGET_TORQUE + SLOT_OFFSET * slot for slot in
 
 def choose_watchdog(
     device: DeviceDescription, request: DeviceRequest, seconds: float | None, period_ns: int
-) -> int:
-    """Return the watchdog time of a device [ns], 0 for off.
+) -> tuple[int, str]:
+    """Return the watchdog time of a device [ns], 0 for off, and its source in an ESI.
 
     Args:
         device: Device, for error messages.
@@ -36,15 +40,29 @@ def choose_watchdog(
         ValueError: The register cannot hold the time, or it is shorter than three exchanges.
     """
     exchange_ns = period_ns * request.divider
+    source = ""
     if seconds is not None:
         watchdog_ns = _rounded(seconds)
     elif _is_torque_controlled(request):
         longest = max(TORQUE_NS, TORQUE_EXCHANGES * exchange_ns)
         watchdog_ns = -(-longest // WATCHDOG_UNIT_NS) * WATCHDOG_UNIT_NS
     else:
-        watchdog_ns = DEFAULT_NS
+        watchdog_ns = _esi_watchdog_ns(device)
+        source = f"ESI {device.esi}"
+        if watchdog_ns < max(LEAST_EXCHANGES * exchange_ns, WATCHDOG_UNIT_NS):
+            watchdog_ns, source = DEFAULT_NS, ""
     _check(device, request, watchdog_ns, period_ns)
-    return watchdog_ns
+    return watchdog_ns, source
+
+
+def _esi_watchdog_ns(device: DeviceDescription) -> int:
+    """Return the watchdog time of the ESI [ns]; 0 if it gives none that the register can hold."""
+    values = device.watchdog
+    if not values.process_data:
+        return 0
+    divider = WATCHDOG_DIVIDER if values.divider is None else values.divider
+    count = round(values.process_data * watchdog_unit_ns(divider) / WATCHDOG_UNIT_NS)
+    return count * WATCHDOG_UNIT_NS if count <= COUNT_MAX else 0
 
 
 def _rounded(seconds: float) -> int:

@@ -55,7 +55,8 @@ def request_state(
     Args:
         station: The device.
         target: The requested state.
-        timeout: Time for the change [s]; None for the default of the state.
+        timeout: Time for the change [s]; None for the default of the state, or the time of the
+            device's ESI if it is longer.
 
     Raises:
         StateError: The device refuses, takes too long, or does not clear a pending error. The
@@ -67,7 +68,19 @@ def request_state(
     elif before.state is target:
         return before
     yield from write_control(station, AlControl(target))
-    return (yield from _await_state(station, target, timeout or TIMEOUTS[target]))
+    return (yield from _await_state(station, target, timeout or _timeout(station, target)))
+
+
+def _timeout(station: Station, target: AlState) -> float:
+    """Return the timeout for a state [s]: the default, or that of the ESI if it is longer."""
+    given = station.timeouts
+    stated = {
+        AlState.INIT: given.back_to_init,
+        AlState.PRE_OP: given.pre_op,
+        AlState.SAFE_OP: given.safe_op_and_op,
+        AlState.OP: given.safe_op_and_op,
+    }
+    return max(TIMEOUTS[target], stated.get(target) or 0.0)
 
 
 def write_control(station: Station, control: AlControl) -> Procedure[None]:

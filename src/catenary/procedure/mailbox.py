@@ -107,6 +107,7 @@ def converse(
         yield from _settle(channel)
     channel.counter = next_counter(channel.counter)
     message = Mailbox(kind, data, channel.counter).encode(channel.layout.receive_size)
+    patience = _patience(channel, timeout)
     channel.owed, channel.emptied = True, False
     for _ in range(RECOVERIES):
         sent, stale = yield from _post(channel, message)
@@ -117,11 +118,11 @@ def converse(
         if stale and (older := (yield from _take(channel))) is not None:
             _drop_late(channel, older)
         before = channel.dropped
-        answer = yield from _await(channel, accept, Deadline(timeout if sent else GRACE))
+        answer = yield from _await(channel, accept, Deadline(patience if sent else GRACE))
         if answer is not None:
             return answer
         if sent:
-            raise _no_answer(channel, kind, timeout, channel.dropped - before)
+            raise _no_answer(channel, kind, patience, channel.dropped - before)
     raise ResponseTimeout(
         f"{channel.station}: {RECOVERIES} frames with the same mailbox message were lost",
         hint="check the cables: the error counters at 0x0300 show which one is faulty",
@@ -143,11 +144,16 @@ def further(
         MailboxError: As in `converse`.
     """
     channel.owed = True
-    before = channel.dropped
-    answer = yield from _await(channel, accept, Deadline(timeout))
+    before, patience = channel.dropped, _patience(channel, timeout)
+    answer = yield from _await(channel, accept, Deadline(patience))
     if answer is None:
-        raise _no_answer(channel, Type.COE, timeout, channel.dropped - before)
+        raise _no_answer(channel, Type.COE, patience, channel.dropped - before)
     return answer
+
+
+def _patience(channel: MailboxChannel, timeout: float) -> float:
+    """Return the longer of a timeout and the response time that the device's ESI states [s]."""
+    return max(timeout, channel.station.timeouts.mailbox_response or 0.0)
 
 
 def _await(
@@ -237,7 +243,8 @@ def _post(channel: MailboxChannel, message: bytes) -> Procedure[tuple[bool, bool
         Two flags: True if the frame came back, and True if an older message of the device was
         waiting.
     """
-    deadline, pace = Deadline(WRITE_TIMEOUT), Pace()
+    patience = max(WRITE_TIMEOUT, channel.station.timeouts.mailbox_request or 0.0)
+    deadline, pace = Deadline(patience), Pace()
     station, layout = channel.station.address, channel.layout
     check = read(EcatCommand.FPRD, station, sync_manager_status(IN))._replace(repeatable=False)
     while True:
@@ -252,7 +259,7 @@ def _post(channel: MailboxChannel, message: bytes) -> Procedure[tuple[bool, bool
             return True, waiting
         full, status = yield from _is_full(channel, OUT)
         if deadline.passed(status):
-            raise _stuck(channel, full)
+            raise _stuck(channel, full, patience)
         yield after(pace.pause())
 
 
@@ -272,10 +279,10 @@ def _drop_late(channel: MailboxChannel, message: Mailbox) -> None:
         channel.dropped += 1
 
 
-def _stuck(channel: MailboxChannel, full: bool) -> MailboxError:
+def _stuck(channel: MailboxChannel, full: bool, patience: float) -> MailboxError:
     if full:
         return MailboxError(
-            f"{channel.station} has not read its mailbox for {WRITE_TIMEOUT:g} s",
+            f"{channel.station} has not read its mailbox for {patience:g} s",
             hint="its application hangs, or waits until its send mailbox is read: power-cycle it",
         )
     return MailboxError(

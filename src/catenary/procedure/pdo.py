@@ -17,9 +17,10 @@ from catenary.model.device import (
     Pdo,
     mapped_pdos,
 )
+from catenary.plan.download import Download
 from catenary.plan.pdo_mapping import ASSIGNMENT_BASE, shape
 from catenary.plan.pdo_search import place_names
-from catenary.plan.start_up import DevicePlan, Download, restoring_downloads
+from catenary.plan.start_up import DevicePlan, restoring_downloads
 from catenary.procedure.exchange import Procedure
 from catenary.procedure.mailbox import MailboxChannel
 from catenary.procedure.sdo import OBJECT_MISSING, download, refused, upload, upload_small
@@ -74,7 +75,7 @@ def write_downloads(
             or refuse the value are skipped.
         ConfigurationError: The value of a start-up object differs after it was written.
     """
-    for step in plan.before_mapping:
+    for step in (*plan.init_commands, *plan.before_mapping):
         yield from _write_object(channel, step)
     for step in plan.mapping:
         try:
@@ -86,13 +87,31 @@ def write_downloads(
         yield from _write_object(channel, step)
 
 
+def write_in_safe_op(channel: MailboxChannel | None, plan: DevicePlan) -> Procedure[None]:
+    """Write the objects that the ESI requires between SAFE-OP and OP.
+
+    Args:
+        channel: The mailbox of the device; None if it has none.
+        plan: The plan of the device.
+
+    Raises:
+        SdoAbort: The device refused a download.
+    """
+    if channel is None:
+        return
+    for step in plan.in_safe_op:
+        yield from _write_object(channel, step)
+
+
 def _write_object(channel: MailboxChannel, step: Download) -> Procedure[None]:
     """Write one object outside the mapping, and verify it if the plan requires this."""
     try:
-        yield from download(channel, step.index, step.subindex, step.data)
+        complete = step.complete_access
+        yield from download(channel, step.index, step.subindex, step.data, complete_access=complete)
     except SdoAbort as abort:
         if not (step.optional and abort.code in OPTIONAL_ABORTS):
             what = f"start-up object {step.place} = {step.text or step.data.hex(' ')}"
+            what += f" (ESI {step.source})" * bool(step.source)
             raise refused(channel, step.index, step.subindex, abort.code, what=what) from abort
     if not step.verify:
         return

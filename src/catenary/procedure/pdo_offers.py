@@ -17,7 +17,7 @@ from catenary.procedure.exchange import Procedure
 from catenary.procedure.mailbox import MailboxChannel
 from catenary.procedure.pdo import read_entries, read_list, read_mapping
 from catenary.procedure.profile import READABLE
-from catenary.procedure.sdo import upload
+from catenary.procedure.sdo import OBJECT_MISSING, upload, upload_small
 from catenary.procedure.sdo_information import describe_entry
 from catenary.procedure.station import within
 from catenary.wire.sdo_information import Access
@@ -71,6 +71,8 @@ def read_offers(
         if words is not None:
             entries = read_entries(words, known[index].entries)
             known[index] = replace(known[index], entries=entries)
+        elif known[index].source and (yield from _is_missing(channel, index)):
+            known[index] = replace(known[index], missing=True)
     for index in taken & set(known):
         if (yield from _is_read_only(channel, device, index)):
             known[index] = replace(known[index], fixed=True)
@@ -108,6 +110,15 @@ def read_values(
     return replace(device, values=tuple(values))
 
 
+def _is_missing(channel: MailboxChannel, index: int) -> Procedure[bool]:
+    """Return True if the device reports that its dictionary does not have an object."""
+    try:
+        yield from upload_small(channel, index, 0)
+    except SdoAbort as abort:
+        return abort.code in OBJECT_MISSING
+    return False
+
+
 def _is_read_only(
     channel: MailboxChannel, device: DeviceDescription, index: int
 ) -> Procedure[bool]:
@@ -126,9 +137,10 @@ def _is_read_only(
 def _differences(
     described: DeviceDescription, found: DeviceDescription, direction: Direction
 ) -> Iterator[str]:
-    """Yield the differences between the SII and the dictionary; none for an SII without PDOs."""
+    """Yield the differences between ESI or SII and the dictionary; none without known PDOs."""
     if not described.pdos(direction):
         return
+    source = described.mapping_source
     before = {each.sync_manager: each.pdos for each in described.assignments(direction)}
     known = {pdo.index: pdo for pdo in described.pdos(direction)}
     for each in found.assignments(direction):
@@ -136,10 +148,14 @@ def _differences(
         then = pdo_names(before.get(each.sync_manager, ()), empty="none")
         if now != then:
             manager = f"SyncManager {each.sync_manager}"
-            yield f"{manager} carries PDOs {now}, but its SII specifies {then}"
+            yield f"{manager} carries PDOs {now}, but its {source} specifies {then}"
         for pdo in each.pdos:
             other = known.get(pdo.index)
             if other is not None and shape(other) != shape(pdo):
                 has = place_names(shape(pdo), empty="no entries")
                 expected = place_names(shape(other), empty="no entries")
-                yield f"PDO 0x{pdo.index:04X} has {has}, but its SII specifies {expected}"
+                where = f" ({other.source})" * bool(other.source)
+                name = "ESI" if other.source else "SII"
+                yield (
+                    f"PDO 0x{pdo.index:04X} has {has}, but its {name}{where} specifies {expected}"
+                )

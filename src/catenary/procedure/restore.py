@@ -14,7 +14,7 @@ from catenary.procedure.al_state import request_state
 from catenary.procedure.configure import configure_mailbox, configure_process_data
 from catenary.procedure.exchange import Procedure, Request, read, write, write_memory
 from catenary.procedure.mailbox import MailboxChannel
-from catenary.procedure.pdo import read_mapping, verify_mapping, write_downloads
+from catenary.procedure.pdo import read_mapping, verify_mapping, write_downloads, write_in_safe_op
 from catenary.procedure.sii import read_identity
 from catenary.procedure.sii_owner import hand_over
 from catenary.procedure.station import Station, answered
@@ -151,6 +151,7 @@ def bring_to_safe_op(
     if clock is not None:
         yield from clock
     yield from request_state(station, AlState.SAFE_OP)
+    yield from write_in_safe_op(channel, plan)
 
 
 def _cleared(station: Station, start: int, size: int) -> Request:

@@ -5,6 +5,8 @@ from __future__ import annotations
 from typing import NamedTuple, TypeVar
 
 from catenary.errors import ResponseTimeout, SegmentError
+from catenary.model.device import DeviceDescription
+from catenary.model.esi_settings import NO_TIMEOUTS, Timeouts
 from catenary.procedure.exchange import Procedure, Reply
 
 T = TypeVar("T")
@@ -16,9 +18,15 @@ class Station(NamedTuple):
     position: int
     address: int
     name: str = ""
+    timeouts: Timeouts = NO_TIMEOUTS  # of its ESI; a longer one replaces the default
 
     def __str__(self) -> str:
         return f"device {self.position} ({self.name})" if self.name else f"device {self.position}"
+
+
+def station_of(device: DeviceDescription) -> Station:
+    """Return the station of a device, with its name for errors and the timeouts of its ESI."""
+    return Station(device.position, device.station_address, device.name, device.timeouts)
 
 
 def answered(reply: Reply, station: Station, what: str) -> bytes:

@@ -1,0 +1,96 @@
+"""Objects that an ESI requires to be written at state transitions (ETG.2000, `CoE/InitCmd`).
+
+Commands of the transitions IP and PS are written in PRE-OP, in this order, before the start-up
+objects of the application. The mailbox is not available in INIT, so IP is the first step in
+PRE-OP. Commands of SO are written in SAFE-OP. Commands of downward transitions are not written.
+TwinCAT and CODESYS also write these commands without being asked.
+
+A command is omitted if the application or Catenary sets its object, because these count more.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator, Sequence
+from typing import NamedTuple
+
+from catenary.model.device import DeviceDescription, Entry
+from catenary.model.esi_settings import InitCommand
+from catenary.plan.download import Download
+from catenary.plan.start_up_object import MAPPING_OBJECTS, StartUp
+
+PRE_OP_STEPS, SAFE_OP_STEPS = ("IP", "PS"), ("SO",)
+
+
+class Commands(NamedTuple):
+    """Commands of an ESI, by the state in which they are written."""
+
+    in_pre_op: tuple[Download, ...] = ()
+    in_safe_op: tuple[Download, ...] = ()
+    omitted: tuple[str, ...] = ()  # commands that are not written, and the reason
+
+
+def choose_commands(
+    device: DeviceDescription,
+    objects: Sequence[StartUp],
+    own: Collection[tuple[int, int]],
+    outputs: Sequence[Entry],
+) -> Commands:
+    """Return the commands of a device's ESI that a plan writes.
+
+    Args:
+        device: Device with its commands.
+        objects: Start-up objects of the application. They replace commands that are not fixed.
+        own: Index and subindex of the objects that Catenary writes.
+        outputs: Mapped outputs, which change in every cycle.
+    """
+    if not device.init_commands or not device.coe:
+        return Commands()
+    given = {(each.index, each.subindex) for each in objects}
+    mapped = {(entry.index, entry.subindex) for entry in outputs}
+    reasons = {each: _reason(each, given, own, mapped) for each in device.init_commands}
+    written = [each for each in device.init_commands if not reasons[each]]
+    known = {*PRE_OP_STEPS, *SAFE_OP_STEPS}
+    omitted = [
+        f"{_place(each)}: {reason} ({each.source})"
+        for each, reason in reasons.items()
+        if reason and known.intersection(each.transitions)
+    ]
+    in_pre_op = tuple(dict.fromkeys(_downloads(written, PRE_OP_STEPS)))
+    return Commands(in_pre_op, tuple(_downloads(written, SAFE_OP_STEPS)), tuple(omitted))
+
+
+def _reason(
+    command: InitCommand,
+    given: Collection[tuple[int, int]],
+    own: Collection[tuple[int, int]],
+    mapped: Collection[tuple[int, int]],
+) -> str:
+    """Return the reason why a command is not written; empty if it is written."""
+    place = (command.index, command.subindex)
+    if any(command.index in objects for objects in MAPPING_OBJECTS):
+        return "the plan writes the mapping"
+    replaced = place in given
+    if command.complete_access:
+        replaced = any(index == command.index for index, _ in given)
+    if replaced and not command.fixed:
+        return "your start-up object replaces it"
+    if place in own:
+        return "Catenary writes this object"
+    return "it is an output of the process data" if place in mapped else ""
+
+
+def _downloads(commands: Sequence[InitCommand], steps: Sequence[str]) -> Iterator[Download]:
+    for step in steps:
+        for each in commands:
+            if step in each.transitions:
+                yield Download(
+                    each.index,
+                    each.subindex,
+                    each.data,
+                    complete_access=each.complete_access,
+                    source=f"{each.source} {each.comment}".strip(),
+                )
+
+
+def _place(command: InitCommand) -> str:
+    return f"0x{command.index:04X}:{command.subindex:02X}"
