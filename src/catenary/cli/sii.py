@@ -1,4 +1,4 @@
-"""`catenary sii read|show|write`: access the EEPROM of a device, or its image in a file."""
+"""`catenary sii read|show|write|build`: access the EEPROM of a device, or its image in a file."""
 
 from __future__ import annotations
 
@@ -15,6 +15,7 @@ from catenary.cli.parsers import (
     add_target,
     note_other_masters,
 )
+from catenary.cli.sii_build import add_build
 
 if TYPE_CHECKING:
     from catenary.bus import MainDevice, SubDevice
@@ -27,15 +28,17 @@ def add_parser(commands: Commands) -> None:
     group = add_command(
         commands,
         "sii",
-        help="read or write the EEPROM of a device",
-        description="Reads or writes the EEPROM (SII) of a device, which contains its identity and "
-        "describes its mailbox and process data.",
+        help="read, write or build the EEPROM of a device",
+        description="Reads, writes or builds the EEPROM (SII) of a device, which contains its "
+        "identity and describes its mailbox and process data.",
         example="catenary sii read eth0 2 --text\ncatenary sii show drive.bin\n"
-        "catenary sii write eth0 2 drive.bin --dry-run",
+        "catenary sii write eth0 2 drive.bin --dry-run\n"
+        "catenary sii build drive.xml -o drive.bin",
     ).add_subparsers(title="commands", metavar="COMMAND", required=True)
     _add_read(group)
     _add_show(group)
     _add_write(group)
+    add_build(group)
 
 
 def _add_read(group: Commands) -> None:
@@ -67,8 +70,8 @@ def _add_show(group: Commands) -> None:
         group,
         "show",
         help="show an image from a file",
-        description="Shows every field of an image from `sii read -o`, and checks it. No device "
-        "is needed. Exit status 1 if the image is invalid.",
+        description="Shows every field of an image from `sii read -o` or `sii build`, and checks "
+        "it. No device is needed. Exit status 1 if the image is invalid.",
         example="catenary sii show drive.bin",
     )
     showing.add_argument("file", metavar="FILE", type=Path, help="file with the binary image")

@@ -13,6 +13,7 @@ from catenary.virtual.devices import (
     Junction,
     Servo,
 )
+from catenary.virtual.devices.described import DescribedDevice, from_esi
 from catenary.virtual.devices.servo_quirks import ServoQuirks
 from catenary.virtual.fault_player import FaultEvent, Loss
 from catenary.virtual.faults import Fault
@@ -26,6 +27,7 @@ __all__ = [
     "AnalogInputs",
     "Coupler",
     "Crystal",
+    "DescribedDevice",
     "Device",
     "DigitalInputs",
     "DigitalOutputs",
@@ -45,6 +47,7 @@ __all__ = [
     "SiiQuirks",
     "demo_segment",
     "faults",
+    "from_esi",
     "read_segment",
     "serve",
 ]

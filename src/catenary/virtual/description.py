@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import zlib
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 from catenary.virtual.mapping_quirks import NO_MAPPING_QUIRKS, MappingQuirks
 from catenary.virtual.op_modes import STANDARD, OpMode
@@ -29,6 +29,9 @@ class Pdo:
     name: str
     entries: tuple[MappedEntry, ...]
     sync_manager: int  # 0xFF: not assigned by default
+    fixed: bool = field(default=False, repr=False)  # its entries cannot be written
+    mandatory: bool = field(default=False, repr=False)
+    excludes: frozenset[int] = field(default=frozenset(), repr=False)
 
     @property
     def bits(self) -> int:
@@ -53,6 +56,38 @@ class MailboxDefault:
     send_offset: int
     send_size: int
     coe_details: int  # bit 0 SDO, 1 SDO information, 2 assignment, 3 mapping, 5 complete access
+
+
+@dataclass(frozen=True, slots=True)
+class Channel:
+    """Process data of one SyncManager."""
+
+    sync_manager: int
+    outputs: bool
+    start: int  # address of the buffers
+    room: int  # maximum size of a buffer [bytes]
+
+    @property
+    def assignment(self) -> int:
+        """Index of the object that assigns its PDOs: 0x1C12 for SyncManager 2."""
+        return 0x1C10 + self.sync_manager
+
+    @property
+    def control(self) -> int:
+        """Direction and mode in the control byte of the SyncManager: three buffers."""
+        return 0x04 if self.outputs else 0x00
+
+
+@dataclass(frozen=True, slots=True)
+class FileFacts:
+    """Facts of a device that comes from a file, which our own kinds of devices derive."""
+
+    vendor: int
+    revision: int
+    channels: tuple[Channel, ...]
+    device_type: int  # object 0x1000
+    sdo_information: bool = True
+    complete_access: bool = True
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,14 +117,24 @@ class Description:
     loop_control: bool = True  # True if 0x0101 can close the ports
     lrw: bool = True
     sii_variant: str = ""  # differences of the SII from the device
+    facts: FileFacts | None = field(default=None, repr=False)  # None: one of our own kinds
+
+    @property
+    def vendor(self) -> int:
+        """Vendor ID."""
+        return VENDOR_ID if self.facts is None else self.facts.vendor
 
     @property
     def revision(self) -> int:
-        """Revision number: 1 in the upper word, a checksum of the description in the lower word.
+        """Revision number of the file; for our own kinds one that the description determines.
+
+        It has 1 in the upper word, a checksum of the description in the lower word.
 
         The checksum does not include names, serial number, alias and device ID. It distinguishes
         devices whose SIIs differ otherwise, because SOEM reads the SII only once for all devices
         with the same identity (src/ec_config.c, ecx_lookup_prev_sii).
         """
+        if self.facts is not None:
+            return self.facts.revision
         kind = replace(self, name="", order="", group="", serial=0, alias=0, identification=0)
         return 0x0001_0000 | zlib.crc32(repr(kind).encode()) & 0xFFFF

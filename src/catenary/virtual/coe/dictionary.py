@@ -94,11 +94,11 @@ def text(name: str, value: str) -> Entry:
 
 
 class Variable:
-    """Bytes of one writable entry."""
+    """Bytes of one writable entry. `limit`: maximum length, at least that of the first value."""
 
-    def __init__(self, value: bytes, *, variable_length: bool = False) -> None:
+    def __init__(self, value: bytes, *, variable_length: bool = False, limit: int = 0) -> None:
         self.value = value
-        self._limit = len(value)
+        self._limit = max(len(value), limit)
         self._variable_length = variable_length
 
     def read(self) -> bytes:

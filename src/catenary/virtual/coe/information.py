@@ -30,18 +30,24 @@ def _message(opcode: int, payload: bytes, left: int = 0) -> bytes:
 class InformationServer:
     """Server of SDO information requests for one dictionary.
 
-    `size`: mailbox size without its header [bytes].
+    `size`: mailbox size without its header [bytes]. `supported`: False refuses all requests.
     """
 
     def __init__(
-        self, dictionary: Dictionary, *, size: int, quirks: MailboxQuirks = NO_MAILBOX_QUIRKS
+        self,
+        dictionary: Dictionary,
+        *,
+        size: int,
+        supported: bool = True,
+        quirks: MailboxQuirks = NO_MAILBOX_QUIRKS,
     ) -> None:
         self._dictionary = dictionary
+        self._supported = supported
         self._quirks = quirks
         self._room = (size - HEADER) & ~1
 
     def serve(self, payload: bytes) -> Iterable[bytes]:
-        opcode = payload[0] & 0x7F if payload else 0
+        opcode = payload[0] & 0x7F if payload and self._supported else 0
         body = payload[4:]
         if opcode == LIST_REQUEST and len(body) >= 2:
             return self._lists(struct.unpack_from("<H", body)[0])

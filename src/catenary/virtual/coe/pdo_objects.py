@@ -29,7 +29,7 @@ from catenary.virtual.coe.dictionary import (
     Dictionary,
     Entry,
 )
-from catenary.virtual.description import Pdo
+from catenary.virtual.description import Channel, Pdo
 from catenary.virtual.mapping_quirks import NO_MAPPING_QUIRKS, MappingQuirks
 
 RX_ASSIGNMENT, TX_ASSIGNMENT = 0x1C12, 0x1C13
@@ -44,14 +44,21 @@ class _Table:
     """
 
     def __init__(
-        self, values: Sequence[int], flag: int, allowed: Sequence[int] | None = None
+        self,
+        values: Sequence[int],
+        flag: int,
+        allowed: Sequence[int] | None = None,
+        *,
+        fixed: bool = False,
     ) -> None:
         self.flag = flag
         self.allowed = allowed
+        self.fixed = fixed
         self.is_mapping = allowed is None
         self.data_type, self._form, size = (
             (UNSIGNED32, "<I", ENTRIES_MAX) if self.is_mapping else (UNSIGNED16, "<H", PDOS_MAX)
         )
+        size = len(values) if fixed else size
         self.places = list(values) + [0] * (size - len(values))
         self.count = len(values)
 
@@ -82,31 +89,36 @@ class PdoObjects:
     def __init__(
         self,
         dictionary: Dictionary,
+        channels: Sequence[Channel],
         rx: Sequence[Pdo],
         tx: Sequence[Pdo],
-        limit: int,
         quirks: MappingQuirks = NO_MAPPING_QUIRKS,
     ) -> None:
         self._dictionary = dictionary
         self._quirks = quirks
-        self._limit_bits = 8 * limit
         self._mappings: dict[int, _Table] = {}
-        self._assigned = {
-            RX_ASSIGNMENT: self._add_direction(RX_ASSIGNMENT, "RxPDO assign", rx, MAP_RX),
-            TX_ASSIGNMENT: self._add_direction(TX_ASSIGNMENT, "TxPDO assign", tx, MAP_TX),
-        }
+        self._pdos = {pdo.index: pdo for pdo in (*rx, *tx)}
+        self._assigned: dict[int, _Table] = {}
+        self._room = {channel.assignment: channel.room for channel in channels}
+        for pdos, flag in ((rx, MAP_RX), (tx, MAP_TX)):
+            for pdo in pdos:
+                self._add_mapping(pdo, flag)
+        for channel in channels:
+            self._add_assignment(channel, rx if channel.outputs else tx)
 
-    def _add_direction(self, index: int, name: str, pdos: Sequence[Pdo], flag: int) -> _Table:
-        for pdo in pdos:
-            packed = [e.index << 16 | e.subindex << 8 | e.bits for e in pdo.entries]
-            table = self._mappings[pdo.index] = _Table(packed, flag)
-            self._add(pdo.index, pdo.name, table)
-        assigned = [pdo.index for pdo in pdos if pdo.sync_manager != 0xFF]
+    def _add_mapping(self, pdo: Pdo, flag: int) -> None:
+        packed = [e.index << 16 | e.subindex << 8 | e.bits for e in pdo.entries]
+        table = self._mappings[pdo.index] = _Table(packed, flag, fixed=pdo.fixed)
+        self._add(pdo.index, pdo.name, table)
+
+    def _add_assignment(self, channel: Channel, pdos: Sequence[Pdo]) -> None:
+        assigned = [pdo.index for pdo in pdos if pdo.sync_manager == channel.sync_manager]
         if self._quirks.power_up is not None:
             assigned = [pdo.index for pdo in pdos if pdo.index in self._quirks.power_up]
+        flag, name = (MAP_RX, "RxPDO assign") if channel.outputs else (MAP_TX, "TxPDO assign")
         table = _Table(assigned, flag, allowed=[pdo.index for pdo in pdos])
-        self._add(index, name, table)
-        return table
+        self._assigned[channel.assignment] = table
+        self._add(channel.assignment, name, table)
 
     def _add(self, index: int, name: str, table: _Table) -> None:
         """Add an assignment or mapping to the dictionary."""
@@ -134,6 +146,8 @@ class PdoObjects:
         self._dictionary.add(index, name, {0: count, **places}, code=code)
 
     def _fixed(self, table: _Table) -> str:
+        if table.fixed:
+            return "declared"
         return self._quirks.fixed_pdos if table.is_mapping else self._quirks.fixed_lists
 
     def _write_count(self, table: _Table, data: bytes) -> None:
@@ -187,8 +201,22 @@ class PdoObjects:
             for value in table.values:
                 self._check_entry(value, table.flag)
             bits = sum(value & 0xFF for value in table.values)
-        if bits > self._limit_bits:
+        if bits > 8 * max(self._room.values(), default=0):
             raise Abort(MAPPING_TOO_LONG)
+
+    def contradicts(self, assignment: int) -> bool:
+        """Return True if assigned PDOs exclude each other, or a mandatory PDO is not assigned.
+
+        A PDO counts as missing only if no SyncManager carries it.
+        """
+        present = {pdo for table in self._assigned.values() for pdo in table.values}
+        table = self._assigned[assignment]
+        own = [self._pdos[pdo] for pdo in table.values if pdo in self._pdos]
+        lacking = any(
+            pdo.mandatory and pdo.index not in present and pdo.sync_manager + 0x1C10 == assignment
+            for pdo in self._pdos.values()
+        )
+        return lacking or any(pdo.excludes & present for pdo in own)
 
     def placed(self, assignment: int) -> list[Placed]:
         """Return the mapped objects of one direction in buffer order, without gaps."""

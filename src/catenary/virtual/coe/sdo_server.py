@@ -26,6 +26,7 @@ COE_HEADER = 2
 SDO_HEADER = 8  # command, index, subindex, size or data
 SEGMENT_HEADER = 1
 DOWNLOAD_SEGMENT, DOWNLOAD, UPLOAD, UPLOAD_SEGMENT, ABORT = 0, 1, 2, 3, 4
+UNSUPPORTED_ACCESS = 0x06010000
 OUT_OF_MEMORY = 0x05040005
 DOWNLOAD_MAX = 1 << 20
 
@@ -58,9 +59,15 @@ class SdoServer:
     """
 
     def __init__(
-        self, dictionary: Dictionary, *, size: int, quirks: MailboxQuirks = NO_MAILBOX_QUIRKS
+        self,
+        dictionary: Dictionary,
+        *,
+        size: int,
+        complete_access: bool = True,
+        quirks: MailboxQuirks = NO_MAILBOX_QUIRKS,
     ) -> None:
         self._dictionary = dictionary
+        self._complete_access = complete_access
         self._drip = quirks.drip
         self._room = size - COE_HEADER
         self._transfer: _Transfer | None = None
@@ -86,6 +93,12 @@ class SdoServer:
             self._transfer = None
             return [_aborted(index, subindex, abort.code)]
 
+    def _check_complete(self, complete: bool, subindex: int) -> None:
+        if complete and not self._complete_access:
+            raise Abort(UNSUPPORTED_ACCESS)
+        if complete and subindex > 1:
+            raise Abort(NO_COMPLETE_ACCESS)
+
     def _store(self, index: int, subindex: int, complete: bool, data: bytes) -> None:
         if complete:
             self._dictionary.write_complete(index, subindex, data)
@@ -100,8 +113,7 @@ class SdoServer:
     def _download(self, payload: bytes, command: int, index: int, subindex: int) -> bytes:
         self._transfer = None
         complete, expedited, sized = bool(command & 0x10), bool(command & 2), bool(command & 1)
-        if complete and subindex > 1:
-            raise Abort(NO_COMPLETE_ACCESS)
+        self._check_complete(complete, subindex)
         if len(payload) < SDO_HEADER:
             raise Abort(WRONG_LENGTH)
         if expedited:
@@ -150,8 +162,7 @@ class SdoServer:
     def _upload(self, command: int, index: int, subindex: int) -> bytes:
         self._transfer = None
         complete = bool(command & 0x10)
-        if complete and subindex > 1:
-            raise Abort(NO_COMPLETE_ACCESS)
+        self._check_complete(complete, subindex)
         data = self._fetch(index, subindex, complete)
         kept = command & 0x10
         if 0 < len(data) <= 4:

@@ -17,10 +17,13 @@ from catenary.virtual.coe.dictionary import (
     MAP_TX,
     OCTET_STRING,
     SIGNED,
+    TOO_LONG,
+    TOO_SHORT,
     UNSIGNED8,
     UNSIGNED16,
     UNSIGNED32,
     WRITE_ANY,
+    Abort,
     Dictionary,
     Entry,
     constant,
@@ -29,11 +32,11 @@ from catenary.virtual.coe.dictionary import (
     text,
 )
 from catenary.virtual.coe.information import SDO_INFORMATION, InformationServer
-from catenary.virtual.coe.pdo_objects import RX_ASSIGNMENT, TX_ASSIGNMENT, PdoObjects
+from catenary.virtual.coe.pdo_objects import RX_ASSIGNMENT, PdoObjects
 from catenary.virtual.coe.quirks import NO_MAILBOX_QUIRKS, MailboxQuirks
 from catenary.virtual.coe.sdo_server import SDO_REQUEST, SdoServer
 from catenary.virtual.description import (
-    VENDOR_ID,
+    Channel,
     Description,
     MailboxDefault,
     Pdo,
@@ -46,8 +49,10 @@ from catenary.virtual.state_machine import (
     FATAL_SYNC_ERROR,
     INIT,
     INVALID_INPUT_CONFIGURATION,
+    INVALID_INPUT_MAPPING,
     INVALID_MAILBOX_CONFIGURATION,
     INVALID_OUTPUT_CONFIGURATION,
+    INVALID_OUTPUT_MAPPING,
     INVALID_WATCHDOG_CONFIGURATION,
     NO_SYNC_ERROR,
     NO_VALID_OUTPUTS,
@@ -62,7 +67,7 @@ from catenary.virtual.state_machine import (
 EMERGENCY = 1
 ENABLE_AND_MODE = 0x0F  # mask of direction and mode in the control byte of a SyncManager
 WATCHDOG_TRIGGER = 0x40  # bit in the same byte
-WATCHDOG_DIVIDER, WATCHDOG_TIME = 0x0400, 0x0420  # registers
+AL_STATUS, WATCHDOG_DIVIDER, WATCHDOG_TIME = 0x0130, 0x0400, 0x0420  # registers
 RAM_START, RAM_END = 0x1000, 0x3000
 BLOB_BYTES = 2048  # an object larger than any usual mailbox
 
@@ -111,6 +116,12 @@ def sync_managers_of(
     )
 
 
+def channels_of(mailbox_size: int) -> tuple[Channel, ...]:
+    """Return the process data of our own kinds of devices: SyncManagers 2 and 3."""
+    out, into, room = process_data_areas(mailbox_size)
+    return Channel(2, True, out, room), Channel(3, False, into, room)
+
+
 class Application:
     """Application of one device."""
 
@@ -124,49 +135,79 @@ class Application:
         delay_ns: int,
         quirks: MailboxQuirks = NO_MAILBOX_QUIRKS,
     ) -> None:
-        box = description.mailbox
-        if box is None:
-            raise ValueError("an application needs a mailbox, but the description has none")
         self._core = core
         self._buffers = Buffers(core)
         self._position = position
-        self._box = box
+        self._box = description.mailbox
+        self._emulation = description.emulation
         self.synchronisation: Synchronisation | None = None  # only for devices that support SYNC0
         self.checks_watchdog = False  # see ServoQuirks
         self.states = StateMachine(self, scheduler, description.identification)
-        self.dictionary = Dictionary(lambda: self.states.state)
+        self.dictionary = Dictionary(self._state)
         self._add_communication_objects(description, quirks.text_prefix)
-        out, into, room = process_data_areas(box.receive_size)
-        self._areas = (out, into)
+        size = description.mailbox.receive_size if description.mailbox else 0
+        facts = description.facts
+        self._channels = channels_of(size) if facts is None else facts.channels
         self.pdos = PdoObjects(
             self.dictionary,
+            self._channels,
             description.rx_pdos,
             description.tx_pdos,
-            room,
             description.mapping_quirks,
         )
-        size = box.send_size - HEADER.size
-        self._sdo = SdoServer(self.dictionary, size=size, quirks=quirks)
-        self._information = InformationServer(self.dictionary, size=size, quirks=quirks)
+        self._add_servers(description, quirks)
         self.mailbox = Mailbox(self, scheduler, self._serve_coe, delay_ns=delay_ns, quirks=quirks)
-        self._gate(mailbox=False, process_data=False)
+        self._gate(mailbox=self._emulation, process_data=self._emulation)
+
+    def _add_servers(self, description: Description, quirks: MailboxQuirks) -> None:
+        box, facts = description.mailbox, description.facts
+        size = (box.send_size if box else HEADER.size) - HEADER.size
+        self._sdo = SdoServer(
+            self.dictionary,
+            size=size,
+            complete_access=facts is None or facts.complete_access,
+            quirks=quirks,
+        )
+        self._information = InformationServer(
+            self.dictionary,
+            size=size,
+            supported=facts is None or facts.sdo_information,
+            quirks=quirks,
+        )
+
+    def _state(self) -> int:
+        """Return the AL state. With emulation, only the controller knows it."""
+        if self._emulation:
+            return self._core.peek(self._position, AL_STATUS, 1)[0] & 0x0F
+        return self.states.state
 
     def _add_communication_objects(self, d: Description, text_prefix: str) -> None:
         add = self.dictionary.add_variable
-        add(0x1000, number("Device type", UNSIGNED32, 0x0002_0192 if d.axes else 0x0000_1389))
+        own_type = 0x0002_0192 if d.axes else 0x0000_1389
+        device_type = own_type if d.facts is None else d.facts.device_type
+        add(0x1000, number("Device type", UNSIGNED32, device_type))
         add(0x1001, Entry("Error register", UNSIGNED8, 8, 0x07, self._error_register))
         add(0x1008, text("Manufacturer device name", text_prefix + d.name))
         add(0x1009, text("Manufacturer hardware version", "1"))
         add(0x100A, text("Manufacturer software version", "1.0"))
         identity = zip(
             ("Vendor ID", "Product code", "Revision number", "Serial number"),
-            (VENDOR_ID, d.product_code, d.revision, d.serial),
+            (d.vendor, d.product_code, d.revision, d.serial),
             strict=True,
         )
         record = self.dictionary.add_record
         record(0x1018, "Identity", [number(name, UNSIGNED32, value) for name, value in identity])
-        kinds = [number(f"Subindex {k:03d}", UNSIGNED8, k) for k in (1, 2, 3, 4)]
+        kinds = [
+            number(f"Subindex {n:03d}", UNSIGNED8, each.kind)
+            for n, each in enumerate(d.sync_managers, start=1)
+        ]
         record(0x1C00, "Sync manager type", kinds, code=ARRAY)
+        if d.facts is None:
+            self._add_test_objects()
+
+    def _add_test_objects(self) -> None:
+        """Add objects of our own kinds of devices that exercise long and writable transfers."""
+        add = self.dictionary.add_variable
         blob = bytes(k * 7 & 0xFF for k in range(BLOB_BYTES))
         add(0x2100, constant("Large octet string", OCTET_STRING, blob))
         add(
@@ -257,15 +298,22 @@ class Application:
         if state >= PRE_OP and before == INIT and not self._mailbox_is_configured():
             return INVALID_MAILBOX_CONFIGURATION
         if state >= SAFE_OP and before == PRE_OP:
-            if not self._buffer_is_configured(2, RX_ASSIGNMENT, 0x04):
-                return INVALID_OUTPUT_CONFIGURATION
-            if not self._buffer_is_configured(3, TX_ASSIGNMENT, 0x00):
-                return INVALID_INPUT_CONFIGURATION
+            for channel in self._channels:
+                if refusal := self._check_channel(channel):
+                    return refusal
             refusal = 0 if self.synchronisation is None else self.synchronisation.check()
             if refusal == 0 and self.checks_watchdog and not self._watchdog_is_consistent():
                 return INVALID_WATCHDOG_CONFIGURATION
             return refusal
         return 0
+
+    def _check_channel(self, channel: Channel) -> int:
+        """Return 0, or the AL status code of a fault in the mapping or the SyncManager."""
+        if self.pdos.contradicts(channel.assignment):
+            return INVALID_OUTPUT_MAPPING if channel.outputs else INVALID_INPUT_MAPPING
+        if self._buffer_is_configured(channel):
+            return 0
+        return INVALID_OUTPUT_CONFIGURATION if channel.outputs else INVALID_INPUT_CONFIGURATION
 
     def _watchdog_is_consistent(self) -> bool:
         """Return True if the trigger bit of SyncManager 2 matches the activation of the watchdog.
@@ -280,6 +328,8 @@ class Application:
 
     def _mailbox_is_configured(self) -> bool:
         box = self._box
+        if box is None:
+            return True
         expected = (
             (box.receive_offset, box.receive_size, 0x06),
             (box.send_offset, box.send_size, 0x02),
@@ -290,18 +340,22 @@ class Application:
                 return False
         return True
 
-    def _buffer_is_configured(self, n: int, assignment: int, control: int) -> bool:
-        size = self.pdos.size(assignment)
-        if len(self.pdos.placed(assignment)) > _segment.MAPPED_MAX:
+    def _buffer_is_configured(self, channel: Channel) -> bool:
+        size = self.pdos.size(channel.assignment)
+        if len(self.pdos.placed(channel.assignment)) > _segment.MAPPED_MAX:
             return False
-        start, length, found, enabled, _full = self._buffers.settings(self._position, n)
+        start, length, found, enabled, _full = self._buffers.settings(
+            self._position, channel.sync_manager
+        )
         if size == 0:
             return not enabled or length == 0
-        area = self._areas[n - 2]
-        return (start, length, found & ENABLE_AND_MODE, enabled) == (area, size, control, True)
+        expected = (channel.start, size, channel.control, True)
+        return (start, length, found & ENABLE_AND_MODE, enabled) == expected
 
     def lacks_for_op(self) -> int:
-        has_outputs = self.pdos.size(RX_ASSIGNMENT) > 0
+        has_outputs = any(
+            each.outputs and self.pdos.size(each.assignment) for each in self._channels
+        )
         if has_outputs and not self._core.outputs_seen(self._position):
             return NO_VALID_OUTPUTS
         if self.synchronisation is not None and self.synchronisation.awaits_pulses():
@@ -312,7 +366,7 @@ class Application:
         if before == INIT and state == PRE_OP:
             self.mailbox.reset()
         if before < SAFE_OP <= state:
-            self._map_process_data()
+            self.map_process_data()
             if self.synchronisation is not None:
                 self.synchronisation.begin()
         if state < SAFE_OP <= before and self.synchronisation is not None:
@@ -325,18 +379,27 @@ class Application:
         self._core.enable_outputs(self._position, state == OP)
 
     def _gate(self, *, mailbox: bool, process_data: bool) -> None:
-        for n, opened in ((0, mailbox), (1, mailbox), (2, process_data), (3, process_data)):
+        gates = {} if self._box is None else {0: mailbox, 1: mailbox}
+        gates |= {channel.sync_manager: process_data for channel in self._channels}
+        for n, opened in gates.items():
             self._buffers.block(self._position, n, not opened)
 
-    def _map_process_data(self) -> None:
-        for n, assignment, flag in ((2, RX_ASSIGNMENT, MAP_RX), (3, TX_ASSIGNMENT, MAP_TX)):
+    def map_process_data(self) -> None:
+        """Map the first SyncManager of each direction to slots; the model has no more."""
+        mapped: set[bool] = set()
+        for channel in self._channels:
+            if channel.outputs in mapped:
+                continue
             entries: list[tuple[int, int, int, bool]] = []
-            for placed in self.pdos.placed(assignment):
+            for placed in self.pdos.placed(channel.assignment):
                 entry = self.dictionary.entry(placed.index, placed.subindex)
-                if entry.slot >= 0 and entry.access & flag:
+                if entry.slot >= 0 and entry.access & (MAP_RX if channel.outputs else MAP_TX):
                     signed = entry.data_type in SIGNED
                     entries.append((placed.bit, placed.bits, entry.slot, signed))
-            self._core.map_process_data(self._position, n == 2, n if entries else -1, entries)
+            n = channel.sync_manager if entries else -1
+            self._core.map_process_data(self._position, channel.outputs, n, entries)
+            if entries:
+                mapped.add(channel.outputs)
 
     def slot_entry(self, name: str, data_type: int, bits: int, slot: int, access: int) -> Entry:
         """Return a dictionary entry whose value is a slot of the model.
@@ -355,7 +418,9 @@ class Application:
             return value.to_bytes(size, "little")
 
         def write(data: bytes) -> None:
-            value = int.from_bytes(data, "little", signed=signed)
+            if len(data) != size:
+                raise Abort(TOO_LONG if len(data) > size else TOO_SHORT)
+            value = int.from_bytes(data, "little", signed=signed or bits == 64)
             self._core.put_slot(self._position, slot, value)
 
         writable = access & WRITE_ANY

@@ -1,0 +1,68 @@
+"""`catenary sii build`: build the image of an EEPROM from a vendor's ESI file."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+
+from catenary.cli.arguments import number
+from catenary.cli.parsers import Commands, add_command
+
+
+def add_build(group: Commands) -> None:
+    building = add_command(
+        group,
+        "build",
+        help="build an image from an ESI file",
+        description="Builds the EEPROM image (SII) of a device from its ESI file (XML). Notes name "
+        "what an SII cannot contain. No device is needed.",
+        example="catenary sii build drive.xml -o drive.bin\n"
+        "catenary sii build terminals.xml --device EL2004 --serial 7 -o el2004.bin\n"
+        "catenary sii show drive.bin",
+    )
+    building.add_argument("file", metavar="FILE", type=Path, help="ESI file (XML)")
+    building.add_argument(
+        "--device",
+        metavar="NAME|PRODUCT[:REVISION]",
+        default="",
+        help="device in the file; needed if it has several",
+    )
+    building.add_argument(
+        "--serial", metavar="N", type=number, default=0, help="serial number (default 0)"
+    )
+    building.add_argument(
+        "--alias", metavar="N", type=number, help="station alias (default: that of the file)"
+    )
+    building.add_argument(
+        "--no-pdo-names",
+        action="store_true",
+        help="leave out the names of PDOs and entries, for a small EEPROM",
+    )
+    building.add_argument(
+        "-o", "--output", metavar="OUT", required=True, help="write the image to OUT; - is stdout"
+    )
+    building.set_defaults(run=run_build)
+
+
+def run_build(arguments: argparse.Namespace) -> int:
+    from catenary.esi.reader import read_esi
+    from catenary.esi.selection import select_device
+    from catenary.esi.sii import assemble_sii
+
+    device = select_device(read_esi(arguments.file), arguments.device)
+    build = assemble_sii(
+        device,
+        serial=arguments.serial,
+        alias=arguments.alias,
+        pdo_names=not arguments.no_pdo_names,
+    )
+    for note in build.notes:
+        print(f"note: {device.source}: {note}", file=sys.stderr)
+    if arguments.output == "-":
+        sys.stdout.buffer.write(build.image)
+        return 0
+    Path(arguments.output).write_bytes(build.image)
+    used = len(build.image.rstrip(b"\xff"))
+    print(f"{arguments.output}: {device}\n{used} of {len(build.image)} bytes used")
+    return 0
