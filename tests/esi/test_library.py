@@ -13,8 +13,9 @@ from pathlib import Path
 import pytest
 
 from catenary.errors import EsiError, EsiLookupError
-from catenary.esi.library import Library, default_folder
+from catenary.esi.library import Library
 from catenary.esi.lookup import Rule
+from catenary.esi.user_folder import default_folder
 from tests.esi.esi_file import VENDOR, device, esi, module, write
 
 

@@ -14,9 +14,9 @@ from dataclasses import replace
 
 from catenary.errors import IdentityError
 from catenary.esi.device import EsiDevice, RevisionCheck
+from catenary.esi.lookup import accepts
 from catenary.esi.object_descriptions import documented_objects
 from catenary.esi.process_data import with_process_data
-from catenary.esi.revision import revision_accepted
 from catenary.esi.settings import with_settings
 from catenary.model.device import DeviceDescription
 
@@ -66,7 +66,8 @@ def check_key(description: DeviceDescription, esi: EsiDevice) -> None:
             found=found,
             hint="use the ESI file of this device; its vendor offers it for download",
         )
-    if revision_accepted(esi.revision_check, esi.key, found.revision):
+    check = esi.revision_check
+    if check is RevisionCheck.NONE or accepts(check, found.revision, esi.key.revision):
         return
     raise IdentityError(
         f"{description}: {esi.source} is not for its revision 0x{found.revision:08X}: the file "

@@ -24,8 +24,8 @@ from catenary.esi.record import FileIndex, Kind, Record
 from catenary.esi.source import EsiWarning
 from catenary.esi.sources import locked, read_sources, write_sources
 from catenary.esi.store import MEMORY
+from catenary.esi.user_folder import default_folder, user_folder
 
-VARIABLE = "CATENARY_ESI"
 SMALL = 4 << 20  # [bytes]; files of a temporary library up to this size are indexed in 0.5 s
 ADD_HINT = "add the vendor's ESI file: catenary esi add FILE"
 MAX_NAMES = 20_000  # compared with a name that was not found
@@ -369,22 +369,8 @@ class Library:
             return Assembly(self._files()).device(now[0])
 
 
-def default_folder() -> Path:
-    """Return the folder of the user's library."""
-    given = os.environ.get(VARIABLE)
-    if given:
-        return Path(os.path.abspath(os.path.expanduser(given)))
-    return _user_folder("XDG_DATA_HOME", ".local/share") / "catenary" / "esi"
-
-
-def _user_folder(variable: str, fallback: str) -> Path:
-    """Return a folder of the XDG base directory specification; it ignores relative paths."""
-    given = os.environ.get(variable, "")
-    return Path(given) if os.path.isabs(given) else Path.home() / fallback
-
-
 def _cache_folder() -> Path | None:
-    folder = _user_folder("XDG_CACHE_HOME", ".cache") / "catenary" / "esi"
+    folder = user_folder("XDG_CACHE_HOME", ".cache") / "catenary" / "esi"
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError:  # the index is then made in memory

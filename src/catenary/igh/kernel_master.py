@@ -22,7 +22,7 @@ from catenary.wire.al import AlState
 
 if TYPE_CHECKING:  # plan imports NumPy, which a scan does not need
     from catenary.bus.diagnosis import Diagnosis
-    from catenary.bus.master import MasterOwner
+    from catenary.bus.master import Complete, MasterOwner
     from catenary.bus.states import Outcome
     from catenary.plan.planner import Plan
     from catenary.plan.request import DeviceRequest, ProcessDataRequest
@@ -93,6 +93,8 @@ class KernelMaster:
             renewed = describe(self.reservation, sub.position)
             _check_same(sub.description, renewed)
             if sub.esi is not None:
+                from catenary.esi.apply import applied
+
                 renewed = applied(renewed, sub.esi)
             objects = [
                 object_information(self.reservation, sub.position, index, subindex)
