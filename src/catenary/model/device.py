@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from enum import IntEnum
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from catenary.model.esi_settings import (
     NO_TIMEOUTS,
@@ -24,6 +24,9 @@ from catenary.model.esi_settings import (
 from catenary.wire.features import Information
 from catenary.wire.sii import MailboxProtocol
 from catenary.wire.sii_categories import SyncManagerUse
+
+if TYPE_CHECKING:
+    from catenary.model.module import ModularDevice
 
 
 class Identity(NamedTuple):
@@ -244,6 +247,7 @@ class DeviceDescription:
     named_mappings: tuple[NamedMapping, ...] = ()
     timeouts: Timeouts = NO_TIMEOUTS
     watchdog: WatchdogValues = NO_WATCHDOG_VALUES
+    modular: ModularDevice | None = None  # slots and modules, from an ESI file
 
     @property
     def profile(self) -> int | None:
