@@ -84,6 +84,14 @@ def lacking(config: pytest.Config, marker: str, reason: str) -> Never:
     pytest.skip(reason)
 
 
+@pytest.fixture(scope="session", autouse=True)
+def _no_esi_library(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
+    """Use an empty library of ESI files instead of the user's."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("CATENARY_ESI", str(tmp_path_factory.getbasetemp() / "esi_library"))
+        yield
+
+
 @pytest.fixture(scope="session")
 def shared_data(pytestconfig: pytest.Config) -> Path:
     """Return the folder of captures, SII images and device descriptions shared by projects."""

@@ -18,7 +18,7 @@ would prevent a process from entering a network namespace.
 TYPE_CHECKING = not __name__
 
 if TYPE_CHECKING:
-    from catenary import control, drive, errors, realtime, record, share, types, virtual
+    from catenary import control, drive, errors, esi, realtime, record, share, types, virtual
     from catenary.bus import SubDevice
     from catenary.bus import event_types as events
     from catenary.drive import DistributedClock, Drives, Inputs, Outputs, ProcessData, StartUp
@@ -72,6 +72,7 @@ __all__ = [
     "control",
     "drive",
     "errors",
+    "esi",
     "events",
     "interfaces",
     "law",
@@ -82,7 +83,7 @@ __all__ = [
     "virtual",
 ]
 
-_MODULES = ("control", "drive", "errors", "realtime", "record", "share", "types", "virtual")
+_MODULES = ("control", "drive", "errors", "esi", "realtime", "record", "share", "types", "virtual")
 _DRIVE = ("DistributedClock", "Drives", "Inputs", "Outputs", "ProcessData", "StartUp")
 _ERRORS = (  # errors that a loop raises; the others are in catenary.errors
     "CatenaryError",

@@ -19,4 +19,5 @@ NAMES = [
 @pytest.mark.parametrize("name", NAMES)
 def test_the_examples_run(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("CATENARY_ESI", str(tmp_path / "esi_library"))
     assert run_page(ROOT / name, monkeypatch)

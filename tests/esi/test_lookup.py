@@ -18,6 +18,7 @@ def record(
     path: str = "a.xml",
     order: int = 0,
     hides: tuple[int, ...] = (),
+    type: str = "",
 ) -> Record:
     keys = tuple(DeviceKey(1, 2, each) for each in hides)
     entry = IndexEntry(
@@ -30,6 +31,7 @@ def record(
         revision=revision,
         revision_check=check,
         hides=keys,
+        type=type,
     )
     return Record(entry, path, "/", order)
 
@@ -125,3 +127,10 @@ def test_the_source_that_was_added_last_is_preferred() -> None:
     choice = choose(known, 1)
     assert choice is not None
     assert [each.path for each in choice.records] == ["c.xml", "a.xml", "b.xml"]
+
+
+def test_the_order_code_decides_between_equal_numbers() -> None:
+    known = [record(2, type="A"), record(1, type="A"), record(1, type="B")]
+    choice = choose(known, 1, "B")
+    assert choice is not None
+    assert [each.entry.type for each in choice.records] == ["B", "A"]

@@ -14,6 +14,7 @@ from catenary.cli import (
     demo,
     diag,
     doctor,
+    esi,
     graph,
     init,
     plot,
@@ -32,7 +33,7 @@ VIRTUAL_TIME = "times are virtual: they come from the segment's clock, not from 
 PROGRAM = "catenary"
 DESCRIPTION = "Real-time EtherCAT for Python."
 COMMANDS = (
-    *(scan, state, graph, diag, sdo, reg, alias, sii),
+    *(scan, state, graph, diag, sdo, reg, alias, sii, esi),
     *(init, check),
     *(demo, doctor, bench, virtual, realtime, record, plot),
 )

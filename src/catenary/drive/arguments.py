@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 from difflib import get_close_matches
 from typing import TypeAlias
 
@@ -11,15 +12,17 @@ from catenary.bus import SubDevice
 from catenary.drive.axis import MEASURED, Axis
 from catenary.drive.channel import Channel, ChannelSpec, make_channel
 from catenary.drive.objects import NAMED_COLUMNS, WRITTEN_OBJECTS, AxisObject
-from catenary.model.device import mapped_entries
+from catenary.model.device import DeviceDescription, mapped_entries
 from catenary.plan.cycle import NumberKind
+from catenary.plan.named_pdos import pdos_named
 from catenary.plan.request import DistributedClock, ObjectReference, WrittenPdo
 from catenary.plan.start_up_object import StartUp
 from catenary.wire.cia402 import Mode
 
 AxisSource: TypeAlias = SubDevice | tuple[SubDevice, int]
 PdoEntry: TypeAlias = tuple[int, int, int] | str  # (index, subindex, bits), or a channel name
-PdoList: TypeAlias = Sequence[int] | Mapping[int, Sequence[PdoEntry]]
+PdoName: TypeAlias = int | str  # number, or name of a PDO or a mapping
+PdoList: TypeAlias = str | Sequence[PdoName] | Mapping[PdoName, Sequence[PdoEntry]]
 ColumnSpec: TypeAlias = ChannelSpec | AxisObject
 Columns: TypeAlias = Sequence[str | tuple[str, ColumnSpec]] | Mapping[str, ColumnSpec]
 
@@ -132,38 +135,55 @@ def clock_request(dc: DistributedClock | bool) -> DistributedClock | None:
 
 
 def written_pdos(
-    pdos: PdoList, named: Mapping[str, Channel] | Mapping[str, AxisObject]
+    pdos: PdoList,
+    named: Mapping[str, Channel] | Mapping[str, AxisObject],
+    device: DeviceDescription,
 ) -> tuple[WrittenPdo, ...]:
     """Return the PDOs of the option `pdos`, with their entries if they are given.
 
     Args:
         pdos: value of the option.
         named: objects that the entries may refer to by name.
+        device: device with the names of its PDOs and mappings.
 
     Raises:
-        TypeError: The option is neither a list of numbers nor a mapping of numbers to entries.
-        ValueError: An index is not that of a PDO, or a name is unknown.
+        TypeError: The option is neither a list of numbers and names nor a mapping of these to
+            entries.
+        ValueError: An index is not that of a PDO, or the name of an entry is unknown.
+        MappingError: The name of a PDO is unknown or ambiguous.
     """
-    if not isinstance(pdos, Iterable) or not all(isinstance(index, int) for index in pdos):
+    pdos = [pdos] if isinstance(pdos, str) else pdos
+    if not isinstance(pdos, Iterable) or not all(map(_is_pdo, pdos)):
         raise TypeError(
-            f"pdos={pdos!r}: give PDO numbers, [0x1A00], or PDOs with entries, {{0x1A00: entries}}"
+            f"pdos={pdos!r}: give PDO numbers, [0x1A00], names, ['Inputs'], or PDOs with entries, "
+            "{0x1A00: entries}"
         )
-    for index in pdos:
-        if not 0x1600 <= index < 0x1C00:
-            raise ValueError(
-                f"pdos: 0x{index:04X} is not a PDO; use 0x1600 to 0x19FF for outputs and 0x1A00 to "
-                "0x1BFF for inputs"
-            )
-    if not isinstance(pdos, Mapping):
-        return tuple(WrittenPdo(index) for index in pdos)
-    return tuple(
-        WrittenPdo(index, tuple(_written_entry(index, each, named) for each in entries) or None)
-        for index, entries in pdos.items()
-    )
+    found: list[WrittenPdo] = []
+    for each in pdos:
+        chosen = pdos_named(device, each) if isinstance(each, str) else (_numbered(each),)
+        if isinstance(pdos, Mapping) and pdos[each]:
+            entries = tuple(_written_entry(each, entry, named) for entry in pdos[each])
+            chosen = tuple(replace(pdo, entries=entries) for pdo in chosen)
+        found += [pdo for pdo in chosen if pdo not in found]
+    return tuple(found)
+
+
+def _is_pdo(given: object) -> bool:
+    """Return True for a number or a name; a number in quotes is neither."""
+    return isinstance(given, int) or (isinstance(given, str) and not given.startswith("0x"))
+
+
+def _numbered(index: int) -> WrittenPdo:
+    if not 0x1600 <= index < 0x1C00:
+        raise ValueError(
+            f"pdos: 0x{index:04X} is not a PDO; use 0x1600 to 0x19FF for outputs and 0x1A00 to "
+            "0x1BFF for inputs"
+        )
+    return WrittenPdo(index)
 
 
 def _written_entry(
-    pdo: int, entry: PdoEntry, named: Mapping[str, Channel] | Mapping[str, AxisObject]
+    pdo: PdoName, entry: PdoEntry, named: Mapping[str, Channel] | Mapping[str, AxisObject]
 ) -> ObjectReference:
     if not isinstance(entry, str):
         return ObjectReference(*entry)
@@ -171,7 +191,8 @@ def _written_entry(
         near = get_close_matches(entry, named, n=1)
         guess = f"; did you mean {near[0]!r}?" if near else ""
         known = f"known names are {', '.join(named)}" if named else "this request has no names"
-        raise ValueError(f"pdos: unknown name {entry!r} in 0x{pdo:04X}; {known}{guess}")
+        place = repr(pdo) if isinstance(pdo, str) else f"0x{pdo:04X}"
+        raise ValueError(f"pdos: unknown name {entry!r} in {place}; {known}{guess}")
     found = named[entry]
     return ObjectReference(found.index, found.subindex, found.bit_length)
 

@@ -23,6 +23,7 @@ from catenary.drive.limits import LimitOptions
 from catenary.drive.objects import AxisObject
 from catenary.drive.units import AxisUnits, per_axis
 from catenary.plan.cycle import OnLoss
+from catenary.plan.request import WrittenPdo
 from catenary.plan.start_up_object import StartUp
 
 V = TypeVar("V")
@@ -94,6 +95,13 @@ class CommonOptions:
     start_up: Sequence[StartUp]
 
 
+def _pdos(sub: SubDevice, common: CommonOptions) -> tuple[WrittenPdo, ...]:
+    """Return the PDOs of the option `pdos` for one device, whose PDOs may have other names."""
+    if not common.pdos:
+        return ()
+    return written_pdos(common.pdos, common.columns, sub.description)
+
+
 def make_axes(
     sources: Sequence[tuple[SubDevice, int]], options: AxisOptions, common: CommonOptions
 ) -> tuple[Axis, ...]:
@@ -112,7 +120,6 @@ def make_axes(
     units, limits = options.units(n), options.limits(n)
     names = axis_names(sources, common.names)
     measured = known(tuple(MEASURED) if common.measured is None else common.measured)
-    written = written_pdos(common.pdos, common.columns)
     axes = tuple(
         Axis(
             name=names[k],
@@ -127,7 +134,7 @@ def make_axes(
             divider=cycles_between("divider", common.divider),
             required=common.required,
             homing=options.each("homing", n)[k],
-            pdos=written,
+            pdos=_pdos(sub, common),
             objects=start_up_list(common.start_up),
         )
         for k, (sub, slot) in enumerate(sources)

@@ -13,9 +13,10 @@ from catenary.errors import MappingError
 from catenary.model.device import Assignment, DeviceDescription, Direction, Entry, Pdo
 from catenary.plan.cycle import Column
 from catenary.plan.numbers import ANY, Which
+from catenary.plan.op_mode import mode_pdos
 from catenary.plan.pdo_rewrite import write_down
 from catenary.plan.pdo_search import pdo_names
-from catenary.plan.request import ImageLayout, WrittenPdo
+from catenary.plan.request import DistributedClock, ImageLayout, WrittenPdo
 
 
 class NamedChannel(NamedTuple):
@@ -110,19 +111,27 @@ def _choice(devices: Sequence[DeviceDescription], direction: Direction) -> str:
     return f": no PDO is assigned; choose with pdos= from {pdo_names(offered)}"
 
 
-def with_written(
-    device: DeviceDescription, direction: Direction, pdos: Sequence[WrittenPdo]
+def with_chosen(
+    device: DeviceDescription,
+    pdos: Sequence[WrittenPdo],
+    clock: DistributedClock | None,
+    directions: Sequence[Direction],
 ) -> DeviceDescription:
-    """Return the description of a device with other PDOs assigned; unchanged without PDOs.
+    """Return the description of a device with the PDOs of a request, or those of its OpMode.
 
     Args:
         device: the device.
-        direction: direction of the PDOs.
         pdos: PDOs to assign, with their entries if these are to be written.
+        clock: clock request, which chooses the OpMode.
+        directions: directions to change.
     """
-    if not pdos:
-        return device
-    return device.with_process_data(direction, write_down(device, direction, pdos).assignments)
+    for direction in directions:
+        chosen = [pdo for pdo in pdos if pdo.direction is direction]
+        chosen = chosen or list(mode_pdos(device, clock, direction))
+        if chosen:
+            assignments = write_down(device, direction, chosen).assignments
+            device = device.with_process_data(direction, assignments)
+    return device
 
 
 def number_entries(assignment: Assignment) -> list[tuple[Pdo, Entry]]:

@@ -75,11 +75,12 @@ class Drives(Request):
     - `required`: if False, the loop continues without a lost drive. Its axes keep their last
       values. Enable them again when they are `present`.
     - `divider`: n to exchange in every n-th cycle of the loop.
-    - `dc`: distributed clocks. True uses the settings in the SII of each device. A
+    - `dc`: distributed clocks. True uses the settings in the ESI or SII of each device. A
       `DistributedClock` applies to all devices.
     - `pdos`: PDOs to assign on each device, `[0x1701, 0x1B01]`, or with their entries (index,
       subindex, bits), `{0x1600: [(0x6040, 0, 16), (0x607A, 0, 32)]}`. They are written even if the
       SII declares them fixed. If a direction has no PDOs in this option, Catenary chooses them.
+      Names of PDOs, or the name of a mapping of the ESI file, follow the rules of the file.
     - `start_up`: `StartUp` objects to write to each device before SAFE-OP.
 
     Options with one value for all axes, or a sequence with one value per axis:

@@ -20,7 +20,7 @@ from catenary.drive.device_channels import (
     chosen_channels,
     column,
     mapped_channels,
-    with_written,
+    with_chosen,
 )
 from catenary.drive.request import Request
 from catenary.model.device import Direction
@@ -90,8 +90,14 @@ class Channels(Request):
     ) -> None:
         super().__init__(subs)
         named = make_channels("channels", channels or {})
-        written = written_pdos(pdos, named)
-        self._pdos = tuple(pdo for pdo in written if pdo.direction is self.direction)
+        self._pdos = {
+            sub.position: tuple(
+                pdo
+                for pdo in written_pdos(pdos, named, sub.description)
+                if pdo.direction is self.direction
+            )
+            for sub in subs
+        }
         self._required = required
         self._divider = cycles_between("divider", divider)
         self._clock = clock_request(dc)
@@ -112,7 +118,12 @@ class Channels(Request):
                 )
             self._channels = chosen_channels(subs[0], named)
         else:
-            devices = [with_written(sub.description, self.direction, self._pdos) for sub in subs]
+            devices = [
+                with_chosen(
+                    sub.description, self._pdos[sub.position], self._clock, [self.direction]
+                )
+                for sub in subs
+            ]
             self._channels = mapped_channels(devices, self.direction, scale or {})
         self._places: dict[str, tuple[Reals | Integers | Bytes, int]] = {}
 
@@ -157,7 +168,7 @@ class Channels(Request):
                 clock=self._clock,
                 divider=self._divider,
                 required=self._required,
-                pdos=self._pdos,
+                pdos=self._pdos[sub.position],
                 objects=self._start_up,
             )
         return requests

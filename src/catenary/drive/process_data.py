@@ -21,12 +21,12 @@ from catenary.drive.device_channels import (
     number_entries,
     place_entries,
     unique_names,
-    with_written,
+    with_chosen,
 )
 from catenary.drive.image_place import Place, make_place
 from catenary.drive.request import Request
 from catenary.errors import ConfigurationError
-from catenary.model.device import Direction
+from catenary.model.device import DeviceDescription, Direction
 from catenary.plan.cycle import ImageArea
 from catenary.plan.request import (
     Bytes,
@@ -35,7 +35,6 @@ from catenary.plan.request import (
     ImageLayout,
     RequestTables,
     Views,
-    WrittenPdo,
 )
 from catenary.plan.start_up_object import StartUp
 
@@ -57,15 +56,16 @@ class ProcessData(Request):
             the object dictionary. `{}` for no inputs.
         outputs: the same for outputs. The request writes all output bytes of the device, except
             with `{}`: another request can then write them.
-        pdos: PDOs to assign, `[0x1A01]`, or with their entries by name or as (index, subindex,
-            bits), `{0x1A00: ["force", "status"]}`. None to let Catenary choose them.
+        pdos: PDOs to assign by number or name, `[0x1A01, "Status"]`, or with their entries by name
+            or as (index, subindex, bits), `{0x1A00: ["force", "status"]}`; or the name of a
+            mapping of the ESI file. None to let Catenary choose them.
         safe: values of outputs by name, or the bytes of all outputs. The loop sends them when it
             ends for any reason. Outputs without a safe value become 0. The device then leaves OP
             and determines its outputs itself.
         start_up: objects to write to the device before SAFE-OP.
         divider: n to exchange in every n-th cycle of the loop.
         required: if False, the loop continues without the device; see `present`.
-        dc: distributed clocks. True uses the settings in the SII of the device.
+        dc: distributed clocks. True uses the settings in the ESI or SII of the device.
 
     Raises:
         TypeError: An option has the wrong type, for example an object that is neither a Channel nor
@@ -94,20 +94,22 @@ class ProcessData(Request):
         }
         _check_names(inputs or {}, outputs or {})
         known = {**(named[Direction.INPUT] or {}), **(named[Direction.OUTPUT] or {})}
-        self._pdos = written_pdos(pdos or (), known)
+        self._pdos = written_pdos(pdos or (), known, sub.description)
         self._writes = outputs is None or bool(outputs)
         self._is_named = inputs is not None
         self._channels = {
             direction: chosen_channels(sub, channels or {}) for direction, channels in named.items()
         }
         unnamed = [direction for direction, channels in named.items() if channels is None]
-        self._channels |= _mapped_channels(sub, unnamed, self._pdos, known)
+        self._clock = clock_request(dc)
+        self._channels |= _mapped_channels(
+            with_chosen(sub.description, self._pdos, self._clock, unnamed), unnamed, known
+        )
         self._safe = bytes(safe) if isinstance(safe, bytearray | memoryview) else safe
         self._check_safe()
         self._start_up = start_up_list(start_up)
         self._divider = cycles_between("divider", divider)
         self._required = required
-        self._clock = clock_request(dc)
         self._places: dict[str, tuple[Direction, Place]] = {}
         self._images: dict[Direction, memoryview] = {}
         self._unit = -1
@@ -292,16 +294,11 @@ class ProcessData(Request):
 
 
 def _mapped_channels(
-    sub: SubDevice,
-    directions: Sequence[Direction],
-    pdos: Sequence[WrittenPdo],
-    taken: Mapping[str, Channel],
+    device: DeviceDescription, directions: Sequence[Direction], taken: Mapping[str, Channel]
 ) -> dict[Direction, tuple[NamedChannel, ...]]:
     """Return the mapped channels of these directions, with names that are not in `taken`."""
     found = []
     for direction in directions:
-        written = [pdo for pdo in pdos if pdo.direction is direction]
-        device = with_written(sub.description, direction, written)
         for assignment in device.assignments(direction):
             found += [(direction, device, *each) for each in number_entries(assignment)]
     names = unique_names([(entry.name, pdo.name, d.noun) for d, _, pdo, entry in found])

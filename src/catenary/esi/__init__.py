@@ -1,5 +1,107 @@
-"""EtherCAT SubDevice Information (ESI, ETG.2000): vendors' device description files."""
+"""EtherCAT SubDevice Information (ESI, ETG.2000): vendors' device description files.
 
-from catenary.esi.reader import read_device, read_esi, read_module
+from catenary.esi import Library
 
-__all__ = ["read_device", "read_esi", "read_module"]
+library = Library()
+library.add("Beckhoff_EtherCAT_XML.zip")
+device = library.find(vendor=2, product=0x07D43052, revision=0x00120000)
+
+The library and the parser are loaded when they are first used: a scan without ESI files needs
+neither.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from catenary.esi.device import (
+    DeviceKey,
+    EsiController,
+    EsiDevice,
+    EsiEeprom,
+    EsiEepromCategory,
+    EsiEntry,
+    EsiFile,
+    EsiInitCommand,
+    EsiMailbox,
+    EsiMapping,
+    EsiModeSyncManager,
+    EsiModule,
+    EsiOpMode,
+    EsiPdo,
+    EsiSlot,
+    EsiSlots,
+    EsiSyncManager,
+    EsiTimeouts,
+    EsiWatchdog,
+    RevisionCheck,
+)
+from catenary.esi.dictionary import (
+    EsiArray,
+    EsiDataType,
+    EsiDictionary,
+    EsiObject,
+    EsiObjectEntry,
+    EsiSubItem,
+)
+from catenary.esi.lookup import Choice, Rule
+from catenary.esi.record import FileIndex, IndexEntry, Kind, Record
+from catenary.esi.source import EsiWarning, Source
+
+if TYPE_CHECKING:
+    from catenary.esi.library import Added, Library
+    from catenary.esi.reader import read_esi
+
+__all__ = [
+    "Added",
+    "Choice",
+    "DeviceKey",
+    "EsiArray",
+    "EsiController",
+    "EsiDataType",
+    "EsiDevice",
+    "EsiDictionary",
+    "EsiEeprom",
+    "EsiEepromCategory",
+    "EsiEntry",
+    "EsiFile",
+    "EsiInitCommand",
+    "EsiMailbox",
+    "EsiMapping",
+    "EsiModeSyncManager",
+    "EsiModule",
+    "EsiObject",
+    "EsiObjectEntry",
+    "EsiOpMode",
+    "EsiPdo",
+    "EsiSlot",
+    "EsiSlots",
+    "EsiSubItem",
+    "EsiSyncManager",
+    "EsiTimeouts",
+    "EsiWarning",
+    "EsiWatchdog",
+    "FileIndex",
+    "IndexEntry",
+    "Kind",
+    "Library",
+    "Record",
+    "RevisionCheck",
+    "Rule",
+    "Source",
+    "read_esi",
+]
+
+_HOMES = {
+    "Added": "catenary.esi.library",
+    "Library": "catenary.esi.library",
+    "read_esi": "catenary.esi.reader",
+}
+
+
+def __getattr__(name: str) -> object:
+    from importlib import import_module
+
+    if name not in _HOMES:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}", name=name)
+    return getattr(import_module(_HOMES[name]), name)

@@ -244,7 +244,9 @@ class Library:
         """Return all entries of one kind, the preferred ones first."""
         return self._files().records("kind=?", kind.value)
 
-    def choose(self, vendor: int, product: int, revision: int | None = None) -> Choice | None:
+    def choose(
+        self, vendor: int, product: int, revision: int | None = None, *, order: str = ""
+    ) -> Choice | None:
         """Choose among the descriptions of a product; None if the library has none.
 
         The exact revision is preferred, then the newest one that is not above the device's.
@@ -253,13 +255,16 @@ class Library:
             vendor: Vendor ID.
             product: Product code.
             revision: Revision of the device; None for the newest description.
+            order: Order code, which decides between descriptions with the same numbers.
         """
         records = self._files().records(
             "kind='device' AND e.vendor=? AND product=?", vendor, product
         )
-        return choose(records, revision)
+        return choose(records, revision, order)
 
-    def find(self, vendor: int, product: int, revision: int | None = None) -> EsiDevice | None:
+    def find(
+        self, vendor: int, product: int, revision: int | None = None, *, order: str = ""
+    ) -> EsiDevice | None:
         """Return the description of a device; None if the library does not have the product.
 
         Its warnings name the rule, if the revision differs, and other files with the same key.
@@ -268,12 +273,13 @@ class Library:
             vendor: Vendor ID.
             product: Product code.
             revision: Revision of the device; None for the newest description.
+            order: Order code, which decides between descriptions with the same numbers.
 
         Raises:
             EsiLookupError: The library has only newer revisions. The message lists them.
             EsiError: The file cannot be read.
         """
-        choice = self.choose(vendor, product, revision)
+        choice = self.choose(vendor, product, revision, order=order)
         if choice is None:
             return None
         if choice.record is None:
@@ -321,9 +327,12 @@ class Library:
         return sorted(shown, key=lambda each: (each.entry.type, -each.entry.revision))
 
     def near(self, text: str) -> list[str]:
-        """Return order codes that are similar to a text, the most similar one first."""
-        types = {each.entry.type.casefold(): each.entry.type for each in self.records()[:MAX_NAMES]}
-        return [types[each] for each in get_close_matches(text.casefold(), types, n=5)]
+        """Return order codes of devices with similar names, the most similar one first."""
+        types: dict[str, str] = {}
+        for each in (record.entry for record in self.records()[:MAX_NAMES]):
+            types.update(dict.fromkeys((each.type.casefold(), each.name.casefold()), each.type))
+        found = get_close_matches(text.casefold(), types, n=5)
+        return list(dict.fromkeys(types[each] for each in found))
 
     def check(self) -> list[str]:
         """Compare every file with the index by content, and return what is wrong.

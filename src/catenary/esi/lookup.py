@@ -75,14 +75,16 @@ def accepts(check: RevisionCheck, device: int, file: int) -> bool:
     return RULES[check](device, file)
 
 
-def choose(records: Iterable[Record], revision: int | None) -> Choice | None:
+def choose(records: Iterable[Record], revision: int | None, order: str = "") -> Choice | None:
     """Choose among the descriptions of one product; None if there are none.
 
     Args:
         records: All descriptions of the product.
         revision: Revision of the device; None for the newest one that is not hidden.
+        order: Order code that is preferred among descriptions of one revision.
     """
     ranked = sorted(records, key=_newest_first)
+    ranked.sort(key=lambda each: (-each.entry.revision, each.entry.type != order))  # stable
     if not ranked:
         return None
     rule, best = _newest(ranked) if revision is None else _for_device(ranked, revision)

@@ -141,6 +141,7 @@ class _Pass:
         self.findings = Findings(document.file)
         self.findings.warnings.extend(document.warnings)
         self.first_fault: EsiError | None = None
+        self._has_vendor = False
         self._opened: dict[str, Document | None] = {}
 
     @property
@@ -196,8 +197,7 @@ class _Pass:
                 groups.setdefault(text_of(found.element, "Type"), text_of(found.element, "Name"))
             elif plain_text(found.element.text) and len(names) < REFERENCES_MAX:
                 names[file_name(found.element.text)] = None
-        if vendor is None:
-            self._warn(self.document.line, "the file has no vendor; 0 assumed")
+        self._has_vendor = vendor is not None
         return read_vendor(vendor, self.findings, Vendor(0)), groups, tuple(names)
 
     def _devices(self, vendor: Vendor, modules: list[EsiModule]) -> list[EsiDevice]:
@@ -209,6 +209,8 @@ class _Pass:
             except EsiError as error:
                 self._skip(error, "device", found.element.line)
                 continue
+            if not self._has_vendor and found.element.find("Vendor") is None:
+                self._warn(found.element.line, "neither file nor device has a vendor; 0 assumed")
             devices.append(self._with_dictionary(device))
         return devices
 
