@@ -113,9 +113,9 @@ def test_a_small_eeprom_may_leave_names_out(
     esi.write_text(ESI.format(size=242), encoding="utf-8")
     status, _, err = call(f"sii build {esi} --device DR10 -o {path}", capsys)
     assert status != 0
-    assert "--no-pdo-names" in err
+    assert "--pdos unnamed" in err
     assert not path.exists()
-    assert call(f"sii build {esi} --device DR10 --no-pdo-names -o {path}", capsys)[0] == 0
+    assert call(f"sii build {esi} --device DR10 --pdos unnamed -o {path}", capsys)[0] == 0
     assert len(path.read_bytes()) == 242
 
 

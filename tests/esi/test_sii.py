@@ -237,8 +237,10 @@ def test_an_image_that_exceeds_the_eeprom_is_refused() -> None:
     small = replace(DRIVE, pdos=pdos, eeprom=EsiEeprom(700, b"\x05"))
     with pytest.raises(ConfigurationError, match="but its EEPROM has 700") as caught:
         build_sii(small)
-    assert "--no-pdo-names" in caught.value.hint
-    assert len(assemble_sii(small, pdo_names=False).image) == 700
+    assert "--pdos unnamed" in caught.value.hint
+    assert len(assemble_sii(small, pdos="unnamed").image) == 700
+    absent = decode_sii(assemble_sii(small, pdos="absent").image)
+    assert (absent.transmit_pdos, absent.receive_pdos) == ((), ())
 
 
 def test_without_a_size_the_eeprom_fits() -> None:

@@ -29,6 +29,7 @@ from catenary.model.device import Direction
 from catenary.virtual import DescribedDevice, Segment, from_esi
 from catenary.wire.sii import MailboxProtocol
 from catenary.wire.sii_categories import SyncManagerUse
+from tests.virtual.main_device import SM0, STATION, MainDevice
 
 
 def variable(index: int, name: str, bits: int, **facts: object) -> EsiObject:
@@ -229,3 +230,40 @@ def test_an_unknown_object_is_a_lookup_error() -> None:
             model.read_object(0x5000)
         with pytest.raises(LookupError, match="not in a PDO"):
             model.write_object(0x6083, 0, bytes(4))
+
+
+@pytest.mark.parametrize(("length", "status"), [(5, 0x04), (6, 0x12)])
+def test_a_sync_manager_without_pdos_may_keep_the_length_of_the_sii(
+    length: int, status: int
+) -> None:
+    """SOEM does so, for example with the ESI of the NI 9144."""
+    manager = EsiSyncManager(0, SyncManagerUse.OUTPUTS, 0x1200, 5, control=0x64)
+    device = replace(DRIVE, sync_managers=(manager,), pdos=(), mailbox=None, dictionary=None)
+    main = MainDevice(Segment([from_esi(device)]))
+    main.number_stations()
+    main.request(STATION, 2)
+    main.write(STATION, SM0, struct.pack("<HHBBBB", 0x1200, length, 0x64, 0, 1, 0))
+    assert main.request(STATION, 4)[0] == status
+
+
+def test_outputs_in_the_digital_output_register() -> None:
+    """The SyncManager of Beckhoff's digital output terminals is at 0x0F00 (SII of the EL2004)."""
+    entry = EsiEntry(0x7000, 1, 1, "Output", "BOOL")
+    pdos = tuple(
+        EsiPdo(Direction.OUTPUT, 0x1600 + k, "Channel", (replace(entry, index=0x7000 + k),), 0)
+        for k in range(4)
+    )
+    manager = EsiSyncManager(0, SyncManagerUse.OUTPUTS, 0x0F00, 1, control=0x44, op_only=True)
+    eeprom = EsiEeprom(2048, bytes.fromhex("040100000000000F"))
+    device = replace(
+        DRIVE, sync_managers=(manager,), pdos=pdos, mailbox=None, dictionary=None, eeprom=eeprom
+    )
+    with opened(device) as (main, model):
+        data = cat.ProcessData(main.subs[0])
+        with cat.Loop(data, period=2e-3) as loop:
+            data.outputs[0] = 5
+            for _ in range(4):
+                next(loop)
+            assert model.state == 8
+            assert [model.read_object(0x7000 + k, 1)[0] for k in range(4)] == [1, 0, 1, 0]
+            assert model.core.peek(0, 0x0F00, 1) == b"\x05"

@@ -35,9 +35,10 @@ def add_build(group: Commands) -> None:
         "--alias", metavar="N", type=number, help="station alias (default: that of the file)"
     )
     building.add_argument(
-        "--no-pdo-names",
-        action="store_true",
-        help="leave out the names of PDOs and entries, for a small EEPROM",
+        "--pdos",
+        choices=("named", "unnamed", "absent"),
+        default="named",
+        help="leave out the names of PDOs, or all PDOs, for a small EEPROM",
     )
     building.add_argument(
         "-o", "--output", metavar="OUT", required=True, help="write the image to OUT; - is stdout"
@@ -55,7 +56,7 @@ def run_build(arguments: argparse.Namespace) -> int:
         device,
         serial=arguments.serial,
         alias=arguments.alias,
-        pdo_names=not arguments.no_pdo_names,
+        pdos=arguments.pdos,
     )
     for note in build.notes:
         print(f"note: {device.source}: {note}", file=sys.stderr)

@@ -97,13 +97,20 @@ def make_device(
     Raises:
         EsiError: The device has no valid identification.
     """
+    device = _with_process_data(_identified(element, vendor, findings), element, findings)
+    device = _with_services(device, element, findings)
+    return replace(
+        device,
+        modules=accepted_modules(device.slots, modules),
+        unknown=unknown_paths(element, DEVICE),
+        warnings=tuple(findings.warnings),
+    )
+
+
+def _identified(element: Element, vendor: Vendor, findings: Findings) -> EsiDevice:
+    """Return a device with its identification and its relations to other devices."""
     key = read_key(element, vendor, findings)
     kind = element.find("Type")
-    managers = read_sync_managers(element, findings)
-    pdos = (_assigned(pdo, managers, element, findings) for pdo in read_pdos(element, findings))
-    profile = read_profile(element, findings)
-    slots = read_slots(element, findings)
-    register, by_al_status = read_identification(element, findings)
     return EsiDevice(
         key=key,
         vendor_name=text_of(element.find("Vendor"), "Name") or vendor.name,
@@ -115,31 +122,46 @@ def make_device(
         hides=_keys(element, "HideType", key, findings),
         alternatives=_keys(element, "AlternativeType", key, findings),
         sub_devices=tuple(plain_text(child.text) for child in element.all("SubDevice")),
-        profile=profile.number,
-        profile_channels=profile.channels,
+        use_lrd_lwr=findings.flag(kind, "UseLrdLwr"),
+        config_in_safe_op=findings.flag(kind, "TcCfgModeSafeOp"),
+        source=findings.source(element),
+    )
+
+
+def _with_process_data(device: EsiDevice, element: Element, findings: Findings) -> EsiDevice:
+    """Return a device with SyncManagers, PDOs, clocks and slots."""
+    managers = read_sync_managers(element, findings)
+    pdos = (_assigned(pdo, managers, element, findings) for pdo in read_pdos(element, findings))
+    return replace(
+        device,
         fmmus=read_fmmus(element),
         sync_managers=managers,
         pdos=tuple(pdos),
-        mailbox=read_mailbox(element, findings),
         has_clock=element.find("Dc") is not None,
         op_modes=read_op_modes(element, findings),
+        alternative_mappings=read_mappings(element, findings),
+        slots=read_slots(element, findings),
+    )
+
+
+def _with_services(device: EsiDevice, element: Element, findings: Findings) -> EsiDevice:
+    """Return a device with its mailbox, dictionary, EEPROM and general facts."""
+    profile = read_profile(element, findings)
+    register, by_al_status = read_identification(element, findings)
+    return replace(
+        device,
+        profile=profile.number,
+        profile_channels=profile.channels,
+        mailbox=read_mailbox(element, findings),
         dictionary=profile.dictionary,
         dictionary_file=profile.dictionary_file,
-        alternative_mappings=read_mappings(element, findings),
-        slots=slots,
-        modules=accepted_modules(slots, modules),
         controller=read_controller(element, findings),
         timeouts=read_timeouts(element, findings),
         watchdog=read_watchdog(element, findings),
         eeprom=read_eeprom(element, findings),
-        use_lrd_lwr=findings.flag(kind, "UseLrdLwr"),
-        config_in_safe_op=findings.flag(kind, "TcCfgModeSafeOp"),
         e_bus_current_ma=read_current(element, findings),
         identification_register=register,
         identifies_by_al_status=by_al_status,
-        unknown=unknown_paths(element, DEVICE),
-        warnings=tuple(findings.warnings),
-        source=findings.source(element),
     )
 
 

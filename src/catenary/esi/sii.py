@@ -15,10 +15,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 from catenary.errors import ConfigurationError, DecodeError
-from catenary.esi.device import EsiDevice, EsiEeprom, EsiMailbox, EsiSyncManager
+from catenary.esi.device import EsiDevice, EsiEeprom, EsiPdo, EsiSyncManager
+from catenary.esi.sii_general import sii_general
 from catenary.esi.sii_process_data import sii_clock_modes, sii_pdos
 from catenary.esi.sii_strings import SiiStrings
 from catenary.model.device import Direction
@@ -33,10 +34,7 @@ from catenary.wire.sii import (
     decode_sii,
 )
 from catenary.wire.sii_categories import (
-    CoeDetails,
     FmmuUse,
-    General,
-    GeneralFlags,
     SyncManagerEnable,
     SyncManagerEntry,
     SyncManagerUse,
@@ -49,15 +47,22 @@ from catenary.wire.sii_categories import (
 
 SMALLEST = 2048  # [bytes]: 16 kbit, the smallest EEPROM in use
 BYTES_PER_KBIT = 128
-CONFIGURATION_BYTES = 14  # words 0 to 6, which precede the checksum
-GROUP_COPY = 1  # place of byte 14 in General.reserved: the number of the group once more
-# Port types in 4 bits, ETG.2010: MII, E-bus, Fast Hot Connect; also in esctool (sii.cpp, Newtec)
-PORTS = {"Y": 1, "K": 3, "H": 4}
+# Words 0 to 6, which precede the checksum; KickCAT also ignores the rest (ESI/SIIBuilder.cc).
+CONFIGURATION_BYTES = 14
 FMMU_USES = {
     "outputs": FmmuUse.OUTPUTS,
     "inputs": FmmuUse.INPUTS,
     "mboxstate": FmmuUse.MAILBOX_STATE,
     "": FmmuUse.UNUSED,
+}
+
+
+PdoContent = Literal["named", "unnamed", "absent"]
+# Next step if an image exceeds its EEPROM
+SHORTER: dict[PdoContent, str] = {
+    "named": "build it without the names of PDOs (--pdos unnamed), or without PDOs (--pdos absent)",
+    "unnamed": "build it without PDOs (--pdos absent), or correct ByteSize in the ESI",
+    "absent": "correct ByteSize in the ESI",
 }
 
 
@@ -84,7 +89,7 @@ def build_sii(device: EsiDevice, *, serial: int = 0, alias: int | None = None) -
 
 
 def assemble_sii(
-    device: EsiDevice, *, serial: int = 0, alias: int | None = None, pdo_names: bool = True
+    device: EsiDevice, *, serial: int = 0, alias: int | None = None, pdos: PdoContent = "named"
 ) -> SiiBuild:
     """Return the SII image of a device, with notes.
 
@@ -92,7 +97,8 @@ def assemble_sii(
         device: The device.
         serial: Serial number.
         alias: Station alias; None takes that of `ConfigData`.
-        pdo_names: False leaves the names of PDOs and entries out, for small EEPROMs.
+        pdos: "unnamed" leaves the names of PDOs and entries out, "absent" the PDOs, for small
+            EEPROMs. A device with CoE lists its PDOs in its dictionary.
 
     Raises:
         ValueError: The serial number or the alias is out of range.
@@ -106,12 +112,12 @@ def assemble_sii(
     if eeprom.data:
         return SiiBuild(_given(device, eeprom, serial, alias), ("the image is Eeprom/Data",))
     try:
-        categories = _categories(device, eeprom, notes, pdo_names)
+        categories = _categories(device, eeprom, notes, pdos)
         header = _header(device, eeprom, notes)
         if alias is not None:
             header = replace(header, station_alias=alias)
         sii = Sii(replace(header, serial=serial), categories)
-        size = _size(device, eeprom, len(sii.encode()), pdo_names)
+        size = _size(device, eeprom, len(sii.encode()), pdos)
         sii = replace(sii, header=replace(sii.header, size_kbit=_kbit(size)))
         return SiiBuild(sii.encode(size), tuple(notes))
     except ValueError as error:
@@ -127,7 +133,7 @@ def _kbit(size: int) -> int:
     return -(-size // BYTES_PER_KBIT)
 
 
-def _size(device: EsiDevice, eeprom: EsiEeprom, needed: int, pdo_names: bool) -> int:
+def _size(device: EsiDevice, eeprom: EsiEeprom, needed: int, pdos: PdoContent) -> int:
     """Return the size of the EEPROM [bytes].
 
     Raises:
@@ -138,10 +144,9 @@ def _size(device: EsiDevice, eeprom: EsiEeprom, needed: int, pdo_names: bool) ->
         size *= 2
     if needed <= size <= MAXIMUM_SIZE:
         return size + size % 2
-    shorter = "build it without the names of PDOs (--no-pdo-names)" if pdo_names else ""
     raise ConfigurationError(
         f"{device}: the image has {needed} bytes, but its EEPROM has {min(size, MAXIMUM_SIZE)}",
-        hint=shorter or "correct ByteSize in the ESI",
+        hint=SHORTER[pdos],
     )
 
 
@@ -194,13 +199,13 @@ def _area(managers: Sequence[EsiSyncManager], use: SyncManagerUse) -> MailboxAre
 
 
 def _categories(
-    device: EsiDevice, eeprom: EsiEeprom, notes: list[str], pdo_names: bool
+    device: EsiDevice, eeprom: EsiEeprom, notes: list[str], pdos: PdoContent
 ) -> tuple[Category, ...]:
     strings = SiiStrings()
-    general = _general(device, strings)
+    general = sii_general(device, strings)
     outputs, inputs = (
-        sii_pdos(device.pdos_of(each), device.dictionary, strings, notes, names=pdo_names)
-        for each in (Direction.OUTPUT, Direction.INPUT)
+        sii_pdos(found, device.dictionary, strings, notes, names=pdos == "named")
+        for found in _written_pdos(device, pdos)
     )
     modes = sii_clock_modes(device.op_modes, strings, notes)
     found = (
@@ -217,58 +222,12 @@ def _categories(
     return tuple(Category(number, data) for number, data in found if data)
 
 
-def _general(device: EsiDevice, strings: SiiStrings) -> General:
-    order = strings.number(device.type)  # in the order of Beckhoff's images: EL2004, DigOut ...
-    group, name = strings.number(device.group), strings.number(device.name)
-    mailbox = device.mailbox or EsiMailbox(MailboxProtocol(0))
-    reserved = bytearray(15)
-    reserved[GROUP_COPY] = group
-    return General(
-        group=group,
-        order=order,
-        name=name,
-        coe=_coe_details(mailbox),
-        foe=int(MailboxProtocol.FOE in mailbox.protocols),
-        eoe=int(MailboxProtocol.EOE in mailbox.protocols),
-        soe_channels=int(MailboxProtocol.SOE in mailbox.protocols),
-        ds402_channels=mailbox.drive_channels,
-        flags=_general_flags(device, mailbox),
-        current_ma=device.e_bus_current_ma,
-        physical_ports=_ports(device.physics),
-        identification_address=device.identification_register or 0,
-        reserved=bytes(reserved),
-    )
-
-
-def _coe_details(mailbox: EsiMailbox) -> CoeDetails:
-    details = CoeDetails(0)
-    if MailboxProtocol.COE not in mailbox.protocols:
-        return details
-    for given, bit in (
-        (True, CoeDetails.SDO),
-        (mailbox.sdo_information, CoeDetails.SDO_INFORMATION),
-        (mailbox.pdo_assign, CoeDetails.PDO_ASSIGN),
-        (mailbox.pdo_configuration, CoeDetails.PDO_CONFIGURATION),
-        (mailbox.pdo_upload, CoeDetails.UPLOAD_AT_START),
-        (mailbox.complete_access, CoeDetails.COMPLETE_ACCESS),
-    ):
-        details |= bit if given else 0
-    return details
-
-
-def _general_flags(device: EsiDevice, mailbox: EsiMailbox) -> int:
-    by_memory = device.identification_register is not None and not device.identifies_by_al_status
-    return (
-        (GeneralFlags.NO_LRW if device.use_lrd_lwr else 0)
-        | (GeneralFlags.MAILBOX_DATA_LINK_LAYER if mailbox.data_link_layer else 0)
-        | (GeneralFlags.IDENTIFICATION_BY_AL_STATUS if device.identifies_by_al_status else 0)
-        | (GeneralFlags.IDENTIFICATION_BY_MEMORY if by_memory else 0)
-    )
-
-
-def _ports(physics: str) -> int:
-    """Return the types of the ports, 4 bits each; the first letter is port 0."""
-    return sum(PORTS.get(letter, 0) << 4 * port for port, letter in enumerate(physics[:4].upper()))
+def _written_pdos(
+    device: EsiDevice, pdos: PdoContent
+) -> tuple[tuple[EsiPdo, ...], tuple[EsiPdo, ...]]:
+    if pdos == "absent":
+        return (), ()
+    return device.pdos_of(Direction.OUTPUT), device.pdos_of(Direction.INPUT)
 
 
 def _fmmus(texts: Sequence[str], notes: list[str]) -> list[int]:

@@ -13,6 +13,7 @@ from typing import NamedTuple
 
 NUMBER = re.compile(r"([+-]?)((?:#?0?x)+|#)?([0-9a-f]{1,40})")
 DECIMAL = re.compile(r"([+-]?[0-9]{1,40})\.0*")
+EXPONENT = re.compile(r"[0-9]+e[0-9]+")  # neither decimal nor certainly hexadecimal
 BLANK = re.compile(r"\s+")
 HEX_PREFIX = re.compile(r"(?:#?0?x)+", re.IGNORECASE)
 ENGLISH, GERMAN = 1033, 1031
@@ -36,7 +37,7 @@ def parse_number(text: str) -> Parsed:
     """
     compact = BLANK.sub("", text).lower()
     found = NUMBER.fullmatch(compact)
-    if found is None:
+    if found is None or EXPONENT.fullmatch(compact):
         return _from_decimal(text, compact)
     sign, prefix, digits = found.groups()
     if prefix:

@@ -30,7 +30,7 @@ from typing import Any, Literal
 
 import msgspec
 
-from catenary.errors import ConfigurationError
+from catenary.errors import CatenaryError, ConfigurationError
 from catenary.virtual.device_tables import DeviceTable, located
 from catenary.virtual.devices.device import Device
 from catenary.virtual.faults import Fault
@@ -79,7 +79,7 @@ def _named(where: str) -> Iterator[None]:
         yield
     except OUT_OF_RANGE as error:
         raise ConfigurationError(f"{where}: {error}", hint=HINT) from error
-    except ConfigurationError as error:  # of an ESI, which has its own hint
+    except CatenaryError as error:  # of an ESI, which has its own hint
         raise ConfigurationError(f"{where}: {error.message}", hint=error.hint) from error
 
 
@@ -89,7 +89,7 @@ def _device_in_fault(folder: Path, kind: type, given: Any) -> Any:
         raise NotImplementedError
     try:
         return located(msgspec.convert(given, DeviceTable), folder).device()
-    except (*OUT_OF_RANGE, ConfigurationError) as error:
+    except (*OUT_OF_RANGE, CatenaryError) as error:
         raise ValueError(str(error)) from error  # msgspec names the place
 
 

@@ -66,6 +66,7 @@ class Channel:
     outputs: bool
     start: int  # address of the buffers
     room: int  # maximum size of a buffer [bytes]
+    idle_length: int = 0  # of the SyncManager in the SII, which may remain without PDOs [bytes]
 
     @property
     def assignment(self) -> int:

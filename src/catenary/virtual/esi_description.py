@@ -104,7 +104,9 @@ def channels_of(device: EsiDevice) -> tuple[Channel, ...]:
         direction = by_pdos.get(each.index)
         outputs = each.use is SyncManagerUse.OUTPUTS or direction is Direction.OUTPUT
         if direction is not None or each.use in (SyncManagerUse.OUTPUTS, SyncManagerUse.INPUTS):
-            found.append(Channel(each.index, outputs, each.start, each.max_size or BUFFER_MAX))
+            room = each.max_size or BUFFER_MAX
+            # SOEM leaves the length of the SII if no PDO is assigned (ec_config.c).
+            found.append(Channel(each.index, outputs, each.start, room, each.default_size))
     return tuple(found)
 
 

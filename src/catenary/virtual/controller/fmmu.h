@@ -49,7 +49,9 @@ static int fmmu_access(controller *c, const fmmu *f, uint64_t base, uint32_t siz
     uint32_t bytes = (uint32_t)((physical + (hi - lo) + 7) / 8) - first_byte;
     if ((uint64_t)first_byte + bytes > c->memory_size)
         return 0;
-    int registers = first_byte < REG_END;    /* for example a cyclically mapped mailbox status, 0x080D */
+    int outputs = first_byte >= REG_DIGITAL_OUTPUT && first_byte + bytes <= REG_DIGITAL_OUTPUT_END;
+    /* for example a cyclically mapped mailbox status, 0x080D */
+    int registers = first_byte < REG_END && !outputs;
     if (registers && (write || first_byte + bytes > REG_END))
         return 0;
     if (f->bytewise && !registers)

@@ -13,8 +13,19 @@ static inline uint8_t *sm_registers(controller *c, int n) {
     return c->memory + REG_SM + n * SM_SIZE;
 }
 
+/* Return 1 for a SyncManager on the digital output data of the controller, as in Beckhoff's digital
+ * terminals (ESC data sheet, 0x0F00 to 0x0F03). These registers are a single buffer. */
+static inline int sm_is_digital_output(const sync_manager *sm) {
+    return !sm->mailbox && sm->ecat_writes && sm->start >= REG_DIGITAL_OUTPUT
+        && (uint32_t)sm->start + sm->length <= REG_DIGITAL_OUTPUT_END;
+}
+
+static inline int sm_has_one_buffer(const sync_manager *sm) {
+    return sm->mailbox || sm_is_digital_output(sm);
+}
+
 static inline uint32_t sm_span(const sync_manager *sm) {
-    return sm->mailbox ? sm->length : 3u * sm->length;
+    return sm_has_one_buffer(sm) ? sm->length : 3u * sm->length;
 }
 
 static inline void sm_show_status(controller *c, int n) {
@@ -44,7 +55,8 @@ static void sm_configured(controller *c, int n) {
     sm->ecat_writes = (r[4] & SM_CONTROL_ECAT_WRITES) != 0;
     sm->watchdog = (r[4] & SM_CONTROL_WATCHDOG) != 0;
     sm->enabled = (r[6] & SM_ACTIVATE_ENABLE) && sm->length > 0
-        && (uint32_t)sm->start + sm_span(sm) <= c->memory_size && sm->start >= REG_END;
+        && (uint32_t)sm->start + sm_span(sm) <= c->memory_size
+        && (sm->start >= REG_END || sm_is_digital_output(sm));
     sm->blocked = (r[7] & SM_PDI_DEACTIVATE) != 0;
     if (sm->enabled != was_enabled || sm->blocked != was_blocked) {
         sm->full = sm->open = sm->written = 0;
@@ -61,7 +73,7 @@ static void sm_configured(controller *c, int n) {
 }
 
 static inline uint8_t *sm_buffer(controller *c, const sync_manager *sm, uint8_t which) {
-    return c->memory + sm->start + (sm->mailbox ? 0u : (uint32_t)which * sm->length);
+    return c->memory + sm->start + (sm_has_one_buffer(sm) ? 0u : (uint32_t)which * sm->length);
 }
 
 /* Return the number of a buffer that is neither `a` nor `b`: the last complete one, and one in

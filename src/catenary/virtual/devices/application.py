@@ -348,7 +348,7 @@ class Application:
             self._position, channel.sync_manager
         )
         if size == 0:
-            return not enabled or length == 0
+            return not enabled or length in (0, channel.idle_length)
         expected = (channel.start, size, channel.control, True)
         return (start, length, found & ENABLE_AND_MODE, enabled) == expected
 

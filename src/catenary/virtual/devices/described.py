@@ -181,6 +181,7 @@ def from_esi(
         crystal: Frequency error and jitter of the clock.
 
     Raises:
+        EsiError: The file cannot be read.
         ConfigurationError: The file has no such device, or gives no valid SII.
     """
     if not isinstance(source, EsiDevice):
@@ -196,7 +197,8 @@ def esi_device(path: str | PathLike[str], wanted: str = "") -> EsiDevice:
         wanted: Order code, name, or PRODUCT[:REVISION]; needed if the file has several devices.
 
     Raises:
-        ConfigurationError: The file cannot be read, or has no such device.
+        EsiError: The file cannot be read.
+        ConfigurationError: The file has no such device.
     """
     return select_device(read_esi(Path(path)), wanted)
 
