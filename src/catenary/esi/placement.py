@@ -1,8 +1,8 @@
 """Places of modules in the slots of a modular device (ETG.5001), and the indices there.
 
-Each instance of a `Slot` counts as one slot; the instances are numbered consecutively from 0. A slot
-adds its number times the increments of the device, or its own increments if it has them, to the
-indices that depend on the slot (`DependOnSlot`).
+Each instance of a `Slot` counts as one slot; the instances are numbered consecutively from 0. To
+the indices that depend on the slot (`DependOnSlot`), it adds its number times the increments of
+the device, or its own increments if it has them.
 """
 
 from __future__ import annotations

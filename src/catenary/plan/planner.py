@@ -30,6 +30,7 @@ from catenary.plan.layout import (
 )
 from catenary.plan.mailboxes import MailboxArea, with_mailboxes
 from catenary.plan.mapping import make_mapping
+from catenary.plan.modules import make_module_plan, with_requested_modules
 from catenary.plan.op_mode import mode_pdos
 from catenary.plan.options import PlanOptions
 from catenary.plan.output_owners import check_owners
@@ -131,7 +132,7 @@ class _Draft(NamedTuple):
 
     def plan(self, place: DeviceLayout, period_ns: int, lead_ns: int) -> DevicePlan:
         clock = self.request.clock
-        return make_device_plan(
+        plan = make_device_plan(
             self.device,
             self.request,
             self.outputs,
@@ -143,6 +144,7 @@ class _Draft(NamedTuple):
             else make_sync(self.device, clock, period_ns * self.request.divider, lead_ns),
             self.watchdog_source if place.output_size else "",
         )
+        return replace(plan, modules=make_module_plan(self.device, self.request.modules))
 
 
 def _drafts(
@@ -157,6 +159,7 @@ def _drafts(
     drafts = []
     for device in devices:
         request = combined.get(device.position, DeviceRequest(required=required))
+        device = with_requested_modules(device, request.modules)
         watchdog_ns, watchdog_source = choose_watchdog(
             device, request, options.watchdog, options.period_ns
         )

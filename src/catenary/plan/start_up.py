@@ -32,6 +32,7 @@ from catenary.plan.clocks import SyncPlan
 from catenary.plan.download import Download
 from catenary.plan.init_commands import choose_commands
 from catenary.plan.layout import DeviceLayout
+from catenary.plan.modules import ModulePlan
 from catenary.plan.pdo_mapping import ASSIGNMENT_BASE, Mapping, shape
 from catenary.plan.start_up_object import StartUp
 from catenary.types import Scalar, by_index
@@ -69,11 +70,13 @@ class DevicePlan:
     omitted_commands: tuple[str, ...] = ()  # commands of the ESI that are not written, and why
     watchdog_source: str = ""  # file and line; empty if it is not from an ESI
     mapping_source: str = ""  # "CoE", "SII", "ESI FILE:LINE", or of the OpMode or named mapping
+    modules: ModulePlan | None = None  # None: the device is not modular
 
     @property
     def downloads(self) -> tuple[Download, ...]:
         """All downloads in PRE-OP, in the order of writing."""
-        return (*self.init_commands, *self.before_mapping, *self.mapping, *self.start_up)
+        own = (*self.init_commands, *self.before_mapping, *self.mapping, *self.start_up)
+        return own if self.modules is None else (*self.modules.downloads, *own)
 
     @property
     def watchdog_count(self) -> int:
