@@ -191,8 +191,8 @@ def test_commands_are_written_before_your_objects(tmp_path: Path) -> None:
         plan = main.plan(cat.ProcessData(sub, start_up=[own]))
         device = plan.devices[1]
         assert [each.index for each in device.downloads] == [0x6065, 0x6083, 0x6085]
-        assert [each.index for each in device.in_safe_op] == [0x6084]
-        assert [line.split(" (")[0] for line in device.omitted_commands] == [
+        assert [each.index for each in device.commands.in_safe_op] == [0x6084]
+        assert [line.split(" (")[0] for line in device.commands.omitted] == [
             "0x1C12:00: the plan writes the mapping",
             "0x6085:00: your start-up object replaces it",
         ]
@@ -219,7 +219,7 @@ def test_a_command_for_the_mode_does_not_override_the_chosen_mode(tmp_path: Path
     with MainDevice(servo_file.segment()) as main:
         sub = main.scan(esi=path)[1]
         plan = main.plan(cat.Drives([sub], counts_per_turn=2**20, mode="csv", velocity_limit=1.0))
-        assert plan.devices[1].in_safe_op == ()
+        assert plan.devices[1].commands.in_safe_op == ()
         main.configure(plan)
         assert sub.sdo.read(0x6060, type=SINT) == 9
 

@@ -155,6 +155,40 @@ def test_extrapolation_stops_before_a_position_limit() -> None:
     assert b.drives[0].target_position <= 100
 
 
+@pytest.mark.parametrize("pause", [10, 20, 40])
+@pytest.mark.parametrize("acceleration", [5.0, 50.0])
+def test_the_return_to_set_points_does_not_exceed_a_position_limit(
+    pause: int, acceleration: float
+) -> None:
+    """The set-points reach the limit and stop while the command still catches up."""
+    limits = AxisLimits(velocity=20.0, step=10.0, position_max=0.12, position_min=-0.12)
+    b = working(CSP, acceleration=acceleration, deceleration=acceleration, limits=limits)
+    for end in (0.12, -0.12):
+        while abs(b.target_position[0]) < 0.09 or b.target_position[0] * end < 0:
+            b.target_position[0] += np.sign(end) * 2e-3
+            b.engine.next()
+        log = Recorder(b)
+        b.engine.spend(pause * MS)
+        for _ in range(400):
+            b.target_position[0] = np.clip(b.target_position[0] + end / 60, -0.12, 0.12)
+            b.engine.next()
+        assert max(np.abs(log.positions)) <= 120
+        assert log.positions[-1] == round(end * COUNTS)
+        assert not b.axis_flags[0] & AXIS_FALLBACK
+
+
+def test_a_return_to_set_points_beyond_a_limit_ends_at_the_limit() -> None:
+    limits = AxisLimits(velocity=20.0, step=10.0, position_max=0.12)
+    b = working(CSP, acceleration=50.0, deceleration=50.0, limits=limits)
+    moving(b, 2.0, 40)
+    log = Recorder(b)
+    b.engine.spend(20 * MS)
+    moving(b, 2.0, 300)
+    assert max(log.positions) <= 120
+    assert log.positions[-1] == 120
+    assert not b.axis_flags[0] & AXIS_FALLBACK
+
+
 def test_a_hand_over_decelerates_at_once_and_holds_without_limit() -> None:
     b = working(CSP, deceleration=100.0)
     moving(b, 2.0)

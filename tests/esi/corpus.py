@@ -219,6 +219,20 @@ FILES: dict[str, bytes] = {
     "SyncManager that does not exist": esi(device(SM, TX.replace('Sm="3"', 'Sm="5"'))).encode(),
     "unknown SyncManager": esi(device(SM.replace("Outputs", "AxisIn"), RX, TX)).encode(),
     "alternative mappings": esi(device(MAPPINGS, SM, TX)).encode(),
+    "SyncManager options": esi(
+        device(
+            '<Sm StartAddress="#x1000" Enable="0" Virtual="1" OpOnly="1" FixedAssignment="true">'
+            "Outputs</Sm>"
+        )
+    ).encode(),
+    "all mailbox protocols": esi(
+        device(
+            "<Mailbox><AoE/><EoE/><FoE/><SoE/><VoE/>"
+            '<CoE PdoAssign="1" PdoConfig="true" PdoUpload="1" SegmentedSdo="1" DS402Channels="2"/>'
+            "</Mailbox>"
+        )
+    ).encode(),
+    "whole EEPROM": esi(device("<Eeprom><Data>0102</Data></Eeprom>")).encode(),
     "init commands": esi(
         device(INIT.replace("<InitCmd", "<InitCmd><Index>1</Index></InitCmd><InitCmd", 1))
     ).encode(),

@@ -101,3 +101,8 @@ def test_any_bytes_have_an_encoding(data: bytes, name: str) -> None:
     for attempt in (data, b'<?xml version="1.0" encoding="' + name.encode() + b'"?>' + data):
         if not attempt.startswith((b"\xff\xfe\0\0", b"\0\0\xfe\xff")):
             choose_encoding(attempt)
+
+
+def test_long_texts_take_linear_time() -> None:
+    text = "a" * 2_000_000 + "&#x4E2D;"
+    assert len(text_of(declared("gb2312", text, "gb2312"))) == 2_000_001

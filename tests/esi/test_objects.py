@@ -157,3 +157,15 @@ def test_the_number_of_warnings_is_bounded() -> None:
     findings = Findings("a.xml")
     read("", "<Object/>" * 3000, findings)
     assert len(findings.warnings) == 1001
+
+
+def test_the_number_of_entries_is_bounded(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("catenary.esi.objects.ENTRIES_MAX", 1000)
+    objects = "".join(
+        f"<Object><Index>{n}</Index><Type>DTARR</Type></Object>" for n in range(1, 100)
+    )
+    types = corpus.TYPES.replace("<Elements>3<", "<Elements>255<")
+    findings = Findings("a.xml")
+    found = read(types, objects, findings)
+    assert sum(len(each.entries) for each in found.objects.values()) <= 1000 + 255
+    assert "further objects are ignored" in findings.warnings[-1].message

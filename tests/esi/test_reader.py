@@ -190,6 +190,12 @@ def faulty(name: str) -> Document:
     return make_document(b"<html/>", name)
 
 
+def truncated(name: str) -> Document:
+    found = references(name)
+    assert found is not None
+    return make_document(found.data[:-20], name)
+
+
 def test_references_that_cannot_be_used_become_warnings() -> None:
     document = make_document(corpus.FILES["references"], NAME)
     missing = read_document(document, references=lambda name: None)
@@ -198,6 +204,18 @@ def test_references_that_cannot_be_used_become_warnings() -> None:
     unusable = read_document(document, references=faulty)
     assert ["is not an ESI" in str(each) for each in unusable.warnings] == [True, False]
     assert str(unusable.warnings[1]).startswith("Sub/Dict.xml:")
+    faults = read_document(document, references=truncated).warnings
+    assert [each.source.file for each in faults] == ["Sub/Modules.xml", "Sub/Dict.xml"]
+    assert all("the referenced file is ignored" in each.message for each in faults)
+
+
+def test_a_dictionary_that_several_devices_name_is_read_once() -> None:
+    part = "<Profile><DictionaryFile>Sub\\Dict.xml</DictionaryFile></Profile>"
+    names: list[str] = []
+    document = make_document(corpus.esi(*[corpus.device(part)] * 3).encode(), NAME)
+    file = read_document(document, references=lambda name: names.append(name) or references(name))
+    assert names == ["Sub/Dict.xml"]
+    assert all(device.dictionary is not None for device in file.devices)
 
 
 def test_modules_and_dictionaries_as_roots() -> None:

@@ -127,7 +127,7 @@ def bring_to_safe_op(
         )
     runner.run_all([request_state(sub.station, AlState.SAFE_OP) for sub in subs])
     planned = zip(subs, plan.devices, strict=True)
-    runner.run_all([_finish(sub, device) for sub, device in planned if device.in_safe_op])
+    runner.run_all([_finish(sub, device) for sub, device in planned if device.commands.in_safe_op])
     for sub in subs:
         sub.state = AlState.SAFE_OP
     return measured

@@ -81,8 +81,31 @@ cdef inline double approach(double value, double target, double step) noexcept n
 
 # ---- fallback: no valid set-point
 
+cdef double towards_limits(const axis_t *a, double position, double velocity,
+                           double deceleration) noexcept nogil:
+    """Return the velocity, reduced so that a position can stop before the position limits."""
+    if a.position_max < INFINITY and velocity > 0:
+        velocity = fmin(velocity, sqrt(2 * deceleration * fmax(a.position_max - position, 0.0)))
+    if a.position_min > -INFINITY and velocity < 0:
+        velocity = fmax(velocity, -sqrt(2 * deceleration * fmax(position - a.position_min, 0.0)))
+    return velocity
+
+
+cdef inline double within_limits(axis_t *a, double target) noexcept nogil:
+    """Return a target within the position limits.
+
+    A command that is outside its limits may stay or return, but not move further away.
+    """
+    cdef double held = a.commanded_position
+    return clamp(a, target, fmin(a.position_min, held), fmax(a.position_max, held))
+
+
 cdef void return_to(axes_t *x, axis_t *a, double target, double velocity) noexcept nogil:
-    """Move the command towards a moving set-point, at a velocity from the remaining distance."""
+    """Move the command towards a moving set-point, at a velocity from the remaining distance.
+
+    The command stops before the position limits, although it may move faster than the set-point.
+    """
+    cdef double held = a.commanded_position
     cdef double distance = target - a.commanded_position - velocity * x.period
     cdef double step = a.acceleration * x.period
     cdef double catch_up
@@ -91,16 +114,20 @@ cdef void return_to(axes_t *x, axis_t *a, double target, double velocity) noexce
         return
     catch_up = fmin(sqrt(2 * a.acceleration * fabs(distance)), fabs(distance) / x.period)
     velocity = approach(a.command_velocity, velocity + copysign(catch_up, distance), step)
-    a.command_velocity = fmin(fmax(velocity, -a.velocity_limit), a.velocity_limit)
-    a.commanded_position += a.command_velocity * x.period
+    velocity = fmin(fmax(velocity, -a.velocity_limit), a.velocity_limit)
+    velocity = towards_limits(a, held, velocity, a.acceleration)
+    a.commanded_position = within_limits(a, held + velocity * x.period)
+    a.command_velocity = (a.commanded_position - held) / x.period
 
 
 cdef void track(axes_t *x, axis_t *a, double target, double velocity) noexcept nogil:
     """Command a moving set-point, within the limits. While `returning`, only approach it."""
     cdef double held = a.commanded_position
     cdef double step = a.velocity_limit * x.period
-    # An axis that is outside its limits may stay or return, but not move further away.
-    target = clamp(a, target, fmin(a.position_min, held), fmax(a.position_max, held))
+    cdef double limited = within_limits(a, target)
+    if limited != target:
+        target = limited
+        velocity = 0.0
     if a.returning:
         return_to(x, a, target, velocity)
         if a.returning:
@@ -108,15 +135,6 @@ cdef void track(axes_t *x, axis_t *a, double target, double velocity) noexcept n
             return
     a.commanded_position = clamp(a, target, held - step, held + step)
     a.command_velocity = (a.commanded_position - held) / x.period
-
-
-cdef double towards_limits(const axis_t *a, double velocity) noexcept nogil:
-    """Return the velocity, reduced so that the set-points can stop before a position limit."""
-    if a.position_max < INFINITY and velocity > 0:
-        velocity = fmin(velocity, sqrt(2 * a.deceleration * fmax(a.position_max - a.ghost, 0.0)))
-    if a.position_min > -INFINITY and velocity < 0:
-        velocity = fmax(velocity, -sqrt(2 * a.deceleration * fmax(a.ghost - a.position_min, 0.0)))
-    return velocity
 
 
 cdef inline double fallback_velocity(const axis_t *a) noexcept nogil:
@@ -136,7 +154,7 @@ cdef void fall_back_position(axes_t *x, axis_t *a, bint keep) noexcept nogil:
         a.ghost_velocity = fallback_velocity(a) if a.accepted >= 2 else 0.0
     if not keep:
         a.ghost_velocity = approach(a.ghost_velocity, 0.0, a.deceleration * x.period)
-    a.ghost_velocity = towards_limits(a, a.ghost_velocity)
+    a.ghost_velocity = towards_limits(a, a.ghost, a.ghost_velocity, a.deceleration)
     a.ghost += a.ghost_velocity * x.period
     track(x, a, a.ghost, a.ghost_velocity)
 
@@ -192,7 +210,7 @@ cdef void follow_position(axes_t *x, axis_t *a, const target_t *t, double target
         between = stamp - since if stamp > since else 1
         age = x.number - stamp if x.number > stamp else 0
     if a.mode != CSP:
-        a.commanded_position = clamp(a, target, fmin(a.position_min, held), fmax(a.position_max, held))
+        a.commanded_position = within_limits(a, target)
         a.refused_cycles = 0
         return
     if not is_accepted(x, a, target, between):

@@ -15,7 +15,7 @@ from catenary.drive.arguments import (
     start_up_list,
     written_pdos,
 )
-from catenary.drive.channel import ChannelSpec, make_channels
+from catenary.drive.channel import Channel, ChannelSpec, make_channels
 from catenary.drive.device_channels import (
     chosen_channels,
     column,
@@ -23,7 +23,7 @@ from catenary.drive.device_channels import (
     with_chosen,
 )
 from catenary.drive.request import Request
-from catenary.model.device import Direction
+from catenary.model.device import DeviceDescription, Direction
 from catenary.plan.cycle import Bank
 from catenary.plan.request import (
     Bytes,
@@ -34,6 +34,7 @@ from catenary.plan.request import (
     Reals,
     RequestTables,
     Views,
+    WrittenPdo,
 )
 from catenary.plan.start_up_object import StartUp
 
@@ -90,14 +91,7 @@ class Channels(Request):
     ) -> None:
         super().__init__(subs)
         named = make_channels("channels", channels or {})
-        self._pdos = {
-            sub.position: tuple(
-                pdo
-                for pdo in written_pdos(pdos, named, sub.description)
-                if pdo.direction is self.direction
-            )
-            for sub in subs
-        }
+        self._pdos = {sub.position: self._chosen_pdos(sub, pdos, named) for sub in subs}
         self._required = required
         self._divider = cycles_between("divider", divider)
         self._clock = clock_request(dc)
@@ -118,14 +112,21 @@ class Channels(Request):
                 )
             self._channels = chosen_channels(subs[0], named)
         else:
-            devices = [
-                with_chosen(
-                    sub.description, self._pdos[sub.position], self._clock, [self.direction]
-                )
-                for sub in subs
-            ]
+            devices = [self._described(sub) for sub in subs]
             self._channels = mapped_channels(devices, self.direction, scale or {})
         self._places: dict[str, tuple[Reals | Integers | Bytes, int]] = {}
+
+    def _chosen_pdos(
+        self, sub: SubDevice, pdos: PdoList, named: Mapping[str, Channel]
+    ) -> tuple[WrittenPdo, ...]:
+        if not pdos:
+            return ()
+        written = written_pdos(pdos, named, sub.description)
+        return tuple(pdo for pdo in written if pdo.direction is self.direction)
+
+    def _described(self, sub: SubDevice) -> DeviceDescription:
+        """Return the description of a device with the PDOs of this request."""
+        return with_chosen(sub.description, self._pdos[sub.position], self._clock, [self.direction])
 
     def array(self, bank: Bank) -> Reals | Integers | Bytes:
         """Return the array of a bank. Raises RuntimeError before a loop is open."""

@@ -16,7 +16,7 @@ from typing import NamedTuple
 PIECE = 1 << 20  # bytes that are decoded at once while an encoding is chosen
 DECLARATION = re.compile(rb"""^\s*<\?xml[^>]{0,400}?encoding\s*=\s*["']([^"'>]{1,60})["']""")
 KANA = re.compile("[\u3041-\u30ff]")  # Japanese text contains them
-RUN = re.compile("[\x00-\xff]*[\x80-\xff][\x00-\xff]*")
+RUN = re.compile("[\x00-\xff]+")
 # Supersets: files that declare the smaller set use characters of the larger one.
 CODECS = {
     "gb2312": "gb18030",

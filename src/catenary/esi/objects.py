@@ -31,6 +31,8 @@ from catenary.esi.findings import Findings, text_of
 from catenary.esi.xml import Element
 from catenary.types import by_name
 
+ENTRIES_MAX = 200_000  # in one dictionary; arrays make many entries from few bytes
+
 
 class _Types(NamedTuple):
     """Data types of a dictionary, and their elements, which contain default values."""
@@ -62,8 +64,13 @@ def read_dictionary(element: Element, findings: Findings) -> EsiDictionary:
     )
     objects: dict[int, EsiObject] = {}
     parent = element.find("Objects")
+    count = 0
     for each in parent.all("Object") if parent is not None else ():
+        if count > ENTRIES_MAX:
+            findings.warn(each, f"more than {ENTRIES_MAX} entries; further objects are ignored")
+            break
         found = _object(each, types, findings)
+        count += len(found.entries) if found is not None else 0
         if found is None:
             findings.warn(each, "Object without an index is ignored")
         elif found.index in objects:

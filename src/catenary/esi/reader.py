@@ -33,7 +33,7 @@ GROUP_PATHS = frozenset({"Descriptions/Groups/Group", "Groups/Group"})
 REFERENCE_PATHS = frozenset({"InfoReference", "Descriptions/InfoReference"})
 FACTS = VENDOR_PATHS | GROUP_PATHS | REFERENCE_PATHS
 NAMES = frozenset({"Id", "Name", "Type"})
-REFERENCES_MAX = 1000
+REFERENCES_MAX = 100
 
 # Returns the document of a referenced file, by its name with slashes; None if it was not found.
 References: TypeAlias = Callable[[str], Document | None]
@@ -142,7 +142,7 @@ class _Pass:
         self.findings.warnings.extend(document.warnings)
         self.first_fault: EsiError | None = None
         self._has_vendor = False
-        self._opened: dict[str, Document | None] = {}
+        self._dictionaries: dict[str, EsiDictionary | None] = {}
 
     @property
     def warnings(self) -> tuple[EsiWarning, ...]:
@@ -154,8 +154,7 @@ class _Pass:
         vendor, groups, names = self._facts()
         modules = self._modules(self.document)
         for name in names:
-            other = self._referenced(name)
-            modules += self._modules(other) if other is not None else []
+            modules += self._modules_of(name)
         devices = self._devices(vendor, modules)
         if not devices and not modules:
             if self.first_fault is not None:
@@ -214,6 +213,15 @@ class _Pass:
             devices.append(self._with_dictionary(device))
         return devices
 
+    def _modules_of(self, name: str) -> list[EsiModule]:
+        """Return the modules of a referenced file; none if it is faulty."""
+        document = self._referenced(name)
+        try:
+            return self._modules(document) if document is not None else []
+        except EsiError as error:
+            self._skip(error, "referenced file", self.document.line)
+            return []
+
     def _modules(self, document: Document) -> list[EsiModule]:
         modules = []
         for found in find_elements(document, MODULE_PATHS):
@@ -229,29 +237,35 @@ class _Pass:
 
     def _with_dictionary(self, holder: Holder) -> Holder:
         """Return a device or module with the dictionary of another file, if it names one."""
-        if holder.dictionary is not None or not holder.dictionary_file:
+        name = holder.dictionary_file
+        if holder.dictionary is not None or not name:
             return holder
-        other = self._referenced(holder.dictionary_file)
-        dictionary = self.dictionary(other) if other is not None else None
-        return replace(holder, dictionary=dictionary)
+        if name not in self._dictionaries:
+            self._dictionaries[name] = self._dictionary_of(name)
+        return replace(holder, dictionary=self._dictionaries[name])
+
+    def _dictionary_of(self, name: str) -> EsiDictionary | None:
+        """Return the dictionary of a referenced file; None if it is faulty."""
+        document = self._referenced(name)
+        try:
+            return self.dictionary(document) if document is not None else None
+        except EsiError as error:
+            self._skip(error, "referenced file", self.document.line)
+            return None
 
     def _referenced(self, name: str) -> Document | None:
         """Return a referenced file; warn if it cannot be used."""
         if self.references is None:
             return None
-        if name not in self._opened:
-            found: Document | None = None
-            try:
-                found = self.references(name)
-                if found is None:
-                    self._warn(self.document.line, f"the referenced file {name!r} was not found")
-                elif root_tag(found) not in ROOTS:
-                    found = None
-                    self._warn(self.document.line, f"the referenced file {name!r} is not an ESI")
-            except EsiError as error:
-                self._skip(error, "referenced file", self.document.line)
-            self._opened[name] = found
-        return self._opened[name]
+        try:
+            found = self.references(name)
+            if found is not None and root_tag(found) in ROOTS:
+                return found
+            reason = "was not found" if found is None else "is not an ESI file"
+            self._warn(self.document.line, f"the referenced file {name!r} {reason}")
+        except EsiError as error:
+            self._skip(error, "referenced file", self.document.line)
+        return None
 
     def _skip(self, error: EsiError, what: str, line: int) -> None:
         self.first_fault = self.first_fault or error

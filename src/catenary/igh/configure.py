@@ -137,15 +137,7 @@ def _device(
     if not config:
         raise _no_handle(f"{label}: no configuration")
     _configure_process_data(master, plan, config, label)
-    # The master writes SDOs only in PRE-OP, also those that an ESI requires in SAFE-OP.
-    for download in (
-        *plan.init_commands,
-        *plan.before_mapping,
-        *plan.start_up,
-        *plan.in_safe_op,
-    ):
-        if download.complete_access:
-            raise _no_complete_access(label, download)
+    for download in _downloads(plan, label):
         data = ctypes.create_string_buffer(download.data, len(download.data))
         if download.optional:
             # Write it now: the master stops configuring a device that refuses a start-up SDO.
@@ -163,6 +155,20 @@ def _device(
     register = library.ecrt_slave_config_create_reg_request(config, REGISTER_SIZE)
     requests = sdo or 0, register or 0
     return DeviceConfiguration(plan.position, address, config, *requests, plan.sync)
+
+
+def _downloads(plan: DevicePlan, label: str) -> tuple[Download, ...]:
+    """Return the start-up SDOs. The master writes all of them in PRE-OP, also those for SAFE-OP.
+
+    Raises:
+        ConfigurationError: A download of the ESI needs complete access.
+    """
+    before = (*plan.commands.in_pre_op, *plan.before_mapping)
+    downloads = (*before, *plan.start_up, *plan.commands.in_safe_op)
+    for each in downloads:
+        if each.complete_access:
+            raise _no_complete_access(label, each)
+    return downloads
 
 
 def _download_if_there(master: Reservation, position: int, download: Download) -> None:

@@ -85,7 +85,7 @@ def _details(stop: StoppedAxis, cycle: CyclePlan, log: Log) -> str:
 def _late_limit_ns(mode: int, cycle: CyclePlan) -> int:
     if mode == Mode.CST:
         return cycle.late_limit_torque_ns
-    if mode == Mode.CSV:
+    if mode in (Mode.CSV, Mode.PV):
         return cycle.late_limit_velocity_ns
     return cycle.late_limit_position_ns
 

@@ -28,6 +28,14 @@ class Commands(NamedTuple):
     in_safe_op: tuple[Download, ...] = ()
     omitted: tuple[str, ...] = ()  # commands that are not written, and the reason
 
+    @property
+    def written(self) -> tuple[Download, ...]:
+        """Commands of both states."""
+        return self.in_pre_op + self.in_safe_op
+
+
+NO_COMMANDS = Commands()
+
 
 def choose_commands(
     device: DeviceDescription,
@@ -44,7 +52,7 @@ def choose_commands(
         outputs: Mapped outputs, which change in every cycle.
     """
     if not device.init_commands or not device.coe:
-        return Commands()
+        return NO_COMMANDS
     given = {(each.index, each.subindex) for each in objects}
     mapped = {(entry.index, entry.subindex) for entry in outputs}
     reasons = {each: _reason(each, given, own, mapped) for each in device.init_commands}

@@ -101,7 +101,7 @@ def _devices(devices: Sequence[DevicePlan]) -> Iterator[str]:
 
 def _start_up(devices: Sequence[DevicePlan]) -> Iterator[str]:
     """Yield the SDO downloads in the order of writing, with old and new values."""
-    chosen = [each for each in devices if each.downloads or each.in_safe_op]
+    chosen = [each for each in devices if each.downloads or each.commands.in_safe_op]
     if chosen:
         yield "start-up: SDOs written in PRE-OP, in this order"
     for device in chosen:
@@ -109,7 +109,7 @@ def _start_up(devices: Sequence[DevicePlan]) -> Iterator[str]:
         if device.modules is not None:
             yield from (f"        {'modules':<15} {each}" for each in ident_lines(device.modules))
         old = {change.what: change.old or "(not read)" for change in device.changes}
-        yield from (_download("ESI", each, old) for each in device.init_commands)
+        yield from (_download("ESI", each, old) for each in device.commands.in_pre_op)
         yield from (_download("before mapping", each, old) for each in device.before_mapping)
         for change in device.changes:
             if ":" not in change.what:  # a list of PDOs or of entries
@@ -117,8 +117,8 @@ def _start_up(devices: Sequence[DevicePlan]) -> Iterator[str]:
                 yield f"        {'mapping':<15} {change.what}  {before} → {change.new}"
         for each in device.start_up:
             yield _download("yours" if each.text else "Catenary", each, old)
-        yield from (_download("ESI, in SAFE-OP", each, old) for each in device.in_safe_op)
-        yield from (f"        {'ESI, omitted':<15} {each}" for each in device.omitted_commands)
+        yield from (_download("ESI, in SAFE-OP", each, old) for each in device.commands.in_safe_op)
+        yield from (f"        {'ESI, omitted':<15} {each}" for each in device.commands.omitted)
 
 
 def _download(owner: str, download: Download, old: Mapping[str, str]) -> str:

@@ -30,7 +30,7 @@ from catenary.model.device import (
 from catenary.plan.changes import Change, mapping_changes, value_changes
 from catenary.plan.clocks import SyncPlan
 from catenary.plan.download import Download
-from catenary.plan.init_commands import choose_commands
+from catenary.plan.init_commands import NO_COMMANDS, Commands, choose_commands
 from catenary.plan.layout import DeviceLayout
 from catenary.plan.modules import ModulePlan
 from catenary.plan.pdo_mapping import ASSIGNMENT_BASE, Mapping, shape
@@ -65,9 +65,7 @@ class DevicePlan:
     changes: tuple[Change, ...] = ()  # changes by the downloads, with old and new values
     rejected: tuple[str, ...] = ()  # mappings that change less, and their obstacles
     left_out: tuple[str, ...] = ()  # optional objects that are not exchanged
-    init_commands: tuple[Download, ...] = ()  # of the ESI, written first in PRE-OP
-    in_safe_op: tuple[Download, ...] = ()  # of the ESI, written in SAFE-OP
-    omitted_commands: tuple[str, ...] = ()  # commands of the ESI that are not written, and why
+    commands: Commands = NO_COMMANDS  # of the ESI, before the other objects or in SAFE-OP
     watchdog_source: str = ""  # file and line; empty if it is not from an ESI
     mapping_source: str = ""  # "CoE", "SII", "ESI FILE:LINE", or of the OpMode or named mapping
     modules: ModulePlan | None = None  # None: the device is not modular
@@ -75,7 +73,7 @@ class DevicePlan:
     @property
     def downloads(self) -> tuple[Download, ...]:
         """All downloads in PRE-OP, in the order of writing."""
-        own = (*self.init_commands, *self.before_mapping, *self.mapping, *self.start_up)
+        own = (*self.commands.in_pre_op, *self.before_mapping, *self.mapping, *self.start_up)
         return own if self.modules is None else (*self.modules.downloads, *own)
 
     @property
@@ -121,17 +119,8 @@ def make_device_plan(
         *(Download(*each, optional=True) for each in of_sync),
         *after,
     )
-    commands = choose_commands(
-        device,
-        request.objects,
-        {(each.index, each.subindex) for each in start_up if not each.text},
-        mapped_entries(outputs.assignments),
-    )
-    written = [
-        (each.index, each.subindex, each.data)
-        for each in (*commands.in_pre_op, *before, *start_up, *commands.in_safe_op)
-        if not each.complete_access
-    ]
+    own = {(each.index, each.subindex) for each in start_up if not each.text}
+    commands = choose_commands(device, request.objects, own, mapped_entries(outputs.assignments))
     left_out = outputs.left_out + inputs.left_out
     return DevicePlan(
         position=device.position,
@@ -147,18 +136,28 @@ def make_device_plan(
         mapping_changed=outputs.changed or inputs.changed,
         watchdog_ns=watchdog_ns,
         sync=sync,
-        changes=(
-            *mapping_changes(device, Direction.OUTPUT, outputs),
-            *mapping_changes(device, Direction.INPUT, inputs),
-            *value_changes(device, written),
-        ),
+        changes=_changes(device, outputs, inputs, (*commands.written, *before, *start_up)),
         rejected=outputs.rejected + inputs.rejected,
         left_out=tuple(f"0x{each.index:04X}:{each.subindex:02X}" for each in left_out),
-        init_commands=commands.in_pre_op,
-        in_safe_op=commands.in_safe_op,
-        omitted_commands=commands.omitted,
+        commands=commands,
         watchdog_source=watchdog_source,
         mapping_source=_mapping_source(device, outputs, inputs),
+    )
+
+
+def _changes(
+    device: DeviceDescription, outputs: Mapping, inputs: Mapping, steps: Sequence[Download]
+) -> tuple[Change, ...]:
+    """Return the changes by the mapping and by other downloads.
+
+    Whole objects (complete access) are omitted, because their present values are not read.
+    """
+    single = (each for each in steps if not each.complete_access)
+    values = [(each.index, each.subindex, each.data) for each in single]
+    return (
+        *mapping_changes(device, Direction.OUTPUT, outputs),
+        *mapping_changes(device, Direction.INPUT, inputs),
+        *value_changes(device, values),
     )
 
 

@@ -75,7 +75,7 @@ def write_downloads(
             or refuse the value are skipped.
         ConfigurationError: The value of a start-up object differs after it was written.
     """
-    for step in (*plan.init_commands, *plan.before_mapping):
+    for step in (*plan.commands.in_pre_op, *plan.before_mapping):
         yield from write_object(channel, step)
     for step in plan.mapping:
         try:
@@ -99,7 +99,7 @@ def write_in_safe_op(channel: MailboxChannel | None, plan: DevicePlan) -> Proced
     """
     if channel is None:
         return
-    for step in plan.in_safe_op:
+    for step in plan.commands.in_safe_op:
         yield from write_object(channel, step)
 
 
@@ -171,7 +171,7 @@ def _refused_mapping(
         f"{channel.station}: {what}: {refusal}"
         + (f"\n  alternatives that change less:{alternatives}" if alternatives else ""),
         hint="its SII allows the change, but the device does not; request only objects that it "
-        "maps, or choose other PDOs with pdos= (`catenary scan` shows the mapping)",
+        "maps, or choose other PDOs with pdos= (print(sub.pdos) shows the mapping)",
     )
 
 
