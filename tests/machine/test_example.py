@@ -22,7 +22,7 @@ def example(shared_data: Path) -> Path:
 
 
 def without_esi(example: Path, folder: Path) -> Path:
-    """Write the example without the ESI file, which is not supported yet. Return its path."""
+    """Write the example without its ESI file, which is not shared. Return its path."""
     text = example.read_text(encoding="utf-8")
     lines = [line for line in text.splitlines() if not line.startswith(ESI)]
     assert len(lines) == len(text.splitlines()) - 1
@@ -43,9 +43,12 @@ def test_the_segment_agrees_with_the_example(example: Path) -> None:
     assert {each.verdict for each in found} == {"same"}
 
 
-def test_the_esi_file_of_the_example_is_refused_with_its_line(example: Path) -> None:
-    with pytest.raises(MachineFileError, match="ESI files are not supported yet") as caught:
-        Machine(example)
+def test_the_missing_esi_file_of_the_example_is_refused_with_its_line(example: Path) -> None:
+    machine = Machine(example, target=example_segment())
+    with pytest.raises(
+        MachineFileError, match=r"there is no file or folder .*acme_imu\.xml"
+    ) as caught:
+        machine.open()
     line = example.read_text(encoding="utf-8").splitlines()[(caught.value.line or 0) - 1]
     assert line.startswith(ESI)
 

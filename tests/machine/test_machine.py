@@ -13,6 +13,7 @@ from catenary.loop import Loop, Scheduling, StopPolicy
 from catenary.machine import Machine
 from catenary.types import INT, USINT
 from catenary.virtual import Coupler, DigitalOutputs, Segment
+from tests.esi import servo_file
 from tests.machine.files import SMALL, small_segment, write_small
 
 AL_STATUS = 0x0130
@@ -274,11 +275,31 @@ def test_an_object_outside_all_pdos_is_refused(tmp_path: Path) -> None:
     assert caught.value.key == "process_data.valves.outputs.vacuum"
 
 
-def test_esi_files_are_refused(tmp_path: Path) -> None:
+def test_a_missing_esi_file_is_refused_with_its_key(tmp_path: Path) -> None:
     text = SMALL.replace("position = 2", 'position = 2\nesi = "gauge.xml"')
-    with pytest.raises(MachineFileError, match="ESI files are not supported yet") as caught:
-        Machine(write_small(tmp_path, text))
+    machine = Machine(write_small(tmp_path, text))
+    with pytest.raises(MachineFileError, match="there is no file or folder") as caught:
+        machine.open()
     assert caught.value.key == "device[2].esi"
+
+
+def test_the_esi_file_of_another_device_is_refused_with_its_key(tmp_path: Path) -> None:
+    esi = servo_file.write(tmp_path, "gauge.xml", product=7)
+    text = SMALL.replace("position = 2", 'position = 2\nesi = "gauge.xml"')
+    machine = Machine(write_small(tmp_path, text))
+    with pytest.raises(MachineFileError, match="does not describe device") as caught:
+        machine.open()
+    assert caught.value.key == "device[2].esi"
+    assert str(esi) in str(caught.value)
+
+
+def test_a_folder_of_esi_files_at_the_top(tmp_path: Path) -> None:
+    (tmp_path / "esi").mkdir()
+    path = servo_file.write(tmp_path / "esi")
+    text = SMALL.replace("[loop]", 'esi = "esi"\n\n[loop]', 1)
+    with Machine(write_small(tmp_path, text)) as machine:
+        found = [sub.esi for sub in machine.main.subs if sub.is_drive]
+        assert [each.source.file for each in found if each is not None] == [str(path)]
 
 
 def test_a_machine_without_roles_has_no_loop(tmp_path: Path) -> None:

@@ -9,33 +9,35 @@ from typing import TYPE_CHECKING, Literal, TypeAlias
 
 from catenary.errors import EsiError, EsiLookupError, IdentityError
 from catenary.esi.user_folder import default_folder
-from catenary.model.device import DeviceDescription
+from catenary.model.device import DeviceDescription, Identity
 
 if TYPE_CHECKING:  # a scan without ESI files imports neither sqlite nor a parser
     from catenary.esi.device import EsiDevice
     from catenary.esi.library import Library
+    from catenary.esi.lookup import Choice
 
 SHOWN = 8  # devices in an error
 
-EsiPlace: TypeAlias = "str | os.PathLike[str] | Library | Literal[False] | None"
+EsiFiles: TypeAlias = "str | os.PathLike[str] | Library"
+EsiPlace: TypeAlias = "EsiFiles | Sequence[EsiFiles] | Literal[False] | None"
 
 
 class EsiSource:
     """ESI descriptions for the devices of one scan. It remembers those that it used."""
 
-    def __init__(self, library: Library, *, given: bool) -> None:
-        """Open the index of the library.
+    def __init__(self, libraries: Sequence[Library], *, given: bool) -> None:
+        """Open the indices of the libraries.
 
         Args:
-            library: Library of ESI files.
-            given: True if the application gave it; False for the user's own library.
+            libraries: Libraries of ESI files, the preferred one first.
+            given: True if the application gave them; False for the user's own library.
 
         Raises:
-            EsiError: The library cannot be read.
+            EsiError: A library cannot be read.
         """
         self.found: dict[int, EsiDevice] = {}  # by position
-        self.notes = tuple(library.problems)
-        self._library = library
+        self.notes = tuple(problem for each in libraries for problem in each.problems)
+        self._libraries = tuple(libraries)
         self._given = given
 
     def complete(self, device: DeviceDescription) -> DeviceDescription:
@@ -59,24 +61,32 @@ class EsiSource:
         from catenary.esi.apply import applied
         from catenary.esi.duplicates import warning_of
 
-        identity = device.identity
-        choice = self._library.choose(identity.vendor, identity.product, identity.revision)
-        if choice is None:
+        library, choice = self._choice(device.identity)
+        if library is None or choice is None:
             return device
         if choice.record is None:
             revisions = ", ".join(f"0x{each.entry.revision:08X}" for each in choice.candidates)
             return _noted(
                 device,
-                f"{self._library.path} has its ESI only for newer revisions than "
-                f"0x{identity.revision:08X}: {revisions}",
+                f"{library.path} has its ESI only for newer revisions than "
+                f"0x{device.identity.revision:08X}: {revisions}",
             )
-        esi = self._library.read(choice.record)
+        esi = library.read(choice.record)
         completed = applied(device, esi)
         self.found[device.position] = esi
-        others = (
-            warning_of(choice.record, other, self._library.read) for other in choice.records[1:]
-        )
+        others = (warning_of(choice.record, other, library.read) for other in choice.records[1:])
         return _noted(completed, *map(str, others))
+
+    def _choice(self, identity: Identity) -> tuple[Library | None, Choice | None]:
+        """Return the first library with a suitable description, or else with any of the product."""
+        unsuitable: tuple[Library | None, Choice | None] = (None, None)
+        for library in self._libraries:
+            choice = library.choose(identity.vendor, identity.product, identity.revision)
+            if choice is not None and choice.record is not None:
+                return library, choice
+            if choice is not None:
+                unsuitable = library, choice
+        return unsuitable
 
     def check_used(self, devices: Sequence[DeviceDescription]) -> None:
         """Check that a given file or folder describes at least one device.
@@ -89,7 +99,7 @@ class EsiSource:
         """
         if not self._given or self.found or not devices:
             return
-        described = [str(each) for each in self._library.records()]
+        described = [str(each) for library in self._libraries for each in library.records()]
         shown = "".join(f"\n    {each}" for each in described[:SHOWN])
         shown += f"\n    and {len(described) - SHOWN} more" * (len(described) > SHOWN)
         present = ", ".join(
@@ -99,7 +109,7 @@ class EsiSource:
         raise EsiLookupError(
             f"describes none of the devices on the segment, which are {present}; it "
             + (f"describes{shown}" if described else "has no devices"),
-            file=str(self._library.path),
+            file=", ".join(str(library.path) for library in self._libraries),
             candidates=tuple(described),
             hint="use the ESI files of these devices, or omit esi=",
         )
@@ -109,8 +119,8 @@ def open_source(place: EsiPlace) -> EsiSource | None:
     """Return the ESI files of a scan; None without any.
 
     Args:
-        place: File or folder, or a library. None: the library of the user if it exists. False:
-            no ESI files.
+        place: File or folder, a library, or a list of these, the preferred one first. None: the
+            library of the user if it exists. False: no ESI files.
 
     Raises:
         EsiError: A given file, folder or library cannot be read.
@@ -120,9 +130,12 @@ def open_source(place: EsiPlace) -> EsiSource | None:
     from catenary.esi.library import Library
 
     if place is None:
-        return EsiSource(Library(), given=False)
-    library = place if isinstance(place, Library) else Library.of(place)
-    return EsiSource(library, given=True)
+        return EsiSource([Library()], given=False)
+    places: Sequence[EsiFiles] = [place]  # type: ignore[list-item]  # not a sequence
+    if isinstance(place, Sequence) and not isinstance(place, str):
+        places = place
+    libraries = [each if isinstance(each, Library) else Library.of(each) for each in places]
+    return EsiSource(libraries, given=True)
 
 
 def unchanged(device: DeviceDescription) -> DeviceDescription:

@@ -242,9 +242,9 @@ class MainDevice:
             strict: If True, raise the first error of a device, with further errors as notes; `subs`
                 still has all handles. If False, store each error in `SubDevice.error`, and raise it
                 when the device is used.
-            esi: ESI file, folder of ESI files, or a `Library`. None: the user's library
-                (`catenary esi`), if it exists. False: no ESI files. `SubDevice.esi` has the
-                description of each device; `notes` has contradictions to the device.
+            esi: ESI file, folder of ESI files, `Library`, or a list of these, the preferred one
+                first. None: the user's library (`catenary esi`), if it exists. False: no ESI files.
+                `SubDevice.esi` has the description of each device; `notes` has contradictions.
 
         Returns:
             All devices, by position.

@@ -12,6 +12,7 @@ from catenary.errors import CatenaryError, IdentityError, SegmentError
 from catenary.loop.devices import LoopRequest
 from catenary.machine.by_name import ByName
 from catenary.machine.comparison import Comparison, expected_identity
+from catenary.machine.esi_files import check_esi_files
 from catenary.machine.file import MachineFile
 from catenary.machine.requests import (
     devices_of,
@@ -73,13 +74,14 @@ def make_found(file: MachineFile, found: Sequence[Comparison]) -> MachineParts:
 
     Raises:
         CatenaryError: A device of the file did not reach PRE-OP.
-        MachineFileError: A table requests an object or axis that its device does not have, or an
-            option is not valid.
+        MachineFileError: A table requests an object or axis that its device does not have, an
+            option is not valid, or the ESI file of a device does not describe it.
     """
     subs = {each.name: each.found for each in found if each.verdict == "same" and each.found}
     for sub in subs.values():
         if sub.error is not None:
             raise sub.error
+    check_esi_files(file, subs)
     absent = {each.name: each.fault for each in found if each.verdict == "absent"}
     present, missing = _roles(file, "drives", file.tables.drives, absent)
     drives = {role: make_drives(file, role, subs) for role in present}

@@ -18,9 +18,10 @@ from catenary.loop.devices import LoopRequest
 from catenary.loop.laws.law import Law, LawFunction
 from catenary.machine.by_name import ByName
 from catenary.machine.comparison import compare
+from catenary.machine.esi_files import esi_places
 from catenary.machine.found import MachineParts, make_found, raise_differences
 from catenary.machine.options import loop_options
-from catenary.machine.read import read_machine, refuse_unsupported
+from catenary.machine.read import read_machine
 from catenary.plan.cycle import ExecutionMode
 from catenary.plan.sink import Sink
 from catenary.target import MainDevice, segment_of, source_of
@@ -57,7 +58,6 @@ class Machine:
         self, path: str | Path, target: str | LinkSource | None = None, *, force: bool = False
     ) -> None:
         self._file = read_machine(path)
-        refuse_unsupported(self._file)
         source = self._file.source() if target is None else source_of(target)
         self._segment = segment_of(source)
         self._main = MainDevice(source, force=force)
@@ -203,9 +203,10 @@ class Machine:
     def _find(self) -> MachineParts:
         """Check the identities, bring the devices to PRE-OP, scan them, and make the requests."""
         file = self._file
+        places = esi_places(file)
         if not self._has_own_master:  # the IgH master does not support a passive scan
             raise_differences(file, compare(file.tables.device, self._main.passive_scan()))
-        found = compare(file.tables.device, self._main.scan(strict=False))
+        found = compare(file.tables.device, self._main.scan(strict=False, esi=places))
         raise_differences(file, found)
         return make_found(file, found)
 

@@ -98,7 +98,9 @@ def process_data_options(file: MachineFile, role: str) -> dict[str, Any]:
             options[name] = getattr(table, name)
     if table.safe:
         options["safe"] = dict(table.safe)
-    if table.pdos:
+    if isinstance(table.pdos, list):
+        options["pdos"] = table.pdos
+    elif table.pdos:
         options["pdos"] = {
             pdo_index(file, (*path, "pdos", pdo), pdo): names for pdo, names in table.pdos.items()
         }

@@ -33,14 +33,3 @@ def read_machine(path: str | Path) -> MachineFile:
             if given is not UNSET:
                 check_channels(file, ("process_data", role, name), given)
     return file
-
-
-def refuse_unsupported(file: MachineFile) -> None:
-    """Raise MachineFileError for keys that the format defines but this version does not support."""
-    for number, device in enumerate(file.tables.device):
-        if device.esi is not UNSET:
-            raise file.error(
-                ("device", number, "esi"),
-                f'device "{device.name}": ESI files are not supported yet',
-                hint="remove the key; names and mapping are then read from the device",
-            )

@@ -172,7 +172,7 @@ def _check_process_data(file: MachineFile, path: KeyPath, table: ProcessDataTabl
                 text = f'"{name}" is not an output{nearest(name, list(outputs))}'
                 raise file.error((*path, "safe", name), text)
     known = [*inputs, *outputs]
-    for pdo, names in table.pdos.items():
+    for pdo, names in table.pdos.items() if isinstance(table.pdos, dict) else ():
         pdo_index(file, (*path, "pdos", pdo), pdo)
         for number, name in enumerate(names):
             if name not in known:

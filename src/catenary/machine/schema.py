@@ -42,6 +42,7 @@ DoubleWord = Annotated[int, Meta(ge=0, le=0xFFFFFFFF)]
 Object = Annotated[str, Meta(description="object, 0xINDEX:SUBINDEX", examples=["0x6000:11"])]
 Mode = Literal["csp", "csv", "cst", "pp", "pv", "hm"]
 TypeName = Annotated[str, Meta(description="data type", examples=["UINT", "REAL"])]
+EsiPlace = Annotated[str, Meta(description="ESI file, or folder of ESI files")]
 Divider = Annotated[int, Meta(description="n: exchange in every n-th cycle", ge=1)]
 
 
@@ -126,8 +127,8 @@ class DeviceTable(Table, frozen=True, kw_only=True):
     alias: Optional[Annotated[int, Meta(description="station alias", ge=1, le=0xFFFF)]] = UNSET
     position: Optional[Annotated[int, Meta(description="the first is 0", ge=0, le=0xFFFF)]] = UNSET
     required: Annotated[bool, Meta(description="false if the device may be absent")] = True
-    esi: Optional[Annotated[str, Meta(description="ESI file; not supported yet")]] = UNSET
-    op_mode: Optional[Annotated[str, Meta(description="OpMode from the SII")]] = UNSET
+    esi: Optional[EsiPlace] = UNSET
+    op_mode: Optional[Annotated[str, Meta(description="OpMode from the ESI or SII")]] = UNSET
     start_up: list[StartUpTable] = []
     comment: str = ""
 
@@ -195,7 +196,7 @@ class DrivesTable(Table, frozen=True, kw_only=True):
     required: Optional[bool] = UNSET
     divider: Optional[Divider] = UNSET
     clock: Optional[bool | ClockTable] = UNSET
-    pdos: Optional[list[Word] | dict[str, list[tuple[Word, int, int]]]] = UNSET
+    pdos: Optional[list[Word | str] | dict[str, list[tuple[Word, int, int]]]] = UNSET
 
 
 class ChannelTable(Table, frozen=True, kw_only=True):
@@ -217,7 +218,7 @@ class ProcessDataTable(Table, frozen=True, kw_only=True):
     inputs: Optional[dict[str, Object | ChannelTable]] = UNSET
     outputs: Optional[dict[str, Object | ChannelTable]] = UNSET
     safe: dict[str, bool | int | float] = {}
-    pdos: dict[str, list[str]] = {}
+    pdos: list[Word | str] | dict[str, list[str]] = {}
     required: Optional[bool] = UNSET
     divider: Optional[Divider] = UNSET
     clock: Optional[bool | ClockTable] = UNSET
@@ -231,6 +232,7 @@ class MachineTables(Table, frozen=True, kw_only=True):
     target: Optional[Annotated[str, Meta(description='"eth0", "eth0,eth1", "virtual:FILE"')]] = (
         UNSET
     )
+    esi: Optional[EsiPlace] = UNSET
     loop: LoopTable = LoopTable()
     clocks: ClocksTable = ClocksTable()
     device: list[DeviceTable] = []

@@ -113,13 +113,9 @@ def make_device_plan(
         TypeError: The value of a start-up object does not agree with its type.
     """
     before, after = object_downloads(device, request.objects)
-    of_sync = sync.objects if sync is not None and device.coe else ()
-    start_up = (
-        *(Download(*each) for each in request.start_up),
-        *(Download(*each, optional=True) for each in of_sync),
-        *after,
-    )
-    own = {(each.index, each.subindex) for each in start_up if not each.text}
+    mine = _own_downloads(device, request, sync)
+    start_up = (*mine, *after)
+    own = {(each.index, each.subindex) for each in mine}
     commands = choose_commands(device, request.objects, own, mapped_entries(outputs.assignments))
     left_out = outputs.left_out + inputs.left_out
     return DevicePlan(
@@ -142,6 +138,17 @@ def make_device_plan(
         commands=commands,
         watchdog_source=watchdog_source,
         mapping_source=_mapping_source(device, outputs, inputs),
+    )
+
+
+def _own_downloads(
+    device: DeviceDescription, request: DeviceRequest, sync: SyncPlan | None
+) -> tuple[Download, ...]:
+    """Return the objects that Catenary writes."""
+    of_sync = sync.objects if sync is not None and device.coe else ()
+    return (
+        *(Download(*each) for each in request.start_up),
+        *(Download(*each, optional=True) for each in of_sync),
     )
 
 
