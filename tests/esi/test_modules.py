@@ -144,3 +144,24 @@ def test_the_axes_of_a_real_device(shared_data: Path) -> None:
     assert [e.index for e in two.output_pdos[0].entries][:2] == [0x6840, 0x687A]
     assert (one.axes, two.axes) == ((0,), (1,))
     assert {each.direction for each in device.modules[0].pdos} == set(Direction)
+
+
+def test_slots_as_text_mark_the_default_module(shared_data: Path) -> None:
+    [device] = read_esi(shared_data / "esi" / "hpm_ECAT_CIA402.xml").devices
+    assert str(device.slots) == (
+        "slot 0  Axis 0  required\n"
+        "    0x00119800  csv,csp - axis\n"
+        "    0x00219800  csp - axis\n"
+        "    0x00319800  csv - axis  default\n"
+        "slot 1  Axis 1\n"
+        "    0x00119800  csv,csp - axis\n"
+        "    0x00219800  csp - axis\n"
+        "    0x00319800  csv - axis"
+    )
+
+
+def test_a_module_that_was_not_found_is_listed() -> None:
+    slots = coupler(EsiSlot("Terminals", 2, 8, (0x99,), 0x99)).slots
+    assert str(slots) == (
+        "slots 0 to 7  Terminals  at least 2 occupied\n    0x00000099  (not found)  default"
+    )

@@ -76,11 +76,7 @@ def accepts(slot: EsiSlot, module: EsiModule) -> bool:
         slot: The slot. One that names neither idents nor classes accepts every module.
         module: The module.
     """
-    if not slot.module_idents and not slot.module_classes:
-        return True
-    return module.ident in slot.module_idents or (
-        bool(module.module_class) and module.module_class in slot.module_classes
-    )
+    return slot.accepts(module.ident, module.module_class)
 
 
 def accepted_by(device: EsiDevice, slot: EsiSlot) -> tuple[EsiModule, ...]:
