@@ -25,6 +25,7 @@ from catenary.model.module import (
     DETECTED_IDENTS,
     ConfiguredModule,
     ModularDevice,
+    with_mapping_of,
     with_modules,
 )
 
@@ -134,22 +135,7 @@ def _with_placements(
         note = f"its modules ({source}) are not used: {error.message}"
         return replace(device, notes=(*device.notes, note))
     fitted = with_modules(device, configured(esi, placed), source)
-    return _with_mapping_of(device, fitted) if device.mapping_source in READ_SOURCES else fitted
-
-
-def _with_mapping_of(device: DeviceDescription, fitted: DeviceDescription) -> DeviceDescription:
-    """Return a description with the mapping that was read, and the other PDOs of the modules."""
-    for direction in Direction:
-        known = {pdo.index for pdo in device.pdos(direction)}
-        added = tuple(
-            replace(pdo, sync_manager=None)
-            for pdo in fitted.pdos(direction)
-            if pdo.index not in known
-        )
-        fitted = fitted.with_process_data(
-            direction, device.assignments(direction), device.pdos(direction) + added
-        )
-    return replace(fitted, mapping_source=device.mapping_source)
+    return with_mapping_of(fitted, device) if device.mapping_source in READ_SOURCES else fitted
 
 
 def _configured(device: EsiDevice, placed: Placement) -> ConfiguredModule:

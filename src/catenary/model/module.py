@@ -135,6 +135,26 @@ def with_modules(
     )
 
 
+def with_mapping_of(fitted: DeviceDescription, device: DeviceDescription) -> DeviceDescription:
+    """Return a description with modules, and with the mapping that the device reports.
+
+    Args:
+        fitted: The description with modules.
+        device: The description with the present mapping.
+    """
+    for direction in Direction:
+        known = {pdo.index for pdo in device.pdos(direction)}
+        added = tuple(
+            replace(pdo, sync_manager=None)
+            for pdo in fitted.pdos(direction)
+            if pdo.index not in known
+        )
+        fitted = fitted.with_process_data(
+            direction, device.assignments(direction), device.pdos(direction) + added
+        )
+    return replace(fitted, mapping_source=device.mapping_source)
+
+
 def _commands(
     modular: ModularDevice, modules: Sequence[ConfiguredModule]
 ) -> tuple[InitCommand, ...]:

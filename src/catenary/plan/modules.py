@@ -14,10 +14,10 @@ from __future__ import annotations
 
 import struct
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from catenary.errors import ConfigurationError
-from catenary.model.device import DeviceDescription
+from catenary.model.device import DeviceDescription, Direction, mapped_pdos
 from catenary.model.module import (
     CONFIGURED_IDENTS,
     DEFAULTS,
@@ -53,7 +53,9 @@ def with_requested_modules(
 ) -> DeviceDescription:
     """Return the description with the modules that the application requests.
 
-    A device keeps the mapping that it reports if it already has these modules.
+    A device keeps the mapping that it reports if these modules are configured in it, and their PDOs
+    are assigned. Otherwise, the default assignment of the modules counts, because writing 0xF030
+    can change the mapping.
 
     Args:
         device: Description of the device.
@@ -62,19 +64,38 @@ def with_requested_modules(
     Raises:
         ConfigurationError: The device has no slots.
     """
+    modular = device.modular
     if modules is None:
-        return device
-    if device.modular is None:
+        if modular is None or not _is_rewritten(device, modular, modular.modules_source):
+            return device
+        return with_modules(device, modular.modules, modular.modules_source)
+    if modular is None:
         raise ConfigurationError(
             f"{device} has no slots for modules: no ESI of a modular device was used for it",
             hint="scan with its ESI file, main.scan(esi=...), or omit modules=",
         )
-    idents = slot_idents(modules)
-    configured = device.modular.configured
-    is_configured = configured is None or same_idents(configured, idents)
-    if is_configured and same_idents(device.modular.idents, idents):
+    same = same_idents(modular.idents, slot_idents(modules))
+    if same and not _is_rewritten(device, modular, REQUESTED) and _carries(device, modules):
         return device
     return with_modules(device, modules, REQUESTED)
+
+
+def _carries(device: DeviceDescription, modules: Sequence[ConfiguredModule]) -> bool:
+    """Return True if all PDOs that modules assign by default are assigned."""
+    assigned = {pdo.index for d in Direction for pdo in mapped_pdos(device.assignments(d))}
+    defaults = (p for m in modules for d in Direction for p in m.pdos(d))
+    return all(pdo.index in assigned for pdo in defaults if pdo.sync_manager is not None)
+
+
+def _is_rewritten(device: DeviceDescription, modular: ModularDevice, source: str) -> bool:
+    """Return True if 0xF030 has other idents than the modules in use, and is written."""
+    before = modular.configured
+    return (
+        device.coe
+        and source != DEFAULTS
+        and before is not None
+        and not same_idents(before, modular.idents)
+    )
 
 
 def make_module_plan(
@@ -91,18 +112,21 @@ def make_module_plan(
         return None
     chosen = modular.modules if modules is None else tuple(modules)
     source = modular.modules_source if modules is None else REQUESTED
-    idents = slot_idents(chosen)
-    return ModulePlan(modular, chosen, source, _downloads(device, modular, idents, source))
+    return ModulePlan(modular, chosen, source, _downloads(device, modular, chosen, source))
 
 
 def _downloads(
-    device: DeviceDescription, modular: ModularDevice, idents: tuple[int, ...], source: str
+    device: DeviceDescription,
+    modular: ModularDevice,
+    modules: tuple[ConfiguredModule, ...],
+    source: str,
 ) -> tuple[Download, ...]:
     """Return the downloads of 0xF030. Devices with a fixed number of slots refuse subindex 0."""
     before = modular.configured
-    differs = before is not None and not same_idents(before, idents)
-    if not device.coe or not (modular.download_idents or (differs and source != DEFAULTS)):
+    chosen = replace(modular, modules=modules)
+    if not (device.coe and modular.download_idents) and not _is_rewritten(device, chosen, source):
         return ()
+    idents = slot_idents(modules)
     count = min(max(len(idents), len(before or ())), IDENTS_MAX)
     padded = (*idents, *[0] * (count - len(idents)))
     ranks = enumerate(padded, start=1)

@@ -10,6 +10,7 @@ from typing import NamedTuple
 from catenary import notebook
 from catenary.errors import ConfigurationError
 from catenary.model.device import DeviceDescription, Direction
+from catenary.model.module import with_mapping_of
 from catenary.plan.clock_report import Clocks
 from catenary.plan.clocks import ClockChoice, choose_clocks, make_clock_plan, make_sync
 from catenary.plan.combination import gather_requests
@@ -37,7 +38,7 @@ from catenary.plan.output_owners import check_owners
 from catenary.plan.pdo_mapping import Mapping
 from catenary.plan.report import report
 from catenary.plan.request import DeviceRequest, ProcessDataRequest, RequestTables, WrittenPdo
-from catenary.plan.start_up import DevicePlan, make_device_plan
+from catenary.plan.start_up import DevicePlan, compared, make_device_plan
 from catenary.plan.watchdog import choose_watchdog
 from catenary.wire.cia402 import Mode
 
@@ -119,6 +120,7 @@ class _Draft(NamedTuple):
     inputs: Mapping
     watchdog_ns: int
     watchdog_source: str
+    found: DeviceDescription  # with the mapping that the device reports
 
     def data(self, *, optional: bool) -> DeviceData:
         return DeviceData(
@@ -144,7 +146,8 @@ class _Draft(NamedTuple):
             else make_sync(self.device, clock, period_ns * self.request.divider, lead_ns),
             self.watchdog_source if place.output_size else "",
         )
-        return replace(plan, modules=make_module_plan(self.device, self.request.modules))
+        plan = replace(plan, modules=make_module_plan(self.device, self.request.modules))
+        return plan if self.found is self.device else compared(plan, self.found)
 
 
 def _drafts(
@@ -157,9 +160,9 @@ def _drafts(
     _check_positions(devices, combined)
     required = not combined or any(request.required for request in combined.values())
     drafts = []
-    for device in devices:
-        request = combined.get(device.position, DeviceRequest(required=required))
-        device = with_requested_modules(device, request.modules)
+    for found in devices:
+        request = combined.get(found.position, DeviceRequest(required=required))
+        device = with_requested_modules(found, request.modules)
         watchdog_ns, watchdog_source = choose_watchdog(
             device, request, options.watchdog, options.period_ns
         )
@@ -172,6 +175,7 @@ def _drafts(
                 make_mapping(device, Direction.INPUT, request.inputs, inputs),
                 watchdog_ns,
                 watchdog_source,
+                device if device is found else with_mapping_of(device, found),
             )
         )
     return drafts

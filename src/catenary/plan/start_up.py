@@ -263,6 +263,24 @@ def renewed(plan: DevicePlan, device: DeviceDescription) -> DevicePlan:
     )
 
 
+def compared(plan: DevicePlan, device: DeviceDescription) -> DevicePlan:
+    """Return the plan with the changes of a mapping that differs from that of its description.
+
+    Args:
+        plan: Plan of the device, such as one for other modules in its slots.
+        device: Description with the present mapping of the device.
+    """
+    changes = [
+        change
+        for each in Direction
+        for change in mapping_changes(
+            device, each, _difference(device, each, plan.assignments(each))
+        )
+    ]
+    values = (change for change in plan.changes if ":" in change.what)
+    return replace(renewed(plan, device), changes=(*changes, *values))
+
+
 def _difference(
     device: DeviceDescription, direction: Direction, requested: tuple[Assignment, ...]
 ) -> Mapping:

@@ -6,7 +6,13 @@ from dataclasses import replace
 
 from catenary.errors import ConfigurationError, MailboxError, ResponseTimeout, SdoAbort
 from catenary.model.device import DeviceDescription
-from catenary.model.module import BY_IDENT, CONFIGURED_IDENTS, DETECTED_IDENTS, with_modules
+from catenary.model.module import (
+    BY_IDENT,
+    CONFIGURED_IDENTS,
+    DETECTED_IDENTS,
+    with_mapping_of,
+    with_modules,
+)
 from catenary.plan.modules import ModulePlan, ident_difference
 from catenary.plan.start_up import DevicePlan, renewed
 from catenary.procedure.exchange import Procedure
@@ -93,13 +99,12 @@ def prepare_modules(
     if modules is None:
         return device, plan
     yield from _check_detected(channel, modules)
-    present = device.modular
-    if not modules.downloads and present is not None and present.modules == modules.modules:
-        return device, plan
+    fitted = with_modules(device, modules.modules, modules.source)
+    if not modules.downloads:
+        return with_mapping_of(fitted, device), plan
     for step in modules.downloads:
         yield from write_object(channel, step)
-    fitted = with_modules(device, modules.modules, modules.source)
-    if modules.downloads and fitted.modular is not None:
+    if fitted.modular is not None:
         modular = replace(fitted.modular, configured=modules.idents)
         fitted = replace(fitted, modular=modular)
     fitted = yield from read_mapping(channel, fitted)
