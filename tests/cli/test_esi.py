@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from catenary.cli.esi import key_of
+from catenary.cli.esi_commands import key_of
 from catenary.cli.main import main
 from tests.esi.esi_file import VENDOR, device, esi, module, write
 

@@ -13,9 +13,13 @@ from pathlib import Path
 import pytest
 
 from catenary.errors import EsiError, EsiLookupError
+from catenary.esi.duplicates import differences
+from catenary.esi.folders import default_folder
 from catenary.esi.library import Library
 from catenary.esi.lookup import Rule
-from catenary.esi.user_folder import default_folder
+from catenary.esi.reader import read_esi
+from catenary.esi.record import Record
+from tests.esi import corpus
 from tests.esi.esi_file import VENDOR, device, esi, module, write
 
 
@@ -266,6 +270,14 @@ def test_a_damaged_index_is_made_again(library: Library, tmp_path: Path, damage:
     assert len(library.sources) == 1
 
 
+def test_an_index_that_fails_while_open_is_reported(library: Library, tmp_path: Path) -> None:
+    library.add(write(tmp_path / "a.xml", device()))
+    library._files()._store.close()  # SQLite then raises an error for every request
+    for use in (lambda: library.search("x"), lambda: library.files, library.check):
+        with pytest.raises(EsiError, match=r"index\.sqlite: the index cannot be used"):
+            use()
+
+
 def test_a_damaged_list_is_reported_and_kept(library: Library) -> None:
     library.path.mkdir()
     (library.path / "library.json").write_text("{")
@@ -288,6 +300,7 @@ def test_an_index_that_cannot_be_written_is_used_in_memory(
 
 PROGRAM = """
 import sys
+from catenary.esi.duplicates import differences
 from catenary.esi.library import Library
 for path in sys.argv[2:]:
     Library(sys.argv[1]).add(path)
@@ -321,7 +334,7 @@ def test_the_same_description_twice_is_reported(library: Library, tmp_path: Path
     (warning,) = found.warnings
     assert f"{tmp_path}/b.xml:7 has the same description of 0x00005A5A:0x00000001" in str(warning)
     assert str(warning).startswith(f"{found.source}: ")
-    assert len(library.duplicates()) == 1
+    assert len(library._duplicates()) == 1
 
 
 def test_different_descriptions_of_one_device_are_reported(
@@ -340,6 +353,19 @@ def test_different_descriptions_of_one_device_are_reported(
     found = library.find(VENDOR, 1, 1)
     assert found is not None
     assert found.source.file == f"{tmp_path}/esi/b.xml"
+
+
+def test_a_duplicate_that_cannot_be_read_is_a_warning(
+    library: Library, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    library.add(write(tmp_path / "b.xml", device()))
+    library.add(write(tmp_path / "a.xml", device()))
+    (tmp_path / "b.xml").unlink()  # after the library was opened
+    monkeypatch.setattr("catenary.esi.indexed_files.IndexedFiles.refresh", lambda *_, **__: None)
+    found = library.find(VENDOR, 1, 1)
+    assert found is not None
+    assert "b.xml:7 has the same key" in str(found.warnings[0])
+    assert "cannot be compared: " in str(found.warnings[0])
 
 
 # lookup
@@ -479,11 +505,39 @@ def test_a_library_of_a_folder_or_file_writes_nothing(tmp_path: Path) -> None:
     assert sorted(os.listdir(tmp_path / "esi")) == ["a.xml", "b.xml"]
 
 
+def test_a_temporary_library_cannot_be_changed(tmp_path: Path) -> None:
+    path = write(tmp_path / "esi/a.xml", device())
+    with Library.of(tmp_path / "esi") as library:
+        for change in (library.add, library.remove):
+            with pytest.raises(ValueError, match="temporary library"):
+                change(path)
+    assert os.listdir(tmp_path / "esi") == ["a.xml"]
+
+
+@pytest.mark.parametrize("limit", ["MAX_FILES", "MAX_FOLDERS"])
+def test_a_folder_that_is_too_large_is_refused(
+    library: Library, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, limit: str
+) -> None:
+    monkeypatch.setattr(f"catenary.esi.sources.{limit}", 2)
+    for name in "abc":
+        write(tmp_path / "esi" / name / "a.xml", device())
+    with pytest.raises(EsiError, match="more than 2"):
+        library.add(tmp_path / "esi")
+    assert library.sources == ()
+    assert "more than 2" in Library.of(tmp_path / "esi").problems[0]
+
+
+def test_a_folder_that_is_nested_too_deeply_is_reported(library: Library, tmp_path: Path) -> None:
+    write(tmp_path / "esi" / "/".join("abcdefghijklmnopqrst") / "a.xml", device())
+    (problem,) = library.add(tmp_path / "esi").problems
+    assert "nested too deeply" in problem
+
+
 def test_the_index_of_a_large_folder_is_cached(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
-    monkeypatch.setattr("catenary.esi.library.SMALL", 100)
+    monkeypatch.setattr("catenary.esi.folders.SMALL", 100)
     write(tmp_path / "esi/a.xml", device())
     assert found(Library.of(tmp_path / "esi")) == "Drive"
     monkeypatch.setattr("catenary.esi.indexed_files.index_file", None)
@@ -510,5 +564,31 @@ def test_the_shared_files(shared_data: Path) -> None:
             assert choice is not None
             assert choice.rule is Rule.EXACT
             assert library.find(*record.key) is not None
-        assert len(library.duplicates()) == 1  # two versions of pollen's Orbita2d
-        assert json.dumps([str(each) for each in library.duplicates()])
+        assert len(library._duplicates()) == 1  # two versions of pollen's Orbita2d
+        assert json.dumps([str(each) for each in library._duplicates()])
+
+
+@pytest.mark.parametrize("name", [*corpus.FILES, *corpus.FAULTY_FILES])
+def test_a_device_from_its_place_is_that_of_the_whole_file(tmp_path: Path, name: str) -> None:
+    path = tmp_path / "a.xml"
+    path.write_bytes({**corpus.FILES, **corpus.FAULTY_FILES}[name])
+    with Library.of(path) as library:
+        records = library.records()
+        try:
+            whole = read_esi(path)
+        except EsiError:
+            assert not any(readable(library, record) for record in records)
+            return
+        assert [each.key for each in records] == [each.key for each in whole.devices]
+        for record, device in zip(records, whole.devices, strict=True):
+            found = library.read(record)
+            assert differences(found, device) == []
+            assert found.source == device.source == record.source
+            assert set(device.warnings) <= set(found.warnings)
+
+
+def readable(library: Library, record: Record) -> bool:
+    try:
+        return bool(library.read(record))
+    except EsiError:
+        return False

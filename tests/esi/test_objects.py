@@ -127,6 +127,11 @@ def test_info_belongs_to_the_entry_with_its_name_or_position(
     assert values == expected
 
 
+def test_the_unit_of_an_array_applies_to_its_elements() -> None:
+    found = read(corpus.TYPES, variable("DT2000", 64, "<Unit>#x00010000</Unit>")).objects[1]
+    assert [entry.unit for entry in found.entries] == [None, 0x10000, 0x10000, 0x10000]
+
+
 def test_types_that_refer_to_themselves_end() -> None:
     types = (
         "<DataType><Name>A</Name><BaseType>B</BaseType></DataType>"

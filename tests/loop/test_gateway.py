@@ -9,7 +9,9 @@ import pytest
 import catenary as cat
 from catenary.errors import ConfigurationError
 from catenary.esi.reader import read_esi
-from tests.loop.gateway import AI, DI, DO, FILE, gateway
+from catenary.virtual import Coupler, Segment, from_esi
+from catenary.virtual.faults import power_cycle
+from tests.loop.gateway import AI, DI, DO, FILE, gateway, text
 
 DOWNLOAD = 'DownloadModuleIdentList="1"'
 
@@ -45,6 +47,26 @@ def test_the_list_is_written_if_the_esi_requires_it(tmp_path: Path) -> None:
         assert sub.description.modular.configured == (DI, AI)
         with cat.Loop(cat.ProcessData(sub), period=2e-3) as loop:  # again, with known idents
             next(loop)
+
+
+def test_a_restarted_gateway_gets_its_list_again(tmp_path: Path) -> None:
+    (tmp_path / FILE).write_text(text(DOWNLOAD))
+    model = from_esi(tmp_path / FILE, modules=[DI, AI])
+    segment = Segment([Coupler(), model])
+    with cat.MainDevice(segment) as main:
+        sub = main.scan(esi=tmp_path / FILE)[1]
+        data = cat.ProcessData(sub, modules=[DI, AI], required=False)
+        with cat.Loop(data, period=2e-3) as loop:
+            segment.inject(power_cycle(1, at=segment.time + 0.05, for_=0.1))
+            lost = False
+            for cycle in loop:
+                lost = lost or not data.present
+                if cycle.time > 1.0:
+                    break
+            assert lost
+            assert data.present
+        assert model.application.module_lists is not None
+        assert model.application.module_lists.configured == [DI, AI, 0, 0]
 
 
 def test_the_slots_can_be_printed(tmp_path: Path) -> None:

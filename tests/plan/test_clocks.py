@@ -8,7 +8,8 @@ from dataclasses import replace
 import pytest
 
 from catenary.errors import ConfigurationError
-from catenary.model.device import DeviceDescription, OpMode
+from catenary.model.device import DeviceDescription, Entry, OpMode, Pdo, SyncManager
+from catenary.model.esi_settings import ModeAssignment
 from catenary.plan.clocks import SyncPlan, make_sync, start_time_ns
 from catenary.plan.cycle import DatagramKind
 from catenary.plan.options import PlanOptions
@@ -16,7 +17,9 @@ from catenary.plan.planner import Plan, make_plan
 from catenary.plan.request import DeviceRequest, DistributedClock
 from catenary.wire.datagram import EcatCommand, decode_datagram
 from catenary.wire.features import Feature
+from catenary.wire.sii_categories import SyncManagerUse
 from tests.plan.devices import Asking, coupler, lamps, servo
+from tests.plan.devices import device as device_of
 
 PERIOD_NS = 1_000_000
 LONG = Feature.DISTRIBUTED_CLOCKS | Feature.DISTRIBUTED_CLOCKS_64_BIT
@@ -359,3 +362,66 @@ def test_it_prints() -> None:
 def test_an_op_mode_is_a_name() -> None:
     with pytest.raises(TypeError, match="op_mode=0: must be the name of an OpMode"):
         DistributedClock(op_mode=0)  # type: ignore[arg-type]
+
+
+# -- modes of an ESI -----------------------------------------------------------------------------
+
+
+def test_a_mode_is_found_by_its_description() -> None:
+    mode = OpMode("DC", "DC-Synchron", 0x0300, source="drive.xml:64")
+    plan = make_sync(clocked(servo(0), mode), DistributedClock(op_mode="dc-synchron"), PERIOD_NS)
+    assert (plan.op_mode, plan.source) == ("DC", "ESI drive.xml:64")
+
+
+def test_the_cycle_of_sync1_may_be_a_time() -> None:
+    mode = OpMode("DC", "", 0x0700, sync0_ns=250_000, sync1_ns=1_000_000)
+    plan = make_sync(clocked(servo(0), mode), DistributedClock(), PERIOD_NS)
+    assert (plan.cycle_ns, plan.sync1_ns, plan.span_ns) == (250_000, 750_000, 1_000_000)
+
+
+def test_the_factor_of_a_shift_adds_sync0_cycles() -> None:
+    mode = OpMode("DC", "", 0x0300, sync0_factor=2, shift_ns=-10_000, shift_factor=1)
+    plan = make_sync(clocked(servo(0), mode), DistributedClock(), PERIOD_NS)
+    assert (plan.cycle_ns, plan.shift_ns) == (2_000_000, 1_990_000)
+
+
+def test_a_shift_of_inputs_counts_from_the_start_of_the_frames() -> None:
+    mode = OpMode("DC", "", 0x0300, shift_ns=-10_000, shift_of_inputs=True)
+    device = clocked(servo(0), mode)
+    plan = make_sync(device, DistributedClock(), PERIOD_NS, lead_ns=200_000)
+    assert plan.shift_ns == 790_000  # 10 us before the next cycle start, 200 us before SYNC0
+    chosen = make_sync(device, DistributedClock(shift=1e-6), PERIOD_NS, lead_ns=200_000)
+    assert chosen.shift_ns == 1000
+
+
+def test_an_error_names_the_file_of_the_mode() -> None:
+    mode = OpMode("SM", "", 0, source="drive.xml:60")
+    with pytest.raises(ConfigurationError, match=r"drive\.xml:60 \(OpMode 'SM'\): AssignActivate"):
+        make_sync(clocked(servo(0), mode), DistributedClock(op_mode="sm"), PERIOD_NS)
+
+
+def test_clocks_show_the_settings_and_their_source() -> None:
+    mode = OpMode("DC", "DC-Synchron", 0x0300, source="drive.xml:64")
+    plan = make_plan([clocked(servo(0), mode)], [asking(0)])
+    assert str(plan.clocks).splitlines()[0] == (
+        "device 0 (Servo): AssignActivate 0x0300, SYNC0 1 ms, shift +0 us, OpMode 'DC', "
+        "source: ESI drive.xml:64"
+    )
+    assert [clock.position for clock in plan.clocks] == [0]
+    assert "reference clock: device 0" in str(plan.clocks)
+    assert str(make_plan([servo(0)]).clocks) == "no distributed clocks"
+
+
+def test_a_mode_with_oversampling_changes_only_the_lengths_without_coe() -> None:
+    pdo = Pdo(0x1A00, (Entry(0x6000, 1, 16, "Value", 3),), None)
+    inputs = SyncManager(0, SyncManagerUse.INPUTS, 0x1100, 2, 0x20)
+    own = ModeAssignment(0, (0x1A00,), (4,))
+    mode = OpMode("4x", "", 0x0300, sync0_factor=-4, assignments=(own,), source="el.xml:5")
+    device = device_of(0, "Inputs", inputs=(pdo,), sync_managers=(inputs,))
+    plan = make_plan([clocked(device, mode)], [asking(0)])
+    [manager] = plan.devices[0].layout.sync_managers
+    assert (manager.index, manager.length) == (0, 8)
+    [assignment] = plan.devices[0].inputs
+    assert [each.index for each in assignment.pdos] == [0x1A00, 0x1A01, 0x1A02, 0x1A03]
+    assert plan.devices[0].downloads == ()
+    assert "mapping from ESI el.xml:5" in str(plan)

@@ -8,6 +8,7 @@ import signal
 import subprocess
 import sys
 import threading
+import time
 from pathlib import Path
 
 import pytest
@@ -21,6 +22,7 @@ from catenary.realtime import (
     VirtualClock,
     session,
 )
+from catenary.realtime.supervisor import Supervisor
 from catenary.realtime.system import preparation
 from tests.realtime import bodies
 from tests.realtime.test_clock import MS, records
@@ -187,6 +189,21 @@ def test_arguments_that_cannot_be_pickled_are_an_error():
     task = Task(bodies.spend, (lambda: 1,), name="a", period=1e-3)
     with pytest.raises(TaskError, match=r"task 'a'.*could not be started"):
         Tasks(task, workers="processes").start()
+
+
+def test_a_failure_that_is_recorded_late_is_an_error_of_the_start(monkeypatch):
+    record = Supervisor._record_end
+
+    def late(*arguments, **more):
+        time.sleep(0.2)
+        return record(*arguments, **more)
+
+    monkeypatch.setattr(Supervisor, "_record_end", late)
+    tasks = Tasks(
+        Task(bodies.idle, (threading.Lock(),), name="a", period=1e-3), workers="processes"
+    )
+    with pytest.raises(TaskError, match=r"task 'a'.*could not be started"):
+        tasks.start()
 
 
 def test_a_refused_priority_is_an_error_with_a_hint(monkeypatch):

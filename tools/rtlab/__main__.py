@@ -60,9 +60,10 @@ def in_one_line(error: OSError) -> str:
 
 def parse(arguments: Sequence[str]) -> argparse.Namespace:
     known = "\n".join(f"  {name:12}{table.help}" for name, table in tables.TABLES.items())
+    others = ", ".join(name for name, table in tables.TABLES.items() if not table.of_all)
     parser = argparse.ArgumentParser(
         prog="python -m tools.rtlab",
-        description=f"tables:\n{known}\n  all         all except quick",
+        description=f"tables:\n{known}\n  all         all except {others}",
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("tables", nargs="*", default=["all"], metavar="TABLE")

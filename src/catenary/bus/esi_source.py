@@ -8,15 +8,15 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Literal, TypeAlias
 
 from catenary.errors import EsiError, EsiLookupError, IdentityError
-from catenary.esi.user_folder import default_folder
-from catenary.model.device import DeviceDescription, Identity
+from catenary.esi.folders import default_folder
+from catenary.model.device import DeviceDescription
 
 if TYPE_CHECKING:  # a scan without ESI files imports neither sqlite nor a parser
     from catenary.esi.device import EsiDevice
     from catenary.esi.library import Library
     from catenary.esi.lookup import Choice
 
-SHOWN = 8  # devices in an error
+SHOWN = 8  # devices in an error, or descriptions of one device
 
 EsiFiles: TypeAlias = "str | os.PathLike[str] | Library"
 EsiPlace: TypeAlias = "EsiFiles | Sequence[EsiFiles] | Literal[False] | None"
@@ -61,7 +61,7 @@ class EsiSource:
         from catenary.esi.apply import applied
         from catenary.esi.duplicates import warning_of
 
-        library, choice = self._choice(device.identity)
+        library, choice = self._choice(device)
         if library is None or choice is None:
             return device
         if choice.record is None:
@@ -74,14 +74,18 @@ class EsiSource:
         esi = library.read(choice.record)
         completed = applied(device, esi)
         self.found[device.position] = esi
-        others = (warning_of(choice.record, other, library.read) for other in choice.records[1:])
+        more = choice.records[1:SHOWN]
+        others = (warning_of(choice.record, other, library.read) for other in more)
         return _noted(completed, *map(str, others))
 
-    def _choice(self, identity: Identity) -> tuple[Library | None, Choice | None]:
+    def _choice(self, device: DeviceDescription) -> tuple[Library | None, Choice | None]:
         """Return the first library with a suitable description, or else with any of the product."""
         unsuitable: tuple[Library | None, Choice | None] = (None, None)
         for library in self._libraries:
-            choice = library.choose(identity.vendor, identity.product, identity.revision)
+            identity = device.identity
+            choice = library.choose(
+                identity.vendor, identity.product, identity.revision, order=device.order
+            )
             if choice is not None and choice.record is not None:
                 return library, choice
             if choice is not None:

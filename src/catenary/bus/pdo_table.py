@@ -10,6 +10,7 @@ from catenary.model.device import DeviceDescription, Direction
 from catenary.plan.numbers import entry_places
 from catenary.types import by_index
 
+NAMES_SHOWN = 4  # named values of one object
 HEADINGS = ("PDO", "object", "name", "type", "bits", "bit offset")
 
 
@@ -27,6 +28,8 @@ class PdoRow:
     type: str  # empty if unknown
     bit_length: int
     bit_offset: int
+    unit: str = ""  # from the ESI file
+    enumeration: tuple[tuple[int, str], ...] = ()  # values with texts, from the ESI file
 
 
 class PdoTable(Sequence[PdoRow]):
@@ -72,6 +75,8 @@ def _rows(device: DeviceDescription, direction: Direction) -> Iterator[PdoRow]:
             _type_name(entry.data_type),
             entry.bit_length,
             bit,
+            entry.unit,
+            entry.enumeration,
         )
 
 
@@ -86,10 +91,20 @@ def _table(rows: Sequence[PdoRow]) -> Iterator[str]:
     if not rows:
         return
     cells = [HEADINGS, *map(_cells, rows)]
+    if any(row.unit or row.enumeration for row in rows):
+        facts = ["unit, values", *map(_facts, rows)]
+        cells = [(*each, fact) for each, fact in zip(cells, facts, strict=True)]
     widths = [max(map(len, column)) for column in zip(*cells, strict=True)]
     for each in cells:
         texts = (text.ljust(width) for text, width in zip(each, widths, strict=True))
         yield f"    {'  '.join(texts)}".rstrip()
+
+
+def _facts(row: PdoRow) -> str:
+    """Return the unit and the named values, `rad` or `8 = CSP, 9 = CSV`."""
+    names = [f"{value} = {text}" for value, text in row.enumeration[:NAMES_SHOWN]]
+    names += ["..."] * (len(row.enumeration) > NAMES_SHOWN)
+    return ", ".join(filter(None, (row.unit, *names)))
 
 
 def _cells(row: PdoRow) -> tuple[str, ...]:

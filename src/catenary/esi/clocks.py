@@ -26,7 +26,8 @@ def _op_mode(element: Element, findings: Findings) -> EsiOpMode:
     return EsiOpMode(
         name=text_of(element, "Name"),
         description=text_of(element, "Desc"),
-        assign_activate=findings.required(element, "AssignActivate", bits=16) or 0,
+        assign_activate=findings.required(element, "AssignActivate", bits=16, reaction="0 assumed")
+        or 0,
         sync0_ns=_time(sync0, findings),
         sync0_factor=_factor(sync0, findings),
         shift_ns=_time(shift, findings),

@@ -22,9 +22,9 @@ BLANKS = bytes(byte if byte >= 32 or byte in b"\t\n\r" else 32 for byte in range
 class Limits(NamedTuple):
     """Limits of a file. Larger files are refused."""
 
-    file_size: int = 256 << 20  # [bytes]
+    file_size: int = 128 << 20  # [bytes]; the largest real files have about 45 MB
     token_size: int = 8 << 20  # longest tag or comment [bytes]
-    elements: int = 16_000_000  # in the file
+    elements: int = 5_000_000  # in the file; 45 MB have about 1 500 000
     tree_elements: int = 500_000  # in one tree
     depth: int = 64
     children: int = 100_000  # of one element

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import fields, is_dataclass
 
+from catenary.errors import EsiError
 from catenary.esi.device import EsiDevice
 from catenary.esi.record import Record
 from catenary.esi.source import EsiWarning, Source
@@ -59,7 +60,11 @@ def warning_of(used: Record, other: Record, read: Callable[[Record], EsiDevice])
         other: The other one.
         read: Function that reads a description.
     """
-    found = differences(read(used), read(other))
+    try:
+        found = differences(read(used), read(other))
+    except EsiError as error:
+        text = f"{other.source} has the same key {used.key} and cannot be compared: {error.message}"
+        return EsiWarning(used.source, text)
     if not found:
         text = f"{other.source} has the same description of {used.key}"
     else:

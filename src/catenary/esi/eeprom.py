@@ -34,7 +34,6 @@ def _category(element: Element, findings: Findings) -> EsiEepromCategory | None:
     """Return a category. `DataString` becomes text, the other forms little-endian bytes."""
     number = findings.required(element, "CatNo", bits=16)
     if number is None:
-        findings.warn(element, "EEPROM category without a number is ignored")
         return None
     data = findings.data(element.find("Data")) or b""
     text = element.find("DataString")

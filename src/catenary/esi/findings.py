@@ -82,17 +82,20 @@ class Findings:
         value = self.number(element, attribute, bits=bits, signed=signed)
         return default if value is None else value
 
-    def required(self, element: Element, tag: str, *, bits: int = 32) -> int | None:
+    def required(
+        self, element: Element, tag: str, *, bits: int = 32, reaction: str = "ignored"
+    ) -> int | None:
         """Return the number in a child; warn and return None if it is missing.
 
         Args:
             element: The parent.
             tag: The tag of the child.
             bits: The width of the number.
+            reaction: The consequence of a missing number.
         """
         child = element.find(tag)
         if child is None or not child.text.strip():
-            self.warn(element, f"{element.tag} has no {tag}")
+            self.warn(element, f"{element.tag} has no {tag}; {reaction}")
             return None
         return self.number(child, bits=bits)
 
@@ -134,9 +137,7 @@ def text_of(element: Element | None, tag: str) -> str:
         element: The parent; None if the file does not have it.
         tag: The tag of the child.
     """
-    if element is None:
-        return ""
-    found = element.all(tag)
-    if len(found) == 1:
-        return plain_text(found[0].text)
+    found = [child for child in element.children if child.tag == tag] if element else []
+    if len(found) < 2:
+        return plain_text(found[0].text) if found else ""
     return chosen_text((child.attributes, child.text) for child in found)

@@ -6,6 +6,7 @@ import hashlib
 import os
 import sqlite3
 from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import NamedTuple
 
@@ -43,7 +44,8 @@ class IndexedFiles:
     def __init__(self, sources: Sources, index: str, lock: Path | None) -> None:
         self._sources = sources
         self._lock = lock
-        self._store = _open_store(index)
+        with _index_errors(index):
+            self._store = _open_store(index)
         if self._store.path == MEMORY:
             self._lock = None  # the index of this process alone
         self.problems: tuple[str, ...] = ()
@@ -61,18 +63,12 @@ class IndexedFiles:
         Raises:
             EsiError: The index cannot be written, or a folder has too many files.
         """
-        try:
+        with _index_errors(self._store.path):
             changes = self._changes(list_files(self._sources()), all_hashes)
             if changes.any:
                 with locked(self._lock):  # another process may have done it, or added a file
                     changes = self._changes(list_files(self._sources()), all_hashes)
                     self._update(changes)
-        except sqlite3.Error as error:
-            raise EsiError(
-                f"the index cannot be used: {error}",
-                file=self._store.path,
-                hint="delete this file; it is made again from your ESI files",
-            ) from error
         self.problems = tuple(changes.problems)
 
     def _changes(self, listing: Listing, all_hashes: bool) -> Changes:
@@ -118,18 +114,19 @@ class IndexedFiles:
             where: Condition in SQL.
             values: Values of the condition.
         """
-        return self._store.records(where, *values)
+        with _index_errors(self._store.path):
+            return self._store.records(where, *values)
 
     def file(self, path: str) -> FileIndex | None:
         """Return what the devices of a file share; None if the file is not indexed."""
-        return self._store.file(path)
+        with _index_errors(self._store.path):
+            return self._store.file(path)
 
-    def files(self) -> Iterator[FileIndex]:
+    def files(self) -> list[FileIndex]:
         """Return all files, without their entries, in the order of their paths."""
-        for path in sorted(self._store.states()):
-            found = self._store.file(path)
-            if found is not None:
-                yield found
+        with _index_errors(self._store.path):
+            found = [self._store.file(path) for path in sorted(self._store.states())]
+        return [each for each in found if each is not None]
 
 
 def indexed_or_warned(path: str) -> FileIndex:
@@ -139,6 +136,19 @@ def indexed_or_warned(path: str) -> FileIndex:
     except EsiError as error:
         source = Source(path, error.line or 1)
         return FileIndex(path, warnings=(EsiWarning(source, error.reason),))
+
+
+@contextmanager
+def _index_errors(path: str) -> Iterator[None]:
+    """Raise an EsiError for an error of SQLite: the index is locked, or was damaged while open."""
+    try:
+        yield
+    except sqlite3.Error as error:
+        raise EsiError(
+            f"the index cannot be used: {error}",
+            file=path,
+            hint="delete this file; it is made again from your ESI files",
+        ) from error
 
 
 def _digest(path: str) -> str:

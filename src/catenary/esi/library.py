@@ -6,7 +6,7 @@ import hashlib
 import os
 import re
 import shutil
-from collections.abc import Iterable
+from collections import deque
 from dataclasses import dataclass, replace
 from difflib import get_close_matches
 from pathlib import Path
@@ -18,16 +18,16 @@ from catenary.esi.archive import extract
 from catenary.esi.assembly import Assembly
 from catenary.esi.device import DeviceKey, EsiDevice
 from catenary.esi.duplicates import warning_of
+from catenary.esi.folders import cache_folder, default_folder, is_small
 from catenary.esi.indexed_files import IndexedFiles
 from catenary.esi.lookup import Choice, Rule, choose, hidden_keys
 from catenary.esi.record import FileIndex, Kind, Record
 from catenary.esi.source import EsiWarning
-from catenary.esi.sources import locked, read_sources, write_sources
+from catenary.esi.sources import locked, read_sources, walk, write_sources
 from catenary.esi.store import MEMORY
-from catenary.esi.user_folder import default_folder, user_folder
 
-SMALL = 4 << 20  # [bytes]; files of a temporary library up to this size are indexed in 0.5 s
 ADD_HINT = "add the vendor's ESI file: catenary esi add FILE"
+MAX_DUPLICATES = 10  # that one lookup compares
 MAX_NAMES = 20_000  # compared with a name that was not found
 
 
@@ -118,9 +118,11 @@ class Library:
             path: The file, folder or archive.
 
         Raises:
-            EsiError: The path does not exist, or the archive is invalid or unsafe.
+            EsiError: The path does not exist, the folder is too large, or the archive is unsafe.
+            ValueError: The library is a temporary one (`of`).
         """
         given = Path(os.path.abspath(path))
+        self._check_permanent()
         if not given.exists():
             raise EsiError("no such file or folder", file=str(path), hint="check the path")
         self.path.mkdir(parents=True, exist_ok=True)
@@ -131,6 +133,8 @@ class Library:
                 file=str(path),
                 hint="unpack it, and add the XML files",
             )
+        if given.is_dir():
+            deque(walk(given, []), maxlen=0)  # an error before anything is changed
         with locked(self._lock):
             source = self._extracted(given) if archive else given
             others = [each for each in self._listed() if each != source]
@@ -139,6 +143,10 @@ class Library:
         files = self._files()
         files.refresh(all_hashes=True)
         return self._added(files, source)
+
+    def _check_permanent(self) -> None:
+        if self._temporary:
+            raise ValueError("`Library.of` gives a temporary library; change `Library()` instead")
 
     def _extracted(self, archive: Path) -> Path:
         """Extract an archive into the library, and return the folder."""
@@ -174,8 +182,10 @@ class Library:
 
         Raises:
             EsiError: The library does not list this path.
+            ValueError: The library is a temporary one (`of`).
         """
         given = Path(os.path.abspath(path))
+        self._check_permanent()
         if given not in self.sources:
             raise EsiError(
                 f"the library {self.path} does not list this path",
@@ -184,7 +194,7 @@ class Library:
             )
         with locked(self._lock):
             write_sources(self._list, [each for each in self._listed() if each != given])
-            if given.parent == self.path / "archives":
+            if given.parent == self.path / "archives" and given.is_dir():
                 shutil.rmtree(given)
         self._files().refresh()
 
@@ -226,14 +236,10 @@ class Library:
         return self._opened
 
     def _index_and_lock(self) -> tuple[str, Path | None]:
-        if not self._temporary:
-            return (
-                (str(self.path / "index.sqlite"), self._lock)
-                if self.path.is_dir()
-                else (MEMORY, None)
-            )
-        folder = _cache_folder()
-        if folder is None or _is_small(self.path):
+        if not self._temporary and self.path.is_dir():
+            return str(self.path / "index.sqlite"), self._lock
+        folder = cache_folder() if self._temporary else None
+        if folder is None or is_small(self.path):
             return MEMORY, None
         name = hashlib.sha256(os.fsencode(self.path)).hexdigest()[:16]
         return str(folder / f"{name}.sqlite"), folder / f"{name}.lock"
@@ -301,7 +307,8 @@ class Library:
         """Return the warnings of a lookup: another revision, duplicates, missing files."""
         record = choice.record
         assert record is not None
-        notes = [warning_of(record, other, self.read) for other in choice.records[1:]]
+        others = choice.records[1 : 1 + MAX_DUPLICATES]
+        notes = [warning_of(record, other, self.read) for other in others]
         if revision is not None and choice.rule is not Rule.EXACT:
             text = (
                 f"revision 0x{record.entry.revision:08X} is used for a device of revision "
@@ -341,9 +348,9 @@ class Library:
         """
         files = self._files()
         files.refresh(all_hashes=True)
-        return [*files.problems, *(str(each) for each in self.duplicates())]
+        return [*files.problems, *(str(each) for each in self._duplicates())]
 
-    def duplicates(self) -> list[EsiWarning]:
+    def _duplicates(self) -> list[EsiWarning]:
         """Return a warning for each further description of the same device."""
         first: dict[DeviceKey, Record] = {}
         found = []
@@ -378,39 +385,5 @@ class Library:
             return Assembly(self._files()).device(now[0])
 
 
-def _cache_folder() -> Path | None:
-    folder = user_folder("XDG_CACHE_HOME", ".cache") / "catenary" / "esi"
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError:  # the index is then made in memory
-        return None
-    return folder
-
-
-def _is_small(path: Path) -> bool:
-    if path.is_file():
-        return path.stat().st_size <= SMALL
-    total = 0
-    for place, _folders, names in os.walk(path):
-        total += sum(_size(os.path.join(place, each)) for each in names if each.endswith("xml"))
-        if total > SMALL:
-            return False
-    return True
-
-
-def _size(path: str) -> int:
-    return os.stat(path).st_size if os.path.isfile(path) else 0
-
-
 def _words(record: Record) -> str:
     return " ".join(f"{record.entry.type} {record.entry.name}".split()).casefold()
-
-
-def newest(records: Iterable[Record]) -> list[Record]:
-    """Return the newest revision of each product."""
-    found: dict[tuple[int, int], Record] = {}
-    for each in records:
-        old = found.setdefault((each.entry.vendor, each.entry.product), each)
-        if each.entry.revision > old.entry.revision:
-            found[each.entry.vendor, each.entry.product] = each
-    return list(found.values())

@@ -1,13 +1,13 @@
 """Choice of a description by vendor, product and revision.
 
-Beckhoff's rule is "device revision in the system >= device revision in the configuration"
-(infosys.beckhoff.com, ethercatsystem/2477553291): newer devices support older descriptions.
+Beckhoff's rule is that the revision of the device is not below that of the configuration
+(infosys.beckhoff.com, ethercatsystem/2477553291), because newer devices support older descriptions.
 So the newest description that is not above the device is used. `CheckRevisionNo` (ETG.2000) states
 the vendor's own rule, which decides among several.
 
 `HideType` names older revisions that a newer one replaces in a catalogue. A device of an older
 revision still needs its own description. So hidden ones are only omitted from a search without a
-revision, as in EtherLab (getEtherCATInfo.m: "the last slave device that is not hidden").
+revision, as in EtherLab (getEtherCATInfo.m).
 """
 
 from __future__ import annotations
@@ -128,3 +128,13 @@ def _newest(ranked: Sequence[Record]) -> tuple[Rule, Record]:
 def hidden_keys(records: Iterable[Record]) -> frozenset[DeviceKey]:
     """Return the keys that newer descriptions hide. A description cannot hide itself."""
     return frozenset(key for each in records for key in each.entry.hides if key != each.key)
+
+
+def newest(records: Iterable[Record]) -> list[Record]:
+    """Return the newest revision of each product."""
+    found: dict[tuple[int, int], Record] = {}
+    for each in records:
+        old = found.setdefault((each.entry.vendor, each.entry.product), each)
+        if each.entry.revision > old.entry.revision:
+            found[each.entry.vendor, each.entry.product] = each
+    return list(found.values())

@@ -71,11 +71,9 @@ def read_dictionary(element: Element, findings: Findings) -> EsiDictionary:
             break
         found = _object(each, types, findings)
         count += len(found.entries) if found is not None else 0
-        if found is None:
-            findings.warn(each, "Object without an index is ignored")
-        elif found.index in objects:
+        if found is not None and found.index in objects:
             findings.warn(each, f"object 0x{found.index:04X} occurs again; the first one counts")
-        else:
+        elif found is not None:
             objects[found.index] = found
     return EsiDictionary(types.by_name, objects)
 
@@ -164,29 +162,25 @@ def _entries(
 ) -> Iterator[EsiObjectEntry]:
     info = element.find("Info")
     infos = _infos_of(parts, info)
-    whole_unit = findings.number(info.find("Unit")) if info is not None else None
+    unit = findings.number(info.find("Unit")) if info is not None else None  # of all elements
     seen: set[int] = set()
     for part, (name, each) in zip(parts, infos, strict=True):
         if part.subindex in seen:
             findings.warn(element, f"subindex {part.subindex} of 0x{index:04X} occurs again")
             continue
         seen.add(part.subindex)
-        entry = _entry(index, part, each, types, findings)
-        yield replace(
-            entry,
-            name=name or entry.name,
-            access=entry.access or whole.access,
-            pdo_mapping=entry.pdo_mapping or (whole.pdo_mapping if part.subindex else ""),
-            unit=whole_unit if entry.unit is None else entry.unit,
-        )
+        entry = _entry(index, whole, part, types, findings, each, name)
+        yield replace(entry, unit=unit) if unit and part.subindex and not entry.unit else entry
 
 
 def _entry(
     index: int,
+    whole: EsiSubItem,
     part: _Part,
-    info: Element | None,
     types: Mapping[str, EsiDataType],
     findings: Findings,
+    info: Element | None,
+    name: str,
 ) -> EsiObjectEntry:
     member = part.member
     base = base_of(member.type, types)
@@ -195,11 +189,11 @@ def _entry(
     return EsiObjectEntry(
         index=index,
         subindex=part.subindex,
-        name=member.name,
+        name=name or member.name,
         type=member.type,
         bit_length=bits,
-        access=member.access,
-        pdo_mapping=member.pdo_mapping,
+        access=member.access or whole.access,
+        pdo_mapping=member.pdo_mapping or (whole.pdo_mapping if part.subindex else ""),
         default=read_value(default, base, bits, findings),
         minimum=read_value(_limit(info, "Min"), base, bits, findings),
         maximum=read_value(_limit(info, "Max"), base, bits, findings),

@@ -35,7 +35,6 @@ def read_pdos(parent: Element, findings: Findings) -> tuple[EsiPdo, ...]:
 def _pdo(element: Element, findings: Findings) -> EsiPdo | None:
     index = findings.required(element, "Index", bits=16)
     if index is None:
-        findings.warn(element, f"{element.tag} without an index is ignored")
         return None
     excludes = element.all("Exclude")
     entries = (_entry(entry, findings) for entry in element.all("Entry"))
@@ -63,7 +62,7 @@ def _pdo(element: Element, findings: Findings) -> EsiPdo | None:
 def _entry(element: Element, findings: Findings) -> EsiEntry | None:
     """Return an entry; None for a gap of 0 bits."""
     type_name = text_of(element, "DataType")
-    index = findings.required(element, "Index", bits=16) or 0
+    index = findings.required(element, "Index", bits=16, reaction="read as a gap") or 0
     bit_length = findings.number(element.find("BitLen"), bits=16)
     if bit_length is None:
         bit_length = _length_of_type(type_name)

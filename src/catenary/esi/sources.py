@@ -15,6 +15,7 @@ from catenary.errors import EsiError
 from catenary.esi.references import inside
 
 MAX_FILES = 20_000  # of one folder
+MAX_FOLDERS = 20_000
 MAX_DEPTH = 16
 LOCK_TIMEOUT = 60.0  # [s]; an index of 45 MB takes 5 s
 POLL = 0.02  # [s]
@@ -38,20 +39,21 @@ class Listing(NamedTuple):
 def list_files(sources: Sequence[Path]) -> Listing:
     """Return the XML files of files and folders.
 
-    A file that several sources contain belongs to the last one.
+    A file that several sources contain belongs to the last one. A folder with too many files is
+    reported, and the others are used.
 
     Args:
         sources: Absolute paths.
-
-    Raises:
-        EsiError: A folder has too many files.
     """
     files: dict[str, Found] = {}
     problems: list[str] = []
     for order, source in enumerate(sources):
         if source.is_dir():
-            for path in _walk(source, problems):
-                files[path] = Found(path, str(source), order)
+            try:
+                for path in walk(source, problems):
+                    files[path] = Found(path, str(source), order)
+            except EsiError as error:
+                problems.append(error.message)
         elif source.is_file():
             files[str(source)] = Found(str(source), str(source.parent), order)
         else:
@@ -59,26 +61,39 @@ def list_files(sources: Sequence[Path]) -> Listing:
     return Listing(files, tuple(problems))
 
 
-def _walk(folder: Path, problems: list[str]) -> Iterator[str]:
+def walk(folder: Path, problems: list[str]) -> Iterator[str]:
+    """Yield the XML files of a folder and its subfolders, in the order of their names.
+
+    Args:
+        folder: The folder.
+        problems: Receives what cannot be read.
+
+    Raises:
+        EsiError: The folder has too many files or subfolders.
+    """
+
     def failed(error: OSError) -> None:
         problems.append(f"{error.filename}: {error.strerror}")
 
     count = 0
-    for place, folders, names in os.walk(folder, onerror=failed):
-        if len(Path(place).relative_to(folder).parts) >= MAX_DEPTH:
+    for number, (place, folders, names) in enumerate(os.walk(folder, onerror=failed)):
+        if number >= MAX_FOLDERS:
+            raise _too_many(folder, f"{MAX_FOLDERS} folders")
+        if folders and len(Path(place).relative_to(folder).parts) >= MAX_DEPTH:
+            problems.append(f"{place}: its folders are nested too deeply, and are not searched")
             folders.clear()
         folders[:] = sorted(each for each in folders if not each.startswith("."))
         for name in sorted(each for each in names if each.lower().endswith(".xml")):
             count += 1
             if count > MAX_FILES:
-                raise EsiError(
-                    f"more than {MAX_FILES} XML files",
-                    file=str(folder),
-                    hint="add a smaller folder",
-                )
+                raise _too_many(folder, f"{MAX_FILES} XML files")
             path = Path(place, name)
             if path.is_file() and inside(path, folder):  # not a link that leaves the folder
                 yield str(path)
+
+
+def _too_many(folder: Path, what: str) -> EsiError:
+    return EsiError(f"more than {what}", file=str(folder), hint="use a smaller folder")
 
 
 def read_sources(file: Path) -> list[Path]:

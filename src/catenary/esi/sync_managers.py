@@ -17,6 +17,8 @@ USES = {
     "output": SyncManagerUse.OUTPUTS,
     "inputs": SyncManagerUse.INPUTS,
     "input": SyncManagerUse.INPUTS,
+    "dynamicoutputs": SyncManagerUse.OUTPUTS,  # Beckhoff AX5000
+    "dynamicinputs": SyncManagerUse.INPUTS,
     "": SyncManagerUse.UNUSED,
 }
 USE_OF = {"RxPdo": SyncManagerUse.OUTPUTS, "TxPdo": SyncManagerUse.INPUTS}

@@ -16,6 +16,7 @@ DECIMAL = re.compile(r"([+-]?[0-9]{1,40})\.0*")
 EXPONENT = re.compile(r"[0-9]+e[0-9]+")  # neither decimal nor certainly hexadecimal
 BLANK = re.compile(r"\s+")
 HEX_PREFIX = re.compile(r"(?:#?0?x)+", re.IGNORECASE)
+DIGITS_MAX = 40
 ENGLISH, GERMAN = 1033, 1031
 PRIMARY_LANGUAGE, ENGLISH_LANGUAGE = 0x3FF, 0x09  # part of an LcId, in all countries
 TRUTH = {"0": False, "false": False, "no": False, "1": True, "true": True, "yes": True, "": False}
@@ -35,6 +36,8 @@ def parse_number(text: str) -> Parsed:
     Raises:
         ValueError: The text is not a number, or has more than 40 digits.
     """
+    if text.isascii() and text.isdigit() and len(text) <= DIGITS_MAX:  # the usual case
+        return Parsed(int(text))
     compact = BLANK.sub("", text).lower()
     found = NUMBER.fullmatch(compact)
     if found is None or EXPONENT.fullmatch(compact):

@@ -127,17 +127,14 @@ def root_tag(document: Document) -> str:
     return parser.root
 
 
-class _Open:
+class _Open(NamedTuple):
     """Element whose end was not reached."""
 
-    __slots__ = ("attributes", "children", "line", "tag", "texts")
-
-    def __init__(self, tag: str, attributes: dict[str, str], line: int) -> None:
-        self.tag = tag
-        self.attributes = attributes
-        self.line = line
-        self.texts: list[str] = []
-        self.children: list[Element] = []
+    tag: str
+    attributes: dict[str, str]
+    line: int
+    first_text: int  # in the texts of the parser
+    children: list[Element]
 
 
 class _Parser:
@@ -161,7 +158,11 @@ class _Parser:
         self._open: list[_Open] = []  # open elements of the present tree
         self._ignored = 0  # open elements below the first ignored one, with it
         self._place = (0, 0)  # offset of the present tree, and of the end of its start tag
-        self._elements = self._tree_elements = self._text_length = 0
+        # Texts of the open elements. An element removes its own at its end, so that those of the
+        # elements around it remain. The parser calls `append` itself, without a Python function.
+        self._texts: list[str] = []
+        self._elements = 0  # started
+        self._tree_end = limits.elements  # number of the last element that the tree may contain
         self._base = document.mark
         self._line_offset = document.line - 1
         self._decode = document.encoding.text
@@ -201,8 +202,8 @@ class _Parser:
 
     def _start(self, name: str, attributes: dict[str, str]) -> None:
         self._elements += 1
-        if self._elements > self.limits.elements:
-            self._refuse(f"more than {self.limits.elements} elements")
+        if self._elements > self._tree_end:
+            self._refuse_elements()
         if self._ignored:
             self._ignored += 1
             if self._ignored > self.limits.depth:
@@ -224,9 +225,10 @@ class _Parser:
         if path in self.wanted:
             start = self._expat.CurrentByteIndex + self._base
             self._place = start, self._end_of_empty(start)
-            self._tree_elements = 0
+            last = self._elements + self.limits.tree_elements - 1
+            self._tree_end = min(last, self.limits.elements)
             self._push(tag, attributes)
-            self._expat.CharacterDataHandler = self._text
+            self._expat.CharacterDataHandler = self._texts.append
         elif path in self._ways:
             if path:
                 self._path.append(tag)
@@ -238,20 +240,18 @@ class _Parser:
         self._expat.CharacterDataHandler = None
 
     def _push(self, tag: str, attributes: dict[str, str]) -> None:
-        self._tree_elements += 1
-        if self._tree_elements > self.limits.tree_elements:
-            self._refuse(f"more than {self.limits.tree_elements} elements in one {self._tree}")
         if len(self._path) + len(self._open) >= self.limits.depth:
             self._refuse(f"elements are nested deeper than {self.limits.depth}")
         if attributes:
             attributes = self._decoded(attributes)
-        self._text_length = 0
         line = self._expat.CurrentLineNumber + self._line_offset
-        self._open.append(_Open(tag, attributes, line))
+        self._open.append(_Open(tag, attributes, line, len(self._texts), []))
 
-    @property
-    def _tree(self) -> str:
-        return self._open[0].tag
+    def _refuse_elements(self) -> Never:
+        if self._elements > self.limits.elements:
+            self._refuse(f"more than {self.limits.elements} elements")
+        tree = self._open[0].tag
+        self._refuse(f"more than {self.limits.tree_elements} elements in one {tree}")
 
     def _decoded(self, attributes: dict[str, str]) -> dict[str, str]:
         """Return the attributes with local names and decoded values."""
@@ -265,36 +265,36 @@ class _Parser:
             if not name.startswith("xmlns")
         }
 
-    def _text(self, text: str) -> None:
-        self._text_length += len(text)
-        if self._text_length > self.limits.text_length:
-            self._refuse(f"a text is longer than {self.limits.text_length} characters")
-        self._open[-1].texts.append(text)
-
     def _end(self, _name: str) -> None:
         if self._ignored:
             self._ignored -= 1
             if not self._ignored and self._open:
-                self._expat.CharacterDataHandler = self._text
+                self._expat.CharacterDataHandler = self._texts.append
             return
         if not self._open:
             del self._path[-1:]
             return
-        last = self._open.pop()
-        text = "".join(last.texts)
-        if not text.isascii():
-            text = self._decode(text)
-        element = Element(last.tag, last.attributes, text, tuple(last.children), last.line)
+        tag, attributes, line, first_text, children = self._open.pop()
+        element = Element(tag, attributes, self._text(first_text), tuple(children), line)
         if not self._open:
             self._finish(element)
             return
-        children = self._open[-1].children
-        if len(children) >= self.limits.children:
+        siblings = self._open[-1].children
+        if len(siblings) >= self.limits.children:
             self._refuse(f"more than {self.limits.children} children")
-        children.append(element)
+        siblings.append(element)
+
+    def _text(self, first: int) -> str:
+        """Return the text of the element that ends, and remove it from the texts."""
+        text = "".join(self._texts[first:])
+        del self._texts[first:]
+        if len(text) > self.limits.text_length:
+            self._refuse(f"a text is longer than {self.limits.text_length} characters")
+        return text if text.isascii() else self._decode(text)
 
     def _finish(self, element: Element) -> None:
         self._expat.CharacterDataHandler = None
+        self._tree_end = self.limits.elements
         start, end = self._place
         if not end:
             closing = self._expat.CurrentByteIndex + self._base

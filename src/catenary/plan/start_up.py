@@ -270,13 +270,10 @@ def compared(plan: DevicePlan, device: DeviceDescription) -> DevicePlan:
         plan: Plan of the device, such as one for other modules in its slots.
         device: Description with the present mapping of the device.
     """
-    changes = [
-        change
-        for each in Direction
-        for change in mapping_changes(
-            device, each, _difference(device, each, plan.assignments(each))
-        )
-    ]
+    changes: list[Change] = []
+    for each in Direction:
+        difference = _difference(device, each, plan.assignments(each))
+        changes += mapping_changes(device, each, difference)
     values = (change for change in plan.changes if ":" in change.what)
     return replace(renewed(plan, device), changes=(*changes, *values))
 

@@ -68,11 +68,16 @@ def request_state(
     elif before.state is target:
         return before
     yield from write_control(station, AlControl(target))
-    return (yield from _await_state(station, target, timeout or _timeout(station, target)))
+    return (yield from _await_state(station, target, timeout or state_timeout(station, target)))
 
 
-def _timeout(station: Station, target: AlState) -> float:
-    """Return the timeout for a state [s]: the default, or that of the ESI if it is longer."""
+def state_timeout(station: Station, target: AlState) -> float:
+    """Return the timeout for a state [s]: the default, or that of the ESI if it is longer.
+
+    Args:
+        station: The device.
+        target: The requested state.
+    """
     given = station.timeouts
     stated = {
         AlState.INIT: given.back_to_init,

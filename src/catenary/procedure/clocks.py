@@ -40,7 +40,7 @@ from catenary.wire.register import (
 LATCHES = 16  # number of latches to average: time stamps jitter by 10 ns or more
 LOST_MAX = 16  # lost frames in a row after which the reference is assumed lost
 BURST_STEP = 512  # frames per step of the procedure
-# The reset values, which SOEM (`ecx_set_slaves_to_default`), KickCAT (`enableDC`) and ethercrab
+# Values that SOEM (`ecx_set_slaves_to_default`), KickCAT (`enableDC`) and ethercrab
 # write: no filter on the difference, 2^12 on the speed, and the bandwidth of the loop.
 DIFFERENCE_FILTER, SPEED_FILTER, SPEED_START = 0, 12, 0x1000
 SPAN_64, SPAN_32 = 1 << 64, 1 << 32

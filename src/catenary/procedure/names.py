@@ -32,21 +32,41 @@ def name_entries(
 ) -> Procedure[DeviceDescription]:
     """Read the names and data types of the assigned entries, and the names of the assigned PDOs.
 
-    Return the description with those that are known.
+    Return the description with those that are known. The ESI completes what the device lacks.
 
     Args:
         channel: The mailbox of the device.
         device: The description.
     """
     if device.mailbox is None or not (device.mailbox.coe and device.mailbox.sdo_information):
-        return device
+        return _documented(device)
     dictionary = _Names(channel)
     for direction in Direction:
         for pdo in mapped_pdos(device.assignments(direction)):
             named = yield from dictionary.name(pdo)
             if named != pdo:
                 device = _with_pdo(device, direction, named)
+    return _documented(device)
+
+
+def _documented(device: DeviceDescription) -> DeviceDescription:
+    """Return the description with the names and types that only the ESI dictionary has."""
+    if not device.documented:
+        return device
+    for direction in Direction:
+        for pdo in mapped_pdos(device.assignments(direction)):
+            entries = tuple(_completed_by_esi(device, entry) for entry in pdo.entries)
+            if entries != pdo.entries:
+                device = _with_pdo(device, direction, replace(pdo, entries=entries))
     return device
+
+
+def _completed_by_esi(device: DeviceDescription, entry: Entry) -> Entry:
+    known = device.documented_object(entry.index, entry.subindex) if entry.index else None
+    if known is None or (entry.name and entry.data_type and entry.unit):
+        return entry
+    named = _completed(entry, entry.name or known.name, known.data_type)
+    return replace(named, unit=known.unit, enumeration=known.enumeration)
 
 
 class _Names:

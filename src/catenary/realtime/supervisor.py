@@ -69,6 +69,10 @@ class Supervisor:
         """Wait until all tasks have ended. Return False after a timeout of `seconds`."""
         return self._all_ended.wait(seconds)
 
+    def has_ended(self, name: str) -> bool:
+        """Return True if a task has ended for the last time, and its failure is recorded."""
+        return name not in self._alive
+
     def raise_failure(self) -> None:
         """Raise the failure that stopped all tasks, if any. Later calls do nothing."""
         if self._fatal is not None and not self._raised:

@@ -16,7 +16,7 @@ from types import TracebackType
 from typing import Self, TypeVar
 
 from catenary.errors import TaskError
-from catenary.realtime._task import NEW
+from catenary.realtime._task import FAILED, NEW
 from catenary.realtime.analysis import Demand, Verdict, analyse
 from catenary.realtime.clock import VirtualClock
 from catenary.realtime.handle import Handle
@@ -264,14 +264,20 @@ class Tasks:
     def _wait_for_all(self) -> None:
         deadline = time.monotonic_ns() + round(START_SECONDS * 1e9)
         for handle in self:
-            while handle.block.state == NEW and time.monotonic_ns() < deadline:
-                handle.block.wait_while(NEW, time.monotonic_ns() + 50_000_000)
+            while self._is_starting(handle) and time.monotonic_ns() < deadline:
+                handle.block.wait_while(handle.block.state, time.monotonic_ns() + 50_000_000)
                 self._started().raise_failure()
             if handle.block.state == NEW:
                 raise TaskError(
                     f"{handle.task} did not start within {START_SECONDS:g} s", task=handle.name
                 )
         self._started().raise_failure()
+
+    def _is_starting(self, handle: Handle) -> bool:
+        """Return True until the task runs, or the supervisor has recorded its failure."""
+        if handle.block.state == FAILED:
+            return not self._started().has_ended(handle.name)
+        return handle.block.state == NEW
 
     def _now_ns(self) -> int:
         return time.monotonic_ns() if self._clock is None else self._clock.now_ns
