@@ -96,11 +96,7 @@ class ProcessData(Request):
         super().__init__([sub])
         self._modules = chosen_modules(sub, modules)
         device = described(sub, self._modules)
-        named = {
-            Direction.INPUT: None if inputs is None else make_channels("inputs", inputs),
-            Direction.OUTPUT: None if outputs is None else make_channels("outputs", outputs),
-        }
-        _check_names(inputs or {}, outputs or {})
+        named = _named_channels(inputs, outputs)
         known = {**(named[Direction.INPUT] or {}), **(named[Direction.OUTPUT] or {})}
         self._pdos = written_pdos(pdos or (), known, device)
         self._writes = outputs is None or bool(outputs)
@@ -300,6 +296,18 @@ class ProcessData(Request):
                 f"{self!r}: {name!r} is not a name; use `inputs` or `outputs` to access bytes"
             )
         raise KeyError(f"{self!r}: {_unknown(name, self.names)}")
+
+
+def _named_channels(
+    inputs: Mapping[str, ChannelSpec] | None, outputs: Mapping[str, ChannelSpec] | None
+) -> dict[Direction, dict[str, Channel] | None]:
+    """Return the chosen channels by direction; None for all that are mapped."""
+    named = {
+        Direction.INPUT: None if inputs is None else make_channels("inputs", inputs),
+        Direction.OUTPUT: None if outputs is None else make_channels("outputs", outputs),
+    }
+    _check_names(inputs or {}, outputs or {})
+    return named
 
 
 def _mapped_channels(

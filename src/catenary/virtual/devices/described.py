@@ -15,7 +15,6 @@ from catenary.errors import ConfigurationError
 from catenary.esi.device import EsiDevice
 from catenary.esi.module_choice import ModuleName, choose_modules
 from catenary.esi.placement import default_placements, slot_places, with_placements
-from catenary.esi.reader import read_esi
 from catenary.esi.selection import select_device
 from catenary.esi.sii import assemble_sii
 from catenary.model.device import Direction
@@ -231,6 +230,8 @@ def esi_device(path: str | PathLike[str], wanted: str = "") -> EsiDevice:
         EsiError: The file cannot be read.
         ConfigurationError: The file has no such device.
     """
+    from catenary.esi.reader import read_esi  # the parser is loaded only for ESI files
+
     return select_device(read_esi(Path(path)), wanted)
 
 
