@@ -13,6 +13,8 @@ from catenary.esi.device import EsiSlot
 from catenary.esi.placement import default_placements, slot_places
 from catenary.esi.reader import read_esi
 from catenary.model.device import Direction
+from tests.esi.esi_file import module as module_text
+from tests.esi.esi_file import write
 from tests.esi.modular import AI, DI, DO, MODULES, STATUS, coupler
 
 
@@ -165,3 +167,10 @@ def test_a_module_that_was_not_found_is_listed() -> None:
     assert str(slots) == (
         "slots 0 to 7  Terminals  at least 2 occupied\n    0x00000099  (not found)  default"
     )
+
+
+def test_the_group_of_a_module_is_read(tmp_path: Path) -> None:
+    text = module_text(0x77).replace("ModuleIdent=", 'ModulePdoGroup="2" ModuleIdent=')
+    path = write(tmp_path / "modules.xml", modules=text)
+    [found] = read_esi(path).modules
+    assert (found.ident, found.pdo_group) == (0x77, 2)

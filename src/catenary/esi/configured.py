@@ -152,6 +152,7 @@ def _configured(device: EsiDevice, placed: Placement) -> ConfiguredModule:
         documented=documented_objects(module.dictionary),
         pdo_offset=place.pdo_offset,
         index_offset=place.index_offset,
+        pdo_group=module.pdo_group,
         source=str(module.source),
     )
 

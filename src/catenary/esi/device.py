@@ -308,6 +308,7 @@ class EsiModule:
     init_commands: tuple[EsiInitCommand, ...] = ()
     dictionary: EsiDictionary | None = None
     dictionary_file: str = ""  # file that contains the dictionary (`DictionaryFile`)
+    pdo_group: int = 0  # `ModulePdoGroup`: PDOs are assigned by group, then by slot
     source: Source = NO_SOURCE
 
 

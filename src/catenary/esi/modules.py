@@ -46,6 +46,7 @@ def make_module(element: Element, findings: Findings) -> EsiModule:
         type=text_of(element, "Type"),
         name=text_of(element, "Name"),
         module_class=kind.attributes.get("ModuleClass", "").strip(),
+        pdo_group=findings.integer(kind, "ModulePdoGroup", bits=16),
         pdos=read_pdos(element, findings),
         init_commands=read_init_commands(element.find("Mailbox"), findings),
         dictionary=profile.dictionary,

@@ -131,7 +131,8 @@ def with_placements(device: EsiDevice, placed: tuple[Placement, ...]) -> EsiDevi
     if not placed:
         return device
     modules = [placed_module(each) for each in placed]
-    pdos = [pdo for each in modules for pdo in each.pdos]
+    by_group = sorted(modules, key=lambda each: each.pdo_group)  # otherwise by slot
+    pdos = [pdo for each in by_group for pdo in each.pdos]
     indices = {pdo.index for pdo in pdos}
     own = (p for p in device.pdos if not (p.overwritten_by_module and p.index in indices))
     mailbox = device.mailbox

@@ -33,6 +33,7 @@ class ConfiguredModule:
     documented: tuple[ObjectInformation, ...] = ()  # its part of the dictionary
     pdo_offset: int = 0  # added to PDO indices that depend on the slot
     index_offset: int = 0  # added to object indices that depend on the slot
+    pdo_group: int = 0  # PDOs are assigned by group, then by slot
     source: str = ""  # file and line
 
     def pdos(self, direction: Direction) -> tuple[Pdo, ...]:
@@ -108,7 +109,8 @@ def with_modules(
 ) -> DeviceDescription:
     """Return the description of a modular device with other modules in its slots.
 
-    The PDOs of the modules follow those of the device, by slot. Its assignment is the default one.
+    The PDOs of the modules follow those of the device, by group and slot (ETG.5001). The assignment
+    is the default one.
 
     Args:
         device: A modular device.
@@ -118,9 +120,10 @@ def with_modules(
     modular = device.modular
     if modular is None:
         return device
+    by_group = sorted(modules, key=lambda each: each.pdo_group)
     for direction in Direction:
         own = modular.own_pdos(direction)
-        added = tuple(pdo for each in modules for pdo in each.pdos(direction))
+        added = tuple(pdo for each in by_group for pdo in each.pdos(direction))
         replaced = modular.replaceable_pdos & {pdo.index for pdo in added}
         pdos = (*(pdo for pdo in own if pdo.index not in replaced), *added)
         device = device.with_process_data(direction, assignments(pdos), pdos)

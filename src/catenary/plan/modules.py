@@ -3,11 +3,11 @@
 Order of trust: the modules that the application requests, those that the device detected (0xF050),
 those that are configured in it (0xF030), the default modules of the ESI.
 
-0xF030 is written first if the ESI requires it (`DownloadModuleIdentList`), or if it
-differs from modules that the application requests or the device detected. Devices compare it with
-0xF050 and refuse SAFE-OP with AL status 0x0070 if they differ. The sample of Beckhoff's slave stack
-(SSC, `Module_UpdateObjectDictionary`) adds the objects of the modules only when 0xF030 is written.
-Other masters write the list in PRE-OP, too.
+0xF030 is written first if the ESI requires it (`DownloadModuleIdentList`), or if it differs from
+modules that the application requests or the device detected. Devices compare it with 0xF050 and
+refuse SAFE-OP with AL status 0x0070 if they differ: SOEM, which does not write it, fails until
+TwinCAT has written it (SOEM#884). The sample of Beckhoff's slave stack (SSC,
+`Module_UpdateObjectDictionary`) adds the objects of the modules only when 0xF030 is written.
 """
 
 from __future__ import annotations
@@ -165,7 +165,7 @@ def ident_difference(plan: ModulePlan, detected: Sequence[int]) -> str:
 
 def module_lines(plan: ModulePlan) -> list[str]:
     """Return the modules by slot as text, with their PDOs, objects and sources."""
-    lines = [f"modules {plan.source}"]
+    lines = [f"modules {plan.source}" + ": none" * (not plan.modules)]
     for each in plan.modules:
         pdos = [f"0x{pdo.index:04X}" for pdo in (*each.output_pdos, *each.input_pdos)]
         objects = f", objects + 0x{each.index_offset:X}" * bool(each.index_offset)
