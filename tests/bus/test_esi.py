@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -17,6 +18,7 @@ from catenary.plan import DeviceRequest
 from catenary.plan.request import DistributedClock
 from catenary.types import SINT, UDINT, UINT, USINT
 from catenary.wire.al import AlState
+from catenary.wire.sdo_information import ListType
 from tests.esi import servo_file
 from tests.plan.devices import Asking
 
@@ -62,10 +64,9 @@ def test_names_come_from_the_esi_and_the_mapping_from_the_device(tmp_path: Path)
 
 def test_a_scan_without_esi_files_imports_neither_sqlite_nor_a_parser() -> None:
     program = (
-        "import sys; from catenary.bus import MainDevice; from tests.esi import servo_file\n"
-        "with MainDevice(servo_file.segment()) as main:\n"
-        "    assert main.scan()[1].esi is None\n"
-        "found = {'sqlite3', 'catenary.esi.xml', 'catenary.esi.library', 'catenary.esi.reader'}\n"
+        "import sys; import catenary.bus; from catenary.bus.esi_source import open_source\n"
+        "assert open_source(None) is open_source(False) is None\n"
+        "found = {'sqlite3', 'pyexpat', 'catenary.esi.library', 'catenary.esi.reader'}\n"
         "print(sorted(found & set(sys.modules)))"
     )
     environment = {"CATENARY_ESI": "/nonexistent", "PATH": "/usr/bin:/bin"}
@@ -228,14 +229,10 @@ def test_a_command_for_the_mode_does_not_override_the_chosen_mode(tmp_path: Path
 
 
 def choices(folder: Path) -> Path:
-    exclude = "<Exclude>#x1a00</Exclude>"
-    pdos = servo_file.PDOS + servo_file.pdo(
-        "TxPdo", 0x1A01, "Inputs short", servo_file.TX[:1], "", exclude
-    )
     mapping = """<VendorSpecific><TwinCAT><AlternativeSmMapping><Name>Short</Name>
       <Sm No="2"><Pdo>#x1600</Pdo></Sm><Sm No="3"><Pdo>#x1A01</Pdo></Sm>
       </AlternativeSmMapping></TwinCAT></VendorSpecific>"""
-    return servo_file.write(folder, pdos=pdos, info=mapping)
+    return servo_file.write(folder, pdos=servo_file.choices(), info=mapping)
 
 
 def test_pdos_by_the_name_of_a_pdo_or_a_mapping(tmp_path: Path) -> None:
@@ -269,3 +266,58 @@ def test_an_unknown_name_lists_similar_ones(tmp_path: Path) -> None:
         with pytest.raises(MappingError, match="has the name 'Inputs shrt'") as caught:
             cat.ProcessData(sub, pdos=["Inputs shrt"])
         assert "'Inputs short'" in str(caught.value)
+
+
+# -- objects -----------------------------------------------------------------------------------
+
+
+def test_types_and_named_values_come_from_the_dictionary_of_the_esi(tmp_path: Path) -> None:
+    servo_file.write(tmp_path, profile=servo_file.PROFILE)
+    with MainDevice(servo_file.segment()) as main:
+        sub = main.scan(esi=tmp_path)[1]
+        [mode] = [row for row in sub.pdos if row.index == 0x6060]
+        assert mode.enumeration == ((8, "CSP"),)
+        assert "8 = CSP" in str(sub.pdos)
+        known = sub.description.documented_object(0x6065, 0)
+        assert known is not None
+        assert (known.name, known.data_type) == ("Window", UDINT.index)
+
+
+def test_objects_of_the_esi_replace_missing_sdo_information(tmp_path: Path) -> None:
+    path = servo_file.write(tmp_path, profile=servo_file.PROFILE)
+    with MainDevice(servo_file.segment()) as main:
+        sub = main.scan(esi=tmp_path)[1]
+        assert sub.channel is not None
+        sub.channel.layout = replace(sub.channel.layout, sdo_information=False)
+        assert [each.index for each in sub.sdo.list()] == [0x6060, 0x6065]
+        assert [each.index for each in sub.sdo.list(ListType.RXPDO_MAPPABLE)] == [0x6060]
+        assert str(path) in sub.sdo.notes[0]
+        [entry] = sub.sdo.describe(0x6065).entries
+        assert (entry.data_type, entry.bit_length, entry.name) == (UDINT.index, 32, "Window")
+
+
+def test_start_up_values_take_their_type_from_the_esi(tmp_path: Path) -> None:
+    servo_file.write(tmp_path, profile=servo_file.PROFILE)
+    with MainDevice(servo_file.segment()) as main:
+        sub = main.scan(esi=tmp_path)[1]
+        assert sub.description.mailbox is not None
+        silent = replace(sub.description.mailbox, sdo_information=False)
+        sub.description = replace(sub.description, mailbox=silent)
+        plan = main.plan(cat.ProcessData(sub, start_up=[cat.StartUp(0x6065, 0, 77)]))
+        assert [each.data for each in plan.devices[1].downloads] == [b"M\0\0\0"]
+        assert "77 (UDINT)" in str(plan)
+
+
+def test_a_loop_runs_with_the_commands_and_clocks_of_the_esi(tmp_path: Path) -> None:
+    commands = servo_file.command(0x6065, "10270000") + servo_file.command(0x6084, "e8030000", "SO")
+    servo_file.write(tmp_path, commands=commands)
+    with MainDevice(servo_file.segment()) as main:
+        sub = main.scan(esi=tmp_path)[1]
+        clock = cat.DistributedClock(op_mode="DC-Synchron")
+        data = cat.ProcessData(sub, dc=clock)
+        with cat.Loop(data, period=1e-3) as loop:
+            for _ in range(10):
+                next(loop)
+            assert data.present
+        assert sub.sdo.read(0x6065, type=UDINT) == 10_000
+        assert sub.sdo.read(0x6084, type=UDINT) == 1000

@@ -9,6 +9,7 @@ import pytest
 
 from catenary.cli.main import VIRTUAL_TIME, main
 from catenary.virtual.description import VENDOR_ID
+from tests.esi import servo_file
 
 NOTE = f"note: {VIRTUAL_TIME}\n"
 
@@ -53,6 +54,19 @@ def test_sdo_read_without_a_type_prints_bytes_and_a_number(
 def test_sdo_read_with_a_type(capsys: pytest.CaptureFixture[str]) -> None:
     _, out, _ = call("sdo read virtual 3 0x1008 --type STRING", capsys)
     assert out == "Catenary virtual servo 2\n"
+
+
+def test_sdo_read_takes_type_and_name_from_the_esi_of_the_user(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    servo_file.write(tmp_path, profile=servo_file.PROFILE)
+    monkeypatch.setenv("CATENARY_ESI", str(tmp_path))
+    _, out, _ = call("sdo read virtual 2 0x6065", capsys)
+    assert out == "262144\n"
+    named = servo_file.PROFILE.replace("<Enum>8</Enum>", "<Enum>0</Enum>")
+    servo_file.write(tmp_path, profile=named)
+    _, out, _ = call("sdo read virtual 2 0x6060", capsys)
+    assert out == "0  (CSP)\n"
 
 
 def test_sdo_read_as_json(capsys: pytest.CaptureFixture[str]) -> None:

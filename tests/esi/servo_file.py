@@ -20,6 +20,21 @@ MODES = """
           <CycleTimeSync0 Factor="1">0</CycleTimeSync0></OpMode>"""
 
 
+PROFILE = """<Profile><ProfileNo>402</ProfileNo><Dictionary>
+  <DataTypes>
+    <DataType><Name>MODE</Name><BaseType>SINT</BaseType><BitSize>8</BitSize>
+      <EnumInfo><Text>CSP</Text><Enum>8</Enum></EnumInfo></DataType>
+    <DataType><Name>SINT</Name><BitSize>8</BitSize></DataType>
+    <DataType><Name>UDINT</Name><BitSize>32</BitSize></DataType>
+  </DataTypes>
+  <Objects>
+    <Object><Index>#x6060</Index><Name>Mode</Name><Type>MODE</Type><BitSize>8</BitSize>
+      <Flags><Access>rw</Access><PdoMapping>R</PdoMapping></Flags></Object>
+    <Object><Index>#x6065</Index><Name>Window</Name><Type>UDINT</Type><BitSize>32</BitSize>
+      <Flags><Access>rw</Access></Flags></Object>
+  </Objects></Dictionary></Profile>"""
+
+
 def segment(**options: object) -> Segment:
     return Segment([Coupler(), Servo(**options)])  # type: ignore[arg-type]
 
@@ -54,6 +69,12 @@ def command(index: int, data: str, transition: str = "PS", attributes: str = "")
             <Comment>from the ESI</Comment></InitCmd>"""
 
 
+def choices() -> str:
+    """Return PDOs with one more, which cannot be assigned together with the inputs."""
+    exclude = "<Exclude>#x1a00</Exclude>"
+    return PDOS + pdo("TxPdo", 0x1A01, "Inputs short", TX[:1], "", exclude)
+
+
 PDOS = pdo("RxPdo", 0x1600, "Outputs", RX, 'Sm="2"') + pdo("TxPdo", 0x1A00, "Inputs", TX, 'Sm="3"')
 
 
@@ -67,12 +88,13 @@ def text(
     number: int | None = None,
     check: str = "",
     product: int = PRODUCT,
+    vendor: int = VENDOR_ID,
 ) -> str:
     """Return the file. Each option is the content of one element."""
     known = revision() if number is None else number
     return f"""<?xml version="1.0" encoding="utf-8"?>
 <EtherCATInfo>
-  <Vendor><Id>#x{VENDOR_ID:x}</Id><Name>Catenary</Name></Vendor>
+  <Vendor><Id>#x{vendor:x}</Id><Name>Catenary</Name></Vendor>
   <Descriptions><Groups><Group><Type>G</Type><Name>Drives</Name></Group></Groups>
     <Devices><Device Physics="YY">
         <Type ProductCode="#x{product:x}" RevisionNo="#x{known:x}" {check}>SERVO</Type>

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import hypothesis
 import pytest
-from hypothesis import given
 from hypothesis import strategies as st
 
 from catenary.errors import ConfigurationError
@@ -118,6 +118,24 @@ def test_general_category() -> None:
         | GeneralFlags.MAILBOX_DATA_LINK_LAYER
         | GeneralFlags.IDENTIFICATION_BY_MEMORY
     )
+
+
+@pytest.mark.parametrize(
+    ("profile", "channels", "given", "expected"),
+    [(402, (), 0, 1), (5001, (402, 402), 0, 2), (5001, (), 0, 0), (402, (402,), 3, 3)],
+)
+def test_drive_channels(profile: int, channels: tuple[int, ...], given: int, expected: int) -> None:
+    mailbox = EsiMailbox(MailboxProtocol.COE, drive_channels=given)
+    device = replace(DRIVE, mailbox=mailbox, profile=profile, profile_channels=channels)
+    general = decode_sii(build_sii(device)).general
+    assert general is not None
+    assert general.ds402_channels == expected
+
+
+def test_safe_op_in_configuration_mode_is_a_flag() -> None:
+    general = decode_sii(build_sii(replace(DRIVE, config_in_safe_op=True))).general
+    assert general is not None
+    assert GeneralFlags.SAFE_OP in GeneralFlags(general.flags)
 
 
 @pytest.mark.parametrize(
@@ -277,7 +295,7 @@ def test_a_value_that_does_not_fit_names_the_device() -> None:
         build_sii(replace(DRIVE, pdos=(pdo,), eeprom=None))
 
 
-@given(
+@hypothesis.given(
     st.text(max_size=300),
     st.lists(st.integers(0, 700), max_size=20),
     st.binary(max_size=20),

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import pytest
 
-from catenary.errors import ConfigurationError
+from catenary.errors import ConfigurationError, MappingError
 from catenary.model.device import DeviceDescription, Entry, OpMode, Pdo, SyncManager
 from catenary.model.esi_settings import ModeAssignment
 from catenary.plan.clocks import SyncPlan, make_sync, start_time_ns
@@ -410,6 +410,13 @@ def test_clocks_show_the_settings_and_their_source() -> None:
     assert [clock.position for clock in plan.clocks] == [0]
     assert "reference clock: device 0" in str(plan.clocks)
     assert str(make_plan([servo(0)]).clocks) == "no distributed clocks"
+
+
+def test_absurd_oversampling_is_refused() -> None:
+    own = ModeAssignment(3, (0x1A00,), (1_000_000,))
+    mode = OpMode("DC", "", 0x0300, assignments=(own,), source="el.xml:5")
+    with pytest.raises(MappingError, match=r"el\.xml:5: 1000000 samples of PDO 0x1A00"):
+        make_plan([clocked(servo(0), mode)], [asking(0)])
 
 
 def test_a_mode_with_oversampling_changes_only_the_lengths_without_coe() -> None:

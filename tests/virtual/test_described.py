@@ -267,3 +267,38 @@ def test_outputs_in_the_digital_output_register() -> None:
             assert model.state == 8
             assert [model.read_object(0x7000 + k, 1)[0] for k in range(4)] == [1, 0, 1, 0]
             assert model.core.peek(0, 0x0F00, 1) == b"\x05"
+
+
+def test_the_first_of_assigned_pdos_that_exclude_each_other_is_used() -> None:
+    both = (DRIVE.pdos[0], DRIVE.pdos[1], replace(DRIVE.pdos[2], sync_manager=3))
+    with opened(replace(DRIVE, pdos=both)) as (main, model):
+        data = cat.ProcessData(main.subs[0])
+        with cat.Loop(data, period=2e-3) as loop:
+            next(loop)
+            assert (model.state, len(data.inputs)) == (8, 6)
+
+
+def test_a_device_may_map_more_objects_than_the_model_has() -> None:
+    entries = tuple(EsiEntry(0x6000 + k // 200, k % 200 + 1, 8, "", "USINT") for k in range(200))
+    more = tuple(replace(each, index=0x6100) for each in entries)
+    pdos = tuple(
+        EsiPdo(Direction.INPUT, 0x1A00 + k, "", part, 3) for k, part in enumerate((entries, more))
+    )
+    with opened(replace(DRIVE, pdos=pdos)) as (main, model):
+        data = cat.ProcessData(main.subs[0])
+        with cat.Loop(data, period=2e-3) as loop:
+            next(loop)
+            assert (model.state, len(data.inputs)) == (8, 400)
+
+
+def test_a_mailbox_without_coe_reaches_op() -> None:
+    device = replace(DRIVE, mailbox=EsiMailbox(MailboxProtocol.FOE | MailboxProtocol.EOE))
+    with opened(device) as (main, model):
+        sub = main.subs[0]
+        assert sub.description.mapping_source == "SII"
+        data = cat.ProcessData(sub)
+        with cat.Loop(data, period=2e-3) as loop:
+            next(loop)
+            assert (model.state, len(data.outputs), len(data.inputs)) == (8, 4, 6)
+        with pytest.raises(CatenaryError):
+            sub.sdo.read(0x1000)

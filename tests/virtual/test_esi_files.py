@@ -42,3 +42,27 @@ def test_the_default_configuration_reaches_op(
                 next(loop)
             assert model.state == OP
             assert (len(data.outputs), len(data.inputs)) == (outputs, inputs)
+
+
+@pytest.mark.parametrize(
+    ("file", "mode"),
+    [
+        ("hpm_ECAT_CIA402.xml", "DC"),
+        ("hpm_ECAT_EOE.xml", "DC"),
+        ("hpm_ECAT_FOE.xml", "DC"),
+        ("hpm_ECAT_IO.xml", "DC"),
+        ("metalmusings_EaserCAT_2000.xml", "DC"),
+        ("metalmusings_EaserCAT_6000.xml", "DC"),
+    ],
+)
+def test_the_clock_modes_start_sync0(shared_data: Path, file: str, mode: str) -> None:
+    """Pollen's files are missing: their shift of 2 s is longer than a cycle."""
+    model = from_esi(shared_data / "esi" / file)
+    with cat.MainDevice(Segment([model])) as main:
+        [sub] = main.scan()
+        data = cat.ProcessData(sub, dc=cat.DistributedClock(op_mode=mode))
+        with cat.Loop(data, period=2e-3) as loop:
+            for _ in range(5):
+                next(loop)
+            assert model.state == OP
+            assert model.core.peek(0, 0x0981, 1) == b"\x03"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from contextlib import suppress
-from typing import Protocol, TypeAlias, TypeVar, overload
+from typing import TYPE_CHECKING, Protocol, TypeAlias, TypeVar, overload
 
 from catenary.bus.pending import Pending
 from catenary.errors import CatenaryError, MailboxError, SdoAbort
@@ -15,6 +15,9 @@ from catenary.procedure.sdo_information import DescribedObject, describe_object,
 from catenary.procedure.station import Station, within
 from catenary.types import DataType
 from catenary.wire.sdo_information import ListType, ObjectDescription
+
+if TYPE_CHECKING:  # a scan without ESI files does not need them
+    from catenary.esi.device import EsiDevice
 
 T = TypeVar("T")
 
@@ -49,6 +52,9 @@ class ObjectOwner(Protocol):
 
     @property
     def error(self) -> CatenaryError | None: ...
+
+    @property
+    def esi(self) -> EsiDevice | None: ...
 
 
 class Sdo:
@@ -225,22 +231,36 @@ class Sdo:
 
         The device is queried once per object. If the device lists an object without describing it,
         only the index is known, and `object_code` is 0. `notes` names these objects, and the
-        missing part of a truncated list.
+        missing part of a truncated list. Without SDO information, the objects are those of the ESI.
 
         Raises:
             SdoAbort: The device refuses the list.
             MailboxError: The device does not support SDO information.
         """
         self.notes = ()
-        found, self.notes = self._sub.main.converse(list_objects(self._channel(), kind))
+        channel, esi = self._channel(), self._sub.esi
+        if esi is not None and not channel.layout.sdo_information:
+            from catenary.bus.esi_objects import list_esi_objects
+
+            self.notes = (f"{self._sub.station} has no SDO information: objects of {esi.source}",)
+            return list_esi_objects(esi, kind)
+        found, self.notes = self._sub.main.converse(list_objects(channel, kind))
         return found
 
     def describe(self, index: int) -> DescribedObject:
         """Read the description of one object and its entries: types, lengths, access and names.
 
-        The `notes` of the result name the entries that the device does not describe.
+        The `notes` of the result name the entries that the device does not describe. Without SDO
+        information, the description is that of the ESI.
         """
-        return self._sub.main.converse(describe_object(self._channel(index), index))
+        channel, esi = self._channel(index), self._sub.esi
+        if esi is not None and not channel.layout.sdo_information:
+            from catenary.bus.esi_objects import describe_esi_object
+
+            known = describe_esi_object(esi, index)
+            if known is not None:
+                return known
+        return self._sub.main.converse(describe_object(channel, index))
 
     def _upload(
         self, index: int, subindex: int, complete: bool, limit: int, timeout: float

@@ -13,6 +13,7 @@ from catenary.cli.parsers import Commands, add_command, add_force, add_json, add
 from catenary.cli.text import escaped
 
 if TYPE_CHECKING:
+    from catenary.model.device import ObjectInformation
     from catenary.types import DataType, Value
 
 NUMBER_SIZES = (1, 2, 4, 8)  # sizes of numbers [bytes]
@@ -39,7 +40,8 @@ def _add_read(group: Commands) -> None:
         group,
         "read",
         help="read an object",
-        description="Reads one entry. Without --type, prints its bytes and a likely meaning.",
+        description="Reads one entry. Without --type, the type comes from the device's ESI file. "
+        "If there is none, prints the bytes and a likely meaning.",
         example="catenary sdo read eth0 2 0x1018:1 --type UDINT\n"
         "catenary sdo read virtual 2 0x1008 --type STRING --json",
     )
@@ -116,11 +118,14 @@ def run_read(arguments: argparse.Namespace) -> int:
     with MainDevice(arguments.target, force=arguments.force) as main:
         device = device_at(main.scan(strict=False), arguments.position)
         data = device.sdo.read(at.index, at.subindex)
+        known = device.description.documented_object(at.index, at.subindex)
     value = kind.decode(data) if kind else None
+    if kind is None and known is not None:
+        value = documented_value(known, data)
     if arguments.json:
         print(_as_json(arguments, data, value))
     else:
-        print(as_text(data, value))
+        print(as_text(data, value) + meaning(known, value))
     return 0
 
 
@@ -189,6 +194,25 @@ def as_text(data: bytes, value: Value | None) -> str:
     if value is None:
         return explain(data)
     return escaped(value) if isinstance(value, str) else str(value)
+
+
+def documented_value(known: ObjectInformation, data: bytes) -> Value | None:
+    """Return the value by the data type in the ESI of the device; None if it does not fit."""
+    from catenary.errors import DecodeError
+    from catenary.types import by_index
+
+    try:
+        return by_index(known.data_type).decode(data)
+    except (ValueError, DecodeError):
+        return None
+
+
+def meaning(known: ObjectInformation | None, value: Value | None) -> str:
+    """Return the unit and the name of a value in the ESI, such as " mV" or "  (CSP)"."""
+    if known is None or value is None:
+        return ""
+    text = dict(known.enumeration).get(value) if isinstance(value, int) else None
+    return f" {known.unit}" * bool(known.unit) + f"  ({text})" * bool(text)
 
 
 def explain(data: bytes) -> str:

@@ -35,6 +35,7 @@ from catenary.wire.sii_categories import (
 )
 
 ROW = 16  # bytes per line
+GROUP_AGAIN = 1  # place of byte 14 of the general category in General.reserved
 _KNOWN = frozenset(
     (
         CategoryType.STRINGS,
@@ -158,8 +159,12 @@ def _general(sii: Sii, general: General) -> Iterator[str]:
     yield f"flags 0x{general.flags:02X}: {_flags(GeneralFlags(general.flags))}"
     yield f"current {general.current_ma} mA, ports 0x{general.physical_ports:04X}"
     yield f"identification at 0x{general.identification_address:04X}"
-    if any(general.reserved):
-        yield from _rows("general, reserved", general.reserved)
+    again = general.reserved[GROUP_AGAIN]
+    if again:
+        yield f"group again, number {again}: {sii.string(again)!r}"
+    others = general.reserved[:GROUP_AGAIN] + b"\0" + general.reserved[GROUP_AGAIN + 1 :]
+    if any(others):
+        yield from _rows("general, reserved", others)
 
 
 def _sync_manager(number: int, each: SyncManagerEntry) -> str:

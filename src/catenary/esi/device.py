@@ -146,9 +146,9 @@ class EsiModeSyncManager:
     oversampling: tuple[int, ...] = ()  # factor of each of these PDOs; 1 without oversampling
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, repr=False)
 class EsiOpMode:
-    """One mode of the distributed clocks (`Dc/OpMode`)."""
+    """One mode of the distributed clocks (`Dc/OpMode`). Its repr is short, as a list shows it."""
 
     name: str
     description: str = ""
@@ -163,6 +163,14 @@ class EsiOpMode:
     sync1_shift_ns: int = 0
     sync_managers: tuple[EsiModeSyncManager, ...] = ()
     source: Source = NO_SOURCE
+
+    def __repr__(self) -> str:
+        name = f"{self.name!r}, {self.description!r}" if self.description else repr(self.name)
+        parts = [name, f"AssignActivate 0x{self.assign_activate:04X}"]
+        if self.assign_activate:
+            cycle = f"{self.sync0_ns} ns" if self.sync0_ns else f"factor {self.sync0_factor}"
+            parts.append(f"SYNC0 {cycle}, shift {self.shift_ns} ns")
+        return f"<OpMode {', '.join(parts)}, {self.source}>"
 
 
 @dataclass(frozen=True, slots=True)

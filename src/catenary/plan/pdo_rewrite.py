@@ -86,6 +86,12 @@ def write_down(
     lists: dict[int, list[Pdo]] = {}
     copies: set[int] = set()
     for each in written:
+        if each.copies > ENTRIES_MAX:
+            raise MappingError(
+                f"{device}: {each.source}: {each.copies} samples of PDO 0x{each.index:04X} per "
+                f"cycle; at most {ENTRIES_MAX} PDOs can be assigned",
+                hint="the OpMode of the ESI file is wrong; choose another one",
+            )
         pdo = _written_pdo(device, direction, each, known)
         pdos = lists.setdefault(_channel(device, direction, each, pdo), [])
         pdos += [replace(pdo, index=pdo.index + k) for k in range(each.copies)]

@@ -159,7 +159,7 @@ def sync_text(sync: SyncPlan) -> str:
     second = f", SYNC1 {sync.sync1_ns / 1e3:g} us later" * (Activation.SYNC1 in sync.activation)
     hidden = "" if Activation.SYNC0 in sync.activation else " (not signalled to the device)"
     mode = f", OpMode {sync.op_mode!r}" * bool(sync.op_mode)
-    mode += f" ({sync.source})" * bool(sync.source)
+    mode += f" ({sync.source})" * sync.source.startswith("ESI")
     return (
         f"SYNC0 every {sync.cycle_ns / 1e3:g} us{hidden}, "
         f"{sync.shift_ns / 1e3:+g} us after the common SYNC0 time{second}, "

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 from catenary.esi.device import EsiDevice, EsiEntry, EsiMailbox, EsiPdo, EsiSyncManager
 from catenary.esi.sii_process_data import PART_BITS, type_number
@@ -138,11 +139,27 @@ def _permissions(mailbox: EsiMailbox | None) -> MappingQuirks:
 def pdos_of(device: EsiDevice, direction: Direction) -> tuple[Pdo, ...]:
     """Return the PDOs of one direction.
 
+    If a file assigns PDOs that exclude each other, the device starts with the first one. Without
+    CoE nothing can be chosen, so all of them stay assigned.
+
     Args:
         device: The device.
         direction: Outputs or inputs.
     """
-    return tuple(_pdo(device, pdo) for pdo in device.pdos_of(direction))
+    coe = device.mailbox is not None and MailboxProtocol.COE in device.mailbox.protocols
+    assigned: dict[int, EsiPdo] = {}
+    found = []
+    for pdo in device.pdos_of(direction):
+        rivals = [each for each in assigned.values() if pdo.index in each.excludes]
+        rivals += [assigned[index] for index in pdo.excludes if index in assigned]
+        if coe and rivals:
+            pdo = replace(pdo, sync_manager=None, mandatory=False)
+        elif not coe:
+            pdo = replace(pdo, excludes=frozenset())
+        if pdo.sync_manager is not None:
+            assigned[pdo.index] = pdo
+        found.append(_pdo(device, pdo))
+    return tuple(found)
 
 
 def _pdo(device: EsiDevice, pdo: EsiPdo) -> Pdo:

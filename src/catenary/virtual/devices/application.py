@@ -150,6 +150,7 @@ class Application:
         self._add_communication_objects(description, quirks.text_prefix)
         size = description.mailbox.receive_size if description.mailbox else 0
         facts = description.facts
+        self._from_file = facts is not None
         self._channels = channels_of(size) if facts is None else facts.channels
         self.pdos = PdoObjects(
             self.dictionary,
@@ -347,7 +348,8 @@ class Application:
 
     def _buffer_is_configured(self, channel: Channel) -> bool:
         size = self.pdos.size(channel.assignment)
-        if len(self.pdos.placed(channel.assignment)) > _segment.MAPPED_MAX:
+        too_many = len(self.pdos.placed(channel.assignment)) > _segment.MAPPED_MAX
+        if too_many and not self._from_file:
             return False
         start, length, found, enabled, _full = self._buffers.settings(
             self._position, channel.sync_manager
@@ -402,6 +404,7 @@ class Application:
                     signed = entry.data_type in SIGNED
                     entries.append((placed.bit, placed.bits, entry.slot, signed))
             n = channel.sync_manager if entries else -1
+            entries = entries[: _segment.MAPPED_MAX]  # only devices from files have more
             self._core.map_process_data(self._position, channel.outputs, n, entries)
             if entries:
                 mapped.add(channel.outputs)

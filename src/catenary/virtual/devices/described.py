@@ -220,7 +220,7 @@ def from_esi(
 
 
 def esi_device(path: str | PathLike[str], wanted: str = "") -> EsiDevice:
-    """Return a device from an ESI file.
+    """Return a device from an ESI file, with the modules and dictionary of files next to it.
 
     Args:
         path: Path of the file.
@@ -230,9 +230,15 @@ def esi_device(path: str | PathLike[str], wanted: str = "") -> EsiDevice:
         EsiError: The file cannot be read.
         ConfigurationError: The file has no such device.
     """
-    from catenary.esi.reader import read_esi  # the parser is loaded only for ESI files
+    # The parser and the library are loaded only for ESI files.
+    from catenary.esi.library import Library
+    from catenary.esi.reader import read_esi
 
-    return select_device(read_esi(Path(path)), wanted)
+    device = select_device(read_esi(Path(path)), wanted)
+    if not device.dictionary_file and (device.slots is None or device.modules):
+        return device
+    with Library.of(path) as library:  # it reads the files that this one refers to
+        return library.find(*device.key, order=device.type) or device
 
 
 def _ports(physics: str) -> tuple[int, ...]:
