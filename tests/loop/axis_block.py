@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import struct
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from catenary.virtual import DescribedDevice
+from catenary.virtual.devices.application import Application
 from catenary.virtual.devices.described import esi_device
 from catenary.virtual.scheduler import Scheduler
 
@@ -30,7 +32,8 @@ class AxisBlock(DescribedDevice):
 
     def _step(self) -> None:
         for axis in self.axes:
-            self._follow(0x800 * axis)
+            if 0x6040 + 0x800 * axis in self.application.dictionary.objects:
+                self._follow(0x800 * axis)
         self._scheduler.after(STEP_NS, self._step)
 
     def _follow(self, offset: int) -> None:
@@ -39,10 +42,36 @@ class AxisBlock(DescribedDevice):
         self.write_object(0x6041 + offset, 0, struct.pack("<H", status))
         if status & 0x0F == 7:
             self.write_object(0x6064 + offset, 0, self.read_object(0x607A + offset))
-        if 0x6861 in self.application.dictionary.objects and offset in self._with_mode():
+        if offset in self._with_mode():
             self.write_object(0x6061 + offset, 0, self.read_object(0x6060 + offset))
 
     def _with_mode(self) -> list[int]:
         """Return the offsets of axes with 0x6061 in a PDO."""
         mapped = {entry.index for pdo in self.esi.pdos for entry in pdo.entries}
         return [0x800 * axis for axis in self.axes if 0x6061 + 0x800 * axis in mapped]
+
+
+class LateBlock(AxisBlock):
+    """Block whose dictionary gets the objects of its modules only when 0xF030 is written.
+
+    Until then, no PDO is assigned, as in the sample of Beckhoff's slave stack.
+    """
+
+    def add_objects(self, application: Application) -> None:
+        super().add_objects(application)
+        objects = application.dictionary.objects
+        kept = [i for i in objects if i < 0x1600 or 0x1C00 <= i < 0x1C10 or i >= 0xF000]
+        self._hidden = {i: each for i, each in objects.items() if i not in (*kept, 0x1C12, 0x1C13)}
+        for index in self._hidden:
+            del objects[index]
+        for table in application.pdos._assigned.values():
+            table.count = 0
+        count = objects[0xF030].entries[0]
+        assert count.write is not None
+        write = count.write
+
+        def show(data: bytes) -> None:
+            write(data)
+            objects.update(self._hidden)
+
+        objects[0xF030].entries[0] = replace(count, write=show)

@@ -12,7 +12,7 @@ import pytest
 import catenary as cat
 from catenary.errors import ConfigurationError
 from catenary.virtual import Segment
-from tests.loop.axis_block import BOTH, CSP, CSV, FILE, AxisBlock
+from tests.loop.axis_block import BOTH, CSP, CSV, FILE, AxisBlock, LateBlock
 
 
 @contextmanager
@@ -81,3 +81,18 @@ def test_modules_need_an_esi(shared_data: Path) -> None:
         [sub] = main.scan(esi=False)
         with pytest.raises(ConfigurationError, match="modules= needs the ESI file"):
             cat.ProcessData(sub, modules=[BOTH])
+
+
+@pytest.mark.parametrize("requested", [[BOTH, CSP], None])
+def test_modules_that_appear_with_the_list(
+    shared_data: Path, requested: list[str | int | None] | None
+) -> None:
+    model = LateBlock(shared_data, [BOTH, CSP])
+    with opened(shared_data, model) as (_, sub):
+        arm = cat.Drives([sub], modules=requested, counts_per_turn=2**20, velocity_limit=9.0)
+        with cat.Loop(arm, period=2e-3) as loop:
+            start = arm.actual.position.copy()
+            for _cycle, count in zip(loop, range(100), strict=False):
+                arm.target.position[:] = start + np.multiply(count, [0.001, -0.002])
+            assert arm.enabled.all()
+            assert abs(arm.actual.position - start).min() > 0.05
