@@ -59,12 +59,12 @@ def ask(url: str) -> None:
 
 
 target, port = (sys.argv[1], 8080) if len(sys.argv) > 1 else ("virtual", 0)
-with cat.MainDevice(target) as main, ThreadingHTTPServer(("localhost", port), Axes) as server:
+with cat.MainDevice(target) as main, ThreadingHTTPServer(("127.0.0.1", port), Axes) as server:
     arm = cat.Drives(main.scan().drives, counts_per_turn=2**20, velocity_limit=2.0)
     with cat.Loop(arm, period=1e-3) as loop:
         loop.run_in_background()
         if port:
             server.serve_forever()
         Thread(target=server.serve_forever, daemon=True).start()
-        ask(f"http://localhost:{server.server_port}")
+        ask(f"http://127.0.0.1:{server.server_port}")
         server.shutdown()

@@ -68,7 +68,7 @@ class Served(HTTPServer):
         self._client.join(60.0)
 
     def _ask(self) -> None:
-        url = f"http://localhost:{self.server_port}"
+        url = f"http://127.0.0.1:{self.server_port}"
         try:
             self._request(url, None)
             self._request(url, b"[0.05, 0.0, 0.05]")

@@ -17,7 +17,7 @@ class Axes(BaseHTTPRequestHandler):
         self.do_GET()
 
 
-with cat.MainDevice("eth0") as main, HTTPServer(("localhost", 8080), Axes) as server:
+with cat.MainDevice("eth0") as main, HTTPServer(("127.0.0.1", 8080), Axes) as server:
     arm = cat.Drives(main.scan().drives, counts_per_turn=2**20, velocity_limit=2.0)
     with cat.Loop(arm, period=1e-3) as loop:
         loop.run_in_background()

@@ -48,6 +48,7 @@ def as_json(devices: Sequence[SubDevice]) -> str:
                 "revision": device.identity.revision,
                 "serial": device.identity.serial,
                 "state": state_name(device),
+                "esi": None if device.esi is None else str(device.esi.source),
                 "error": None if device.error is None else str(device.error),
             }
             for device in devices
