@@ -69,6 +69,25 @@ def test_a_restarted_gateway_gets_its_list_again(tmp_path: Path) -> None:
         assert model.application.module_lists.configured == [DI, AI, 0, 0]
 
 
+def test_a_gateway_that_assigns_its_pdos_itself(tmp_path: Path) -> None:
+    path = tmp_path / FILE
+    path.write_text(text(DOWNLOAD).replace('PdoAssign="1"', 'PdoAssign="0"'))
+    model = from_esi(path, modules=[DI, AI])
+    with cat.MainDevice(Segment([model])) as main:
+        table = model.application.pdos._assigned[0x1C13]
+        table.places[:3], table.count = [0x1A01, 0x1A00, 0x1AFF], 3  # its own order
+        [sub] = main.scan(esi=path)
+        order = "in the order 0x1A01, 0x1A00, 0x1AFF, and does not accept that of the plan"
+        data = cat.ProcessData(sub, modules=[DI, AI])
+        with pytest.raises(ConfigurationError, match=order), cat.Loop(data, period=2e-3):
+            pass
+        again = cat.ProcessData(sub, modules=[DI, AI])
+        assert again.names == ("Value 1", "Value 2", "Inputs", "State")
+        with cat.Loop(again, period=2e-3) as loop:
+            next(loop)
+            assert len(again.inputs) == 6
+
+
 def test_the_slots_can_be_printed(tmp_path: Path) -> None:
     with gateway(tmp_path, [DI]) as (_, sub, _):
         assert sub.esi is not None

@@ -32,7 +32,7 @@ from catenary.procedure.clocks import ClockMeasurement
 from catenary.procedure.configure import configure_process_data
 from catenary.procedure.exchange import Procedure
 from catenary.procedure.mailbox import MailboxChannel
-from catenary.procedure.modules import prepare_modules
+from catenary.procedure.modules import check_order, prepare_modules
 from catenary.procedure.names import name_entries
 from catenary.procedure.pdo import (
     read_mapping,
@@ -207,6 +207,7 @@ def _prepare(sub: SubDevice, plan: DevicePlan) -> Procedure[None]:
         what = "its modules were"
         device, plan = yield from within(WRITE_TIMEOUT, sub.station, preparing, what)
         sub.description = device
+        check_order(device, plan)
     if plan.downloads:
         writing = _write(_channel(sub), device, plan)
         yield from within(WRITE_TIMEOUT, sub.station, writing, "its configuration was")

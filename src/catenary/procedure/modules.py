@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 from catenary.errors import ConfigurationError, MailboxError, ResponseTimeout, SdoAbort
-from catenary.model.device import DeviceDescription
+from catenary.model.device import DeviceDescription, Direction, mapped_pdos
 from catenary.model.module import (
     BY_IDENT,
     CONFIGURED_IDENTS,
@@ -109,6 +110,35 @@ def prepare_modules(
         fitted = replace(fitted, modular=modular)
     fitted = yield from read_mapping(channel, fitted)
     return fitted, renewed(plan, fitted)
+
+
+def check_order(device: DeviceDescription, plan: DevicePlan) -> None:
+    """Check that a device that assigns the PDOs of its modules itself has the order of the plan.
+
+    Some gateways have read-only assignments, and fill them when 0xF030 is written (SOEM#358).
+
+    Args:
+        device: The description, read after 0xF030 was written.
+        plan: The plan of the device.
+
+    Raises:
+        ConfigurationError: The order differs. The description has that of the device now.
+    """
+    if device.mailbox is None or device.mailbox.pdo_assign:
+        return
+    for direction in Direction:
+        present = [pdo.index for pdo in mapped_pdos(device.assignments(direction))]
+        planned = [pdo.index for pdo in mapped_pdos(plan.assignments(direction))]
+        if present != planned and sorted(present) == sorted(planned):
+            raise ConfigurationError(
+                f"{device}: it assigned the {direction.noun} of its modules in the order "
+                f"{_texts(present)}, and does not accept that of the plan, {_texts(planned)}",
+                hint="start the loop again: its order is known now, and the plan uses it",
+            )
+
+
+def _texts(indices: Sequence[int]) -> str:
+    return ", ".join(f"0x{index:04X}" for index in indices)
 
 
 def _check_detected(channel: MailboxChannel, modules: ModulePlan) -> Procedure[None]:
