@@ -25,9 +25,8 @@ from catenary.model.module import (
     DETECTED_IDENTS,
     ConfiguredModule,
     ModularDevice,
-    with_mapping_of,
-    with_modules,
 )
+from catenary.model.module_mapping import with_mapping_of, with_modules
 
 
 def expand(device: EsiDevice, choice: Sequence[ModuleName | None]) -> tuple[ConfiguredModule, ...]:

@@ -26,8 +26,8 @@ from catenary.model.module import (
     ModularDevice,
     same_idents,
     slot_idents,
-    with_modules,
 )
+from catenary.model.module_mapping import with_modules
 from catenary.plan.download import Download
 
 IDENTS_MAX = 255

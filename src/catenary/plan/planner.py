@@ -10,7 +10,7 @@ from typing import NamedTuple
 from catenary import notebook
 from catenary.errors import ConfigurationError
 from catenary.model.device import DeviceDescription, Direction
-from catenary.model.module import with_mapping_of
+from catenary.model.module_mapping import with_mapping_of
 from catenary.plan.clock_report import Clocks
 from catenary.plan.clocks import ClockChoice, choose_clocks, make_clock_plan, make_sync
 from catenary.plan.combination import gather_requests

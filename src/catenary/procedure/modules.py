@@ -11,9 +11,8 @@ from catenary.model.module import (
     BY_IDENT,
     CONFIGURED_IDENTS,
     DETECTED_IDENTS,
-    with_mapping_of,
-    with_modules,
 )
+from catenary.model.module_mapping import with_mapping_of, with_modules
 from catenary.plan.modules import ModulePlan, ident_difference
 from catenary.plan.start_up import DevicePlan, renewed
 from catenary.procedure.exchange import Procedure
