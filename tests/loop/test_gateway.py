@@ -140,3 +140,13 @@ def test_the_file_of_the_gateway_is_valid(tmp_path: Path) -> None:
     with gateway(tmp_path, [DI]):
         [device] = read_esi(tmp_path / FILE).devices
         assert device.warnings == ()
+
+
+def test_inputs_by_name_of_detected_terminals(tmp_path: Path) -> None:
+    with gateway(tmp_path, [DI, AI], DOWNLOAD) as (_, sub, model):
+        values = cat.Inputs(sub)
+        model.write_object(0x6010, 1, b"\x07\x00")
+        with cat.Loop(values, period=2e-3) as loop:
+            for _cycle in range(3):
+                next(loop)
+            assert values["Value 1"] == 7
