@@ -159,7 +159,7 @@ def test_show_notes_another_revision_and_modules(
     out = call("esi show 0x5A5A:1:6", capsys)[1]
     assert f"{drives}:7: revision 0x00000005 is used for a device of revision 0x00000006" in out
     out = call("esi show COUPLER --pdos", capsys)[1]
-    assert "  Axis  0 to 1  empty  accepts 0x00000077" in out.splitlines()
+    assert "  slot 0  Axis\n      0x00000077  AXIS\n" in out
     assert "PDOs of AXIS" in out
 
 

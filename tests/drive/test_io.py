@@ -18,6 +18,7 @@ def sub_of(position: int, direction: Direction, *pdos: Pdo) -> SimpleNamespace:
     assignments = (Assignment(sync_manager=0, pdos=pdos),)
     description = SimpleNamespace(
         position=position,
+        modular=None,
         assignments=lambda wanted: assignments if wanted is direction else (),
         pdos=lambda wanted: pdos if wanted is direction else (),
     )

@@ -13,6 +13,7 @@ from catenary.errors import EsiError
 from catenary.esi.device import DeviceKey, EsiDevice, EsiFile, RevisionCheck
 from catenary.esi.devices import Vendor
 from catenary.esi.document import Document, make_document
+from catenary.esi.modules import with_modules
 from catenary.esi.reader import (
     DEVICE_PATHS,
     MODULE_PATHS,
@@ -20,7 +21,6 @@ from catenary.esi.reader import (
     read_document,
     read_esi,
     read_module,
-    with_modules,
 )
 from catenary.esi.xml import find_elements
 from tests.esi import corpus

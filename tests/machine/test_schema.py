@@ -41,9 +41,14 @@ def names(options: type) -> set[str]:
         (schema.HomingTable, names(HomingMethod), set(), set()),
         # laws and sinks are objects of a program; clocks has a table at the top
         (schema.LoopTable, parameters(Loop), set(), {"laws", "sink", "clocks"}),
-        # start-up objects stand at the device; a clock is called dc in Python
-        (schema.DrivesTable, parameters(Drives), {"axes", "clock"}, {"dc", "start_up"}),
-        (schema.ProcessDataTable, parameters(ProcessData), {"device", "clock"}, {"dc", "start_up"}),
+        # start-up objects and modules stand at the device; a clock is called dc in Python
+        (schema.DrivesTable, parameters(Drives), {"axes", "clock"}, {"dc", "start_up", "modules"}),
+        (
+            schema.ProcessDataTable,
+            parameters(ProcessData),
+            {"device", "clock"},
+            {"dc", "start_up", "modules"},
+        ),
         (
             schema.StartUpTable,
             names(StartUp) - {"_"},

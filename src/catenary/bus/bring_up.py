@@ -20,6 +20,7 @@ from catenary.link import RingLink
 from catenary.model.device import DeviceDescription, Direction, mapped_pdos
 from catenary.plan.clocks import SYNC_OBJECTS
 from catenary.plan.combination import gather_requests
+from catenary.plan.modules import with_requested_modules
 from catenary.plan.op_mode import mode_pdos
 from catenary.plan.pdo_search import any_carries
 from catenary.plan.planner import Plan
@@ -31,6 +32,7 @@ from catenary.procedure.clocks import ClockMeasurement
 from catenary.procedure.configure import configure_process_data
 from catenary.procedure.exchange import Procedure
 from catenary.procedure.mailbox import MailboxChannel
+from catenary.procedure.modules import check_order, prepare_modules
 from catenary.procedure.names import name_entries
 from catenary.procedure.pdo import (
     read_mapping,
@@ -156,11 +158,12 @@ def _describe(sub: SubDevice, request: DeviceRequest) -> Procedure[DeviceDescrip
     if request.clock is not None:
         written += [(index, subindex) for index in SYNC_OBJECTS for subindex in (1, 2)]
     device = yield from read_values(channel, device, written)
+    wanted = with_requested_modules(device, request.modules)
     for direction, references in (
         (Direction.OUTPUT, request.outputs),
         (Direction.INPUT, request.inputs),
     ):
-        missing = _unmapped(device, direction, references)
+        missing = _unmapped(wanted, direction, references)
         chosen = request.written(direction) or mode_pdos(device, request.clock, direction)
         if missing or chosen:
             device = yield from read_offers(channel, device, direction)
@@ -199,6 +202,12 @@ def _prepare(sub: SubDevice, plan: DevicePlan) -> Procedure[None]:
     elif plan.sync is None and sub.sync_types:
         yield from write_types(_channel(sub), sub.sync_types)
         sub.sync_types = {}
+    if device.coe and plan.modules is not None:
+        preparing = prepare_modules(_channel(sub), device, plan)
+        what = "its modules were"
+        device, plan = yield from within(WRITE_TIMEOUT, sub.station, preparing, what)
+        sub.description = device
+        check_order(device, plan)
     if plan.downloads:
         writing = _write(_channel(sub), device, plan)
         yield from within(WRITE_TIMEOUT, sub.station, writing, "its configuration was")

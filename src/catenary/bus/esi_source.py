@@ -41,7 +41,14 @@ class EsiSource:
         self._given = given
 
     def complete(self, device: DeviceDescription) -> DeviceDescription:
-        """Return the description with the facts of its ESI, or with a note why not."""
+        """Return the description with the facts of its ESI, or with a note why not.
+
+        A modular device is completed again when the idents of its modules are known.
+        """
+        if device.modular is not None and device.position in self.found:
+            from catenary.esi.configured import with_reported_modules
+
+            return with_reported_modules(device, self.found[device.position])
         if not device.identity.vendor:  # its SII cannot be used
             return device
         try:

@@ -15,6 +15,7 @@ from catenary.procedure.al_state import request_state
 from catenary.procedure.configure import configure_mailbox
 from catenary.procedure.exchange import Procedure
 from catenary.procedure.mailbox import MailboxChannel
+from catenary.procedure.modules import read_module_lists
 from catenary.procedure.names import name_entries
 from catenary.procedure.pdo_offers import read_first_mapping
 from catenary.procedure.profile import read_profile
@@ -52,7 +53,7 @@ def find(
         device = complete((yield from within(READ_TIMEOUT, station, identify(registers))))
         station = station_of(device)
         patience = BRING_UP_TIMEOUT + (device.timeouts.pre_op or 0.0)
-        return (yield from within(patience, station, bring_to_pre_op(device)))
+        return (yield from within(patience, station, bring_to_pre_op(device, complete)))
     except (DecodeError, ValueError) as error:  # the device sent invalid data
         return ScannedDevice(device, error=_unreadable(station, error))
     except CatenaryError as error:
@@ -66,10 +67,18 @@ def _unreadable(station: Station, error: Exception) -> SegmentError:
     )
 
 
-def bring_to_pre_op(device: DeviceDescription) -> Procedure[ScannedDevice]:
+def bring_to_pre_op(
+    device: DeviceDescription,
+    complete: Callable[[DeviceDescription], DeviceDescription] = unchanged,
+) -> Procedure[ScannedDevice]:
     """Open the mailbox, assign the EEPROM to the device, and request PRE-OP.
 
-    Then read the profile, the mapping and missing names. A device without a mailbox is not read.
+    Then read the profile, the modules, the mapping and missing names. A device without a mailbox is
+    not read.
+
+    Args:
+        device: Description from SII and ESI.
+        complete: Function that adds the modules that a modular device reports.
     """
     station = station_of(device)
     if device.mailbox is None:
@@ -82,6 +91,8 @@ def bring_to_pre_op(device: DeviceDescription) -> Procedure[ScannedDevice]:
     yield from request_state(station, AlState.PRE_OP)
     if device.coe:
         device = yield from read_profile(channel, device)
+        if device.modular is not None:
+            device = complete((yield from read_module_lists(channel, device)))
         device = yield from read_first_mapping(channel, device)
     device = yield from name_entries(channel, device)
     return ScannedDevice(device, channel)

@@ -15,8 +15,6 @@ from catenary.esi.device import (
     EsiModule,
     EsiOpMode,
     EsiPdo,
-    EsiSlot,
-    EsiSlots,
     EsiSyncManager,
 )
 from catenary.esi.dictionary import EsiDictionary
@@ -46,7 +44,7 @@ def device_lines(device: EsiDevice, *, pdos: bool, objects: bool) -> list[str]:
     """
     lines = [*_identity(device), *_sync_managers(device.sync_managers)]
     lines += _pdos("PDOs", device.pdos, entries=pdos)
-    lines += [*_mailbox(device.mailbox), *_op_modes(device), *_slots(device.slots)]
+    lines += [*_mailbox(device.mailbox), *_op_modes(device), *_slots(device)]
     lines += _modules(device.modules, entries=pdos)
     lines += _dictionary(device.dictionary, entries=objects)
     lines += _list("elements that Catenary ignores", device.unknown)
@@ -154,20 +152,17 @@ def _op_mode(mode: EsiOpMode) -> tuple[str, ...]:
     return mode.name, activate, sync0, sync1, mode.description
 
 
-def _slots(slots: EsiSlots | None) -> list[str]:
+def _slots(device: EsiDevice) -> list[str]:
+    """Return the slots, each with the modules that it accepts; the default one is marked."""
+    slots = device.slots
     if slots is None:
         return []
-    increments = (
-        f"slots (PDO increment {slots.pdo_increment}, index increment 0x{slots.index_increment:X})"
+    written = ", 0xF030 is written" * slots.download_module_idents
+    title = (
+        f"slots (PDO increment {slots.pdo_increment}, index increment 0x{slots.index_increment:X}"
+        f"{written})"
     )
-    return _section(increments, [_slot(each) for each in slots.slots])
-
-
-def _slot(slot: EsiSlot) -> tuple[str, ...]:
-    accepted = [f"0x{each:08X}" for each in slot.module_idents] + list(slot.module_classes)
-    default = f"default 0x{slot.default_ident:08X}" if slot.default_ident is not None else "empty"
-    instances = f"{slot.min_instances} to {slot.max_instances}"
-    return slot.name, instances, default, f"accepts {', '.join(accepted)}"
+    return ["", title, *(f"  {escaped(line)}" for line in str(slots).splitlines())]
 
 
 def _modules(modules: Sequence[EsiModule], *, entries: bool) -> list[str]:

@@ -11,6 +11,7 @@ from typing import TypeAlias
 from catenary.bus import SubDevice
 from catenary.drive.axis import MEASURED, Axis
 from catenary.drive.channel import Channel, ChannelSpec, make_channel
+from catenary.drive.modules import Modules, chosen_modules, described
 from catenary.drive.objects import NAMED_COLUMNS, WRITTEN_OBJECTS, AxisObject
 from catenary.model.device import DeviceDescription, mapped_entries
 from catenary.plan.cycle import NumberKind
@@ -35,8 +36,14 @@ MODES: dict[str, Mode] = {
 }
 
 
-def axis_sources(subs: Iterable[AxisSource]) -> list[tuple[SubDevice, int]]:
+def axis_sources(
+    subs: Iterable[AxisSource], modules: Modules | None = None
+) -> list[tuple[SubDevice, int]]:
     """Return (SubDevice, slot) of every axis. A SubDevice without a slot means all of its slots.
+
+    Args:
+        subs: the devices or axes.
+        modules: modules in the slots of each device; None: as scanned.
 
     Raises:
         TypeError: `subs` is not iterable, or an element is neither a SubDevice nor a tuple.
@@ -51,7 +58,8 @@ def axis_sources(subs: Iterable[AxisSource]) -> list[tuple[SubDevice, int]]:
         if isinstance(source, tuple):
             sources.append(source)
         else:
-            sources.extend((source, slot) for slot in source.slots or (0,))
+            slots = described(source, chosen_modules(source, modules)).slots if modules else ()
+            sources.extend((source, slot) for slot in slots or source.slots or (0,))
         check_drive(sources[-1][0])
     if not sources:
         raise ValueError("no axes: the list of SubDevices is empty")

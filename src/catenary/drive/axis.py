@@ -13,6 +13,7 @@ from catenary.drive.report import axis_report
 from catenary.drive.settings import DriveSettings, own_limits
 from catenary.drive.units import AxisUnits
 from catenary.errors import MappingError
+from catenary.model.module import ConfiguredModule
 from catenary.plan.axis_report import AxisReport
 from catenary.plan.cycle import AxisPlan, Bank, Column, Number, NumberKind
 from catenary.plan.numbers import Which
@@ -53,6 +54,7 @@ class Axis:
     homing: HomingMethod | None = None
     pdos: tuple[WrittenPdo, ...] = ()  # PDOs from the application
     objects: tuple[StartUp, ...] = ()  # start-up objects of its device
+    modules: tuple[ConfiguredModule, ...] | None = None  # in the slots of its device
     settings: DriveSettings = field(default_factory=DriveSettings)  # read in PRE-OP
 
     def index(self, base: int) -> int:
@@ -132,6 +134,7 @@ class Axis:
             required=self.required,
             pdos=self.pdos,
             objects=self.objects,
+            modules=self.modules,
         )
 
     @property

@@ -20,6 +20,7 @@ from catenary.drive.arguments import (
 from catenary.drive.axis import MEASURED, Axis
 from catenary.drive.homing import HomingMethod
 from catenary.drive.limits import LimitOptions
+from catenary.drive.modules import Modules, chosen_modules, described
 from catenary.drive.objects import AxisObject
 from catenary.drive.units import AxisUnits, per_axis
 from catenary.plan.cycle import OnLoss
@@ -93,13 +94,15 @@ class CommonOptions:
     divider: int
     pdos: PdoList
     start_up: Sequence[StartUp]
+    modules: Modules | None = None
 
 
 def _pdos(sub: SubDevice, common: CommonOptions) -> tuple[WrittenPdo, ...]:
     """Return the PDOs of the option `pdos` for one device, whose PDOs may have other names."""
     if not common.pdos:
         return ()
-    return written_pdos(common.pdos, common.columns, sub.description)
+    device = described(sub, chosen_modules(sub, common.modules))
+    return written_pdos(common.pdos, common.columns, device)
 
 
 def make_axes(
@@ -113,7 +116,8 @@ def make_axes(
         common: Options that all axes share.
 
     Raises:
-        TypeError: The option `pdos` or `start_up` has the wrong type.
+        ConfigurationError: A slot does not accept a module.
+        TypeError: The option `pdos`, `modules` or `start_up` has the wrong type.
         ValueError: An option is not valid, or a required one is missing.
     """
     n = len(sources)
@@ -136,6 +140,7 @@ def make_axes(
             homing=options.each("homing", n)[k],
             pdos=_pdos(sub, common),
             objects=start_up_list(common.start_up),
+            modules=chosen_modules(sub, common.modules),
         )
         for k, (sub, slot) in enumerate(sources)
     )

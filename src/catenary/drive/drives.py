@@ -25,6 +25,7 @@ from catenary.drive.arguments import (
 from catenary.drive.axis import Axis, column_bank
 from catenary.drive.axis_options import AxisOptions, CommonOptions, PerAxis, make_axes
 from catenary.drive.homing import HomingMethod
+from catenary.drive.modules import Modules
 from catenary.drive.motions import HALT
 from catenary.drive.move import Move, Moves
 from catenary.drive.move_request import (
@@ -82,6 +83,8 @@ class Drives(Request):
       SII declares them fixed. If a direction has no PDOs in this option, Catenary chooses them.
       Names of PDOs, or the name of a mapping of the ESI file, follow the rules of the file.
     - `start_up`: `StartUp` objects to write to each device before SAFE-OP.
+    - `modules`: module of each slot of a modular device, by name, type or ident; None for an empty
+      slot. The device must be scanned with its ESI file. By default, the modules that it reports.
 
     Options with one value for all axes, or a sequence with one value per axis:
 
@@ -161,8 +164,9 @@ class Drives(Request):
         dc: DistributedClock | bool = False,
         pdos: PdoList = (),
         start_up: Sequence[StartUp] = (),
+        modules: Modules | None = None,
     ) -> None:
-        sources = axis_sources(subs)
+        sources = axis_sources(subs, modules)
         super().__init__([sub for sub, _ in sources])
         self._columns = named_columns(columns)
         self._clock = clock_request(dc)
@@ -175,6 +179,7 @@ class Drives(Request):
             divider=divider,
             pdos=pdos,
             start_up=start_up,
+            modules=modules,
         )
         options = AxisOptions(
             mode=mode,

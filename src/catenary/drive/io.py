@@ -22,6 +22,7 @@ from catenary.drive.device_channels import (
     mapped_channels,
     with_chosen,
 )
+from catenary.drive.modules import described
 from catenary.drive.request import Request
 from catenary.model.device import DeviceDescription, Direction
 from catenary.plan.cycle import Bank
@@ -126,7 +127,8 @@ class Channels(Request):
 
     def _described(self, sub: SubDevice) -> DeviceDescription:
         """Return the description of a device with the PDOs of this request."""
-        return with_chosen(sub.description, self._pdos[sub.position], self._clock, [self.direction])
+        device = described(sub, None)
+        return with_chosen(device, self._pdos[sub.position], self._clock, [self.direction])
 
     def array(self, bank: Bank) -> Reals | Integers | Bytes:
         """Return the array of a bank. Raises RuntimeError before a loop is open."""

@@ -24,6 +24,7 @@ from catenary.drive.device_channels import (
     with_chosen,
 )
 from catenary.drive.image_place import Place, make_place
+from catenary.drive.modules import Modules, chosen_modules, described
 from catenary.drive.request import Request
 from catenary.errors import ConfigurationError
 from catenary.model.device import DeviceDescription, Direction
@@ -66,8 +67,12 @@ class ProcessData(Request):
         divider: n to exchange in every n-th cycle of the loop.
         required: if False, the loop continues without the device; see `present`.
         dc: distributed clocks. True uses the settings in the ESI or SII of the device.
+        modules: module of each slot of a modular device, by name, type or ident; None for an empty
+            slot. The device must be scanned with its ESI file. None instead of a list for the
+            modules that the device reports, or else the default modules of the ESI.
 
     Raises:
+        ConfigurationError: A slot does not accept a module.
         TypeError: An option has the wrong type, for example an object that is neither a Channel nor
             (index, subindex, type[, scale]).
         ValueError: A name is unknown or used twice, a value is out of range, or `safe` is given
@@ -86,15 +91,14 @@ class ProcessData(Request):
         divider: int = 1,
         required: bool = True,
         dc: DistributedClock | bool = False,
+        modules: Modules | None = None,
     ) -> None:
         super().__init__([sub])
-        named = {
-            Direction.INPUT: None if inputs is None else make_channels("inputs", inputs),
-            Direction.OUTPUT: None if outputs is None else make_channels("outputs", outputs),
-        }
-        _check_names(inputs or {}, outputs or {})
+        self._modules = chosen_modules(sub, modules)
+        device = described(sub, self._modules)
+        named = _named_channels(inputs, outputs)
         known = {**(named[Direction.INPUT] or {}), **(named[Direction.OUTPUT] or {})}
-        self._pdos = written_pdos(pdos or (), known, sub.description)
+        self._pdos = written_pdos(pdos or (), known, device)
         self._writes = outputs is None or bool(outputs)
         self._is_named = inputs is not None
         self._channels = {
@@ -103,7 +107,7 @@ class ProcessData(Request):
         unnamed = [direction for direction, channels in named.items() if channels is None]
         self._clock = clock_request(dc)
         self._channels |= _mapped_channels(
-            with_chosen(sub.description, self._pdos, self._clock, unnamed), unnamed, known
+            with_chosen(device, self._pdos, self._clock, unnamed), unnamed, known
         )
         self._safe = bytes(safe) if isinstance(safe, bytearray | memoryview) else safe
         self._check_safe()
@@ -200,6 +204,7 @@ class ProcessData(Request):
             required=self._required,
             pdos=self._pdos,
             objects=self._start_up,
+            modules=self._modules,
         )
         return {self._subs[0].position: request}
 
@@ -291,6 +296,18 @@ class ProcessData(Request):
                 f"{self!r}: {name!r} is not a name; use `inputs` or `outputs` to access bytes"
             )
         raise KeyError(f"{self!r}: {_unknown(name, self.names)}")
+
+
+def _named_channels(
+    inputs: Mapping[str, ChannelSpec] | None, outputs: Mapping[str, ChannelSpec] | None
+) -> dict[Direction, dict[str, Channel] | None]:
+    """Return the chosen channels by direction; None for all that are mapped."""
+    named = {
+        Direction.INPUT: None if inputs is None else make_channels("inputs", inputs),
+        Direction.OUTPUT: None if outputs is None else make_channels("outputs", outputs),
+    }
+    _check_names(inputs or {}, outputs or {})
+    return named
 
 
 def _mapped_channels(

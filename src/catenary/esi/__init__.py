@@ -34,6 +34,7 @@ from catenary.esi.device import (
     EsiSyncManager,
     EsiTimeouts,
     EsiWatchdog,
+    ModuleLabel,
     RevisionCheck,
 )
 from catenary.esi.dictionary import (
@@ -85,6 +86,7 @@ __all__ = [
     "IndexEntry",
     "Kind",
     "Library",
+    "ModuleLabel",
     "Record",
     "RevisionCheck",
     "Rule",

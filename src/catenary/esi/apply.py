@@ -13,6 +13,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from catenary.errors import IdentityError
+from catenary.esi.configured import with_slots
 from catenary.esi.device import EsiDevice, RevisionCheck
 from catenary.esi.lookup import accepts
 from catenary.esi.object_descriptions import documented_objects
@@ -35,7 +36,7 @@ def applied(description: DeviceDescription, esi: EsiDevice) -> DeviceDescription
     check_key(description, esi)
     device = with_settings(description, esi)
     device = with_process_data(device, esi)
-    return replace(
+    device = replace(
         device,
         name=_name(device, esi),
         order=device.order or esi.type,
@@ -44,6 +45,7 @@ def applied(description: DeviceDescription, esi: EsiDevice) -> DeviceDescription
         esi=str(esi.source),
         notes=(*device.notes, *_revision_note(device, esi)),
     )
+    return with_slots(device, esi)
 
 
 def check_key(description: DeviceDescription, esi: EsiDevice) -> None:

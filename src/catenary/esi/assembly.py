@@ -14,7 +14,7 @@ from catenary.esi.dictionary import EsiDictionary
 from catenary.esi.findings import Findings
 from catenary.esi.index import element_of
 from catenary.esi.indexed_files import IndexedFiles, indexed_or_warned
-from catenary.esi.modules import make_module
+from catenary.esi.modules import make_module, with_modules
 from catenary.esi.objects import read_dictionary
 from catenary.esi.record import FileIndex, IndexEntry, Kind, Record
 from catenary.esi.references import resolve
@@ -50,10 +50,10 @@ class Assembly:
         root = Path(record.root)
         device = replace(
             device,
-            modules=tuple(self._modules(index, device.slots, root)),
             dictionary=device.dictionary
             or self._dictionary(device.dictionary_file, device.source, root),
         )
+        device = with_modules(device, self._modules(index, device.slots, root))
         return replace(device, warnings=(*device.warnings, *self._warnings))
 
     def _modules(self, index: FileIndex, slots: EsiSlots | None, root: Path) -> list[EsiModule]:

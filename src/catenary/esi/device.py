@@ -247,10 +247,33 @@ class EsiSlot:
     index_increment: int | None = None
     source: Source = NO_SOURCE
 
+    def accepts(self, ident: int, module_class: str) -> bool:
+        """Return True if the slot accepts a module. Without idents and classes, it accepts all.
+
+        Args:
+            ident: Ident of the module.
+            module_class: Class of the module; empty if it has none.
+        """
+        if not self.module_idents and not self.module_classes:
+            return True
+        by_class = bool(module_class) and module_class in self.module_classes
+        return by_class or ident in self.module_idents
+
+
+class ModuleLabel(NamedTuple):
+    """Ident, type and class of a module that the slots of a device accept."""
+
+    ident: int
+    type: str
+    module_class: str = ""
+
+    def __str__(self) -> str:
+        return f"{self.type} (0x{self.ident:08X})"
+
 
 @dataclass(frozen=True, slots=True)
 class EsiSlots:
-    """Slots of a modular device (ETG.5001)."""
+    """Slots of a modular device (ETG.5001). `print` lists them with the accepted modules."""
 
     slots: tuple[EsiSlot, ...] = ()
     max_slot_count: int | None = None
@@ -258,6 +281,27 @@ class EsiSlots:
     index_increment: int = 0  # added to the object indices, times the slot number from 0
     download_module_idents: bool = False  # 0xF030 is written before SAFE-OP
     identify_by: str = ""  # `IdentifyModuleBy`
+    labels: tuple[ModuleLabel, ...] = ()  # of the accepted modules that were found
+
+    def accepted(self, slot: EsiSlot) -> tuple[ModuleLabel, ...]:
+        """Return the modules that a slot accepts; one that was not found has an empty type."""
+        found = tuple(each for each in self.labels if slot.accepts(each.ident, each.module_class))
+        known = {each.ident for each in found}
+        missing = (ModuleLabel(each, "") for each in slot.module_idents if each not in known)
+        return (*found, *missing)
+
+    def __str__(self) -> str:
+        lines, number = [], 0
+        for slot in self.slots:
+            count = max(slot.min_instances, slot.max_instances)
+            place = f"slot {number}" if count == 1 else f"slots {number} to {number + count - 1}"
+            some = "required" if count == 1 else f"at least {slot.min_instances} occupied"
+            lines.append(f"{place}  {slot.name}" + f"  {some}" * bool(slot.min_instances))
+            for each in self.accepted(slot):
+                default = "  default" if each.ident == slot.default_ident else ""
+                lines.append(f"    0x{each.ident:08X}  {each.type or '(not found)'}{default}")
+            number += count
+        return "\n".join(lines)
 
 
 @dataclass(frozen=True, slots=True)
@@ -272,6 +316,7 @@ class EsiModule:
     init_commands: tuple[EsiInitCommand, ...] = ()
     dictionary: EsiDictionary | None = None
     dictionary_file: str = ""  # file that contains the dictionary (`DictionaryFile`)
+    pdo_group: int = 0  # `ModulePdoGroup`: PDOs are assigned by group, then by slot
     source: Source = NO_SOURCE
 
 

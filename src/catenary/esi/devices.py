@@ -28,7 +28,7 @@ from catenary.esi.info import (
 )
 from catenary.esi.known_elements import DEVICE, unknown_paths
 from catenary.esi.mailbox import read_mailbox
-from catenary.esi.modules import accepted_modules, read_profile
+from catenary.esi.modules import read_profile, with_modules
 from catenary.esi.pdos import read_pdos
 from catenary.esi.slots import read_slots
 from catenary.esi.sync_managers import read_fmmus, read_sync_managers
@@ -100,8 +100,7 @@ def make_device(
     device = _with_process_data(_identified(element, vendor, findings), element, findings)
     device = _with_services(device, element, findings)
     return replace(
-        device,
-        modules=accepted_modules(device.slots, modules),
+        with_modules(device, modules),
         unknown=unknown_paths(element, DEVICE),
         warnings=tuple(findings.warnings),
     )

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import replace
 from typing import NamedTuple
 
 from catenary.errors import EsiError
-from catenary.esi.device import EsiModule, EsiSlots
+from catenary.esi.device import EsiDevice, EsiModule, EsiSlots, ModuleLabel
 from catenary.esi.dictionary import EsiDataType, EsiDictionary, EsiObject
 from catenary.esi.findings import Findings, text_of
 from catenary.esi.mailbox import read_init_commands
@@ -45,12 +46,29 @@ def make_module(element: Element, findings: Findings) -> EsiModule:
         type=text_of(element, "Type"),
         name=text_of(element, "Name"),
         module_class=kind.attributes.get("ModuleClass", "").strip(),
+        pdo_group=findings.integer(kind, "ModulePdoGroup", bits=16),
         pdos=read_pdos(element, findings),
         init_commands=read_init_commands(element.find("Mailbox"), findings),
         dictionary=profile.dictionary,
         dictionary_file=profile.dictionary_file,
         source=findings.source(element),
     )
+
+
+def with_modules(device: EsiDevice, modules: Iterable[EsiModule]) -> EsiDevice:
+    """Return a device with the modules that its slots accept.
+
+    Args:
+        device: The device, without modules.
+        modules: The modules that were found.
+    """
+    if device.slots is None:
+        return device
+    accepted = accepted_modules(device.slots, modules)
+    labels = tuple(
+        ModuleLabel(each.ident, each.type or each.name, each.module_class) for each in accepted
+    )
+    return replace(device, slots=replace(device.slots, labels=labels), modules=accepted)
 
 
 def accepted_modules(slots: EsiSlots | None, modules: Iterable[EsiModule]) -> tuple[EsiModule, ...]:
@@ -62,10 +80,10 @@ def accepted_modules(slots: EsiSlots | None, modules: Iterable[EsiModule]) -> tu
     """
     if slots is None:
         return ()
-    idents = {ident for slot in slots.slots for ident in slot.module_idents}
-    classes = {name for slot in slots.slots for name in slot.module_classes}
     return tuple(
-        module for module in modules if module.ident in idents or module.module_class in classes
+        module
+        for module in modules
+        if any(slot.accepts(module.ident, module.module_class) for slot in slots.slots)
     )
 
 

@@ -56,7 +56,7 @@ def _completed(
     """Return the description with its own mapping, and with the PDOs that the ESI adds."""
     rules = {pdo.index: pdo for pdo in described}
     known = {pdo.index: _named(esi, pdo, rules.get(pdo.index)) for pdo in device.pdos(direction)}
-    added = [_pdo(esi, pdo, None) for pdo in described if pdo.index not in known]
+    added = [model_pdo(esi, pdo, None) for pdo in described if pdo.index not in known]
     assigned = tuple(
         replace(each, pdos=tuple(_named(esi, pdo, rules.get(pdo.index)) for pdo in each.pdos))
         for each in device.assignments(direction)
@@ -80,7 +80,7 @@ def _replaced(
             )
             channel = None
         old = before.pop(each.index, None)
-        pdos.append(_with_old_names(_pdo(esi, each, channel), old))
+        pdos.append(_with_old_names(model_pdo(esi, each, channel), old))
     pdos += [replace(pdo, sync_manager=None) for pdo in before.values()]
     assigned = assignments(tuple(pdos))
     if not device.coe:  # otherwise, the mapping that the device reports counts
@@ -115,7 +115,14 @@ def _text(assigned: tuple[Assignment, ...]) -> str:
     return "; ".join(parts) or "none"
 
 
-def _pdo(esi: EsiDevice, described: EsiPdo, channel: int | None) -> Pdo:
+def model_pdo(esi: EsiDevice, described: EsiPdo, channel: int | None) -> Pdo:
+    """Return a PDO of an ESI as a value of the model.
+
+    Args:
+        esi: Device or module with the dictionary that names the entries.
+        described: The PDO.
+        channel: SyncManager to which it is assigned; None: not assigned.
+    """
     return Pdo(
         described.index,
         tuple(_entry(esi, each) for each in described.entries),
@@ -136,7 +143,7 @@ def _named(esi: EsiDevice, pdo: Pdo, described: EsiPdo | None) -> Pdo:
             (each.index, each.subindex): each for each in map(lambda e: _bare(esi, e), pdo.entries)
         }
         return replace(pdo, entries=tuple(_joined(e, entries) for e in pdo.entries))
-    other = _pdo(esi, described, pdo.sync_manager)
+    other = model_pdo(esi, described, pdo.sync_manager)
     entries = {(each.index, each.subindex): each for each in other.entries if each.index}
     return replace(
         other,

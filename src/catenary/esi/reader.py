@@ -18,7 +18,7 @@ from catenary.esi.dictionary import EsiDictionary
 from catenary.esi.document import Document, open_document
 from catenary.esi.encoding import Encoding
 from catenary.esi.findings import Findings, text_of
-from catenary.esi.modules import accepted_modules, make_module
+from catenary.esi.modules import make_module
 from catenary.esi.objects import read_dictionary
 from catenary.esi.source import EsiWarning, Source
 from catenary.esi.values import file_name, plain_text
@@ -120,16 +120,6 @@ def read_module(data: bytes, encoding: Encoding, *, file: str, line: int) -> Esi
         EsiError: The bytes are not one module, or it has no valid identification.
     """
     return make_module(read_fragment(data, encoding, file=file, line=line), Findings(file))
-
-
-def with_modules(device: EsiDevice, modules: Iterable[EsiModule]) -> EsiDevice:
-    """Return a device with the modules that its slots accept.
-
-    Args:
-        device: The device.
-        modules: The modules that were found.
-    """
-    return replace(device, modules=accepted_modules(device.slots, modules))
 
 
 class _Pass:

@@ -37,7 +37,7 @@ def with_settings(device: DeviceDescription, esi: EsiDevice) -> DeviceDescriptio
         mailbox=mailbox,
         op_modes=_op_modes(device.op_modes, esi.op_modes),
         sii_denies_lrw=device.sii_denies_lrw or esi.use_lrd_lwr,
-        init_commands=tuple(map(_init_command, commands)),
+        init_commands=tuple(map(init_command, commands)),
         named_mappings=tuple(
             NamedMapping(each.name, each.default, each.pdos, str(each.source))
             for each in esi.alternative_mappings
@@ -101,7 +101,8 @@ def _op_mode(described: EsiOpMode) -> OpMode:
     )
 
 
-def _init_command(described: EsiInitCommand) -> InitCommand:
+def init_command(described: EsiInitCommand) -> InitCommand:
+    """Return a start-up command of an ESI as a value of the model."""
     return InitCommand(
         described.transitions,
         described.index,

@@ -163,7 +163,9 @@ def _downloads(plan: DevicePlan, label: str) -> tuple[Download, ...]:
     Raises:
         ConfigurationError: A download of the ESI needs complete access.
     """
-    before = (*plan.commands.in_pre_op, *plan.before_mapping)
+    idents = () if plan.modules is None else plan.modules.downloads
+    modules = (each for each in idents if not each.optional)  # not their number: it stays as it is
+    before = (*modules, *plan.commands.in_pre_op, *plan.before_mapping)
     downloads = (*before, *plan.start_up, *plan.commands.in_safe_op)
     for each in downloads:
         if each.complete_access:

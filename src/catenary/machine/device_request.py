@@ -8,10 +8,13 @@ from typing import Any
 from msgspec import UNSET
 
 from catenary.bus import SubDevice
+from catenary.drive.modules import chosen_modules
+from catenary.errors import ConfigurationError
 from catenary.machine.file import MachineFile
 from catenary.machine.lines import KeyPath
 from catenary.machine.references import data_type, object_of
 from catenary.machine.schema import StartUpTable
+from catenary.model.module import ConfiguredModule
 from catenary.plan.request import DeviceRequest, ImageLayout, RequestTables, Views
 from catenary.plan.start_up_object import StartUp
 from catenary.types import Octets
@@ -49,17 +52,48 @@ def _start_up(file: MachineFile, table: StartUpTable, path: KeyPath) -> StartUp:
         return StartUp(index, subindex, value, **options)
 
 
+def device_modules(
+    file: MachineFile, number: int, sub: SubDevice
+) -> tuple[ConfiguredModule, ...] | None:
+    """Return the modules of a device of the file; None without the key `modules`.
+
+    Args:
+        file: the machine file.
+        number: number of the [[device]] table, from 0.
+        sub: the device.
+
+    Raises:
+        MachineFileError: A slot does not accept a module, or no ESI was used for the device.
+    """
+    given = file.tables.device[number].modules
+    if given is UNSET:
+        return None
+    path: KeyPath = ("device", number, "modules")
+    try:
+        return chosen_modules(sub, given)
+    except ConfigurationError as error:
+        raise file.error(path, error.message, hint=error.hint) from error
+
+
 class StartUpRequest:
-    """Request with the start-up objects of one device. It does not request process data.
+    """Request with the start-up objects and modules of one device, without process data.
 
     It also states whether the device may be absent.
     """
 
     def __init__(
-        self, sub: SubDevice, objects: Sequence[StartUp], *, required: bool, divider: int
+        self,
+        sub: SubDevice,
+        objects: Sequence[StartUp],
+        modules: tuple[ConfiguredModule, ...] | None = None,
+        *,
+        required: bool,
+        divider: int,
     ) -> None:
         self.subs = (sub,)
-        self._request = DeviceRequest(objects=tuple(objects), required=required, divider=divider)
+        self._request = DeviceRequest(
+            objects=tuple(objects), required=required, divider=divider, modules=modules
+        )
 
     def pdos(self, period_ns: int) -> Mapping[int, DeviceRequest]:
         """Return the request of the device, by position."""

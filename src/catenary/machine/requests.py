@@ -8,9 +8,10 @@ from msgspec import UNSET
 
 from catenary.bus import SubDevice
 from catenary.drive import Drives
+from catenary.drive.modules import described
 from catenary.drive.process_data import ProcessData
 from catenary.machine.channels import make_channels
-from catenary.machine.device_request import StartUpRequest, start_up_objects
+from catenary.machine.device_request import StartUpRequest, device_modules, start_up_objects
 from catenary.machine.file import MachineFile
 from catenary.machine.lines import KeyPath
 from catenary.machine.options import drives_options, process_data_options
@@ -59,7 +60,8 @@ def make_drives(file: MachineFile, role: str, subs: Subs) -> Drives:
 def _axis(
     file: MachineFile, path: KeyPath, address: AxisAddress, sub: SubDevice
 ) -> tuple[SubDevice, int]:
-    slots = sub.slots or (0,)
+    [number] = [k for k, each in enumerate(file.tables.device) if each.name == address.device]
+    slots = described(sub, device_modules(file, number, sub)).slots or (0,)
     if address.slot is None and len(slots) == 1:
         return sub, slots[0]
     if address.slot in slots:
@@ -87,17 +89,22 @@ def make_process_data(file: MachineFile, role: str, subs: Subs) -> ProcessData:
     table = file.tables.process_data[role]
     sub = subs[table.device]
     options = process_data_options(file, role)
+    [number] = [k for k, each in enumerate(file.tables.device) if each.name == table.device]
+    device = described(sub, device_modules(file, number, sub))
+    modules = file.tables.device[number].modules
+    if modules is not UNSET:
+        options["modules"] = modules
     for name in ("inputs", "outputs"):
         given = getattr(table, name)
         if given is not UNSET:
-            options[name] = make_channels(file, (*path, name), given, sub.description)
+            options[name] = make_channels(file, (*path, name), given, device)
     options.setdefault("required", _required(file, [table.device]))
     with file.located(path, options):
         return ProcessData(sub, **options)
 
 
 def make_device_requests(file: MachineFile, subs: Subs) -> list[StartUpRequest]:
-    """Return requests for present devices that have start-up objects or that may be absent.
+    """Return requests for present devices with start-up objects or modules, or that may be absent.
 
     Args:
         file: the machine file.
@@ -106,13 +113,17 @@ def make_device_requests(file: MachineFile, subs: Subs) -> list[StartUpRequest]:
     made = []
     for number, device in enumerate(file.tables.device):
         objects = start_up_objects(file, number)
-        if device.name not in subs or (device.required and not objects):
+        if device.name not in subs:
+            continue
+        modules = device_modules(file, number, subs[device.name])
+        if device.required and not objects and modules is None:
             continue
         dividers = _dividers(file, device.name)
         made.append(
             StartUpRequest(
                 subs[device.name],
                 objects,
+                modules,
                 required=device.required and not dividers,  # a role has its own `required`
                 divider=dividers[0] if dividers else 1,
             )

@@ -129,6 +129,12 @@ class DeviceTable(Table, frozen=True, kw_only=True):
     required: Annotated[bool, Meta(description="false if the device may be absent")] = True
     esi: Optional[EsiPlace] = UNSET
     op_mode: Optional[Annotated[str, Meta(description="OpMode from the ESI or SII")]] = UNSET
+    modules: Optional[
+        Annotated[
+            list[str | int],
+            Meta(description='module of each slot: type, name or ident; "" for an empty slot'),
+        ]
+    ] = UNSET
     start_up: list[StartUpTable] = []
     comment: str = ""
 

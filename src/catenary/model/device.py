@@ -7,9 +7,7 @@ not access the network. A `source` is file and line of a fact from an ESI file; 
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from dataclasses import dataclass, replace
-from enum import IntEnum
 from typing import NamedTuple
 
 from catenary.model.esi_settings import (
@@ -21,9 +19,35 @@ from catenary.model.esi_settings import (
     Timeouts,
     WatchdogValues,
 )
+from catenary.model.module import ModularDevice
+from catenary.model.process_data import (
+    Assignment,
+    Direction,
+    Entry,
+    ObjectInformation,
+    Pdo,
+    mapped_entries,
+    mapped_pdos,
+)
 from catenary.wire.features import Information
 from catenary.wire.sii import MailboxProtocol
 from catenary.wire.sii_categories import SyncManagerUse
+
+__all__ = [
+    "Assignment",
+    "DeviceDescription",
+    "Direction",
+    "Entry",
+    "Identity",
+    "MailboxLayout",
+    "ObjectInformation",
+    "ObjectValue",
+    "OpMode",
+    "Pdo",
+    "SyncManager",
+    "mapped_entries",
+    "mapped_pdos",
+]
 
 
 class Identity(NamedTuple):
@@ -43,23 +67,6 @@ class Identity(NamedTuple):
     def same_kind(self, other: Identity) -> bool:
         """Return True if vendor and product are equal. Revision and serial number are ignored."""
         return (self.vendor, self.product) == (other.vendor, other.product)
-
-
-class Direction(IntEnum):
-    """Direction of process data, seen from the MainDevice."""
-
-    OUTPUT = 0  # RxPDOs
-    INPUT = 1  # TxPDOs
-
-    @property
-    def use(self) -> SyncManagerUse:
-        """Use of the SyncManagers that carry this direction."""
-        return SyncManagerUse.OUTPUTS if self is Direction.OUTPUT else SyncManagerUse.INPUTS
-
-    @property
-    def noun(self) -> str:
-        """Name of the direction in messages."""
-        return "outputs" if self is Direction.OUTPUT else "inputs"
 
 
 @dataclass(frozen=True, slots=True)
@@ -98,68 +105,6 @@ class SyncManager:
 
 
 @dataclass(frozen=True, slots=True)
-class Entry:
-    """One object in a PDO. Index 0 marks a gap."""
-
-    index: int
-    subindex: int
-    bit_length: int
-    name: str = ""
-    data_type: int = 0  # ETG.1000.6 table 64; 0 if unknown
-    unit: str = ""  # from an ESI file
-    enumeration: tuple[tuple[int, str], ...] = ()  # values with texts, from an ESI file
-
-    @property
-    def place(self) -> tuple[int, int, int]:
-        """Index, subindex and bit length, by which entries are compared."""
-        return self.index, self.subindex, self.bit_length
-
-    def __str__(self) -> str:
-        place = f"0x{self.index:04X}:{self.subindex:02X} ({self.bit_length} bits)"
-        return f"{place} {self.name}".rstrip()
-
-
-@dataclass(frozen=True, slots=True)
-class Pdo:
-    """A process data object: entries that are transferred together."""
-
-    index: int
-    entries: tuple[Entry, ...]
-    sync_manager: int | None  # default assignment; None if not assigned
-    fixed: bool = False  # its entries cannot be changed
-    mandatory: bool = False  # cannot be removed from the assignment
-    name: str = ""
-    excludes: frozenset[int] = frozenset()  # PDOs that cannot be assigned together with it (ESI)
-    excluded_sync_managers: frozenset[int] = frozenset()  # it cannot be assigned to these (ESI)
-    missing: bool = False  # its ESI has it, but its dictionary does not
-    source: str = ""
-
-    @property
-    def bit_length(self) -> int:
-        """Total length of the entries [bits]."""
-        return sum(entry.bit_length for entry in self.entries)
-
-
-@dataclass(frozen=True, slots=True)
-class Assignment:
-    """The PDOs that one SyncManager carries, in order."""
-
-    sync_manager: int
-    pdos: tuple[Pdo, ...]
-    fixed: bool = False  # the list of PDOs (0x1C10 + SyncManager) cannot be changed
-
-    @property
-    def bit_length(self) -> int:
-        """Total length of the PDOs [bits]."""
-        return sum(pdo.bit_length for pdo in self.pdos)
-
-    @property
-    def byte_length(self) -> int:
-        """Total length of the PDOs [bytes], rounded up."""
-        return (self.bit_length + 7) // 8
-
-
-@dataclass(frozen=True, slots=True)
 class OpMode:
     """One mode of a device with distributed clocks.
 
@@ -180,23 +125,6 @@ class OpMode:
     sync1_ns: int = 0  # cycle time of SYNC1; if it is 0, `sync1_factor` applies
     assignments: tuple[ModeAssignment, ...] = ()  # empty: the mode keeps the assignment
     source: str = ""
-
-
-@dataclass(frozen=True, slots=True)
-class ObjectInformation:
-    """Description of a dictionary entry (SDO information, ETG.1000.6 §5.6.3.6)."""
-
-    index: int
-    subindex: int
-    bit_length: int
-    data_type: int = 0
-    output_mappable: bool = True  # as RxPDO
-    input_mappable: bool = True  # as TxPDO
-    name: str = ""
-    note: str = ""  # the reason if the dictionary does not describe it
-    readable: bool = True  # False if it is write-only according to the dictionary
-    unit: str = ""  # from an ESI file
-    enumeration: tuple[tuple[int, str], ...] = ()  # values with texts, from an ESI file
 
 
 @dataclass(frozen=True, slots=True)
@@ -244,6 +172,7 @@ class DeviceDescription:
     named_mappings: tuple[NamedMapping, ...] = ()
     timeouts: Timeouts = NO_TIMEOUTS
     watchdog: WatchdogValues = NO_WATCHDOG_VALUES
+    modular: ModularDevice | None = None  # slots and modules, from an ESI file
 
     @property
     def profile(self) -> int | None:
@@ -343,13 +272,3 @@ class DeviceDescription:
 
     def __str__(self) -> str:
         return f"device {self.position} ({self.name})"
-
-
-def mapped_pdos(assignments: Iterable[Assignment]) -> tuple[Pdo, ...]:
-    """Return all PDOs of the assignments, in order."""
-    return tuple(pdo for assignment in assignments for pdo in assignment.pdos)
-
-
-def mapped_entries(assignments: Iterable[Assignment]) -> tuple[Entry, ...]:
-    """Return all entries of the assignments, without gaps."""
-    return tuple(entry for pdo in mapped_pdos(assignments) for entry in pdo.entries if entry.index)

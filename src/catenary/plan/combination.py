@@ -6,6 +6,7 @@ import math
 from collections.abc import Sequence
 
 from catenary.errors import ConfigurationError
+from catenary.model.module import ConfiguredModule
 from catenary.plan.request import (
     DeviceRequest,
     DistributedClock,
@@ -41,6 +42,7 @@ def gather_requests(
                 before.required or pdos.required,
                 _one_mapping(position, before.pdos, pdos.pdos),
                 _one_start_up(position, before.objects, pdos.objects),
+                _one_list(position, before.modules, pdos.modules),
             )
     return gathered
 
@@ -86,6 +88,21 @@ def _one_start_up(
                 hint="give both the same start_up=, or only one of them",
             )
     return first + tuple(each for each in second if each not in first)
+
+
+def _one_list(
+    position: int,
+    first: tuple[ConfiguredModule, ...] | None,
+    second: tuple[ConfiguredModule, ...] | None,
+) -> tuple[ConfiguredModule, ...] | None:
+    """Return the modules that two requests name. Raise ConfigurationError if they contradict."""
+    if first is not None and second is not None and first != second:
+        raise ConfigurationError(
+            f"device {position}: two requests have different modules in its slots: "
+            f"{', '.join(map(str, first))} and {', '.join(map(str, second))}",
+            hint="give both the same modules=, or only one of them",
+        )
+    return first if second is None else second
 
 
 def _merged(

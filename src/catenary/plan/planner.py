@@ -10,6 +10,7 @@ from typing import NamedTuple
 from catenary import notebook
 from catenary.errors import ConfigurationError
 from catenary.model.device import DeviceDescription, Direction
+from catenary.model.module_mapping import with_mapping_of
 from catenary.plan.clock_report import Clocks
 from catenary.plan.clocks import ClockChoice, choose_clocks, make_clock_plan, make_sync
 from catenary.plan.combination import gather_requests
@@ -30,13 +31,14 @@ from catenary.plan.layout import (
 )
 from catenary.plan.mailboxes import MailboxArea, with_mailboxes
 from catenary.plan.mapping import make_mapping
+from catenary.plan.modules import make_module_plan, with_requested_modules
 from catenary.plan.op_mode import mode_pdos
 from catenary.plan.options import PlanOptions
 from catenary.plan.output_owners import check_owners
 from catenary.plan.pdo_mapping import Mapping
 from catenary.plan.report import report
 from catenary.plan.request import DeviceRequest, ProcessDataRequest, RequestTables, WrittenPdo
-from catenary.plan.start_up import DevicePlan, make_device_plan
+from catenary.plan.start_up import DevicePlan, compared, make_device_plan
 from catenary.plan.watchdog import choose_watchdog
 from catenary.wire.cia402 import Mode
 
@@ -118,6 +120,7 @@ class _Draft(NamedTuple):
     inputs: Mapping
     watchdog_ns: int
     watchdog_source: str
+    found: DeviceDescription  # with the mapping that the device reports
 
     def data(self, *, optional: bool) -> DeviceData:
         return DeviceData(
@@ -131,7 +134,7 @@ class _Draft(NamedTuple):
 
     def plan(self, place: DeviceLayout, period_ns: int, lead_ns: int) -> DevicePlan:
         clock = self.request.clock
-        return make_device_plan(
+        plan = make_device_plan(
             self.device,
             self.request,
             self.outputs,
@@ -143,6 +146,8 @@ class _Draft(NamedTuple):
             else make_sync(self.device, clock, period_ns * self.request.divider, lead_ns),
             self.watchdog_source if place.output_size else "",
         )
+        plan = replace(plan, modules=make_module_plan(self.device, self.request.modules))
+        return plan if self.found is self.device else compared(plan, self.found)
 
 
 def _drafts(
@@ -155,8 +160,9 @@ def _drafts(
     _check_positions(devices, combined)
     required = not combined or any(request.required for request in combined.values())
     drafts = []
-    for device in devices:
-        request = combined.get(device.position, DeviceRequest(required=required))
+    for found in devices:
+        request = combined.get(found.position, DeviceRequest(required=required))
+        device = with_requested_modules(found, request.modules)
         watchdog_ns, watchdog_source = choose_watchdog(
             device, request, options.watchdog, options.period_ns
         )
@@ -169,6 +175,7 @@ def _drafts(
                 make_mapping(device, Direction.INPUT, request.inputs, inputs),
                 watchdog_ns,
                 watchdog_source,
+                device if device is found else with_mapping_of(device, found),
             )
         )
     return drafts

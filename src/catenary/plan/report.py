@@ -12,6 +12,7 @@ from catenary.plan.cycle import ClockPlan, CyclePlan, DatagramKind, DatagramPlan
 from catenary.plan.download import Download
 from catenary.plan.frames import ACYCLIC_GUARD
 from catenary.plan.layout import Layout
+from catenary.plan.modules import ident_lines, module_lines
 from catenary.plan.numbers import entry_places
 from catenary.plan.start_up import DevicePlan
 from catenary.wire.cia402 import Mode
@@ -88,6 +89,8 @@ def _devices(devices: Sequence[DevicePlan]) -> Iterator[str]:
             yield f"    FMMU {place.mailbox.index} in   mailbox full, 1 bit"
         if device.sync is not None:
             yield f"    {sync_text(device.sync)}"
+        if device.modules is not None:
+            yield from (f"    {line}" for line in module_lines(device.modules))
         if device.mapping_source not in COMMON_SOURCES and (device.outputs or device.inputs):
             yield f"    mapping from {device.mapping_source}"
         yield from _entries(Direction.OUTPUT, device.outputs, place.output_offset)
@@ -103,6 +106,8 @@ def _start_up(devices: Sequence[DevicePlan]) -> Iterator[str]:
         yield "start-up: SDOs written in PRE-OP, in this order"
     for device in chosen:
         yield f"    device {device.position}  {device.name}"
+        if device.modules is not None:
+            yield from (f"        {'modules':<15} {each}" for each in ident_lines(device.modules))
         old = {change.what: change.old or "(not read)" for change in device.changes}
         yield from (_download("ESI", each, old) for each in device.commands.in_pre_op)
         yield from (_download("before mapping", each, old) for each in device.before_mapping)

@@ -14,6 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from catenary.model.device import Direction
+from catenary.model.module import ConfiguredModule
 from catenary.plan.axis_report import AxisReport
 from catenary.plan.cycle import AxisPlan, Column, ImageArea, Number
 from catenary.plan.numbers import ANY, Which
@@ -142,6 +143,7 @@ class DeviceRequest:
     required: bool = True  # True if a cycle without it is bad
     pdos: tuple[WrittenPdo, ...] = ()  # PDOs to use in their directions, without a search
     objects: tuple[StartUp, ...] = ()  # start-up objects of the application, in their order
+    modules: tuple[ConfiguredModule, ...] | None = None  # None: those in the description
 
     def written(self, direction: Direction) -> tuple[WrittenPdo, ...]:
         """Return the PDOs of a direction that the application specified."""

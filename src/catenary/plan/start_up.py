@@ -32,6 +32,7 @@ from catenary.plan.clocks import SyncPlan
 from catenary.plan.download import Download
 from catenary.plan.init_commands import NO_COMMANDS, Commands, choose_commands
 from catenary.plan.layout import DeviceLayout
+from catenary.plan.modules import ModulePlan
 from catenary.plan.pdo_mapping import ASSIGNMENT_BASE, Mapping, shape
 from catenary.plan.start_up_object import StartUp
 from catenary.types import Scalar, by_index
@@ -67,11 +68,13 @@ class DevicePlan:
     commands: Commands = NO_COMMANDS  # of the ESI, before the other objects or in SAFE-OP
     watchdog_source: str = ""  # file and line; empty if it is not from an ESI
     mapping_source: str = ""  # "CoE", "SII", "ESI FILE:LINE", or of the OpMode or named mapping
+    modules: ModulePlan | None = None  # None: the device is not modular
 
     @property
     def downloads(self) -> tuple[Download, ...]:
         """All downloads in PRE-OP, in the order of writing."""
-        return (*self.commands.in_pre_op, *self.before_mapping, *self.mapping, *self.start_up)
+        own = (*self.commands.in_pre_op, *self.before_mapping, *self.mapping, *self.start_up)
+        return own if self.modules is None else (*self.modules.downloads, *own)
 
     @property
     def watchdog_count(self) -> int:
@@ -258,6 +261,21 @@ def renewed(plan: DevicePlan, device: DeviceDescription) -> DevicePlan:
         mapping=written,
         mapping_changed=any(mapping.changed for mapping in mappings),
     )
+
+
+def compared(plan: DevicePlan, device: DeviceDescription) -> DevicePlan:
+    """Return the plan with the changes of a mapping that differs from that of its description.
+
+    Args:
+        plan: Plan of the device, such as one for other modules in its slots.
+        device: Description with the present mapping of the device.
+    """
+    changes: list[Change] = []
+    for each in Direction:
+        difference = _difference(device, each, plan.assignments(each))
+        changes += mapping_changes(device, each, difference)
+    values = (change for change in plan.changes if ":" in change.what)
+    return replace(renewed(plan, device), changes=(*changes, *values))
 
 
 def _difference(

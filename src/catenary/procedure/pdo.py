@@ -76,7 +76,7 @@ def write_downloads(
         ConfigurationError: The value of a start-up object differs after it was written.
     """
     for step in (*plan.commands.in_pre_op, *plan.before_mapping):
-        yield from _write_object(channel, step)
+        yield from write_object(channel, step)
     for step in plan.mapping:
         try:
             yield from download(channel, step.index, step.subindex, step.data)
@@ -84,7 +84,7 @@ def write_downloads(
             yield from restore_mapping(channel, device, plan)
             raise _refused_mapping(channel, plan, step, abort) from abort
     for step in plan.start_up:
-        yield from _write_object(channel, step)
+        yield from write_object(channel, step)
 
 
 def write_in_safe_op(channel: MailboxChannel | None, plan: DevicePlan) -> Procedure[None]:
@@ -100,11 +100,20 @@ def write_in_safe_op(channel: MailboxChannel | None, plan: DevicePlan) -> Proced
     if channel is None:
         return
     for step in plan.commands.in_safe_op:
-        yield from _write_object(channel, step)
+        yield from write_object(channel, step)
 
 
-def _write_object(channel: MailboxChannel, step: Download) -> Procedure[None]:
-    """Write one object outside the mapping, and verify it if the plan requires this."""
+def write_object(channel: MailboxChannel, step: Download) -> Procedure[None]:
+    """Write one object outside the mapping, and verify it if the plan requires this.
+
+    Args:
+        channel: The mailbox of the device.
+        step: The object and its value.
+
+    Raises:
+        SdoAbort: The device refused it. Optional objects that it lacks or refuses are skipped.
+        ConfigurationError: The value differs after it was written.
+    """
     try:
         complete = step.complete_access
         yield from download(channel, step.index, step.subindex, step.data, complete_access=complete)

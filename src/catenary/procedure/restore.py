@@ -14,6 +14,7 @@ from catenary.procedure.al_state import request_state
 from catenary.procedure.configure import configure_mailbox, configure_process_data
 from catenary.procedure.exchange import Procedure, Request, read, write, write_memory
 from catenary.procedure.mailbox import MailboxChannel
+from catenary.procedure.modules import prepare_modules
 from catenary.procedure.pdo import read_mapping, verify_mapping, write_downloads, write_in_safe_op
 from catenary.procedure.sii import read_identity
 from catenary.procedure.sii_owner import hand_over
@@ -142,8 +143,9 @@ def bring_to_safe_op(
         clock: The procedure that sets its clock, run before the request; None without a clock.
     """
     if channel is not None and device.coe:
-        found = yield from read_mapping(channel, device)
-        again = renewed(plan, found)
+        found, again = yield from prepare_modules(channel, device, plan)
+        found = yield from read_mapping(channel, found)
+        again = renewed(again, found)
         yield from write_downloads(channel, found, again)
         if again.mapping_changed:
             yield from verify_mapping(channel, device, again)

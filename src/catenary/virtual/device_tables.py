@@ -179,6 +179,7 @@ class EsiTable(_ClockedTable, tag="esi", frozen=True, kw_only=True):
     chosen: str = msgspec.field(default="", name="device")
     mailbox_delay: float = 300e-6
     mailbox_quirks: MailboxQuirks = NO_MAILBOX_QUIRKS
+    modules: tuple[str | int, ...] | None = None  # "" for an empty slot
 
     def device(self) -> Device:
         return DescribedDevice(
@@ -190,6 +191,7 @@ class EsiTable(_ClockedTable, tag="esi", frozen=True, kw_only=True):
             crystal=self.crystal.crystal(),
             clock_bits=self.clock_bits,
             mailbox_quirks=self.mailbox_quirks,
+            modules=self.modules,
         )
 
 

@@ -32,6 +32,7 @@ from catenary.virtual.coe.dictionary import (
     text,
 )
 from catenary.virtual.coe.information import SDO_INFORMATION, InformationServer
+from catenary.virtual.coe.module_lists import ModuleLists
 from catenary.virtual.coe.pdo_objects import RX_ASSIGNMENT, PdoObjects
 from catenary.virtual.coe.quirks import NO_MAILBOX_QUIRKS, MailboxQuirks
 from catenary.virtual.coe.sdo_server import SDO_REQUEST, SdoServer
@@ -54,6 +55,7 @@ from catenary.virtual.state_machine import (
     INVALID_OUTPUT_CONFIGURATION,
     INVALID_OUTPUT_MAPPING,
     INVALID_WATCHDOG_CONFIGURATION,
+    MODULES_DIFFER,
     NO_SYNC_ERROR,
     NO_VALID_OUTPUTS,
     OP,
@@ -142,6 +144,7 @@ class Application:
         self._emulation = description.emulation
         self.synchronisation: Synchronisation | None = None  # only for devices that support SYNC0
         self.checks_watchdog = False  # see ServoQuirks
+        self.module_lists: ModuleLists | None = None  # only of modular devices
         self.states = StateMachine(self, scheduler, description.identification)
         self.dictionary = Dictionary(self._state)
         self._add_communication_objects(description, quirks.text_prefix)
@@ -299,6 +302,8 @@ class Application:
         if state >= PRE_OP and before == INIT and not self._mailbox_is_configured():
             return INVALID_MAILBOX_CONFIGURATION
         if state >= SAFE_OP and before == PRE_OP:
+            if self.module_lists is not None and self.module_lists.differ:
+                return MODULES_DIFFER
             for channel in self._channels:
                 if refusal := self._check_channel(channel):
                     return refusal

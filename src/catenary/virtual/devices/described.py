@@ -6,20 +6,21 @@ The device has no behaviour of its own: a drive does not move. Outputs and input
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from os import PathLike
 from pathlib import Path
 
 from catenary.errors import ConfigurationError
-from catenary.esi.default_modules import with_default_modules
 from catenary.esi.device import EsiDevice
-from catenary.esi.library import Library
-from catenary.esi.reader import read_esi
+from catenary.esi.module_choice import ModuleName, choose_modules
+from catenary.esi.placement import default_placements, slot_places, with_placements
 from catenary.esi.selection import select_device
 from catenary.esi.sii import assemble_sii
 from catenary.model.device import Direction
 from catenary.virtual.coe.dictionary import Abort, Entry
 from catenary.virtual.coe.esi_objects import EsiObjects, code_of, slots_of
+from catenary.virtual.coe.module_lists import CONFIGURED, ModuleLists
 from catenary.virtual.coe.quirks import NO_MAILBOX_QUIRKS, MailboxQuirks
 from catenary.virtual.crystal import EXACT, ClockBits, Crystal
 from catenary.virtual.description import Description
@@ -51,6 +52,7 @@ class DescribedDevice(AppliedDevice):
         crystal: Crystal = EXACT,
         clock_bits: ClockBits = 64,
         mailbox_quirks: MailboxQuirks = NO_MAILBOX_QUIRKS,
+        modules: Sequence[ModuleName | None] | None = None,
     ) -> None:
         """Initialise the device.
 
@@ -63,10 +65,12 @@ class DescribedDevice(AppliedDevice):
             crystal: Frequency error and jitter of the clock.
             clock_bits: Width of the clock, 32 or 64.
             mailbox_quirks: Quirks of the mailbox.
+            modules: Modules in the slots of a modular device; None: the default modules.
 
         Raises:
             ValueError: A value is out of range.
-            ConfigurationError: The ESI does not give a valid SII.
+            ConfigurationError: The ESI does not give a valid SII, or a slot does not accept a
+                module.
         """
         coe = device.mailbox is None or MailboxProtocol.COE in device.mailbox.protocols
         super().__init__(
@@ -81,7 +85,10 @@ class DescribedDevice(AppliedDevice):
                 delay=mailbox_delay, quirks=mailbox_quirks if coe else REFUSES_COE
             ),
         )
-        self.esi = with_default_modules(device)
+        placed = default_placements(device) if modules is None else choose_modules(device, modules)
+        self._modular = device if coe else replace(device, slots=None)
+        self._detected = {each.place.number: each.module.ident for each in placed}
+        self.esi = with_placements(device, placed)
         self.ports = _ports(device.physics)
         self._image = _image(device, serial, alias)
         self._rx, self._tx = (pdos_of(self.esi, each) for each in Direction)
@@ -114,9 +121,25 @@ class DescribedDevice(AppliedDevice):
         for index, (name, entries) in objects.make().items():
             if index not in own:
                 dictionary.add(index, name, entries, code=code_of(entries))
+        self._add_module_lists(application)
         for slot, value in objects.defaults.items():
             signed = len(value) == 8
             self.core.put_slot(self.position, slot, int.from_bytes(value, "little", signed=signed))
+
+    def _add_module_lists(self, application: Application) -> None:
+        """Add the module lists of a modular device. Its file can give the configured modules."""
+        slots = self._modular.slots
+        if slots is None:
+            return
+        count = len(list(slot_places(slots)))
+        detected = [self._detected.get(slot, 0) for slot in range(count)]
+        given = self._modular.dictionary
+        entries = [given.entry(CONFIGURED, k + 1) for k in range(count)] if given else []
+        known = [int.from_bytes(e.default or b"", "little") if e else 0 for e in entries]
+        without = [0] * count if slots.download_module_idents else detected
+        lists = ModuleLists(count, detected, known if any(entries) else without)
+        lists.add_to(application.dictionary, slots.index_increment)
+        application.module_lists = lists
 
     def _given_texts(self) -> set[int]:
         """Return the indices of name and versions that the file gives."""
@@ -169,6 +192,7 @@ def from_esi(
     alias: int = 0,
     serial: int = 0,
     crystal: Crystal = EXACT,
+    modules: Sequence[ModuleName | None] | None = None,
 ) -> DescribedDevice:
     """Return a virtual device from an ESI.
 
@@ -180,14 +204,19 @@ def from_esi(
         alias: Station alias.
         serial: Serial number.
         crystal: Frequency error and jitter of the clock.
+        modules: Module of each slot of a modular device: name, type or ident; None for an empty
+            slot. Without a list, the default modules are plugged in.
 
     Raises:
         EsiError: The file cannot be read.
-        ConfigurationError: The file has no such device, or gives no valid SII.
+        ConfigurationError: The file has no such device, gives no valid SII, or a slot does not
+            accept a module.
     """
     if not isinstance(source, EsiDevice):
         source = esi_device(source, device)
-    return DescribedDevice(source, name=name, alias=alias, serial=serial, crystal=crystal)
+    return DescribedDevice(
+        source, name=name, alias=alias, serial=serial, crystal=crystal, modules=modules
+    )
 
 
 def esi_device(path: str | PathLike[str], wanted: str = "") -> EsiDevice:
@@ -201,6 +230,10 @@ def esi_device(path: str | PathLike[str], wanted: str = "") -> EsiDevice:
         EsiError: The file cannot be read.
         ConfigurationError: The file has no such device.
     """
+    # The parser and the library are loaded only for ESI files.
+    from catenary.esi.library import Library
+    from catenary.esi.reader import read_esi
+
     device = select_device(read_esi(Path(path)), wanted)
     if not device.dictionary_file and (device.slots is None or device.modules):
         return device
