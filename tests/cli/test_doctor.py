@@ -106,7 +106,7 @@ def test_json_cannot_be_combined_with_apply(capsys):
 
 def test_apply_lists_the_changes_first_and_undo_reverts_them(machine, capsys):
     pages = machine.path("/sys/kernel/mm/transparent_hugepage/enabled")
-    assert main(["doctor", "--seconds", "0", "--apply", "--yes"]) == 0
+    assert main(["doctor", "--seconds", "0", "--apply", "--yes"]) == 1  # checks failed
     out = capsys.readouterr().out
     target = "/sys/kernel/mm/transparent_hugepage/enabled"
     listed, done = out.index(f"{target}: always -> madvise"), out.index(f"done: {target}")
@@ -123,8 +123,29 @@ def test_apply_lists_the_changes_first_and_undo_reverts_them(machine, capsys):
 def test_apply_asks(machine, monkeypatch, capsys, answer, after):
     monkeypatch.setattr("sys.stdin.isatty", lambda: True, raising=False)
     monkeypatch.setattr("builtins.input", lambda _: answer)
-    assert main(["doctor", "--seconds", "0", "--apply"]) == 0
+    assert main(["doctor", "--seconds", "0", "--apply"]) == 1  # checks failed
     assert machine.path("/sys/kernel/mm/transparent_hugepage/enabled").read_text() == after
+
+
+@pytest.mark.parametrize(("locked", "status"), [(False, 0), (True, 1)])
+def test_exit_status_of_apply(tmp_path, monkeypatch, capsys, locked, status):
+    """The exit status is 0 if no check failed and no change was refused."""
+    pages = "/sys/kernel/mm/transparent_hugepage/enabled"
+    root = tmp_path / "controller"
+    machine = machines.controller(root, **{pages: "[always] madvise never\n"})
+    monkeypatch.setattr(doctor, "this_machine", lambda *_, **__: machine)
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
+    ground = doctor.change.MachineGround(root)
+
+    class Refusing:
+        read = staticmethod(ground.read)
+
+        def write(self, target, value):
+            raise PermissionError(1, "Operation not permitted", target)
+
+    monkeypatch.setattr(doctor, "MachineGround", lambda: Refusing() if locked else ground)
+    assert main(["doctor", "--seconds", "0", "--apply", "--yes"]) == status
+    assert ("REFUSED" in capsys.readouterr().out) is locked
 
 
 def test_apply_without_a_terminal(machine, monkeypatch, capsys):

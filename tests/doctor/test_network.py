@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import subprocess
 from dataclasses import replace
 
 import pytest
@@ -90,7 +91,13 @@ def test_networkd(tmp_path):
         "/run/systemd/netif/links/3": "ADMIN_STATE=configured",
     }
     check = managed(make(tmp_path, files), I210)
-    assert (check.status, "Unmanaged=yes" in check.advice) == ("WARN", True)
+    assert check.status == "WARN"
+    command, _, reload = check.advice.partition("; ")
+    assert reload == "sudo networkctl reload"
+    printf, _, target = command.partition(" | sudo tee ")
+    assert target == "/etc/systemd/network/10-ethercat.network"
+    content = subprocess.run(["sh", "-c", printf], capture_output=True, text=True, check=True)
+    assert content.stdout == "[Match]\nName=enp2s0\n\n[Link]\nUnmanaged=yes\n"
 
 
 def test_frames_of_other_programs(tmp_path):

@@ -34,7 +34,7 @@ def add_parser(commands: Commands) -> None:
         description="Checks the kernel, processors, clocks, permissions and a network card, and "
         "measures the wake-up latency of threads. Shows commands that solve the problems. Sends "
         "no frames, and changes nothing without --apply. docs/how_to/doctor.md explains every "
-        "check. Exit status 1 if a check failed.",
+        "check. Exit status 1 if a check failed, or if a change was refused.",
         example=EXAMPLE,
     )
     parser.add_argument(
@@ -99,7 +99,8 @@ def run(arguments: argparse.Namespace) -> int:
         colour = terminal and "NO_COLOR" not in os.environ
         print(as_text(examination, colour=colour, width=min(columns, WIDTH)))
     if arguments.apply:
-        return apply(examination.changes, ask=not arguments.yes)
+        refused = apply(examination.changes, ask=not arguments.yes)
+        return FAILED if refused or examination.failed else 0
     return FAILED if examination.failed else 0
 
 

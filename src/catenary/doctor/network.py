@@ -141,8 +141,8 @@ def managed(machine: Machine, card: Card) -> Check:
         return passed(id, "no running program is known to send on the port")
     advice = {
         "NetworkManager": f"sudo nmcli device set {card.name} managed no # until the next reboot",
-        "systemd-networkd": f"`[Match] Name={card.name} [Link] Unmanaged=yes` in "
-        "/etc/systemd/network/10-ethercat.network",
+        "systemd-networkd": f"printf '[Match]\\nName={card.name}\\n\\n[Link]\\nUnmanaged=yes\\n' "
+        "| sudo tee /etc/systemd/network/10-ethercat.network; sudo networkctl reload",
     }
     commands = [advice[name] for name in managers]
     if neighbours:

@@ -54,7 +54,8 @@ class ProcessData(Request):
         sub: the device.
         inputs: `{name: (index, subindex, type[, scale])}`, or a `Channel` for each name. The
             objects are mapped if necessary. None for all mapped inputs, with names from the SII or
-            the object dictionary. `{}` for no inputs.
+            the object dictionary. `{}` for no names;
+            `inputs` still has all bytes.
         outputs: the same for outputs. The request writes all output bytes of the device, except
             with `{}`: another request can then write them.
         pdos: PDOs to assign by number or name, `[0x1A01, "Status"]`, or with their entries by name

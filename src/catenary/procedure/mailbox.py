@@ -60,21 +60,21 @@ RECOVERIES = 5  # attempts per message; then the cable is assumed to be faulty
 UNEXPECTED_MAX = 64  # unexpected messages in a row; the queues of devices are shorter
 
 
-def exclusively(channel: MailboxChannel, conversation: Procedure[T]) -> Procedure[T]:
-    """Wait until no other conversation with this device is active, then run a conversation.
+def exclusively(channel: MailboxChannel, procedure: Procedure[T]) -> Procedure[T]:
+    """Wait until no other procedure uses this mailbox, then run a procedure.
 
-    Conversations are never interleaved. They run in the order in which they were started.
+    Procedures are never interleaved. They run in the order in which they were started.
 
     Args:
         channel: The mailbox of the device.
-        conversation: The procedure to run.
+        procedure: The procedure to run.
     """
     ticket = object()
     channel.turns.append(ticket)
     try:
         while channel.turns[0] is not ticket:
             yield after(TURN)
-        return (yield from conversation)
+        return (yield from procedure)
     finally:
         channel.turns.remove(ticket)
 

@@ -32,7 +32,7 @@ class MailboxChannel:
     """State of one SubDevice's mailbox: counters, repeat toggle, emergencies.
 
     Emergencies arrive between the answers to requests. `listener` is called for each of them, in
-    any conversation. `listen` also reports those that arrived before there was a listener.
+    any procedure. `listen` also reports those that arrived before there was a listener.
     """
 
     station: Station
@@ -48,7 +48,7 @@ class MailboxChannel:
     )
     listener: Listener | None = None
     dropped: int = 0  # unexpected messages and duplicates
-    # Active and waiting conversations; the first one uses the mailbox.
+    # Active and waiting procedures; the first one uses the mailbox.
     turns: deque[object] = field(default_factory=deque)
     posted_ns: int | None = None  # time of the last request, until its answer arrives
     answer_delay_ns: int = 0  # expected time until the device answers

@@ -1,4 +1,4 @@
-"""The device in a conversation, checks of its replies, and deadlines."""
+"""The device in a procedure, checks of its replies, and deadlines."""
 
 from __future__ import annotations
 

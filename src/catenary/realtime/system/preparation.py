@@ -24,8 +24,10 @@ SET_CAPABILITIES = permission_advice()
 REMEDIES = {
     "locked memory": f"run as root, or run once: {SET_CAPABILITIES}; or add an unlimited memlock "
     "line to /etc/security/limits.d",
-    "CPU latency": f"run as root, or let a udev rule open {LATENCY_DEVICE}: KERNEL=="
-    '"cpu_dma_latency", MODE="0660", GROUP="realtime"',
+    "CPU latency": f"run as root, or permit {LATENCY_DEVICE} to a group: "
+    'echo \'KERNEL=="cpu_dma_latency", MODE="0660", GROUP="realtime"\' | sudo tee '
+    "/etc/udev/rules.d/99-cpu-dma-latency.rules; sudo udevadm control --reload; sudo udevadm "
+    "trigger; then join that group: sudo usermod -aG realtime $USER",
     "heap": "use glibc, which has mallopt and malloc_trim",
     "timer slack": "use Linux 2.6.28 or newer",
 }
