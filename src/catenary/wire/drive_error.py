@@ -110,6 +110,6 @@ def error_text(code: int) -> str:
     For an unknown group, return "unknown error".
     """
     for known in (code, code & 0xFFF0, code & 0xFF00, code & 0xF000):
-        if known in ERROR_CODES and (known or not code):  # 0x0000 is no group
+        if known in ERROR_CODES and (known or not code):  # 0x0000 is not a group
             return ERROR_CODES[known]
     return "unknown error"
