@@ -321,3 +321,27 @@ def test_a_loop_runs_with_the_commands_and_clocks_of_the_esi(tmp_path: Path) -> 
             assert data.present
         assert sub.sdo.read(0x6065, type=UDINT) == 10_000
         assert sub.sdo.read(0x6084, type=UDINT) == 1000
+
+
+def test_a_user_library_that_cannot_be_read_does_not_prevent_a_scan(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refused(self: Path) -> bool:
+        raise PermissionError(13, "Permission denied", str(self))
+
+    monkeypatch.setenv("CATENARY_ESI", str(tmp_path))
+    monkeypatch.setattr(Path, "is_dir", refused)
+    with MainDevice(servo_file.segment()) as main:
+        assert main.scan()[1].esi is None
+        assert any("your library of ESI files is not used" in note for note in main.notes)
+
+
+def test_a_user_without_a_home_directory_has_no_library(monkeypatch: pytest.MonkeyPatch) -> None:
+    def no_home() -> Path:
+        raise RuntimeError("Could not determine home directory.")
+
+    for name in ("CATENARY_ESI", "XDG_DATA_HOME"):
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.setattr(Path, "home", no_home)
+    with MainDevice(servo_file.segment()) as main:
+        assert main.scan()[1].esi is None

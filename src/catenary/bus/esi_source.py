@@ -129,17 +129,39 @@ def open_source(place: EsiPlace) -> EsiSource | None:
     Raises:
         EsiError: A given file, folder or library cannot be read.
     """
-    if place is False or (place is None and not default_folder().is_dir()):
+    if place is False:
         return None
+    if place is None:
+        return _user_source()
     from catenary.esi.library import Library
 
-    if place is None:
-        return EsiSource([Library()], given=False)
     places: Sequence[EsiFiles] = [place]  # type: ignore[list-item]  # not a sequence
     if isinstance(place, Sequence) and not isinstance(place, str):
         places = place
     libraries = [each if isinstance(each, Library) else Library.of(each) for each in places]
     return EsiSource(libraries, given=True)
+
+
+def _user_source() -> EsiSource | None:
+    """Return the library of the user; None if it does not exist.
+
+    A library that cannot be read does not prevent a scan: programs also run as other users, for
+    example by sudo. A note reports it.
+    """
+    try:
+        folder = default_folder()
+    except RuntimeError:  # the user has no home directory
+        return None
+    try:
+        if not folder.is_dir():
+            return None
+        from catenary.esi.library import Library
+
+        return EsiSource([Library(folder)], given=False)
+    except (OSError, EsiError) as error:
+        source = EsiSource([], given=False)
+        source.notes = (f"your library of ESI files is not used: {error}",)
+        return source
 
 
 def unchanged(device: DeviceDescription) -> DeviceDescription:
