@@ -78,7 +78,7 @@ def test_unsafe_archives_are_refused(
 @pytest.mark.parametrize(
     ("bounds", "message"),
     [
-        (Bounds(small=1000), "is compressed by 8"),
+        (Bounds(small=1000), r"is compressed 8\d*:1"),
         (Bounds(member_size=99_999), "has 100000 bytes; the limit is 99999"),
         (Bounds(total_size=199_999), "larger than 199999 bytes when extracted"),
     ],

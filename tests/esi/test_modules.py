@@ -103,7 +103,7 @@ def test_a_required_slot_cannot_be_empty() -> None:
 
 
 def test_too_many_modules() -> None:
-    with pytest.raises(ConfigurationError, match="has 4 modules, but the device has 3 slots"):
+    with pytest.raises(ConfigurationError, match="has 4 elements, but the device has 3 slots"):
         expand(coupler(), [DI] * 4)
 
 
@@ -130,7 +130,7 @@ def test_indices_stay_below_the_end_of_the_dictionary() -> None:
 def test_a_device_without_slots_is_refused() -> None:
     with pytest.raises(ConfigurationError, match="has no slots for modules"):
         expand(coupler(slots=None), ["8 DI"])
-    with pytest.raises(TypeError, match="give a list"):
+    with pytest.raises(TypeError, match="is not a list"):
         expand(coupler(), "8 DI")
 
 

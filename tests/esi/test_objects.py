@@ -152,8 +152,8 @@ def test_repeated_objects_and_subindices_are_ignored() -> None:
     found = read(types, 2 * variable("DT", 32, ""), findings)
     assert [entry.name for entry in found.objects[1].entries] == ["a"]
     assert [warning.message for warning in findings.warnings] == [
-        "subindex 0 of 0x0001 occurs again",
-        "subindex 0 of 0x0001 occurs again",
+        "subindex 0 of 0x0001 occurs again; the first one counts",
+        "subindex 0 of 0x0001 occurs again; the first one counts",
         "object 0x0001 occurs again; the first one counts",
     ]
 

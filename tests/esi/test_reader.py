@@ -119,7 +119,7 @@ def test_valid_notations_cause_no_warnings(name: str) -> None:
         ("absurd numbers", "a.xml:3: BitLen: '1e99' "),
         ("BitLen 0", "a.xml:3: entry 0x0000 has 0 bits; ignored"),
         ("BitLen 0", "a.xml:3: entry 0x7000 has 0 bits; kept"),
-        ("no BitLen", "a.xml:3: Entry has no BitLen; 16 bits assumed from its type"),
+        ("no BitLen", "a.xml:3: Entry has no valid BitLen; 16 bits assumed from its type"),
         ("SyncManager that does not exist", "SyncManager 5, which the device does not have"),
         ("unknown SyncManager", "unknown text 'AxisIn'; used as OUTPUTS because of its PDOs"),
         ("init commands", "a.xml:3: InitCmd without index, data or transition is ignored"),

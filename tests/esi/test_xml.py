@@ -109,7 +109,7 @@ SMALL = Limits(
 @pytest.mark.parametrize(
     ("data", "message"),
     [
-        (b"<I/>" + b" " * 1000, "at most 1000"),
+        (b"<I/>" + b" " * 1000, "the limit is 1000 bytes"),
         (b"<I>" * 6 + b"</I>" * 6, "nested deeper than 5"),
         (b"<I>" + b"<A/>" * 5 + b"</I>", "more than 4 children"),
         (b"<I>" + b"<A><B/><B/></A>" * 4 + b"</I>", "more than 10 elements"),

@@ -61,7 +61,7 @@ def check_device(
     """Compare one device with its ESI.
 
     Its SII is read. For its objects, a device in INIT or PRE-OP is brought to PRE-OP and back.
-    Devices in other states are not touched.
+    A device in another state keeps it.
 
     Args:
         main: MainDevice of the device.
@@ -83,7 +83,10 @@ def check_device(
 
 
 def _sii(main: Conversing, device: DeviceDescription, notes: list[str]) -> Sii | None:
-    """Return the SII, even if its checksum is wrong. Without an SII, add a note."""
+    """Return the SII, even if its checksum is wrong; None if it cannot be decoded.
+
+    In both cases, a note names the fault.
+    """
     station = station_of(device)
     image = main.converse(with_eeprom(station, read_image(station)))
     try:

@@ -1,4 +1,4 @@
-"""Objects of an ESI dictionary in the form of SDO information, for devices without the latter."""
+"""Objects of an ESI dictionary in the form of SDO information, for devices without this service."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def list_esi_objects(esi: EsiDevice, kind: ListType) -> tuple[ObjectDescription,
 
     Args:
         esi: ESI of the device.
-        kind: All objects, or those that can be mapped. Other kinds are not in an ESI.
+        kind: All objects, or those that can be mapped. The result is empty for other kinds.
     """
     objects = [] if esi.dictionary is None else list(esi.dictionary.objects.values())
     if kind is not ListType.ALL:

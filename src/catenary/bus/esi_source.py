@@ -41,7 +41,7 @@ class EsiSource:
         self._given = given
 
     def complete(self, device: DeviceDescription) -> DeviceDescription:
-        """Return the description with the facts of its ESI, or with a note why not.
+        """Return the description with the facts of its ESI, or with a note that names the reason.
 
         A modular device is completed again when the idents of its modules are known.
         """

@@ -63,7 +63,7 @@ class Descriptions:
         Args:
             sub: The device.
             single: True if it is the only device to compare. If the files describe only one
-                product, it is then compared with this product even if it is another one.
+                product, this description is then returned even for another device.
 
         Raises:
             EsiError: The file cannot be read.

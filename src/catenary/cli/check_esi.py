@@ -92,7 +92,7 @@ def _depth(arguments: argparse.Namespace, main: MainDevice) -> Depth:
 def _result(
     main: MainDevice, sub: SubDevice, descriptions: Descriptions, depth: Depth, *, single: bool
 ) -> Result:
-    """Compare one device. A fault of it does not affect the others."""
+    """Compare one device. An error becomes its result, so that the others are compared."""
     identity = sub.identity
     if not any(identity):
         notes = "".join(f": {note}" for note in sub.description.notes)

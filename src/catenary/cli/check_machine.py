@@ -49,7 +49,12 @@ def source_and_machine(file: str, target: str | None) -> tuple[LinkSource, Machi
 
 
 def compare_with_segment(file: str, target: str | None) -> Sequence[Comparison]:
-    """Compare a file with its segment, or with the segment of another target."""
+    """Compare a machine file with its segment, or with the segment of another target.
+
+    Args:
+        file: Path of the machine file.
+        target: Target instead of the one in the file; None for that of the file.
+    """
     from catenary.machine import compare, read_machine
     from catenary.target import MainDevice, source_of
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from catenary.cli.parsers import Commands, add_command, add_json
 
-NAME_HELP = "order code, or VENDOR:PRODUCT[:REVISION] in decimal or as 0x1F"
+NAME_HELP = "order code, part of a name, or VENDOR:PRODUCT[:REVISION] in decimal or as 0x1F"
 EXAMPLE = """\
 catenary esi add Beckhoff_EtherCAT_XML.zip
 catenary esi find EL2004
@@ -31,9 +31,9 @@ def add_parser(commands: Commands) -> None:
 
 
 def _add_library(parser: argparse.ArgumentParser, *, files: bool = True) -> None:
-    more = ", or one with ESI files, or one ESI file" if files else ""
+    more = ", a folder with ESI files, or one ESI file" if files else ""
     parser.add_argument(
-        "--library", metavar="PATH", help=f"folder of the library{more} (default: your own)"
+        "--library", metavar="PATH", help=f"folder of the library{more} (default: your own library)"
     )
 
 

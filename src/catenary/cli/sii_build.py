@@ -38,7 +38,8 @@ def add_build(group: Commands) -> None:
         "--pdos",
         choices=("named", "unnamed", "absent"),
         default="named",
-        help="leave out the names of PDOs, or all PDOs, for a small EEPROM",
+        help="for a small EEPROM: unnamed omits the names of PDOs and entries, absent all PDOs "
+        "(default named)",
     )
     building.add_argument(
         "-o", "--output", metavar="OUT", required=True, help="write the image to OUT; - is stdout"

@@ -1,7 +1,9 @@
 """Facts of an ESI added to the description of a device.
 
 The order of trust is: what the application requests, what the device reports (CoE), the ESI, the
-SII. This module only changes descriptions. A contradiction becomes a note; nothing is written.
+SII. Exceptions: a name, an order code and mailbox properties that the SII states are kept.
+
+This module only changes descriptions. A contradiction becomes a note; nothing is written.
 
 TwinCAT compares vendor and product, and the revision by `CheckRevisionNo`, before PRE-OP. IgH and
 SOEM do not compare revisions. Catenary keeps the device, but does not use an ESI whose rule refuses
@@ -82,7 +84,7 @@ def check_key(description: DeviceDescription, esi: EsiDevice) -> None:
 
 
 def _revision_note(device: DeviceDescription, esi: EsiDevice) -> list[str]:
-    """Return a note on another revision that no rule accepts explicitly."""
+    """Return a note if the revisions differ and the ESI has no rule for them."""
     same = device.identity.revision == esi.key.revision
     if same or not esi.key.revision or esi.revision_check is not RevisionCheck.NONE:
         return []

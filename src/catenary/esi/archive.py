@@ -113,7 +113,8 @@ def _check_size(archive: Path, member: zipfile.ZipInfo, bounds: Bounds) -> None:
     if member.file_size > bounds.small and ratio > bounds.ratio:
         raise _refusal(
             archive,
-            f"member {member.filename!r} is compressed by {ratio:.0f}; the limit is {bounds.ratio}",
+            f"member {member.filename!r} is compressed {ratio:.0f}:1; "
+            f"the limit is {bounds.ratio}:1",
         )
 
 
@@ -135,7 +136,7 @@ def _write_all(
 
 
 def _copy(source: IO[bytes], copy: IO[bytes], limit: int) -> int:
-    """Copy at most `limit` bytes, and return the number; more than `limit` if there are more."""
+    """Copy the data, and return the number of bytes. Stop after the chunk that exceeds `limit`."""
     done = 0
     while done <= limit and (chunk := source.read(CHUNK)):
         copy.write(chunk)

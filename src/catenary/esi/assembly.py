@@ -1,4 +1,4 @@
-"""Devices of a library, complete: with the modules and dictionaries of other files."""
+"""Devices of a library with the modules and dictionaries of other files."""
 
 from __future__ import annotations
 
@@ -130,7 +130,7 @@ class Assembly:
         return path
 
     def _index(self, path: str) -> FileIndex:
-        """Return the index of a file; without its entries if the library has the file."""
+        """Return the index of a file. For a file of the library, it has no entries."""
         return self._files.file(path) or indexed_or_warned(path)
 
     def _entries(self, index: FileIndex, kind: Kind) -> list[IndexEntry]:

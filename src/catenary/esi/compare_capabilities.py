@@ -13,7 +13,7 @@ from catenary.wire.sii_categories import CoeDetails
 PROTOCOL_BITS = 0x3F
 MODULAR = 5001  # ETG.5001: the low word of 0x1000, also in devices whose ESI has channel profiles
 EFFECTS = {
-    MailboxProtocol.COE: "masters that use only the SII do not read the object dictionary",
+    MailboxProtocol.COE: "a master does not read the object dictionary if its source lacks CoE",
     MailboxProtocol.FOE: "a firmware update by FoE is refused or not offered",
     MailboxProtocol.EOE: "a tunnel for Ethernet (EoE) is refused or not offered",
 }
@@ -51,7 +51,7 @@ def _protocols(mailbox: EsiMailbox, sii: Sii) -> Iterator[Difference]:
             Sides(_yes(given), _yes(own)),
             mailbox.source,
             EFFECTS.get(protocol, "the protocol is refused or not offered"),
-            "check which of them the firmware supports",
+            "check whether the firmware supports the protocol",
         )
 
 
@@ -92,7 +92,7 @@ def _details(mailbox: EsiMailbox, sii: Sii | None, coe: CoeFacts | None) -> Iter
                 reason,
                 "rely on the behaviour of the device"
                 if behaviour is not None
-                else "if the device refuses it, correct the option in the request",
+                else "if the device refuses it, remove it from your request",
             )
 
 

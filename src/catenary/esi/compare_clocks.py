@@ -95,6 +95,6 @@ def _mode(mode: EsiOpMode, found: ClockMode) -> Iterator[Difference]:
                 ", ".join(text.format(own) for text, _, own in unequal),
             ),
             mode.source,
-            "SYNC signals at other times make the device miss or repeat process data",
+            "SYNC signals at other times can make the device miss or repeat process data",
             "compare both with the manual of the device",
         )

@@ -11,7 +11,7 @@ from catenary.wire.sii_categories import General, GeneralFlags
 
 BYTES_PER_KBIT = 128
 ALIAS_WORD = 4
-# words of ConfigData, ETG.2010 table 2; the alias (word 4) differs by intention
+# words of ConfigData, ETG.2010 table 2; the alias (word 4) is set for each device
 WORDS = {
     0: "PDI control",
     1: "PDI configuration",
@@ -20,7 +20,7 @@ WORDS = {
     5: "reserved word 5",
     6: "reserved word 6",
 }
-PDI = "the controller configures its interface to the processor with it at power-up"
+PDI = "the controller loads this word from the EEPROM at power-up"
 WRITE = "write the vendor's image into the EEPROM (`catenary sii build`, `catenary sii write`)"
 
 
@@ -40,7 +40,7 @@ def compare_configuration(esi: EsiDevice, sii: Sii) -> Iterator[Difference]:
 
 
 def _config_data(esi: EsiDevice, eeprom: EsiEeprom, header: Header) -> Iterator[Difference]:
-    """Yield the words that differ. A short ConfigData is compared as far as it goes."""
+    """Yield the words that differ. Words that ConfigData lacks are not compared."""
     data = eeprom.config_data
     image = header.encode()
     for word, name in WORDS.items():
@@ -131,7 +131,7 @@ def _lrw(esi: EsiDevice, general: General) -> Iterator[Difference]:
         Sides(_support(not esi.use_lrd_lwr), _support(not denied)),
         esi.source,
         "a master that sends LRW to a device without support gets wrong working counters",
-        "the master must use LRD and LWR if either of them denies LRW",
+        "the master must use LRD and LWR if the ESI or the SII denies LRW",
     )
 
 

@@ -92,7 +92,7 @@ def _use(use: int) -> str:
 def _mailbox(
     manager: EsiSyncManager, own: SyncManagerEntry | None, sii: Sii, coe: CoeFacts | None
 ) -> Iterator[Difference]:
-    """Yield the differences of one mailbox area. The header of the SII is decisive for it."""
+    """Yield the differences of one mailbox area. The area in the header of the SII counts."""
     out = manager.use is SyncManagerUse.MAILBOX_OUT
     area = sii.header.standard_receive if out else sii.header.standard_send
     name = "receive" if out else "send"

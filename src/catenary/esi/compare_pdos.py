@@ -1,6 +1,6 @@
 """Comparison of the PDOs of a device with its ESI: existence, entries and assignment.
 
-Entries are compared by their place in the image, so that gaps may be divided in different ways.
+Entries are compared by their bit offset in the PDO, so that one gap equals several shorter ones.
 """
 
 from __future__ import annotations

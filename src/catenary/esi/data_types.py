@@ -50,7 +50,7 @@ def enumeration_of(name: str, types: Mapping[str, EsiDataType]) -> Mapping[int, 
 
 
 def base_of(name: str, types: Mapping[str, EsiDataType]) -> str:
-    """Return the name of the base type that a derived type ends at.
+    """Return the name of the base type at the end of a chain of derived types.
 
     Args:
         name: The name of the type.

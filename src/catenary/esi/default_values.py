@@ -1,7 +1,7 @@
 """Default values and limits in an ESI dictionary, as little-endian bytes of the object.
 
 `DefaultData` contains the bytes as they are transferred. `DefaultValue` is a number, and
-`DefaultString` a text; the data type of the entry decides about their bytes.
+`DefaultString` a text; the data type of the entry determines their bytes.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ def read_value(
     Args:
         element: The element, such as `DefaultData`; None if the file does not have it.
         base: The name of the base data type of the entry.
-        bit_length: The length of the entry.
+        bit_length: The length of the entry [bits].
         findings: The warnings of the reader.
     """
     if element is None or not element.text.strip():

@@ -148,7 +148,7 @@ class EsiModeSyncManager:
 
 @dataclass(frozen=True, slots=True, repr=False)
 class EsiOpMode:
-    """One mode of the distributed clocks (`Dc/OpMode`). Its repr is short, as a list shows it."""
+    """One mode of the distributed clocks (`Dc/OpMode`). Its repr is one line, for lists."""
 
     name: str
     description: str = ""
@@ -187,7 +187,7 @@ class EsiTimeouts:
 
 @dataclass(frozen=True, slots=True)
 class EsiWatchdog:
-    """Watchdog registers that the file asks for (`Device/ESC`); None: the controller's default."""
+    """Watchdog registers that the file requests (`Device/ESC`); None: the controller's default."""
 
     divider: int | None = None  # register 0x0400
     pdi: int | None = None  # register 0x0410
@@ -329,7 +329,7 @@ class EsiDevice:
     type: str  # order code, such as "EL2004"
     name: str
     group: str = ""
-    physics: str = ""  # one letter per port: Y MII, K E-bus, H, blank
+    physics: str = ""  # one letter per port: Y MII, K E-bus, H Fast Hot Connect; blank: none
     revision_check: RevisionCheck = RevisionCheck.NONE
     hides: tuple[DeviceKey, ...] = ()  # older revisions that it replaces (`HideType`)
     alternatives: tuple[DeviceKey, ...] = ()  # compatible devices (`AlternativeType`)

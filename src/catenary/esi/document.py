@@ -48,7 +48,7 @@ class Document(NamedTuple):
 
 
 def open_document(path: str | Path, limits: Limits = LIMITS) -> Document:
-    """Read a file. Its size is checked before.
+    """Read a file, after a check of its size.
 
     Args:
         path: The file.
@@ -71,7 +71,7 @@ def open_document(path: str | Path, limits: Limits = LIMITS) -> Document:
 
 
 def make_document(data: bytes, file: str, limits: Limits = LIMITS) -> Document:
-    """Return the document of bytes: its encoding, and its warnings.
+    """Return the bytes of a file as a document with its encoding and warnings.
 
     Args:
         data: The bytes of the file.
@@ -100,7 +100,7 @@ def make_document(data: bytes, file: str, limits: Limits = LIMITS) -> Document:
 
 
 def make_fragment(data: bytes, encoding: Encoding, *, file: str, line: int) -> Document:
-    """Return the document of one element of a file.
+    """Return the bytes of one element as a document.
 
     Args:
         data: The bytes of the element.
@@ -121,7 +121,7 @@ def _open_without_waiting(path: str, flags: int) -> int:
 
 def _check_size(size: int, file: str, limits: Limits) -> None:
     if size > limits.file_size:
-        raise EsiError(f"{size} bytes; an ESI file has at most {limits.file_size}", file=file)
+        raise EsiError(f"{size} bytes; the limit is {limits.file_size} bytes", file=file)
 
 
 def _warning(file: str, data: bytes, offset: int, text: str) -> EsiWarning:

@@ -111,7 +111,8 @@ def choose_encoding(data: bytes) -> Choice:
     """Return the encoding of a file, the length of its byte-order mark, and warnings.
 
     A byte-order mark decides. Otherwise, the declared encoding applies if it decodes the file, or
-    if most characters are valid in it. Otherwise, the bytes decide.
+    if most characters are valid in it. Otherwise, the bytes decide. A file that is valid UTF-8 is
+    read as UTF-8, even if it declares another 8-bit encoding.
 
     Raises:
         ValueError: The file is in UTF-32, which expat does not support.
@@ -176,7 +177,7 @@ def _fitting(data: bytes, declared: str) -> tuple[Encoding, tuple[tuple[int, str
     used = _guess(data)
     faulty = trial.first if trial is not None else 0
     cause = f"the declared encoding {declared!r}" if declared else "UTF-8, the default encoding,"
-    reason = "does not fit the bytes" if wanted is not None else "does not exist for this file"
+    reason = "does not fit the bytes" if wanted is not None else "cannot be used for this file"
     faults = _try(data, used.name).faults
     lost = f"; {faults} characters were replaced" if faults else ""
     return used, ((faulty, f"{cause} {reason}; read as {used.name}{lost}"),)

@@ -19,7 +19,7 @@ def default_folder() -> Path:
 
 
 def _user_folder(variable: str, fallback: str) -> Path:
-    """Return a folder of the XDG base directory specification; it ignores relative paths."""
+    """Return a folder of the XDG base directory specification. Relative paths are ignored."""
     given = os.environ.get(variable, "")
     return Path(given) if os.path.isabs(given) else Path.home() / fallback
 

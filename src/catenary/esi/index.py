@@ -1,7 +1,8 @@
-"""Index of one ESI file: what it describes, and where. One pass, without the contents of devices.
+"""Index of one ESI file: its devices and modules, and their places in it.
 
-Files of modules (root EtherCATModule) and of dictionaries (EtherCATDict) are indexed, too. The
-schema is not a gate: elements are found by their path, in every kind of file.
+The index is made in one pass, without the contents of devices.
+Files of modules (root EtherCATModule) and of dictionaries (EtherCATDict) are indexed, too.
+Files are not checked against the schema. Elements are found by their path, in every kind of file.
 """
 
 from __future__ import annotations

@@ -37,8 +37,8 @@ class Changes(NamedTuple):
 class IndexedFiles:
     """Files of a library. It owns the index of these files.
 
-    A file is read again if its size or time of change differs and its hash too. So a file that was
-    edited without a change of size and time is not noticed, except by `refresh(all_hashes=True)`.
+    A file is read again if its size or time of change differs, and its hash too. An edit that
+    keeps size and time is noticed only by `refresh(all_hashes=True)`.
     """
 
     def __init__(self, sources: Sources, index: str, lock: Path | None) -> None:

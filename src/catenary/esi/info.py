@@ -31,7 +31,7 @@ def read_timeouts(device: Element, findings: Findings) -> EsiTimeouts:
 
 
 def read_watchdog(device: Element, findings: Findings) -> EsiWatchdog:
-    """Return the watchdog registers that the file asks for.
+    """Return the watchdog registers that the file requests.
 
     Args:
         device: The device.
@@ -77,7 +77,7 @@ def read_mappings(device: Element, findings: Findings) -> tuple[EsiMapping, ...]
 
 
 def read_identification(device: Element, findings: Findings) -> tuple[int | None, bool]:
-    """Return the register of the explicit identification, and True if it is in the AL status.
+    """Return the register of the explicit device identification, and True if the AL status has it.
 
     `IdentificationReg134` denotes register 0x0134, the AL status code (ETG.1020).
 

@@ -146,7 +146,7 @@ class Library:
 
     def _check_permanent(self) -> None:
         if self._temporary:
-            raise ValueError("`Library.of` gives a temporary library; change `Library()` instead")
+            raise ValueError("a library from `Library.of` cannot be changed; use `Library()`")
 
     def _extracted(self, archive: Path) -> Path:
         """Extract an archive into the library, and return the folder."""
@@ -304,7 +304,7 @@ class Library:
         )
 
     def _notes(self, choice: Choice, revision: int | None) -> list[EsiWarning]:
-        """Return the warnings of a lookup: another revision, duplicates, missing files."""
+        """Return the warnings of a lookup: another revision, and other files with the same key."""
         record = choice.record
         assert record is not None
         others = choice.records[1 : 1 + MAX_DUPLICATES]

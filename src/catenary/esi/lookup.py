@@ -3,7 +3,7 @@
 Beckhoff's rule is that the revision of the device is not below that of the configuration
 (infosys.beckhoff.com, ethercatsystem/2477553291), because newer devices support older descriptions.
 So the newest description that is not above the device is used. `CheckRevisionNo` (ETG.2000) states
-the vendor's own rule, which decides among several.
+the vendor's own rule. Descriptions whose rule accepts the device are preferred.
 
 `HideType` names older revisions that a newer one replaces in a catalogue. A device of an older
 revision still needs its own description. So hidden ones are only omitted from a search without a
@@ -44,7 +44,9 @@ class Rule(StrEnum):
 
     EXACT = "exact revision"
     NOT_ABOVE = "newest revision not above the device's"
-    REFUSED = "newest revision not above the device's, which its CheckRevisionNo does not accept"
+    REFUSED = (
+        "newest revision not above the device's, although its CheckRevisionNo refuses the device"
+    )
     ACCEPTED = "newer revision whose CheckRevisionNo accepts the device"
     NEWEST = "newest revision"
     UNSUITABLE = "no suitable revision"

@@ -36,7 +36,9 @@ def choose_modules(device: EsiDevice, choice: Sequence[ModuleName | None]) -> tu
         TypeError: `choice` is not a list of names and idents.
     """
     if isinstance(choice, str) or not isinstance(choice, Sequence):
-        raise TypeError(f'modules={choice!r}: give a list with a module per slot, ["8 DI", None]')
+        raise TypeError(
+            f'modules={choice!r} is not a list; give one module per slot: ["8 DI", None]'
+        )
     if device.slots is None:
         raise ConfigurationError(
             f"{device} has no slots for modules",
@@ -45,7 +47,8 @@ def choose_modules(device: EsiDevice, choice: Sequence[ModuleName | None]) -> tu
     places = tuple(slot_places(device.slots))
     if len(choice) > len(places):
         raise ConfigurationError(
-            f"{device}: modules= has {len(choice)} modules, but the device has {len(places)} slots",
+            f"{device}: modules= has {len(choice)} elements, but the device has "
+            f"{len(places)} slots",
             hint=_slots_text(device, device.slots),
         )
     placed = []

@@ -72,7 +72,7 @@ def with_modules(device: EsiDevice, modules: Iterable[EsiModule]) -> EsiDevice:
 
 
 def accepted_modules(slots: EsiSlots | None, modules: Iterable[EsiModule]) -> tuple[EsiModule, ...]:
-    """Return the modules that the slots of a device accept, by identification or class.
+    """Return the modules that the slots of a device accept, by ident or class.
 
     Args:
         slots: The slots; None if the device is not modular.

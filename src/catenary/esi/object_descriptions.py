@@ -7,7 +7,7 @@ from catenary.esi.units import unit_text
 from catenary.model.device import ObjectInformation
 from catenary.types import by_name
 
-DERIVATIONS_MAX = 8  # a derived type of a derived type ...; a longer chain is a circle
+DERIVATIONS_MAX = 8  # in a chain of derived types; a longer chain is circular
 
 
 def documented_objects(dictionary: EsiDictionary | None) -> tuple[ObjectInformation, ...]:

@@ -166,7 +166,10 @@ def _entries(
     seen: set[int] = set()
     for part, (name, each) in zip(parts, infos, strict=True):
         if part.subindex in seen:
-            findings.warn(element, f"subindex {part.subindex} of 0x{index:04X} occurs again")
+            findings.warn(
+                element,
+                f"subindex {part.subindex} of 0x{index:04X} occurs again; the first one counts",
+            )
             continue
         seen.add(part.subindex)
         entry = _entry(index, whole, part, types, findings, each, name)

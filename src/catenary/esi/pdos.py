@@ -66,7 +66,9 @@ def _entry(element: Element, findings: Findings) -> EsiEntry | None:
     bit_length = findings.number(element.find("BitLen"), bits=16)
     if bit_length is None:
         bit_length = _length_of_type(type_name)
-        findings.warn(element, f"Entry has no BitLen; {bit_length} bits assumed from its type")
+        findings.warn(
+            element, f"Entry has no valid BitLen; {bit_length} bits assumed from its type"
+        )
     if not bit_length:
         reaction = "kept" if index else "ignored"
         findings.warn(element, f"entry 0x{index:04X} has 0 bits; {reaction}")

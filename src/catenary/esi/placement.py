@@ -1,8 +1,8 @@
 """Places of modules in the slots of a modular device (ETG.5001), and the indices there.
 
-Each instance of a `Slot` counts as one slot; the instances are numbered consecutively from 0. To
-the indices that depend on the slot (`DependOnSlot`), it adds its number times the increments of
-the device, or its own increments if it has them.
+Each instance of a `Slot` counts as one slot; the instances are numbered consecutively from 0. A
+slot adds its number times the increment to the indices that depend on it (`DependOnSlot`). A slot
+without an increment of its own uses that of the device.
 """
 
 from __future__ import annotations

@@ -67,7 +67,7 @@ def read_document(document: Document, *, references: References | None = None) -
     root = root_tag(document)
     if root not in ROOTS:
         raise EsiError(
-            f"the root element is {root[:60]!r}, not {', '.join(ROOTS)}",
+            f"the root element is {root[:60]!r}, not one of {', '.join(ROOTS)}",
             file=document.file,
             line=document.line,
             hint="choose an EtherCAT device description (ESI)",

@@ -4,8 +4,8 @@ The rules where ETG.2010 leaves a choice:
 
 - The order of the categories is 10, 30, 40, 41, 50, 51, 60, then those of the file, as in
   Beckhoff's images. All PDOs of a direction share one category: SOEM reads only the first.
-- Names outside of Latin-1 get question marks, longer names are cut to 255 characters, and the
-  256th string is left out. Each results in a note.
+- Names outside of Latin-1 get question marks, longer names are truncated to 255 characters, and
+  strings after the 255th are left out. Each results in a note.
 - An image that exceeds `ByteSize` is an error, because the device could not store it. Without
   `ByteSize`, the size is the smallest power of two that fits, at least 2 KiB.
 - `Eeprom/Data`, the whole image, takes precedence over all other elements.
@@ -110,7 +110,9 @@ def assemble_sii(
     eeprom = device.eeprom or EsiEeprom()
     notes: list[str] = []
     if eeprom.data:
-        return SiiBuild(_given(device, eeprom, serial, alias), ("the image is Eeprom/Data",))
+        return SiiBuild(
+            _given(device, eeprom, serial, alias), ("the image is that of Eeprom/Data",)
+        )
     try:
         categories = _categories(device, eeprom, notes, pdos)
         header = _header(device, eeprom, notes)

@@ -13,8 +13,8 @@ from catenary.wire.sii_categories import ClockMode, Pdo, PdoEntry, PdoFlags
 
 NOT_ASSIGNED = 0xFF
 BITS_MAX = 255  # the length of an entry has one byte
-PART_BITS = 248  # largest multiple of a byte in it
-_DERIVATIONS_MAX = 8  # types that derive from each other
+PART_BITS = 248  # largest multiple of 8 below it
+_DERIVATIONS_MAX = 8  # in a chain of derived types
 _LENGTH = re.compile(r"\(.*\)$")  # STRING(26)
 _BYTES = re.compile(r"^ARRAY\s*\[.*\]\s*OF\s+(BYTE|USINT)$", re.IGNORECASE)
 

@@ -9,7 +9,7 @@ LENGTH_MAX = 255  # so has the length of a string
 class SiiStrings:
     """Owner of the strings of one image, and of the notes about strings that differ from the file.
 
-    Equal strings share a number, as in Beckhoff's images (`shared/data/sii/beckhoff_el2004.bin`).
+    Equal strings share a number, as in Beckhoff's images (EL2004).
     """
 
     def __init__(self) -> None:
@@ -43,5 +43,5 @@ class SiiStrings:
         if stored != text:
             self.notes.append(f"the name {text!r} is written as {stored!r}: an SII uses Latin-1")
         if len(stored) > LENGTH_MAX:
-            self.notes.append(f"the name {stored[:40]!r}… is cut to 255 characters")
+            self.notes.append(f"the name {stored[:40]!r}… is truncated to 255 characters")
         return stored[:LENGTH_MAX]

@@ -80,7 +80,7 @@ def walk(folder: Path, problems: list[str]) -> Iterator[str]:
         if number >= MAX_FOLDERS:
             raise _too_many(folder, f"{MAX_FOLDERS} folders")
         if folders and len(Path(place).relative_to(folder).parts) >= MAX_DEPTH:
-            problems.append(f"{place}: its folders are nested too deeply, and are not searched")
+            problems.append(f"{place}: folders below level {MAX_DEPTH} are not searched")
             folders.clear()
         folders[:] = sorted(each for each in folders if not each.startswith("."))
         for name in sorted(each for each in names if each.lower().endswith(".xml")):
@@ -147,7 +147,7 @@ def locked(file: Path | None, timeout: float = LOCK_TIMEOUT) -> Iterator[None]:
         while not _try_lock(opened.fileno()):
             if time.monotonic() > end:
                 raise EsiError(
-                    f"another process has changed the ESI library for {timeout:.0f} s",
+                    f"another process has locked the ESI library for {timeout:.0f} s",
                     file=str(file),
                     hint="wait for its `catenary esi add`, or end it",
                 )

@@ -16,7 +16,7 @@ from catenary.esi.sources import Found
 
 VERSION = 1  # of the schema and of what the indexer reads; another one is replaced
 MEMORY = ":memory:"
-BUSY = 30.0  # [s]; another process writes
+BUSY = 30.0  # longest wait while another process writes [s]
 SCHEMA = """
 CREATE TABLE files (
     path TEXT PRIMARY KEY, root TEXT, source_order INTEGER,

@@ -1,4 +1,4 @@
-"""Streaming XML parser of ESI files, by expat.
+"""Streaming XML parser of ESI files, based on expat.
 
 Only the wanted elements become trees, one at a time, so that a large file is never in memory as a
 tree. Each tree has its place in the file, from which `read_fragment` parses it again. Tags and
@@ -133,7 +133,7 @@ class _Open(NamedTuple):
     tag: str
     attributes: dict[str, str]
     line: int
-    first_text: int  # in the texts of the parser
+    first_text: int  # number of its first text in `_Parser._texts`
     children: list[Element]
 
 
@@ -155,9 +155,9 @@ class _Parser:
         self.root = ""
         self._ways = {"/".join(path.split("/")[:n]) for path in wanted for n in range(9)}
         self._path: list[str] = []  # open elements outside of wanted trees, without the root
-        self._open: list[_Open] = []  # open elements of the present tree
-        self._ignored = 0  # open elements below the first ignored one, with it
-        self._place = (0, 0)  # offset of the present tree, and of the end of its start tag
+        self._open: list[_Open] = []  # open elements of the current tree
+        self._ignored = 0  # number of open elements from the first ignored one on
+        self._place = (0, 0)  # offset of the current tree; its end if it is empty, otherwise 0
         # Texts of the open elements. An element removes its own at its end, so that those of the
         # elements around it remain. The parser calls `append` itself, without a Python function.
         self._texts: list[str] = []

@@ -41,7 +41,7 @@ class ConfiguredModule:
 
     @property
     def axes(self) -> tuple[int, ...]:
-        """Slots of CiA 402 axes: objects + 0x800·slot, found by their statusword."""
+        """Numbers k of the CiA 402 axes, whose statusword is 0x6041 + 0x800·k."""
         mapped = {entry.index for pdo in self.input_pdos for entry in pdo.entries}
         indices = mapped | {each.index for each in self.documented}
         return tuple(k for k in range(AXES_MAX) if STATUSWORD + AXIS_STRIDE * k in indices)
@@ -66,7 +66,7 @@ class ModularDevice:
     identify_by: str = ""  # `IdentifyModuleBy`
     source: str = ""  # file and line of its ESI
     modules: tuple[ConfiguredModule, ...] = ()
-    modules_source: str = ""  # why these modules
+    modules_source: str = ""  # reason for these modules
     detected: tuple[int, ...] | None = None  # 0xF050; None if it cannot be read
     configured: tuple[int, ...] | None = None  # 0xF030; None if it cannot be read
 

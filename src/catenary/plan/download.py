@@ -15,7 +15,7 @@ class Download:
     subindex: int
     data: bytes
     entry: Entry | None = None
-    optional: bool = False  # True to ignore that the object is absent, read-only or refuses this
+    optional: bool = False  # True to ignore an absent or read-only object, or a refused value
     verify: bool = False  # read back and compared, unless it is write-only
     text: str = ""  # value as the application gave it; empty for objects of Catenary and the ESI
     complete_access: bool = False  # writes all subindices from `subindex` on

@@ -3,9 +3,9 @@
 Commands of the transitions IP and PS are written in PRE-OP, in this order, before the start-up
 objects of the application. The mailbox is not available in INIT, so IP is the first step in
 PRE-OP. Commands of SO are written in SAFE-OP. Commands of downward transitions are not written.
-TwinCAT and CODESYS also write these commands without being asked.
+TwinCAT and CODESYS also write these commands by default.
 
-A command is omitted if the application or Catenary sets its object, because these count more.
+A command is omitted if the application or Catenary sets its object. These values take precedence.
 """
 
 from __future__ import annotations

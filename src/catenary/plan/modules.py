@@ -39,7 +39,7 @@ class ModulePlan:
 
     device: ModularDevice  # slots, names, and lists of the device
     modules: tuple[ConfiguredModule, ...]
-    source: str  # why these modules
+    source: str  # reason for these modules
     downloads: tuple[Download, ...] = ()  # of 0xF030; empty: unchanged
 
     @property
@@ -88,7 +88,7 @@ def _carries(device: DeviceDescription, modules: Sequence[ConfiguredModule]) -> 
 
 
 def _is_rewritten(device: DeviceDescription, modular: ModularDevice, source: str) -> bool:
-    """Return True if 0xF030 has other idents than the modules in use, and is written."""
+    """Return True if the plan writes 0xF030 because its idents differ from the modules in use."""
     before = modular.configured
     return (
         device.coe
@@ -121,7 +121,7 @@ def _downloads(
     modules: tuple[ConfiguredModule, ...],
     source: str,
 ) -> tuple[Download, ...]:
-    """Return the downloads of 0xF030. Devices with a fixed number of slots refuse subindex 0."""
+    """Return the downloads of 0xF030. Subindex 0 is optional: it can be read-only."""
     before = modular.configured
     chosen = replace(modular, modules=modules)
     if not (device.coe and modular.download_idents) and not _is_rewritten(device, chosen, source):
@@ -143,7 +143,7 @@ def _downloads(
 def ident_difference(plan: ModulePlan, detected: Sequence[int]) -> str:
     """Return the slots whose detected module is not the expected one; empty if there are none.
 
-    A device that detects no modules at all reports zeros; these are not compared.
+    A device that cannot detect its modules reports zeros; these are not compared.
 
     Args:
         plan: Modules of the device.

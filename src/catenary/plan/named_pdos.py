@@ -53,7 +53,7 @@ def pdos_named(device: DeviceDescription, name: str) -> tuple[WrittenPdo, ...]:
 def check_rules(
     device: DeviceDescription, direction: Direction, written: Sequence[WrittenPdo]
 ) -> None:
-    """Check PDOs that were chosen by name: Mandatory, Exclude, Fixed and Sm.
+    """Check PDOs that were chosen by name: Mandatory, Exclude, Fixed and ExcludedSm.
 
     PDOs that were given only by numbers are not checked, because such flags are often wrong.
 

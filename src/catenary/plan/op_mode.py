@@ -18,9 +18,9 @@ SYNC_BY_ECAT = 0x0300  # AssignActivate: cyclic operation and SYNC0, controlled 
 def choose_mode(device: DeviceDescription, request: DistributedClock) -> OpMode:
     """Return the OpMode with the requested name.
 
-    Without a name, return the first one that starts SYNC0 or, if there is none, SYNC1. If there is
-    none of these either, return a mode with SYNC0 in every period. ETG.2000 makes the first mode
-    the default, but that one often has no SYNC signals (hpm_ECAT_CIA402.xml: SM-Synchron).
+    Without a name, return the first mode that starts SYNC0, otherwise the first that starts SYNC1.
+    If no mode starts either signal, return one with SYNC0 in every period. ETG.2000 makes the first
+    mode the default, but this mode often has no SYNC signals (hpm_ECAT_CIA402.xml: SM-Synchron).
 
     Args:
         device: Device.

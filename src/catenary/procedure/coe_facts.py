@@ -59,7 +59,7 @@ def in_pre_op(
     """Run a conversation with a device in PRE-OP, then restore its state.
 
     A device in PRE-OP passes through INIT, which restarts its mailbox. A device in another state
-    is not touched.
+    keeps it.
 
     Args:
         station: The device.
@@ -219,14 +219,14 @@ class _Reader:
         return facts if question.objects is None else (yield from self._objects(facts, question))
 
     def _works(self, procedure: Procedure[object], what: str) -> Procedure[bool | None]:
-        """Return True if the device answers, False if it refuses, None if it was not asked."""
+        """Return True if the request succeeds, False if it fails, None if it was not sent."""
         if self._failures >= FAILURES_MAX:
             procedure.close()
             return None
         return (yield from self.attempt(procedure, what)) is not None
 
     def _assignable(self, managers: tuple[int, ...]) -> Procedure[bool | None]:
-        """Return True if the device describes an assignment object as writable."""
+        """Return True if an assignment object is writable; None if none of them is described."""
         found = []
         for manager in managers:
             index = ASSIGNMENT_BASE + manager

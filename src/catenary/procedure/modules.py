@@ -63,7 +63,7 @@ def read_idents(channel: MailboxChannel, index: int) -> Procedure[tuple[int, ...
         index: 0xF050 or 0xF030.
 
     Raises:
-        SdoAbort: The device refuses to read an entry, for another reason.
+        SdoAbort: The device has the list, but refuses to read it.
     """
     try:
         count = (yield from upload_small(channel, index, 0))[:1]
@@ -84,7 +84,8 @@ def prepare_modules(
     """Compare the detected modules with the plan, then write the configured idents.
 
     Nothing is written if the modules differ. After the idents were written, the device may have
-    another mapping; it is read again. Return the description and the plan with what remains.
+    another mapping; it is read again. Return the description, and the plan with the mapping
+    changes that are still needed.
 
     Args:
         channel: The mailbox of the device.
@@ -121,7 +122,7 @@ def check_order(device: DeviceDescription, plan: DevicePlan) -> None:
         plan: The plan of the device.
 
     Raises:
-        ConfigurationError: The order differs. The description has that of the device now.
+        ConfigurationError: The order differs. A new plan from `device` has the right order.
     """
     if device.mailbox is None or device.mailbox.pdo_assign:
         return

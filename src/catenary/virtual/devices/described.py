@@ -172,7 +172,9 @@ class DescribedDevice(AppliedDevice):
         """
         entry = self._entry(index, subindex)
         if entry.slot < 0:
-            raise LookupError(f"{self.name}: 0x{index:04X}:{subindex:02X} is not in a PDO")
+            raise LookupError(
+                f"{self.name}: 0x{index:04X}:{subindex:02X} is not in a PDO, or exceeds 64 bits"
+            )
         value = int.from_bytes(data, "little", signed=len(data) == 8)
         self.core.put_slot(self.position, entry.slot, value)
         self.core.refresh_inputs(self.position)
