@@ -26,6 +26,7 @@ from catenary.model.device import (
     ObjectInformation,
     Pdo,
     mapped_entries,
+    mapped_pdos,
 )
 from catenary.plan.changes import Change, mapping_changes, value_changes
 from catenary.plan.clocks import SyncPlan
@@ -33,7 +34,7 @@ from catenary.plan.download import Download
 from catenary.plan.init_commands import NO_COMMANDS, Commands, choose_commands
 from catenary.plan.layout import DeviceLayout
 from catenary.plan.modules import ModulePlan
-from catenary.plan.pdo_mapping import ASSIGNMENT_BASE, Mapping, shape
+from catenary.plan.pdo_mapping import ASSIGNMENT_BASE, Mapping, differing
 from catenary.plan.start_up_object import StartUp
 from catenary.types import Scalar, by_index
 from catenary.wire.register import watchdog_unit_ns
@@ -281,14 +282,11 @@ def compared(plan: DevicePlan, device: DeviceDescription) -> DevicePlan:
 def _difference(
     device: DeviceDescription, direction: Direction, requested: tuple[Assignment, ...]
 ) -> Mapping:
-    entries = {pdo.index: shape(pdo) for pdo in device.pdos(direction)}
     now = device.assignments(direction)
     lists = {each.sync_manager: [pdo.index for pdo in each.pdos] for each in now}
     return Mapping(
         requested,
-        rewritten=tuple(
-            pdo for each in requested for pdo in each.pdos if entries.get(pdo.index) != shape(pdo)
-        ),
+        rewritten=differing(device, direction, mapped_pdos(requested)),
         reassigned=tuple(
             each.sync_manager
             for each in requested
