@@ -17,7 +17,7 @@ from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, cast
 
-from catenary.errors import ConfigurationError
+from catenary.errors import ConfigurationError, MappingError
 from catenary.model.device import (
     Assignment,
     DeviceDescription,
@@ -42,6 +42,7 @@ from catenary.wire.register import watchdog_unit_ns
 if TYPE_CHECKING:  # request.py imports NumPy, which a scan does not need
     from catenary.plan.request import DeviceRequest
 
+BITS_MAX = 0xFF  # of an entry in a mapping object, ETG.1000.6 table 75
 WATCHDOG_DIVIDER = 2498  # the controller's reset value
 WATCHDOG_UNIT_NS = watchdog_unit_ns(WATCHDOG_DIVIDER)  # 100 µs
 
@@ -330,6 +331,11 @@ def _assignment_downloads(assignment: Assignment, contents: Sequence[Download]) 
 def _pdo_downloads(pdo: Pdo) -> list[Download]:
     downloads = [Download(pdo.index, 0, b"\x00")]
     for rank, entry in enumerate(pdo.entries, start=1):
+        if entry.bit_length > BITS_MAX:
+            raise MappingError(
+                f"PDO 0x{pdo.index:04X} cannot be written: {entry} is longer than {BITS_MAX} bits",
+                hint="split it into several entries, or keep the entries of the device",
+            )
         word = entry.index << 16 | entry.subindex << 8 | entry.bit_length
         downloads.append(Download(pdo.index, rank, struct.pack("<I", word), entry))
     downloads.append(Download(pdo.index, 0, bytes([len(pdo.entries)])))
