@@ -413,10 +413,11 @@ def test_clocks_show_the_settings_and_their_source() -> None:
     assert str(make_plan([servo(0)]).clocks) == "no distributed clocks"
 
 
-def test_absurd_oversampling_is_refused() -> None:
-    own = ModeAssignment(3, (0x1A00,), (1_000_000,))
+@pytest.mark.parametrize("samples", [0, 1_000_000])  # 0 would empty the assignment
+def test_absurd_oversampling_is_refused(samples: int) -> None:
+    own = ModeAssignment(3, (0x1A00,), (samples,))
     mode = OpMode("DC", "", 0x0300, assignments=(own,), source="el.xml:5")
-    with pytest.raises(MappingError, match=r"el\.xml:5: 1000000 samples of PDO 0x1A00"):
+    with pytest.raises(MappingError, match=rf"el\.xml:5: {samples} samples of PDO 0x1A00"):
         make_plan([clocked(servo(0), mode)], [asking(0)])
 
 

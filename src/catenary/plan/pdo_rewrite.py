@@ -85,10 +85,10 @@ def write_down(
     known = {pdo.index: pdo for pdo in device.pdos(direction)}
     lists: dict[int, list[Pdo]] = {}
     for each in written:
-        if each.copies > ENTRIES_MAX:
+        if not 1 <= each.copies <= ENTRIES_MAX:
             raise MappingError(
                 f"{device}: {each.source}: {each.copies} samples of PDO 0x{each.index:04X} per "
-                f"cycle; at most {ENTRIES_MAX} PDOs can be assigned",
+                f"cycle; 1 to {ENTRIES_MAX} PDOs can be assigned",
                 hint="the OpMode of the ESI file is wrong; choose another one",
             )
         pdo = _written_pdo(device, direction, each, known)
