@@ -140,7 +140,7 @@ def test_the_list_is_not_written_without_need() -> None:
 
 def test_an_unknown_module_stays_in_the_list() -> None:
     lists = {"detected": (DI, 0x99, 0), "configured": (DI, 0x99, 0)}
-    device = described(coupler(), **lists)  # type: ignore[arg-type]
+    device = described(coupler(), **lists)
     assert any("0x00000099, which its ESI does not describe" in note for note in device.notes)
     plan = make_plan([device]).devices[0].modules
     assert plan is not None
