@@ -208,6 +208,11 @@ def test_commands_timeouts_and_watchdog_are_kept_with_their_source() -> None:
     assert [each.name for each in device.named_mappings] == ["Compact"]
 
 
+def test_absurd_timeouts_are_bounded() -> None:
+    described = replace(esi.servo(), timeouts=EsiTimeouts(safe_op_and_op=0xFFFFFFFF))
+    assert applied(drive(), described).timeouts.safe_op_and_op == 60.0
+
+
 @pytest.mark.parametrize(
     ("code", "text"),
     [(None, ""), (0, ""), (0xFD260000, "mV"), (0x00010300, "m/s"), (0x12345678, "unit 0x12345678")],

@@ -57,6 +57,7 @@ def link() -> zipfile.ZipInfo:
         (("a.xml", "A.XML"), "has two members with the name 'A.XML'"),
         (("a.xml", "./a.xml"), "has two members with the name './a.xml'"),
         (("readme.txt",), "the archive has no XML file"),
+        (("a" * 300 + ".xml",), "not a valid ZIP archive"),
         (("a.xml", "a.xml/b.xml"), "not a valid ZIP archive"),
         (("1.xml", "2.xml", "3.xml", "4.xml"), "has 4 members; the limit is 3"),
     ],
@@ -115,3 +116,17 @@ def test_an_encrypted_member_is_refused(tmp_path: Path) -> None:
     path.write_bytes(raw)
     with pytest.raises(EsiError, match="is encrypted"):
         extract(path, tmp_path / "x")
+
+
+@pytest.mark.parametrize("method", [zipfile.ZIP_BZIP2, zipfile.ZIP_LZMA])
+def test_damaged_data_of_other_methods_are_reported(tmp_path: Path, method: int) -> None:
+    path = tmp_path / "esi.zip"
+    with zipfile.ZipFile(path, "w", method) as made:
+        made.writestr("a.xml", os.urandom(1000))
+    raw = bytearray(path.read_bytes())
+    for at in range(45, 500):  # after the name
+        raw[at] ^= 0xFF
+    path.write_bytes(raw)
+    with pytest.raises(EsiError, match="not a valid ZIP archive"):
+        extract(path, tmp_path / "x")
+    assert files(tmp_path) == ["esi.zip"]

@@ -293,6 +293,18 @@ def test_the_esi_file_of_another_device_is_refused_with_its_key(tmp_path: Path) 
     assert str(esi) in str(caught.value)
 
 
+def test_the_esi_file_of_a_device_can_be_in_another_folder(tmp_path: Path) -> None:
+    folder = tmp_path / "machine"
+    folder.mkdir()
+    path = servo_file.write(tmp_path)
+    key = f'esi = "../{path.name}"'
+    text = SMALL.replace("alias = 11", f"alias = 11\n{key}")
+    with Machine(write_small(folder, text)) as machine:
+        esi = machine.subs["j1"].esi
+        assert esi is not None
+        assert esi.source.file == str(path)
+
+
 def test_a_folder_of_esi_files_at_the_top(tmp_path: Path) -> None:
     (tmp_path / "esi").mkdir()
     path = servo_file.write(tmp_path / "esi")

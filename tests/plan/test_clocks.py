@@ -15,6 +15,7 @@ from catenary.plan.cycle import DatagramKind
 from catenary.plan.options import PlanOptions
 from catenary.plan.planner import Plan, make_plan
 from catenary.plan.request import DeviceRequest, DistributedClock
+from catenary.plan.start_up import renewed
 from catenary.wire.datagram import EcatCommand, decode_datagram
 from catenary.wire.features import Feature
 from catenary.wire.sii_categories import SyncManagerUse
@@ -412,10 +413,11 @@ def test_clocks_show_the_settings_and_their_source() -> None:
     assert str(make_plan([servo(0)]).clocks) == "no distributed clocks"
 
 
-def test_absurd_oversampling_is_refused() -> None:
-    own = ModeAssignment(3, (0x1A00,), (1_000_000,))
+@pytest.mark.parametrize("samples", [0, 1_000_000])  # 0 would empty the assignment
+def test_absurd_oversampling_is_refused(samples: int) -> None:
+    own = ModeAssignment(3, (0x1A00,), (samples,))
     mode = OpMode("DC", "", 0x0300, assignments=(own,), source="el.xml:5")
-    with pytest.raises(MappingError, match=r"el\.xml:5: 1000000 samples of PDO 0x1A00"):
+    with pytest.raises(MappingError, match=rf"el\.xml:5: {samples} samples of PDO 0x1A00"):
         make_plan([clocked(servo(0), mode)], [asking(0)])
 
 
@@ -432,3 +434,11 @@ def test_a_mode_with_oversampling_changes_only_the_lengths_without_coe() -> None
     assert [each.index for each in assignment.pdos] == [0x1A00, 0x1A01, 0x1A02, 0x1A03]
     assert plan.devices[0].downloads == ()
     assert "mapping from ESI el.xml:5" in str(plan)
+
+
+def test_a_returning_device_keeps_the_entries_of_its_samples() -> None:
+    own = ModeAssignment(3, (0x1A00,), (2,))
+    device = clocked(servo(0), OpMode("2x", "", 0x0300, assignments=(own,)))
+    plan = make_plan([device], [asking(0)]).devices[0]
+    assert [each.index for each in plan.mapping] == [0x1C13] * 4
+    assert renewed(plan, device).mapping == plan.mapping

@@ -138,6 +138,16 @@ def test_the_list_is_not_written_without_need() -> None:
         assert unread.downloads == ()
 
 
+def test_an_unknown_module_stays_in_the_list() -> None:
+    lists = {"detected": (DI, 0x99, 0), "configured": (DI, 0x99, 0)}
+    device = described(coupler(), **lists)
+    assert any("0x00000099, which its ESI does not describe" in note for note in device.notes)
+    plan = make_plan([device]).devices[0].modules
+    assert plan is not None
+    assert plan.downloads == ()
+    assert ident_difference(plan, (DI, 0x99, 0)) == ""
+
+
 def test_the_esi_can_require_the_list() -> None:
     esi = coupler()
     assert esi.slots is not None

@@ -7,10 +7,12 @@ from dataclasses import replace
 import pytest
 
 from catenary import types
-from catenary.errors import ConfigurationError
-from catenary.model.device import ObjectInformation, ObjectValue
+from catenary.errors import ConfigurationError, MappingError
+from catenary.model.device import Entry, ObjectInformation, ObjectValue
+from catenary.plan.pdo_mapping import Mapping
 from catenary.plan.planner import Plan, make_plan
 from catenary.plan.request import DeviceRequest, ObjectReference
+from catenary.plan.start_up import mapping_downloads
 from catenary.plan.start_up_object import StartUp
 from tests.plan.devices import Asking, demo
 
@@ -148,3 +150,11 @@ def test_one_list_may_write_an_object_twice() -> None:
     keys = (StartUp(0x2100, 0, b"\x01"), StartUp(0x2100, 0, b"\x02"))
     plan = plan_of(DeviceRequest(objects=keys))
     assert [d.data for d in plan.devices[3].downloads] == [b"\x01", b"\x02"]
+
+
+def test_an_entry_too_long_for_a_mapping_object_is_not_written() -> None:
+    [pdo] = demo()[3].inputs[0].pdos
+    long = replace(pdo, entries=(Entry(0x6000, 1, 0x180),))  # 0x80 bits of subindex 2 otherwise
+    assigned = replace(demo()[3].inputs[0], pdos=(long,))
+    with pytest.raises(MappingError, match=r"0x6000:01 \(384 bits\) is longer than 255 bits"):
+        mapping_downloads(Mapping((assigned,), rewritten=(long,)))

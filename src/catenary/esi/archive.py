@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import errno
+import lzma
 import os
 import shutil
 import stat
@@ -17,8 +19,10 @@ from catenary.esi.references import parts_of
 CHUNK = 1 << 20  # [bytes]
 FAILURES = (
     *(zipfile.BadZipFile, zlib.error, NotImplementedError, RuntimeError, EOFError, ValueError),
+    *(lzma.LZMAError, MemoryError),  # MemoryError: the dictionary size that LZMA data state
     *(FileExistsError, NotADirectoryError),  # a member is a file and a folder
 )
+OF_MEMBERS = (None, errno.ENAMETOOLONG)  # None: faulty bzip2 data
 ENCRYPTED = 0x1  # bit of `flag_bits`
 
 
@@ -57,9 +61,11 @@ def extract(archive: Path, folder: Path, bounds: Bounds = BOUNDS) -> list[Path]:
         shutil.rmtree(folder, ignore_errors=True)
         os.replace(work, folder)
     except FAILURES as error:
-        raise EsiError(
-            f"not a valid ZIP archive: {error}", file=str(archive), hint="download the file again"
-        ) from error
+        raise _invalid(archive, error) from error
+    except OSError as error:
+        if error.errno in OF_MEMBERS:
+            raise _invalid(archive, error) from error
+        raise
     finally:
         shutil.rmtree(work, ignore_errors=True)
     return [folder.joinpath(*parts) for parts in members.values()]
@@ -142,6 +148,12 @@ def _copy(source: IO[bytes], copy: IO[bytes], limit: int) -> int:
         copy.write(chunk)
         done += len(chunk)
     return done
+
+
+def _invalid(archive: Path, error: Exception) -> EsiError:
+    return EsiError(
+        f"not a valid ZIP archive: {error}", file=str(archive), hint="download the file again"
+    )
 
 
 def _refusal(archive: Path, problem: str) -> EsiError:

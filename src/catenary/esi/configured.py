@@ -107,7 +107,7 @@ def _with_idents(
 ) -> DeviceDescription:
     places = tuple(slot_places(esi.slots)) if esi.slots is not None else ()
     modules = {module.ident: module for module in esi.modules}
-    placed, notes = [], []
+    placed, others, notes = [], [], []
     for number, ident in enumerate(idents):
         place = places[number] if number < len(places) else None
         module = modules.get(ident)
@@ -117,8 +117,11 @@ def _with_idents(
             reason = "does not describe" if module is None else "does not accept there"
             where = place or f"slot {number}"
             notes.append(f"{where} has a module 0x{ident:08X}, which its ESI {reason}")
+            # Without PDOs, but with its ident, so that the plan does not remove it from 0xF030
+            name = "unknown module" if module is None else module.type or module.name
+            others.append(ConfiguredModule(number, place.name if place else "", ident, name))
     device = replace(device, notes=(*device.notes, *notes))
-    return _with_placements(device, esi, tuple(placed), source)
+    return _with_placements(device, esi, tuple(placed), source, others)
 
 
 def _with_placements(
@@ -126,14 +129,19 @@ def _with_placements(
     esi: EsiDevice,
     placed: Sequence[Placement],
     source: str = DEFAULTS,
+    others: Sequence[ConfiguredModule] = (),
 ) -> DeviceDescription:
-    """Return the description with modules, or with a note if they contradict each other."""
+    """Return the description with modules, or with a note if they contradict each other.
+
+    `others` are modules that the ESI does not describe in their slots.
+    """
     try:
         check_indices(esi, placed)
     except ConfigurationError as error:
         note = f"its modules ({source}) are not used: {error.message}"
         return replace(device, notes=(*device.notes, note))
-    fitted = with_modules(device, configured(esi, placed), source)
+    modules = sorted((*configured(esi, placed), *others), key=lambda each: each.slot)
+    fitted = with_modules(device, modules, source)
     return with_mapping_of(fitted, device) if device.mapping_source in READ_SOURCES else fitted
 
 

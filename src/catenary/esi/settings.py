@@ -14,6 +14,8 @@ from catenary.model.esi_settings import (
     WatchdogValues,
 )
 
+TIMEOUT_MAX = 60.0  # [s]; those of known files reach 9 s. Errors such as µs must not block a loop
+
 # Properties of CoE by field: their names in an ESI
 _PROPERTIES = {
     "complete_access": "CompleteAccess",
@@ -116,9 +118,10 @@ def init_command(described: EsiInitCommand) -> InitCommand:
 
 
 def _timeouts(esi: EsiDevice) -> Timeouts:
+    """Return the timeouts [s], at most 60 s."""
     given = esi.timeouts
     each = (
         *(given.pre_op, given.safe_op_and_op, given.back_to_init, given.back_to_safe_op),
         *(given.mailbox_request, given.mailbox_response),
     )
-    return Timeouts(*(None if ms is None else ms / 1000 for ms in each))
+    return Timeouts(*(None if ms is None else min(ms / 1000, TIMEOUT_MAX) for ms in each))

@@ -12,10 +12,12 @@ from catenary.igh._ecrt import Exchange
 from catenary.igh.address import Address, addresses
 from catenary.igh.reservation import Reservation
 from catenary.model.device import DeviceDescription, Direction, Pdo
+from catenary.model.module import BY_IDENT, DETECTED_IDENTS
 from catenary.plan.clocks import SyncPlan
 from catenary.plan.cycle import ClockPlan
 from catenary.plan.download import Download
 from catenary.plan.layout import UnitLayout
+from catenary.plan.modules import ident_difference
 from catenary.plan.planner import Plan
 from catenary.plan.start_up import WATCHDOG_DIVIDER, DevicePlan
 from catenary.procedure.pdo import OPTIONAL_ABORTS
@@ -137,7 +139,7 @@ def _device(
     if not config:
         raise _no_handle(f"{label}: no configuration")
     _configure_process_data(master, plan, config, label)
-    for download in _downloads(plan, label):
+    for download in start_up_downloads(plan, label):
         data = ctypes.create_string_buffer(download.data, len(download.data))
         if download.optional:
             # Write it now: the master stops configuring a device that refuses a start-up SDO.
@@ -157,12 +159,14 @@ def _device(
     return DeviceConfiguration(plan.position, address, config, *requests, plan.sync)
 
 
-def _downloads(plan: DevicePlan, label: str) -> tuple[Download, ...]:
+def start_up_downloads(plan: DevicePlan, label: str) -> tuple[Download, ...]:
     """Return the start-up SDOs. The master writes all of them in PRE-OP, also those for SAFE-OP.
 
     Raises:
-        ConfigurationError: A download of the ESI needs complete access.
+        ConfigurationError: A download of the ESI needs complete access, or a slot has another
+            module than the plan expects.
     """
+    _check_modules(plan, label)
     idents = () if plan.modules is None else plan.modules.downloads
     modules = (each for each in idents if not each.optional)  # not their number: it stays as it is
     before = (*modules, *plan.commands.in_pre_op, *plan.before_mapping)
@@ -171,6 +175,21 @@ def _downloads(plan: DevicePlan, label: str) -> tuple[Download, ...]:
         if each.complete_access:
             raise _no_complete_access(label, each)
     return downloads
+
+
+def _check_modules(plan: DevicePlan, label: str) -> None:
+    """Compare the modules of a plan with those that the device detected, before any download."""
+    modules = plan.modules
+    if modules is None or modules.device.identify_by not in BY_IDENT:
+        return
+    different = ident_difference(modules, modules.device.detected or ())
+    if different:
+        raise ConfigurationError(
+            f"{label}: its modules (0x{DETECTED_IDENTS:04X}) are not those of the plan "
+            f"({modules.source}): {different}",
+            hint="nothing was written; correct modules=, or plug the expected modules in and scan "
+            "again",
+        )
 
 
 def _download_if_there(master: Reservation, position: int, download: Download) -> None:

@@ -7,6 +7,7 @@ addresses. The master itself chooses the addresses.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 from catenary.errors import MailboxError, SdoAbort
 from catenary.igh import abi
@@ -22,6 +23,7 @@ from catenary.model.device import (
     Pdo,
     SyncManager,
 )
+from catenary.model.module import CONFIGURED_IDENTS, DETECTED_IDENTS
 from catenary.model.text import printable
 from catenary.wire.features import Feature, Information, PortKind
 from catenary.wire.sii import MailboxProtocol
@@ -120,6 +122,34 @@ def read_if_there(
             if attempt + 1 == ATTEMPTS:
                 raise
     return None
+
+
+def with_module_lists(master: Reservation, device: DeviceDescription) -> DeviceDescription:
+    """Return the description of a modular device with 0xF050 and 0xF030.
+
+    Args:
+        master: The reserved master.
+        device: The description; returned unchanged if it is not modular or has no CoE mailbox.
+
+    Raises:
+        MailboxError: The device did not answer.
+    """
+    if device.modular is None or not device.coe:
+        return device
+    detected, configured = (
+        _read_idents(master, device.position, index)
+        for index in (DETECTED_IDENTS, CONFIGURED_IDENTS)
+    )
+    modular = replace(device.modular, detected=detected, configured=configured)
+    return replace(device, modular=modular)
+
+
+def _read_idents(master: Reservation, position: int, index: int) -> tuple[int, ...] | None:
+    count = read_if_there(master, position, index)
+    if not count:
+        return None
+    data = (read_if_there(master, position, index, k + 1) or b"" for k in range(count[0]))
+    return tuple(int.from_bytes(each[:4], "little") for each in data)
 
 
 def object_information(

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, NoReturn
 from catenary import bus
 from catenary.errors import CatenaryError, ConfigurationError, NoDeviceError
 from catenary.igh.configure import Configuration, configure
-from catenary.igh.describe import describe, object_information, read_if_there
+from catenary.igh.describe import describe, object_information, read_if_there, with_module_lists
 from catenary.igh.kernel_access import KernelAccess
 from catenary.igh.kernel_cycle import KernelCarrier
 from catenary.igh.reservation import Reservation
@@ -24,6 +24,7 @@ if TYPE_CHECKING:  # plan imports NumPy, which a scan does not need
     from catenary.bus.diagnosis import Diagnosis
     from catenary.bus.master import Complete, MasterOwner
     from catenary.bus.states import Outcome
+    from catenary.esi.device import EsiDevice
     from catenary.plan.planner import Plan
     from catenary.plan.request import DeviceRequest, ProcessDataRequest
     from catenary.plan.start_up import DevicePlan
@@ -67,7 +68,7 @@ class KernelMaster:
         """
         count = self.reservation.device_count()
         self.reservation.wait_preop()
-        found = [complete(describe(self.reservation, position)) for position in range(count)]
+        found = [self._completed(position, complete) for position in range(count)]
         if not found:
             raise NoDeviceError(
                 f"{self.reservation.name}: the master found no device",
@@ -78,6 +79,19 @@ class KernelMaster:
             sub.read_state()
         notes = tuple(f"{each}: {note}" for each in found for note in each.notes)
         return subs, notes
+
+    def _completed(self, position: int, complete: Complete) -> DeviceDescription:
+        """Return the description of a device, with the facts of its ESI and its modules."""
+        device = complete(describe(self.reservation, position))
+        if device.modular is None:
+            return device
+        return complete(with_module_lists(self.reservation, device))
+
+    def _with_esi(self, device: DeviceDescription, esi: EsiDevice) -> DeviceDescription:
+        from catenary.esi.apply import applied
+        from catenary.esi.configured import with_reported_modules
+
+        return with_reported_modules(with_module_lists(self.reservation, applied(device, esi)), esi)
 
     def read_mappings(self, requests: Sequence[ProcessDataRequest], period_ns: int) -> None:
         """Read the mapped PDOs, and the lengths of requested objects that are not mapped.
@@ -93,9 +107,7 @@ class KernelMaster:
             renewed = describe(self.reservation, sub.position)
             _check_same(sub.description, renewed)
             if sub.esi is not None:
-                from catenary.esi.apply import applied
-
-                renewed = applied(renewed, sub.esi)
+                renewed = self._with_esi(renewed, sub.esi)
             objects = [
                 object_information(self.reservation, sub.position, index, subindex)
                 for index, subindex in _unmapped(renewed, asked.get(sub.position))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -64,4 +65,4 @@ def check_esi_files(file: MachineFile, subs: Mapping[str, SubDevice]) -> None:
 
 
 def _place(file: MachineFile, text: str) -> Path:
-    return (Path(file.path).parent / text).absolute()
+    return Path(os.path.abspath(Path(file.path).parent / text))  # without "..", as in a library

@@ -61,6 +61,7 @@ class Pdo:
     excludes: frozenset[int] = frozenset()  # PDOs that cannot be assigned together with it (ESI)
     excluded_sync_managers: frozenset[int] = frozenset()  # it cannot be assigned to these (ESI)
     missing: bool = False  # its ESI has it, but its dictionary does not
+    sample: int = 0  # from 1 for further samples with oversampling; their entries are not written
     source: str = ""
 
     @property

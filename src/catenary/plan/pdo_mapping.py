@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
 from collections.abc import Mapping as Lists
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import chain
 from typing import TYPE_CHECKING, NamedTuple
 
 from catenary.errors import MappingError
@@ -133,14 +134,19 @@ def with_lists(
         if [pdo.index for pdo in before.pdos] != [pdo.index for pdo in pdos]:
             reassigned.append(channel)
         now[channel] = replace(before, pdos=tuple(pdos))
-    known = {pdo.index: shape(pdo) for pdo in device.pdos(direction)}
     return Mapping(
         tuple(now[channel] for channel in sorted(now)),
-        rewritten=tuple(
-            pdo for pdos in lists.values() for pdo in pdos if known.get(pdo.index) != shape(pdo)
-        ),
+        rewritten=differing(device, direction, chain.from_iterable(lists.values())),
         reassigned=tuple(reassigned),
     )
+
+
+def differing(
+    device: DeviceDescription, direction: Direction, pdos: Iterable[Pdo]
+) -> tuple[Pdo, ...]:
+    """Return the PDOs whose entries differ from those of the device, and so are to be written."""
+    known = {pdo.index: shape(pdo) for pdo in device.pdos(direction)}
+    return tuple(pdo for pdo in pdos if not pdo.sample and known.get(pdo.index) != shape(pdo))
 
 
 def shape(pdo: Pdo) -> tuple[tuple[int, int, int], ...]:

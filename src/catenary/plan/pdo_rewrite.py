@@ -84,21 +84,17 @@ def write_down(
     """
     known = {pdo.index: pdo for pdo in device.pdos(direction)}
     lists: dict[int, list[Pdo]] = {}
-    copies: set[int] = set()
     for each in written:
-        if each.copies > ENTRIES_MAX:
+        if not 1 <= each.copies <= ENTRIES_MAX:
             raise MappingError(
                 f"{device}: {each.source}: {each.copies} samples of PDO 0x{each.index:04X} per "
-                f"cycle; at most {ENTRIES_MAX} PDOs can be assigned",
+                f"cycle; 1 to {ENTRIES_MAX} PDOs can be assigned",
                 hint="the OpMode of the ESI file is wrong; choose another one",
             )
         pdo = _written_pdo(device, direction, each, known)
         pdos = lists.setdefault(_channel(device, direction, each, pdo), [])
-        pdos += [replace(pdo, index=pdo.index + k) for k in range(each.copies)]
-        copies.update(range(pdo.index + 1, pdo.index + each.copies))
-    mapping = with_lists(device, direction, lists)
-    rewritten = tuple(pdo for pdo in mapping.rewritten if pdo.index not in copies)
-    mapping = replace(mapping, source=_source(written), rewritten=rewritten)
+        pdos += [replace(pdo, index=pdo.index + k, sample=k) for k in range(each.copies)]
+    mapping = replace(with_lists(device, direction, lists), source=_source(written))
     if not device.coe and all(each.source for each in written):
         return replace(mapping, rewritten=(), reassigned=())
     return mapping

@@ -17,7 +17,7 @@ from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, cast
 
-from catenary.errors import ConfigurationError
+from catenary.errors import ConfigurationError, MappingError
 from catenary.model.device import (
     Assignment,
     DeviceDescription,
@@ -26,6 +26,7 @@ from catenary.model.device import (
     ObjectInformation,
     Pdo,
     mapped_entries,
+    mapped_pdos,
 )
 from catenary.plan.changes import Change, mapping_changes, value_changes
 from catenary.plan.clocks import SyncPlan
@@ -33,7 +34,7 @@ from catenary.plan.download import Download
 from catenary.plan.init_commands import NO_COMMANDS, Commands, choose_commands
 from catenary.plan.layout import DeviceLayout
 from catenary.plan.modules import ModulePlan
-from catenary.plan.pdo_mapping import ASSIGNMENT_BASE, Mapping, shape
+from catenary.plan.pdo_mapping import ASSIGNMENT_BASE, Mapping, differing
 from catenary.plan.start_up_object import StartUp
 from catenary.types import Scalar, by_index
 from catenary.wire.register import watchdog_unit_ns
@@ -41,6 +42,7 @@ from catenary.wire.register import watchdog_unit_ns
 if TYPE_CHECKING:  # request.py imports NumPy, which a scan does not need
     from catenary.plan.request import DeviceRequest
 
+BITS_MAX = 0xFF  # of an entry in a mapping object, ETG.1000.6 table 75
 WATCHDOG_DIVIDER = 2498  # the controller's reset value
 WATCHDOG_UNIT_NS = watchdog_unit_ns(WATCHDOG_DIVIDER)  # 100 µs
 
@@ -281,14 +283,11 @@ def compared(plan: DevicePlan, device: DeviceDescription) -> DevicePlan:
 def _difference(
     device: DeviceDescription, direction: Direction, requested: tuple[Assignment, ...]
 ) -> Mapping:
-    entries = {pdo.index: shape(pdo) for pdo in device.pdos(direction)}
     now = device.assignments(direction)
     lists = {each.sync_manager: [pdo.index for pdo in each.pdos] for each in now}
     return Mapping(
         requested,
-        rewritten=tuple(
-            pdo for each in requested for pdo in each.pdos if entries.get(pdo.index) != shape(pdo)
-        ),
+        rewritten=differing(device, direction, mapped_pdos(requested)),
         reassigned=tuple(
             each.sync_manager
             for each in requested
@@ -332,6 +331,11 @@ def _assignment_downloads(assignment: Assignment, contents: Sequence[Download]) 
 def _pdo_downloads(pdo: Pdo) -> list[Download]:
     downloads = [Download(pdo.index, 0, b"\x00")]
     for rank, entry in enumerate(pdo.entries, start=1):
+        if entry.bit_length > BITS_MAX:
+            raise MappingError(
+                f"PDO 0x{pdo.index:04X} cannot be written: {entry} is longer than {BITS_MAX} bits",
+                hint="split it into several entries, or keep the entries of the device",
+            )
         word = entry.index << 16 | entry.subindex << 8 | entry.bit_length
         downloads.append(Download(pdo.index, rank, struct.pack("<I", word), entry))
     downloads.append(Download(pdo.index, 0, bytes([len(pdo.entries)])))
