@@ -218,10 +218,11 @@ def _with_sync_managers(device: DeviceDescription, esi: EsiDevice) -> DeviceDesc
     described = {each.index: each for each in esi.sync_managers if not count or each.index < count}
     present = {each.index for each in device.sync_managers}
     managers, notes = [], []
-    for each in esi.sync_managers:
-        if _is_misplaced(each, each.index in present) and described.pop(each.index, None):
+    for given in tuple(described.values()):
+        if _is_misplaced(given, given.index in present):
+            del described[given.index]
             notes.append(
-                f"{each.source}: its ESI places SyncManager {each.index} at 0x{each.start:04X}, "
+                f"{given.source}: its ESI places SyncManager {given.index} at 0x{given.start:04X}, "
                 f"but process data start at 0x{MEMORY_START:04X}; it is not used"
             )
     for each in device.sync_managers:
