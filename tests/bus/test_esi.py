@@ -16,6 +16,7 @@ from catenary.esi.library import Library
 from catenary.model.device import Direction
 from catenary.plan import DeviceRequest
 from catenary.plan.request import DistributedClock
+from catenary.procedure.sdo import download
 from catenary.types import SINT, UDINT, UINT, USINT
 from catenary.wire.al import AlState
 from catenary.wire.sdo_information import ListType
@@ -345,3 +346,23 @@ def test_a_user_without_a_home_directory_has_no_library(monkeypatch: pytest.Monk
     monkeypatch.setattr(Path, "home", no_home)
     with MainDevice(servo_file.segment()) as main:
         assert main.scan()[1].esi is None
+
+
+def test_a_device_that_left_op_gets_the_commands_for_op_again(tmp_path: Path) -> None:
+    servo_file.write(tmp_path, commands=servo_file.command(0x6084, "e8030000", "SO"))
+    segment = servo_file.segment()
+    with MainDevice(segment) as main:
+        sub = main.scan(esi=tmp_path)[1]
+        data = cat.ProcessData(sub, required=False)
+        with cat.Loop(data, period=1e-3) as loop:
+            for _ in range(10):
+                next(loop)
+            assert sub.channel is not None
+            written = main.request(download(sub.channel, 0x6084, 0, bytes(4)))
+            while not written.done:
+                next(loop)
+            segment.core.show_al_status(1, AlState.SAFE_OP | 0x10, 0x001A)
+            for _ in range(1000):
+                next(loop)
+            assert data.present
+        assert sub.sdo.read(0x6084, type=UDINT) == 1000

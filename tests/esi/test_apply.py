@@ -10,6 +10,7 @@ from catenary.errors import IdentityError
 from catenary.esi.apply import applied
 from catenary.esi.device import (
     DeviceKey,
+    EsiSyncManager,
     EsiTimeouts,
     EsiWatchdog,
     RevisionCheck,
@@ -17,6 +18,7 @@ from catenary.esi.device import (
 from catenary.esi.object_descriptions import data_type_index
 from catenary.esi.units import unit_text
 from catenary.model.device import DeviceDescription, Direction, Entry, Identity, OpMode, Pdo
+from catenary.wire.sii_categories import SyncManagerUse
 from tests.esi import devices as esi
 from tests.plan import devices
 
@@ -206,6 +208,19 @@ def test_commands_timeouts_and_watchdog_are_kept_with_their_source() -> None:
     assert (device.timeouts.pre_op, device.timeouts.mailbox_response) == (20.0, 4.0)
     assert device.watchdog.process_data == 500
     assert [each.name for each in device.named_mappings] == ["Compact"]
+
+
+@pytest.mark.parametrize("index", [2, 4])  # 4: not in the SII
+def test_process_data_cannot_be_in_the_registers(index: int) -> None:
+    outputs = EsiSyncManager(
+        index, SyncManagerUse.OUTPUTS, 0x0120, 7, control=0x64, source=esi.at(9)
+    )
+    device = applied(drive(), replace(esi.servo(), sync_managers=(outputs,)))
+    assert device.sync_managers == drive().sync_managers
+    assert (
+        f"drive.xml:9: its ESI places SyncManager {index} at 0x0120, but process data start at "
+        "0x1000; it is not used"
+    ) in device.notes
 
 
 def test_absurd_timeouts_are_bounded() -> None:

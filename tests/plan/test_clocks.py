@@ -14,7 +14,7 @@ from catenary.plan.clocks import SyncPlan, make_sync, start_time_ns
 from catenary.plan.cycle import DatagramKind
 from catenary.plan.options import PlanOptions
 from catenary.plan.planner import Plan, make_plan
-from catenary.plan.request import DeviceRequest, DistributedClock
+from catenary.plan.request import DeviceRequest, DistributedClock, ObjectReference
 from catenary.plan.start_up import renewed
 from catenary.wire.datagram import EcatCommand, decode_datagram
 from catenary.wire.features import Feature
@@ -442,3 +442,15 @@ def test_a_returning_device_keeps_the_entries_of_its_samples() -> None:
     plan = make_plan([device], [asking(0)]).devices[0]
     assert [each.index for each in plan.mapping] == [0x1C13] * 4
     assert renewed(plan, device).mapping == plan.mapping
+
+
+def test_an_error_names_the_mode_whose_pdos_lack_an_object() -> None:
+    position = ObjectReference(0x6064, 0, 32)
+    own = ModeAssignment(3, (0x1A05,))
+    status = Pdo(0x1A05, (Entry(0x6041, 0, 16),), None)
+    device = servo(0)
+    device = replace(device, input_pdos=(*device.input_pdos, status))
+    device = clocked(device, OpMode("DC", "", 0x0300, assignments=(own,), source="el.xml:5"))
+    request = DeviceRequest(inputs=(position,), clock=DistributedClock())
+    with pytest.raises(MappingError, match=r"as specified by ESI el\.xml:5 \(0x1A05\)"):
+        make_plan([device], [Asking({0: request})])

@@ -48,6 +48,17 @@ def test_your_object_replaces_a_command_that_is_not_fixed() -> None:
     assert [each.data for each in fixed.downloads] == [b"\x05\x00", b"\x07\x00"]
 
 
+def test_a_fixed_command_does_not_undo_your_object_in_safe_op() -> None:
+    request = DeviceRequest(objects=(StartUp(0x2010, 0, 7, type=types.UINT),))
+    fixed = replace(FILTER, fixed=True, transitions=("PS", "SO"))
+    device = plan_of(fixed, request=request).devices[0]
+    assert [each.data for each in device.downloads] == [b"\x05\x00", b"\x07\x00"]
+    assert device.commands.in_safe_op == ()
+    assert device.commands.omitted == (
+        "0x2010:00: in SAFE-OP, your start-up object counts more (drive.xml:52)",
+    )
+
+
 def test_objects_of_catenary_the_mapping_and_outputs_count_more() -> None:
     mode = replace(FILTER, index=0x6060, data=b"\x08")
     written = DeviceRequest(start_up=((0x6502, 0, b"\x09"),))

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 
 from catenary.errors import MappingError
@@ -38,6 +40,9 @@ def test_an_empty_dictionary_keeps_the_mapping_of_the_sii() -> None:
     device = read({})
     assert (device.outputs, device.inputs) == (servo(0).outputs, servo(0).inputs)
     assert device.mapping_source == "SII"
+    described = replace(servo(0), mapping_source="ESI drive.xml:10")
+    reading = read_mapping(channel(), described)
+    assert play(reading, MailboxDevice(Dictionary({}))) == described
 
 
 def test_an_unreadable_list_keeps_the_mapping_of_the_sii() -> None:

@@ -24,6 +24,7 @@ from catenary.model.device import (
 )
 from catenary.wire.sync_manager import WATCHDOG_TRIGGER
 
+MEMORY_START = 0x1000  # ETG.1000.4 §6.1: registers below
 READ_SOURCES = ("CoE", "IgH master")  # of a mapping that was read from the device
 
 
@@ -217,6 +218,13 @@ def _with_sync_managers(device: DeviceDescription, esi: EsiDevice) -> DeviceDesc
     described = {each.index: each for each in esi.sync_managers if not count or each.index < count}
     present = {each.index for each in device.sync_managers}
     managers, notes = [], []
+    for given in tuple(described.values()):
+        if _is_misplaced(given, given.index in present):
+            del described[given.index]
+            notes.append(
+                f"{given.source}: its ESI places SyncManager {given.index} at 0x{given.start:04X}, "
+                f"but process data start at 0x{MEMORY_START:04X}; it is not used"
+            )
     for each in device.sync_managers:
         other = described.get(each.index)
         changed = each if other is None else _sync_manager(other, each)
@@ -229,6 +237,13 @@ def _with_sync_managers(device: DeviceDescription, esi: EsiDevice) -> DeviceDesc
     managers += [_added(each) for index, each in described.items() if index not in present]
     managers.sort(key=lambda manager: manager.index)
     return replace(device, sync_managers=tuple(managers), notes=(*device.notes, *notes))
+
+
+def _is_misplaced(described: EsiSyncManager, is_present: bool) -> bool:
+    """Return True if process data would be in the registers of the controller."""
+    if described.use not in {direction.use for direction in Direction}:
+        return False
+    return described.start < MEMORY_START and not (is_present and described.start == 0)
 
 
 def _sync_manager(described: EsiSyncManager, present: SyncManager) -> SyncManager:

@@ -64,7 +64,14 @@ def choose_commands(
         if reason and known.intersection(each.transitions)
     ]
     in_pre_op = tuple(dict.fromkeys(_downloads(written, PRE_OP_STEPS)))
-    return Commands(in_pre_op, tuple(_downloads(written, SAFE_OP_STEPS)), tuple(omitted))
+    # In SAFE-OP, a fixed command would follow the object of the application, and undo it.
+    late = [each for each in written if not _is_given(each, given)]
+    omitted += [
+        f"{_place(each)}: in SAFE-OP, your start-up object counts more ({each.source})"
+        for each in written
+        if each not in late and {*SAFE_OP_STEPS}.intersection(each.transitions)
+    ]
+    return Commands(in_pre_op, tuple(_downloads(late, SAFE_OP_STEPS)), tuple(omitted))
 
 
 def _reason(
@@ -77,14 +84,18 @@ def _reason(
     place = (command.index, command.subindex)
     if any(command.index in objects for objects in MAPPING_OBJECTS):
         return "the plan writes the mapping"
-    replaced = place in given
-    if command.complete_access:
-        replaced = any(index == command.index for index, _ in given)
-    if replaced and not command.fixed:
+    if _is_given(command, given) and not command.fixed:
         return "your start-up object replaces it"
     if place in own:
         return "Catenary writes this object"
     return "it is an output of the process data" if place in mapped else ""
+
+
+def _is_given(command: InitCommand, given: Collection[tuple[int, int]]) -> bool:
+    """Return True if the application writes the object, or a part of it."""
+    if command.complete_access:
+        return any(index == command.index for index, _ in given)
+    return (command.index, command.subindex) in given
 
 
 def _downloads(commands: Sequence[InitCommand], steps: Sequence[str]) -> Iterator[Download]:

@@ -165,7 +165,8 @@ def _check_written(
     missing = [each for each in _missing(mapping, requested) if each.required]
     if missing:
         carried = pdo_names(mapping.pdos)
-        reason = f"as specified ({carried}): {object_names(missing)} is not in them"
+        by = f" by {mapping.source}" * bool(mapping.source)
+        reason = f"as specified{by} ({carried}): {object_names(missing)} is not in them"
         _refuse(device, direction, missing, (reason,))
 
 

@@ -35,7 +35,7 @@ def read_mapping(
 ) -> Procedure[DeviceDescription]:
     """Read the present mapping of a device, and return the description with it.
 
-    A direction whose 0x1C1x cannot be read keeps the mapping of the SII, as in IgH (fsm_pdo.c).
+    A direction whose 0x1C1x cannot be read keeps its mapping (SII or ESI), as in IgH (fsm_pdo.c).
 
     Args:
         channel: The mailbox of the device.
@@ -52,7 +52,7 @@ def read_mapping(
         inputs=device.inputs if inputs is None else inputs,
         output_pdos=_joined(device.output_pdos, outputs),
         input_pdos=_joined(device.input_pdos, inputs),
-        mapping_source="SII" if outputs is None and inputs is None else "CoE",
+        mapping_source=device.mapping_source if outputs is None and inputs is None else "CoE",
     )
 
 

@@ -35,6 +35,7 @@ from catenary.procedure import restore
 from catenary.procedure.al_state import request_state
 from catenary.procedure.al_status_poll import Answer, survey
 from catenary.procedure.exchange import Procedure, after
+from catenary.procedure.pdo import write_in_safe_op
 from catenary.wire.al import ERROR_FLAG, STATE_MASK, AlState
 
 Submit = Callable[[Procedure[None]], Pending[None]]
@@ -350,6 +351,7 @@ class Watch:
     def _back_to_op(self, charge: Charge) -> Procedure[None]:
         """Request OP, as the configuration is usually intact. After a failure, start from INIT."""
         if charge.failures == 0:
+            yield from write_in_safe_op(charge.sub.channel, charge.plan)
             yield from request_state(charge.sub.station, AlState.OP)
         else:
             yield from self._restored(charge)
