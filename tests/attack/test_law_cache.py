@@ -79,4 +79,6 @@ def test_a_planted_cache_is_not_read(tmp_path: Path, place: str) -> None:
     marker.rmdir()
     assert run([str(law)], environment) == "7.0"
     assert not marker.exists()
-    assert list((tmp_path / "cache" / "catenary" / "laws").glob("*.nbi"))
+    cached = list((tmp_path / "cache" / "catenary" / "laws").glob("*.nbi"))
+    # In a user namespace, the folders of root belong to another user: the law is not cached.
+    assert bool(cached) == (Path("/").stat().st_uid == 0)
