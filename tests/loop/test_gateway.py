@@ -119,7 +119,8 @@ def test_a_terminal_without_description_is_noted(tmp_path: Path) -> None:
             sub.description.notes
         )
         assert sub.description.modular is not None
-        assert [each.name for each in sub.description.modular.modules] == ["8 DI"]
+        modules = sub.description.modular.modules
+        assert [each.name for each in modules] == ["8 DI", "unknown module"]
 
 
 def test_a_device_without_lists_gets_the_requested_modules(tmp_path: Path) -> None:

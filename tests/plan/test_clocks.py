@@ -418,7 +418,7 @@ def test_absurd_oversampling_is_refused(samples: int) -> None:
     own = ModeAssignment(3, (0x1A00,), (samples,))
     mode = OpMode("DC", "", 0x0300, assignments=(own,), source="el.xml:5")
     with pytest.raises(MappingError, match=rf"el\.xml:5: {samples} samples of PDO 0x1A00"):
-        make_plan([clocked(servo(0), mode)], [asking(0)])
+        make_plan([clocked(servo(0), mode)], [asking(0, clock=DistributedClock(op_mode="DC"))])
 
 
 def test_a_mode_with_oversampling_changes_only_the_lengths_without_coe() -> None:
@@ -427,7 +427,7 @@ def test_a_mode_with_oversampling_changes_only_the_lengths_without_coe() -> None
     own = ModeAssignment(0, (0x1A00,), (4,))
     mode = OpMode("4x", "", 0x0300, sync0_factor=-4, assignments=(own,), source="el.xml:5")
     device = device_of(0, "Inputs", inputs=(pdo,), sync_managers=(inputs,))
-    plan = make_plan([clocked(device, mode)], [asking(0)])
+    plan = make_plan([clocked(device, mode)], [asking(0, clock=DistributedClock(op_mode="4x"))])
     [manager] = plan.devices[0].layout.sync_managers
     assert (manager.index, manager.length) == (0, 8)
     [assignment] = plan.devices[0].inputs
@@ -439,7 +439,8 @@ def test_a_mode_with_oversampling_changes_only_the_lengths_without_coe() -> None
 def test_a_returning_device_keeps_the_entries_of_its_samples() -> None:
     own = ModeAssignment(3, (0x1A00,), (2,))
     device = clocked(servo(0), OpMode("2x", "", 0x0300, assignments=(own,)))
-    plan = make_plan([device], [asking(0)]).devices[0]
+    chosen = asking(0, clock=DistributedClock(op_mode="2x"))
+    plan = make_plan([device], [chosen]).devices[0]
     assert [each.index for each in plan.mapping] == [0x1C13] * 4
     assert renewed(plan, device).mapping == plan.mapping
 
@@ -451,6 +452,19 @@ def test_an_error_names_the_mode_whose_pdos_lack_an_object() -> None:
     device = servo(0)
     device = replace(device, input_pdos=(*device.input_pdos, status))
     device = clocked(device, OpMode("DC", "", 0x0300, assignments=(own,), source="el.xml:5"))
-    request = DeviceRequest(inputs=(position,), clock=DistributedClock())
+    request = DeviceRequest(inputs=(position,), clock=DistributedClock(op_mode="dc"))
     with pytest.raises(MappingError, match=r"as specified by ESI el\.xml:5 \(0x1A05\)"):
         make_plan([device], [Asking({0: request})])
+
+
+def test_a_mode_without_its_name_keeps_the_assignment_of_the_device() -> None:
+    own = ModeAssignment(3, (0x1A05,))
+    device = servo(0)
+    status = Pdo(0x1A05, (Entry(0x6041, 0, 16),), None)
+    device = replace(device, input_pdos=(*device.input_pdos, status))
+    device = clocked(device, OpMode("DC", "", 0x0300, assignments=(own,)))
+    unnamed = make_plan([device], [asking(0)]).devices[0]
+    assert unnamed.inputs == device.inputs
+    assert not unnamed.mapping
+    named = make_plan([device], [asking(0, clock=DistributedClock(op_mode="DC"))]).devices[0]
+    assert [pdo.index for each in named.inputs for pdo in each.pdos] == [0x1A05]

@@ -53,9 +53,11 @@ def starts_sync(assign_activate: int) -> bool:
 def mode_pdos(
     device: DeviceDescription, request: DistributedClock | None, direction: Direction
 ) -> tuple[WrittenPdo, ...]:
-    """Return the PDOs that the chosen OpMode assigns in one direction; empty if it assigns none.
+    """Return the PDOs that the named OpMode assigns in one direction; empty if it assigns none.
 
-    A PDO with oversampling is assigned once per sample, with consecutive indices.
+    Without a name, the device keeps its assignment: an ESI file in the library of the user must not
+    change the process data of a program that does not choose a mode. A PDO with oversampling is
+    assigned once per sample, with consecutive indices.
 
     Args:
         device: Device.
@@ -67,7 +69,7 @@ def mode_pdos(
     """
     from catenary.plan.request import WrittenPdo
 
-    if request is None or not device.op_modes:
+    if request is None or request.op_mode is None:
         return ()
     mode = choose_mode(device, request)
     written = [
