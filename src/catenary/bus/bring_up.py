@@ -21,7 +21,7 @@ from catenary.model.device import DeviceDescription, Direction, mapped_pdos
 from catenary.plan.clocks import SYNC_OBJECTS
 from catenary.plan.combination import gather_requests
 from catenary.plan.modules import with_requested_modules
-from catenary.plan.op_mode import mode_pdos
+from catenary.plan.op_mode import chosen_pdos
 from catenary.plan.pdo_search import any_carries
 from catenary.plan.planner import Plan
 from catenary.plan.request import DeviceRequest, ObjectReference, ProcessDataRequest
@@ -164,8 +164,7 @@ def _describe(sub: SubDevice, request: DeviceRequest) -> Procedure[DeviceDescrip
         (Direction.INPUT, request.inputs),
     ):
         missing = _unmapped(wanted, direction, references)
-        chosen = request.written(direction) or mode_pdos(device, request.clock, direction)
-        if missing or chosen:
+        if missing or chosen_pdos(device, request.pdos, request.clock, direction):
             device = yield from read_offers(channel, device, direction)
         required = [each for each in missing if each.required]
         device = yield from _with_objects(channel, device, required)

@@ -13,7 +13,7 @@ from catenary.errors import MappingError
 from catenary.model.device import Assignment, DeviceDescription, Direction, Entry, Pdo
 from catenary.plan.cycle import Column
 from catenary.plan.numbers import ANY, Which
-from catenary.plan.op_mode import mode_pdos
+from catenary.plan.op_mode import chosen_pdos
 from catenary.plan.pdo_rewrite import write_down
 from catenary.plan.pdo_search import pdo_names
 from catenary.plan.request import DistributedClock, ImageLayout, WrittenPdo
@@ -126,8 +126,7 @@ def with_chosen(
         directions: directions to change.
     """
     for direction in directions:
-        chosen = [pdo for pdo in pdos if pdo.direction is direction]
-        chosen = chosen or list(mode_pdos(device, clock, direction))
+        chosen = chosen_pdos(device, pdos, clock, direction)
         if chosen:
             assignments = write_down(device, direction, chosen).assignments
             device = device.with_process_data(direction, assignments)

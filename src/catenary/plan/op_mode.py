@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from itertools import zip_longest
 from typing import TYPE_CHECKING
 
@@ -50,7 +51,28 @@ def starts_sync(assign_activate: int) -> bool:
     return running and bool(signals & (Activation.SYNC0 | Activation.SYNC1))
 
 
-def mode_pdos(
+def chosen_pdos(
+    device: DeviceDescription,
+    pdos: Iterable[WrittenPdo],
+    clock: DistributedClock | None,
+    direction: Direction,
+) -> tuple[WrittenPdo, ...]:
+    """Return the PDOs that the application specified; without them, those of the OpMode.
+
+    Args:
+        device: Device.
+        pdos: PDOs of the application, of both directions.
+        clock: Clock request; None without clocks.
+        direction: Direction of the PDOs.
+
+    Raises:
+        ConfigurationError: The device has no OpMode with the requested name.
+    """
+    given = tuple(pdo for pdo in pdos if pdo.direction is direction)
+    return given or _mode_pdos(device, clock, direction)
+
+
+def _mode_pdos(
     device: DeviceDescription, request: DistributedClock | None, direction: Direction
 ) -> tuple[WrittenPdo, ...]:
     """Return the PDOs that the named OpMode assigns in one direction; empty if it assigns none.

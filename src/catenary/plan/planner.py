@@ -32,12 +32,12 @@ from catenary.plan.layout import (
 from catenary.plan.mailboxes import MailboxArea, with_mailboxes
 from catenary.plan.mapping import make_mapping
 from catenary.plan.modules import make_module_plan, with_requested_modules
-from catenary.plan.op_mode import mode_pdos
+from catenary.plan.op_mode import chosen_pdos
 from catenary.plan.options import PlanOptions
 from catenary.plan.output_owners import check_owners
 from catenary.plan.pdo_mapping import Mapping
 from catenary.plan.report import report
-from catenary.plan.request import DeviceRequest, ProcessDataRequest, RequestTables, WrittenPdo
+from catenary.plan.request import DeviceRequest, ProcessDataRequest, RequestTables
 from catenary.plan.start_up import DevicePlan, compared, make_device_plan
 from catenary.plan.watchdog import choose_watchdog
 from catenary.wire.cia402 import Mode
@@ -166,7 +166,9 @@ def _drafts(
         watchdog_ns, watchdog_source = choose_watchdog(
             device, request, options.watchdog, options.period_ns
         )
-        outputs, inputs = (_written(device, request, direction) for direction in Direction)
+        outputs, inputs = (
+            chosen_pdos(device, request.pdos, request.clock, each) for each in Direction
+        )
         drafts.append(
             _Draft(
                 device,
@@ -179,13 +181,6 @@ def _drafts(
             )
         )
     return drafts
-
-
-def _written(
-    device: DeviceDescription, request: DeviceRequest, direction: Direction
-) -> tuple[WrittenPdo, ...]:
-    """Return the PDOs that the application specified; without them, those of the OpMode."""
-    return request.written(direction) or mode_pdos(device, request.clock, direction)
 
 
 def _check_positions(

@@ -145,10 +145,6 @@ class DeviceRequest:
     objects: tuple[StartUp, ...] = ()  # start-up objects of the application, in their order
     modules: tuple[ConfiguredModule, ...] | None = None  # None: those in the description
 
-    def written(self, direction: Direction) -> tuple[WrittenPdo, ...]:
-        """Return the PDOs of a direction that the application specified."""
-        return tuple(pdo for pdo in self.pdos if pdo.direction is direction)
-
 
 class ImageLayout(Protocol):
     """Places of the mapped objects. `which` selects one of several places of an object."""
