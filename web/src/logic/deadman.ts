@@ -12,13 +12,13 @@ export const TOKEN_LIFE = 200; // [ms]; the loop accepts no older token
 
 /** Receiver of the messages of a dead-man control. */
 export interface DeadmanOutput {
-  press(axis: string, jog: JogRequest, token: string): number | null;
-  beat(axis: string, press: number, token: string): void;
-  release(axis: string, press: number): void;
+  press(axis: number, jog: JogRequest, token: string): number | null;
+  beat(axis: number, press: number, token: string): void;
+  release(axis: number, press: number): void;
 }
 
 export interface Held {
-  axis: string;
+  axis: number;
   press: number;
 }
 
@@ -42,7 +42,7 @@ export class Deadman {
   }
 
   /** Begin a jog. Return the reason of a refusal, or null. `touch`: an enabling touch is required. */
-  press(axis: string, jog: JogRequest, { touch = false } = {}): Refusal | null {
+  press(axis: number, jog: JogRequest, { touch = false } = {}): Refusal | null {
     if (this.held !== null) return "busy";
     if (touch && !this.enabling) return "not_enabled";
     if (this.token === null || this.isStale()) return "no_token";
