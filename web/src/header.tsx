@@ -63,7 +63,7 @@ function LoopFact({ connection }: { connection: Connection }) {
   const open = connection.state.value === "open";
   const lost = connection.losing.value;
   const tone: Tone = !open ? "" : !connection.running.value ? "bad" : lost ? "warn" : "ok";
-  const shown = !open
+  const shown: string = !open
     ? text.header.unknown
     : !connection.running.value
       ? text.header.stalled
