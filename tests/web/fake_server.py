@@ -200,7 +200,7 @@ def make_axis(at: int, name: str) -> Message:
         "network": 0,
         "device": at + 1,
         "unit": "rad",
-        "mode": "CSP",
+        "mode": 8,
         "position_min": None if at == 5 else -2.9,
         "position_max": None if at == 5 else 2.9,
         "velocity_limit": 3.14,
@@ -258,11 +258,17 @@ def make_device(position: int, count: int, axes: list[str]) -> Message:
     }
 
 
-def make_clocks(count: int) -> list[Message]:
-    return [
-        {"position": position, "reference": position == 1, "offset_ns": (-1) ** position * 14}
+def make_clocks(count: int) -> Message:
+    clocks = [
+        {
+            "position": position,
+            "name": f"servo_{position}",
+            "reference": position == 1,
+            "difference": None if position == 1 else (-1) ** position * 14e-9,
+        }
         for position in range(1, min(count, 5))
     ]
+    return {"clocks": clocks, "locked": True, "text": ""}
 
 
 def make_objects(params: Message) -> Message:
@@ -273,7 +279,7 @@ def make_objects(params: Message) -> Message:
             make_object(0x6060, "Modes of operation", "SINT", options={"8": "CSP", "9": "CSV"}),
             make_object(0x6065, "Following error window", "UDINT", unit="counts"),
         ]
-    return {"entries": entries, "next": [0x60FF, 0] if first == 0x6000 else None}
+    return {"entries": entries, "next": 0x60FF00 if first == 0x6000 else None, "notes": []}
 
 
 def make_object(
