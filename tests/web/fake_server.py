@@ -13,7 +13,12 @@ from playwright.sync_api import BrowserContext, Page, Route, WebSocketRoute
 
 STATIC = Path(__file__).parents[2] / "src/catenary/dashboard/static"
 ORIGIN = "http://catenary.test"
-TYPES = {".html": "text/html", ".js": "text/javascript", ".css": "text/css", ".svg": "image/svg+xml"}
+TYPES = {
+    ".html": "text/html",
+    ".js": "text/javascript",
+    ".css": "text/css",
+    ".svg": "image/svg+xml",
+}
 CSP = (
     "default-src 'none'; script-src 'self'; style-src 'self'; connect-src 'self'; img-src 'self'; "
     "frame-ancestors 'none'; require-trusted-types-for 'script'"
@@ -118,7 +123,10 @@ class FakeServer:
 
     def _serve_file(self, route: Route, path: str) -> None:
         file = STATIC / (path.lstrip("/") or "index.html")
-        headers = {"Content-Security-Policy": CSP, "Content-Type": TYPES.get(file.suffix, "text/plain")}
+        headers = {
+            "Content-Security-Policy": CSP,
+            "Content-Type": TYPES.get(file.suffix, "text/plain"),
+        }
         route.fulfill(body=file.read_bytes(), headers=headers)
 
 
@@ -225,7 +233,11 @@ def make_device(position: int, count: int, axes: list[str]) -> Message:
     return {
         "position": position,
         "network": 0,
-        "name": f"servo_{position}" if own else "EK1100" if position == 0 else f"EL{1000 + position}",
+        "name": f"servo_{position}"
+        if own
+        else "EK1100"
+        if position == 0
+        else f"EL{1000 + position}",
         "group": "Drives" if own else "Couplers",
         "vendor": 2,
         "product": 0x044C2C52,
@@ -324,5 +336,7 @@ def make_histogram(median: float, number: int) -> list[list[float]]:
     total = sum(heights)
     counts = [round(number * each / total) for each in heights]
     return [
-        [low, high, count] for low, high, count in zip(edges, edges[1:], counts, strict=False) if count
+        [low, high, count]
+        for low, high, count in zip(edges, edges[1:], counts, strict=False)
+        if count
     ]
