@@ -68,15 +68,7 @@ class Page:
     def socket(self, role: Role = "operator") -> Socket:
         with self.client(role) as client:
             cookie = client.cookies[self.access.cookie_name]
-        return Socket(
-            connect(
-                self.url.replace("http", "ws") + "/ws",
-                origin=self.url,  # type: ignore[arg-type]
-                additional_headers={"Cookie": f"{self.access.cookie_name}={cookie}"},
-                max_size=None,
-                compression=None,
-            )
-        )
+        return Socket.of(self.url, f"{self.access.cookie_name}={cookie}")
 
 
 class Socket:
@@ -84,6 +76,39 @@ class Socket:
 
     def __init__(self, connection: ClientConnection) -> None:
         self.connection = connection
+
+    @classmethod
+    def of(cls, url: str, cookie: str) -> Socket:
+        return cls(
+            connect(
+                url.replace("http", "ws") + "/ws",
+                origin=url,  # type: ignore[arg-type]
+                additional_headers={"Cookie": cookie},
+                max_size=None,
+                compression=None,
+            )
+        )
+
+    @classmethod
+    def open(cls, url: str, token: str) -> Socket:
+        """Log in, and connect."""
+        answer = httpx.post(f"{url}/login", json={"token": token}, headers={"Origin": url})
+        assert answer.status_code == 204
+        return cls.of(url, answer.headers["set-cookie"].partition(";")[0])
+
+    def any(self) -> dict[str, object]:
+        """Return the next message; skip frames."""
+        while True:
+            received = self.connection.recv(DEADLINE)
+            if isinstance(received, str):
+                message: dict[str, object] = json.loads(received)
+                return message
+
+    def jog_until(self, press: int, status: str) -> dict[str, object]:
+        """Return the message with which a jog reaches a status."""
+        while (message := self.next("jog")) != {**message, "press": press, "status": status}:
+            pass
+        return message
 
     def send(self, op: str, **content: object) -> None:
         self.connection.send(json.dumps({"op": op, **content}))

@@ -64,7 +64,8 @@ def test_integers_have_extremes() -> None:
 
 
 @pytest.mark.parametrize(
-    "signal", ["", "y", "x", "x[3]", "x[-1]", "x[1", "number[0]", "x[1]\n", "x[99999999]", "x[1][0]"]
+    "signal",
+    ["", "y", "x", "x[3]", "x[-1]", "x[1", "number[0]", "x[1]\n", "x[99999999]", "x[1][0]"],
 )
 def test_unknown_signals_are_refused(signal: str) -> None:
     with pytest.raises(ValueError, match="no signal"):

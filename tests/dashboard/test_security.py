@@ -80,7 +80,9 @@ def test_loopback_names_are_own_hosts(host: str) -> None:
     assert access().is_own_host(host)
 
 
-@pytest.mark.parametrize("host", ["", "evil.example", "evil.example:8710", "10.0.0.1", "127.0.0.1.x"])
+@pytest.mark.parametrize(
+    "host", ["", "evil.example", "evil.example:8710", "10.0.0.1", "127.0.0.1.x"]
+)
 def test_other_names_are_not_own_hosts(host: str) -> None:
     assert not access().is_own_host(host)
 
@@ -135,6 +137,8 @@ def test_names_in_host_headers() -> None:
     assert name_of_host("Robot:8710") == "robot"
 
 
-@pytest.mark.parametrize(("host", "answer"), [("127.0.0.2", True), ("::1", True), ("0.0.0.0", False)])
+@pytest.mark.parametrize(
+    ("host", "answer"), [("127.0.0.2", True), ("::1", True), ("0.0.0.0", False)]
+)
 def test_loopback_addresses(host: str, answer: bool) -> None:
     assert is_loopback(host) == answer

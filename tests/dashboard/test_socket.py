@@ -144,11 +144,10 @@ def test_a_flood_of_messages_ends_the_connection(page: Page) -> None:
 
 
 def test_a_large_message_ends_the_connection(page: Page) -> None:
-    with page.socket("viewer") as socket:
-        with pytest.raises(ConnectionClosed):
-            socket.connection.send("x" * 100_000)
-            while True:
-                socket.connection.recv(10)
+    with page.socket("viewer") as socket, pytest.raises(ConnectionClosed):
+        socket.connection.send("x" * 100_000)
+        while True:
+            socket.connection.recv(10)
 
 
 def test_without_a_cookie_the_connection_ends(page: Page) -> None:
@@ -177,19 +176,18 @@ def test_too_many_clients_are_refused(page: Page, monkeypatch: pytest.MonkeyPatc
 
 
 def test_a_killed_program_is_reported_and_its_successor_is_found(name: str) -> None:
-    with serving(name) as page:
-        with page.socket() as socket:
-            assert name in str(socket.next("gone")["reason"])
-            with running_loop(name, 2) as loop:
-                before = socket.next("hello")
-                loop.kill()
-                assert "has died" in str(socket.next("gone")["reason"])
-            with running_loop(name, 3):
-                after = socket.next("hello")
-                assert len(after["layout"]["axes"]) == 3  # type: ignore[index]
-                assert after["run"] != before["run"]
-                socket.send("subscribe", id=1, signals=["position[2]"], full=True)
-                assert socket.frame().lost == 0
+    with serving(name) as page, page.socket() as socket:
+        assert name in str(socket.next("gone")["reason"])
+        with running_loop(name, 2) as loop:
+            before = socket.next("hello")
+            loop.kill()
+            assert "has died" in str(socket.next("gone")["reason"])
+        with running_loop(name, 3):
+            after = socket.next("hello")
+            assert len(after["layout"]["axes"]) == 3  # type: ignore[index]
+            assert after["run"] != before["run"]
+            socket.send("subscribe", id=1, signals=["position[2]"], full=True)
+            assert socket.frame().lost == 0
 
 
 def test_a_stopped_program_is_reported_as_stalled(name: str) -> None:
