@@ -79,7 +79,7 @@ class AsyncClient:
         self._fail(lost(self.name))
         self._connection.close()
 
-    async def call(self, method: str, *, timeout: float | None = None, **params: Any) -> Any:
+    async def call(self, method: str, /, *, timeout: float | None = None, **params: Any) -> Any:
         """Call a method, wait for its result and return it, or raise its error.
 
         If the service is busy, repeat the request until the deadline.

@@ -73,7 +73,7 @@ class Client:
         """Close the connection. A second call has no effect."""
         self._connection.close()
 
-    def call(self, method: str, *, timeout: float | None = None, **params: Any) -> Any:
+    def call(self, method: str, /, *, timeout: float | None = None, **params: Any) -> Any:
         """Call a method, wait for its result and return it, or raise its error.
 
         If the service is busy, repeat the request until the deadline.

@@ -19,10 +19,6 @@ Scalar: TypeAlias = bool | int | float | str | bytes | None
 Value: TypeAlias = Scalar | list[Any]
 
 
-class Struct(msgspec.Struct, frozen=True, kw_only=True):
-    """Base of all results: a map with the names of its fields."""
-
-
 class Request(msgspec.Struct, frozen=True, array_like=True):
     """Call of a method. `timeout` is the time after which no answer is needed [s]."""
 
@@ -33,7 +29,7 @@ class Request(msgspec.Struct, frozen=True, array_like=True):
     params: dict[str, Any] = {}
 
 
-class Failure(Struct):
+class Failure(msgspec.Struct, frozen=True, kw_only=True):
     """Error of a request. `kind` is the name of its class in `catenary.errors` or in Python."""
 
     kind: str
@@ -51,7 +47,7 @@ class Response(msgspec.Struct, frozen=True, array_like=True):
     result: msgspec.Raw = msgspec.Raw(b"\xc0")  # nil
 
 
-class Hello(Struct):
+class Hello(msgspec.Struct, frozen=True, kw_only=True):
     """Identity of the program that serves the requests."""
 
     version: str  # of Catenary
@@ -67,7 +63,7 @@ class Hello(Struct):
     background: bool  # True if a background thread iterates the loop
 
 
-class Port(Struct):
+class Port(msgspec.Struct, frozen=True, kw_only=True):
     """One port of a device, and its errors since power-up or `clear_counters`."""
 
     port: int
@@ -78,7 +74,7 @@ class Port(Struct):
     lost_links: int
 
 
-class Device(Struct):
+class Device(msgspec.Struct, frozen=True, kw_only=True):
     """A device of the segment, with its present state."""
 
     position: int
@@ -104,7 +100,7 @@ class Device(Struct):
     lost: bool
 
 
-class Axis(Struct):
+class Axis(msgspec.Struct, frozen=True, kw_only=True):
     """An axis of the loop, and its limits in rad and N·m, or in m and N if it is linear."""
 
     name: str
@@ -120,7 +116,7 @@ class Axis(Struct):
     deceleration: float | None
 
 
-class ObjectEntry(Struct):
+class ObjectEntry(msgspec.Struct, frozen=True, kw_only=True):
     """An entry of an object dictionary, as the device or its ESI describes it."""
 
     index: int
@@ -136,7 +132,7 @@ class ObjectEntry(Struct):
     maximum: float | None
 
 
-class Objects(Struct):
+class Objects(msgspec.Struct, frozen=True, kw_only=True):
     """A page of an object dictionary. `next` is the `after` of the next page; None: the end."""
 
     entries: list[ObjectEntry]
@@ -144,7 +140,7 @@ class Objects(Struct):
     notes: list[str] = []  # missing or undocumented parts
 
 
-class SdoValue(Struct):
+class SdoValue(msgspec.Struct, frozen=True, kw_only=True):
     """Value of an entry of an object dictionary."""
 
     data: bytes
@@ -153,7 +149,7 @@ class SdoValue(Struct):
     text: str  # value with its unit and meaning
 
 
-class State(Struct):
+class State(msgspec.Struct, frozen=True, kw_only=True):
     """EtherCAT state of a device."""
 
     state: str
@@ -162,7 +158,7 @@ class State(Struct):
     al_status_text: str
 
 
-class Problem(Struct):
+class Problem(msgspec.Struct, frozen=True, kw_only=True):
     """A fault that the diagnosis found."""
 
     what: str
@@ -172,14 +168,14 @@ class Problem(Struct):
     devices: list[int] = []
 
 
-class Diagnosis(Struct):
+class Diagnosis(msgspec.Struct, frozen=True, kw_only=True):
     """Result of a diagnosis."""
 
     problems: list[Problem]
     text: str
 
 
-class EmergencyEntry(Struct):
+class EmergencyEntry(msgspec.Struct, frozen=True, kw_only=True):
     """An emergency message of a device."""
 
     error_code: int
@@ -188,7 +184,7 @@ class EmergencyEntry(Struct):
     text: str
 
 
-class EventEntry(Struct):
+class EventEntry(msgspec.Struct, frozen=True, kw_only=True):
     """Event of a loop, and advice."""
 
     serial: int
@@ -201,14 +197,14 @@ class EventEntry(Struct):
     advice: str
 
 
-class Events(Struct):
+class Events(msgspec.Struct, frozen=True, kw_only=True):
     """Events after a serial number, oldest first."""
 
     events: list[EventEntry]
     lost: int  # number of overwritten events
 
 
-class Figures(Struct):
+class Figures(msgspec.Struct, frozen=True, kw_only=True):
     """Statistics of a phase of the cycle [s]."""
 
     median: float
@@ -218,7 +214,7 @@ class Figures(Struct):
     count: int
 
 
-class Timing(Struct):
+class Timing(msgspec.Struct, frozen=True, kw_only=True):
     """Timing of the loop since it was opened."""
 
     figures: dict[str, Figures]  # by phase
@@ -228,7 +224,7 @@ class Timing(Struct):
     histograms: dict[str, list[tuple[float, float, int]]] = {}  # phase → (from, to [s], count)
 
 
-class ClockEntry(Struct):
+class ClockEntry(msgspec.Struct, frozen=True, kw_only=True):
     """Distributed clock of a device. Differences from the reference clock [s]."""
 
     position: int
@@ -237,7 +233,7 @@ class ClockEntry(Struct):
     difference: float | None
 
 
-class Clocks(Struct):
+class Clocks(msgspec.Struct, frozen=True, kw_only=True):
     """Distributed clocks of a loop. All fields are empty if the loop has none."""
 
     clocks: list[ClockEntry]
@@ -245,13 +241,13 @@ class Clocks(Struct):
     text: str
 
 
-class Text(Struct):
+class Text(msgspec.Struct, frozen=True, kw_only=True):
     """Text for a person."""
 
     text: str
 
 
-class Parameter(Struct):
+class Parameter(msgspec.Struct, frozen=True, kw_only=True):
     """Parameter of a law. None: no limit."""
 
     value: float | list[float]
@@ -260,7 +256,7 @@ class Parameter(Struct):
     unit: str
 
 
-class LawEntry(Struct):
+class LawEntry(msgspec.Struct, frozen=True, kw_only=True):
     """A law of the loop, and its parameters by name."""
 
     name: str
@@ -268,7 +264,7 @@ class LawEntry(Struct):
     parameters: dict[str, Parameter]
 
 
-class Done(Struct):
+class Done(msgspec.Struct, frozen=True, kw_only=True):
     """Completion of a request. `note` describes a side effect; empty without one."""
 
     note: str = ""
