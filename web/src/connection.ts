@@ -1,19 +1,20 @@
 /** Connection to the server of the dashboard. It reconnects by itself. */
 
 import { signal } from "@preact/signals";
-import { decodeFrame, DECIMATED, FULL, type Frame } from "./frame.ts";
+import { decodeFrame, type Frame } from "./frame.ts";
 import type {
+  AxisRequest,
+  CallAnswer,
   ClientMessage,
-  ErrorReply,
-  EventMessage,
-  HelloMessage,
-  JogMessage,
-  RequestedState,
+  ErrorBody,
+  Event,
+  Hello,
   ServerMessage,
   Session,
-  StatusMessage,
-  TimingMessage,
+  Status,
+  Timing,
 } from "./protocol.ts";
+import { KIND_DECIMATED, KIND_FULL } from "./protocol.ts";
 
 /** "login": the server requires a token. "gone": the server answers, the share has ended. */
 export type LinkState = "connecting" | "open" | "gone" | "lost" | "login";
@@ -45,9 +46,9 @@ const PING_INTERVAL = 1000; // [ms]
 /** Error that the server or the loop reported. */
 export class RemoteError extends Error {
   readonly kind: string;
-  readonly hint: string | null;
+  readonly hint: string;
 
-  constructor(reply: ErrorReply) {
+  constructor(reply: ErrorBody) {
     super(reply.message);
     this.kind = reply.kind;
     this.hint = reply.hint;
@@ -58,10 +59,10 @@ export class Connection {
   readonly state = signal<LinkState>("connecting");
   readonly reason = signal<string | null>(null); // why the share is gone
   readonly session = signal<Session | null>(null);
-  readonly hello = signal<HelloMessage | null>(null);
-  readonly status = signal<StatusMessage | null>(null);
-  readonly timing = signal<TimingMessage | null>(null);
-  readonly events = signal<readonly EventMessage[]>([]); // newest first
+  readonly hello = signal<Hello | null>(null);
+  readonly status = signal<Status | null>(null);
+  readonly timing = signal<Timing | null>(null);
+  readonly events = signal<readonly Event[]>([]); // newest first
   readonly delay = signal<number | null>(null); // round trip to the server [ms]
 
   private socket: WebSocket | null = null;
@@ -119,10 +120,9 @@ export class Connection {
   async post<T>(path: string, body: object = {}): Promise<T> {
     const reply = await post(path, body);
     if (reply.status === 401) this.state.value = "login";
-    const answer = (await reply.json()) as { result?: T; error?: ErrorReply };
-    if (answer.error !== undefined) throw new RemoteError(answer.error);
-    if (!reply.ok) throw new Error(`HTTP ${reply.status}`);
-    return answer.result as T;
+    const answer = (await reply.json()) as CallAnswer<T>;
+    if ("error" in answer) throw new RemoteError(answer.error);
+    return answer.result;
   }
 
   /** Subscribe to signals such as "position[0]", and return a function that ends the subscription. */
@@ -142,17 +142,17 @@ export class Connection {
   }
 
   /** Request a jog. Return its press number, or null if there is no connection. */
-  press(axis: string, jog: JogRequest, token: string): number | null {
+  press(axis: number, jog: JogRequest, token: string): number | null {
     const press = this.nextPress++;
     return this.send({ op: "press", axis, ...jog, token, press }) ? press : null;
   }
 
   /** Echo a token of the loop: the jog continues until 200 ms after its issue. */
-  beat(axis: string, press: number, token: string): void {
+  beat(axis: number, press: number, token: string): void {
     this.send({ op: "beat", axis, press, token });
   }
 
-  release(axis: string, press: number): void {
+  release(axis: number, press: number): void {
     this.send({ op: "release", axis, press });
   }
 
@@ -161,7 +161,7 @@ export class Connection {
     return this.send({ op: "stop" });
   }
 
-  request(axes: string[], state: RequestedState): void {
+  request(axes: number[] | null, state: AxisRequest): void {
     this.send({ op: "request", axes, state });
   }
 
@@ -237,7 +237,7 @@ export class Connection {
     for (const callback of this.callbacks.get(message.op) ?? []) callback(message as never);
   }
 
-  private receiveHello(message: HelloMessage): void {
+  private receiveHello(message: Hello): void {
     if (this.hello.value?.run !== message.run) {
       this.events.value = [];
       this.status.value = null;
@@ -255,7 +255,7 @@ export class Connection {
     this.state.value = "gone";
   }
 
-  private receiveEvent(event: EventMessage): void {
+  private receiveEvent(event: Event): void {
     if (this.events.value.some((known) => known.serial === event.serial)) return;
     this.events.value = [event, ...this.events.value].slice(0, EVENTS_KEPT);
   }
@@ -263,7 +263,7 @@ export class Connection {
   private receiveBinary(buffer: ArrayBuffer): void {
     const kind = new Uint8Array(buffer)[0] ?? 0;
     for (const callback of this.binary.get(kind) ?? []) callback(buffer);
-    if (kind !== FULL && kind !== DECIMATED) return;
+    if (kind !== KIND_FULL && kind !== KIND_DECIMATED) return;
     const frame = decodeFrame(buffer);
     this.subscriptions.get(frame.id)?.callback(frame);
   }
@@ -275,8 +275,6 @@ export class Connection {
     this.send({ op: "subscribe", id, signals, full, rate });
   }
 }
-
-export type { JogMessage };
 
 function post(path: string, body: object): Promise<Response> {
   return fetch(path, {

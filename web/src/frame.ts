@@ -1,8 +1,6 @@
 /** Samples of a subscription: the binary frames of the WebSocket. All numbers are little endian. */
 
-export const FULL = 1;
-export const DECIMATED = 2;
-export const HEADER_SIZE = 32; // bytes
+import { FRAME_HEADER_BYTES, FRAME_VERSION, KIND_DECIMATED, KIND_FULL } from "./protocol.ts";
 
 interface FrameHead {
   id: number; // of the subscription
@@ -15,13 +13,13 @@ interface FrameHead {
 
 /** Every sample: `columns[signal][row]`. */
 export interface FullFrame extends FrameHead {
-  kind: typeof FULL;
+  kind: typeof KIND_FULL;
   columns: Float64Array[];
 }
 
 /** Smallest and largest sample in each interval: `minimum[signal][row]`, `maximum[signal][row]`. */
 export interface DecimatedFrame extends FrameHead {
-  kind: typeof DECIMATED;
+  kind: typeof KIND_DECIMATED;
   minimum: Float32Array[];
   maximum: Float32Array[];
 }
@@ -32,7 +30,7 @@ export type Frame = FullFrame | DecimatedFrame;
 export function decodeFrame(buffer: ArrayBuffer): Frame {
   const view = new DataView(buffer);
   const kind = view.getUint8(0);
-  if (view.getUint8(1) !== 1) throw new RangeError("frame of another version");
+  if (view.getUint8(1) !== FRAME_VERSION) throw new RangeError("frame of another version");
   const rows = view.getUint32(4, true);
   const signals = view.getUint32(8, true);
   const head: FrameHead = {
@@ -41,14 +39,14 @@ export function decodeFrame(buffer: ArrayBuffer): Frame {
     lost: view.getUint32(12, true),
     first: view.getFloat64(16, true),
     period: view.getFloat64(24, true),
-    time: new Float64Array(buffer, HEADER_SIZE, rows),
+    time: new Float64Array(buffer, FRAME_HEADER_BYTES, rows),
   };
-  const start = HEADER_SIZE + 8 * rows;
+  const start = FRAME_HEADER_BYTES + 8 * rows;
   const places = Array.from({ length: signals }, (_, signal) => start + 8 * rows * signal);
-  if (kind === FULL) {
+  if (kind === KIND_FULL) {
     return { ...head, kind, columns: places.map((at) => new Float64Array(buffer, at, rows)) };
   }
-  if (kind !== DECIMATED) throw new RangeError(`unknown kind of frame: ${kind}`);
+  if (kind !== KIND_DECIMATED) throw new RangeError(`unknown kind of frame: ${kind}`);
   return {
     ...head,
     kind,
