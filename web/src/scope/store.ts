@@ -9,10 +9,10 @@ export interface Column {
   readonly high: Float64Array;
 }
 
-/** Rows that the server could not deliver; `row` is the marker row (NaN in each column). */
+/** Interval without samples; `row` is the marker row (NaN in each column). */
 export interface Gap {
   readonly row: number;
-  readonly rows: number;
+  readonly rows: number; // lost on the way; 0 after a pause
 }
 
 export interface Rows {
@@ -39,6 +39,8 @@ export class RingStore {
   lost = 0;
   /** Largest number of rows that may be read; fewer while the ring is not full. */
   readonly history: number;
+  private names: readonly string[] = [];
+  private assignment: [Column, number][] | null = null;
 
   constructor(seconds: number, period: number) {
     this.period = period;
@@ -66,6 +68,7 @@ export class RingStore {
 
   add(name: string): void {
     if (this.columns.has(name)) return;
+    this.assignment = null;
     const blocks = this.capacity / BLOCK;
     this.columns.set(name, {
       values: new Float64Array(this.capacity).fill(NaN),
@@ -76,6 +79,7 @@ export class RingStore {
 
   remove(name: string): void {
     this.columns.delete(name);
+    this.assignment = null;
   }
 
   clear(): void {
@@ -96,11 +100,11 @@ export class RingStore {
     if (rows.time[count - 1]! < this.lastTime - 1) this.clear();
     const from = this.firstNew(rows.time);
     if (from === count) return;
-    if (from === 0 && rows.lost > 0 && this.end > 0) this.appendGap(rows.lost);
+    const jump = rows.time[from]! - this.lastTime > 1.5 * this.period;
+    if (jump && this.end > 0) this.appendGap(from === 0 ? rows.lost : 0);
     const kept = Math.max(from, count - this.history);
     this.write(this.time, rows.time, kept);
-    for (const [name, column] of this.columns) {
-      const index = rows.names.indexOf(name);
+    for (const [column, index] of this.assigned(rows.names)) {
       if (index < 0) this.writeNothing(column, count - kept);
       else this.writeColumn(column, rows.values[index]!, kept);
     }
@@ -117,6 +121,15 @@ export class RingStore {
       else high = middle;
     }
     return low;
+  }
+
+  /** Return each column with the index of its values; -1 if the rows do not contain it. */
+  private assigned(names: readonly string[]): [Column, number][] {
+    if (this.assignment === null || this.names !== names) {
+      this.names = names;
+      this.assignment = [...this.columns].map(([name, column]) => [column, names.indexOf(name)]);
+    }
+    return this.assignment;
   }
 
   private firstNew(time: Float64Array): number {
