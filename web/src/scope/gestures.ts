@@ -31,6 +31,13 @@ export class Gestures {
     over.addEventListener("dblclick", () => this.model.live());
   }
 
+  /** End the gesture in progress. */
+  cancel(): void {
+    this.action = null;
+    this.pointers.clear();
+    this.box.remove();
+  }
+
   private down(event: PointerEvent): void {
     const x = this.position(event);
     this.over.setPointerCapture(event.pointerId);
@@ -84,14 +91,10 @@ export class Gestures {
   }
 
   private wheel(event: WheelEvent): void {
-    if (event.ctrlKey || Math.abs(event.deltaY) >= Math.abs(event.deltaX)) {
-      if (!event.ctrlKey && !event.altKey && document.activeElement !== this.over.closest(".scope-plot")) return;
-      event.preventDefault();
+    event.preventDefault();
+    if (Math.abs(event.deltaY) >= Math.abs(event.deltaX)) {
       this.model.zoom(Math.exp(event.deltaY * 0.002), this.time(this.position(event)));
-    } else {
-      event.preventDefault();
-      this.model.pan(this.time(event.deltaX) - this.time(0));
-    }
+    } else this.model.pan(this.time(event.deltaX) - this.time(0));
   }
 
   private drawBox(start: number, end: number): void {

@@ -67,6 +67,11 @@ export class ScopeModel {
     return this.store.end === 0 ? 0 : Math.floor(this.store.timeOf(this.store.begin) / 1000) * 1000;
   }
 
+  /** Add to the cycle clock to get UTC [ns]. */
+  get utcOffset(): number {
+    return this.connection.hello.peek()?.layout.utc_offset_ns ?? 0;
+  }
+
   change(layout: ScopeLayout): void {
     const before = this.layout.peek();
     this.layout.value = layout;
