@@ -19,7 +19,7 @@ export function Scope({ connection }: { connection: Connection }) {
   if (layout === null) return <p class="scope-note">{text.scope.empty}</p>;
   return (
     <div class="scope">
-      <h1 class="visually-hidden">{text.scope.title}</h1>
+      <h1>{text.scope.title}</h1>
       <Toolbar model={model} />
       <TriggerBar model={model} />
       <details class="scope-side" open={matchMedia("(min-width: 820px)").matches}>
