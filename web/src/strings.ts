@@ -9,6 +9,15 @@ export const text = {
     devices: "Devices",
     scope: "Scope",
   },
+  scene: {
+    title: "3D",
+    label: (bodies: number) => `Robot with ${bodies} bodies in 3D`,
+    ghost: "Targets as a ghost",
+    reset: "Reset view",
+    hint: "Drag: turn. Wheel or two fingers: zoom. Right button: move.",
+    pushHint: "Drag the robot to push it. Drag the background to turn the view.",
+    failed: (reason: string) => `This browser cannot show the scene: ${reason}`,
+  },
   scope: {
     title: "Scope",
     empty: "No signals yet: the share has not answered.",
