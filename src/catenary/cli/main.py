@@ -15,6 +15,7 @@ from catenary.cli import (
     diag,
     doctor,
     esi,
+    foxglove,
     graph,
     init,
     plot,
@@ -25,6 +26,7 @@ from catenary.cli import (
     sdo,
     sii,
     state,
+    top,
     virtual,
 )
 from catenary.cli.failure import USAGE, report, silence_stdout
@@ -36,6 +38,7 @@ COMMANDS = (
     *(scan, state, graph, diag, sdo, reg, alias, sii, esi),
     *(init, check),
     *(demo, doctor, bench, virtual, realtime, record, plot),
+    *(top, foxglove),
 )
 EPILOG = """\
 TARGET is one of
