@@ -11,6 +11,7 @@ from catenary.cli import (
     alias,
     bench,
     check,
+    dashboard,
     demo,
     diag,
     doctor,
@@ -37,8 +38,7 @@ DESCRIPTION = "Real-time EtherCAT for Python."
 COMMANDS = (
     *(scan, state, graph, diag, sdo, reg, alias, sii, esi),
     *(init, check),
-    *(demo, doctor, bench, virtual, realtime, record, plot),
-    *(top, foxglove),
+    *(demo, dashboard, top, doctor, bench, virtual, realtime, record, plot, foxglove),
 )
 EPILOG = """\
 TARGET is one of
