@@ -1,4 +1,4 @@
-"""Server of the page for browser tests: plausible answers, and a record of all messages of the page."""
+"""Server of the page for browser tests: plausible answers, and a record of all messages."""
 
 from __future__ import annotations
 
@@ -229,7 +229,7 @@ def make_device(position: int, count: int, axes: list[str]) -> Message:
     if position == 3:
         parent, port = 1, 2
     last = position == count - 1
-    links = {0: True, 1: not (position == 2), 2: position == 1, 3: False}
+    links = {0: True, 1: position != 2, 2: position == 1, 3: False}
     return {
         "position": position,
         "network": 0,
@@ -268,6 +268,10 @@ def make_device(position: int, count: int, axes: list[str]) -> Message:
         "optional": False,
         "lost": position == 7,
     }
+
+
+def name_of(position: int) -> str:
+    return "EK1100" if position == 0 else f"servo_{position}"
 
 
 def make_clocks(count: int) -> Message:

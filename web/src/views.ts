@@ -2,6 +2,7 @@
 
 import type { ComponentType } from "preact";
 import type { Connection } from "./connection.ts";
+import { Scope } from "./scope/scope.tsx";
 import { text } from "./strings.ts";
 import { Axes } from "./views/axes.tsx";
 import { Devices } from "./views/devices.tsx";
@@ -32,5 +33,11 @@ export const views: View[] = [
     label: text.navigation.devices,
     icon: "M9 3h6v5H9zM3 16h6v5H3zM15 16h6v5h-6zM12 8v4M6 16v-4h12v4",
     component: Devices,
+  },
+  {
+    key: "scope",
+    label: text.navigation.scope,
+    icon: "M3 4h18v16H3zM6 14c2-8 4-8 6-2s4 6 6-2",
+    component: Scope,
   },
 ];

@@ -6,6 +6,7 @@ import type { Connection } from "../connection.ts";
 import { Segmented } from "../parts/common.tsx";
 import { confirmed } from "../parts/confirm.tsx";
 import type { AxisInfo } from "../remote.ts";
+import { ScenePanel } from "../scene/panel.tsx";
 import { useResource } from "../resource.ts";
 import { text } from "../strings.ts";
 import { AxisCard } from "./axes/card.tsx";
@@ -27,6 +28,7 @@ export function Axes({ connection }: { connection: Connection }) {
   return (
     <>
       <Toolbar {...{ connection, jogging, noJog, units }} />
+      <ScenePanel connection={connection} />
       <div class="axes-grid">
         {names.map((name, axis) => {
           const info = infos.find((each) => each.name === name);
