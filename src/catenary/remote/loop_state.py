@@ -11,7 +11,7 @@ from catenary.remote.advice import advice_for
 from catenary.remote.program import Program, Work
 from catenary.target import segment_of
 
-QUANTILES = {"median": "median", "p99": "p99", "p999": "p99.9", "max": "max"}
+QUANTILES = {"median": "p50", "p99": "p99", "p999": "p999", "max": "max"}
 
 
 def hello(program: Program) -> messages.Hello:
