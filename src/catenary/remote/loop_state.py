@@ -16,11 +16,9 @@ QUANTILES = {"median": "p50", "p99": "p99", "p999": "p999", "max": "max"}
 
 def hello(program: Program) -> messages.Hello:
     """Return the identity of the program, and what it allows."""
-    import catenary
-
     layout, session = program.share.layout, program.network.session
     return messages.Hello(
-        version=catenary.__version__,
+        version=program.version,
         pid=layout.writer.pid,
         program=layout.writer.command,
         share=layout.name,

@@ -1,10 +1,10 @@
 """Remote service: one thread that answers the requests of all clients of a share.
 
-Theory of operation. The thread runs in passes. A pass receives at most one message, from the clients
-in turn, and continues the requests for at most SLICE. After it, the thread sleeps for PAUSE, so
-that it never holds the interpreter for long. Therefore at most 1 / PAUSE messages are received per
-second. Further ones stay in the sockets of their senders, which then block. Requests beyond the
-rate limit receive BusyError with the time after which to repeat them.
+Theory of operation. The thread runs in passes. A pass receives at most one message, from the
+clients in turn, and continues the requests for at most SLICE. After it, the thread sleeps for
+PAUSE, so that it never holds the interpreter for long. Therefore at most 1 / PAUSE messages are
+received per second. Further ones stay in the sockets of their senders, which then block. Requests
+beyond the rate limit receive BusyError with the time after which to repeat them.
 
 A request that waits for a device stays pending, and does not delay the others. Each has a deadline.
 Clients that do not read, or send messages that are too long, lose their connection.
@@ -92,9 +92,8 @@ class Service:
     def _receive(self, timeout: float) -> bool:
         """Receive at most one message, or accept one client. Return False if there is none."""
         self._clients = deque(client for client in self._clients if client.open)
-        sources = {source.fileno(): source for source in (self._listener, *self._clients)}
         poll = select.poll()
-        for number in (self._wake, *sources):
+        for number in (self._wake, self._listener.fileno(), *(c.fileno() for c in self._clients)):
             poll.register(number, select.POLLIN)
         ready = {number for number, _ in poll.poll(timeout * 1000)}
         if self._listener.fileno() in ready:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import inspect
 import logging
 import time
 from collections.abc import Callable, Generator
@@ -76,10 +75,10 @@ class Task:
             result = call()
         except Exception as error:  # the service must survive an error in a method
             return self._failed(error)
-        if inspect.isgenerator(result):
-            self._work = result
-            return None
-        return self._response(result)
+        if not isinstance(result, Generator):
+            return self._response(result)
+        self._work = result
+        return None
 
     def _expire(self) -> bytes:
         return self.cancel(
