@@ -1,7 +1,8 @@
 """Messages of the remote service of a share, as frozen values: msgpack arrays and maps.
 
 A client sends a `Request` in one packet of a SOCK_SEQPACKET socket. The service answers with one or
-more `Response` packets, whose parts form the encoded result. `RESULTS` names the type of each method's result. JSON has the same field names.
+more `Response` packets, whose parts form the encoded result. `RESULTS` names the type of each
+method's result. JSON has the same field names.
 """
 
 from __future__ import annotations

@@ -35,6 +35,8 @@ class Program:
         # Both take milliseconds, so they are made before the first cycle
         self.plan_text = str(network.plan)
         self.version = version("catenary")
+        # Data types of entries, by identity, index and subindex
+        self.types: dict[tuple[object, int, int], int] = {}
         # Indices and notes of the dictionaries that clients have listed, by identity
         self.dictionaries: dict[object, tuple[tuple[int, ...], list[str]]] = {}
 
