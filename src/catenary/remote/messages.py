@@ -84,6 +84,7 @@ class Device(msgspec.Struct, frozen=True, kw_only=True):
     position: int
     network: int
     name: str
+    order: str
     group: str
     vendor: int
     product: int
