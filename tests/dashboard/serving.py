@@ -167,10 +167,10 @@ def decode_frame(data: bytes) -> DecodedFrame:
 
 
 @contextlib.contextmanager
-def serving(share: str, *, port: int = 0, viewer_only: bool = False) -> Iterator[Page]:
+def serving(share: str, *, port: int = 0, **files: Path) -> Iterator[Page]:
     """Run a server in a thread."""
     listening = open_socket("127.0.0.1", port)
-    options = Options(port=listening.getsockname()[1], viewer_only=viewer_only)
+    options = Options(port=listening.getsockname()[1], **files)  # type: ignore[arg-type]
     access = make_access(options)
     hub = Hub(Source(share), Requests(share))
     server = make_server(access, hub, options)

@@ -16,7 +16,7 @@ from catenary.dashboard.security import Role
 from catenary.dashboard.source import Source
 from catenary.dashboard.status import AxisNotes, axis_statuses, cycle_status
 from catenary.dashboard.subscriptions import Subscriptions
-from catenary.errors import CatenaryError
+from catenary.errors import CatenaryError, ShareError
 from catenary.share import Reader, SharedEvent
 
 TICK = 1 / 60  # [s]
@@ -60,6 +60,7 @@ class Hub:
         self.subscriptions: Subscriptions | None = None
         self.clients: set[Client] = set()
         self._problem = problem
+        self._reason = ""
         self._notes = AxisNotes()
         self._events: list[dict[str, object]] = []
         self._fresh: list[SharedEvent] = []
@@ -71,9 +72,16 @@ class Hub:
     async def run(self) -> None:
         """Serve the clients until the task is cancelled."""
         try:
+            due = time.monotonic()
             while True:
-                self.step(time.monotonic())
-                await asyncio.sleep(TICK)
+                now = time.monotonic()
+                try:
+                    self.step(now)
+                except ShareError as error:
+                    self.source.drop(error.message)
+                    self._change()
+                due = max(due + TICK, now)  # without catching up after a pause
+                await asyncio.sleep(due - time.monotonic())
         finally:
             self.source.close()
 
@@ -83,6 +91,7 @@ class Hub:
             self._change()
         reader = self.source.reader
         if reader is None:
+            self._send_reason()
             return
         self._take_events()
         if self.subscriptions is not None:
@@ -90,8 +99,8 @@ class Hub:
         self._send_token(reader)
         for client in list(self.clients):
             client.follow_motion()
-        if now >= self._status_due:
-            self._status_due = now + STATUS_INTERVAL
+        if now >= self._status_due - TICK / 2:
+            self._status_due = max(self._status_due + STATUS_INTERVAL, now)
             self._send_status(reader)
         if now >= self._timing_due and self.clients:
             self._timing_due = now + TIMING_INTERVAL
@@ -123,9 +132,18 @@ class Hub:
         self.requests.reset()
         if reader is not None:
             self._start(self._find_devices())
+        self._reason = ""
         for client in list(self.clients):
             client.forget_motion()
-            self._greet(client)
+            if reader is not None:
+                self._greet(client)
+
+    def _send_reason(self) -> None:
+        """Send why there is no share, if the reason has changed."""
+        reason = self._problem() or self.source.reason
+        if reason != self._reason:
+            self._reason = reason
+            self._send_all(encode_message("gone", reason=reason))
 
     def _greet(self, client: Client) -> None:
         reader = self.source.reader
