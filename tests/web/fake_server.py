@@ -112,6 +112,8 @@ class FakeServer:
                     "version": "0.1.0",
                 }
             )
+        elif path == "/scene":
+            route.fulfill(status=204)
         elif path == "/login":
             route.fulfill(status=204 if "right" in (route.request.post_data or "") else 403)
         else:

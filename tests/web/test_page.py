@@ -20,6 +20,8 @@ WIDTHS = (390, 820, 1280)
 VIEWS = ("overview", "axes", "devices", "devices/4")
 SETTLE = 120  # time in which the page would send a wrong message [ms]
 
+HELD_TIME = "window.testTime = 1000; performance.now = () => window.testTime;"
+
 Opened = tuple[Page, FakeServer]
 
 
@@ -27,6 +29,7 @@ Opened = tuple[Page, FakeServer]
 def opened(browser: Browser) -> Iterator[Opened]:
     """A page that is connected, in the view of the axes."""
     page = browser.new_page(viewport={"width": 1280, "height": 860})
+    page.add_init_script(HELD_TIME)
     server = FakeServer(page)
     open_view(page, "axes")
     yield page, server
@@ -40,16 +43,24 @@ def open_view(page: Page, view: str) -> None:
 
 def hold_jog(page: Page, server: FakeServer) -> None:
     """Hold the button that moves the first axis in positive direction."""
-    server.send_token("t1")
-    page.wait_for_timeout(20)
+    give_token(page, server, "t1")
     page.get_by_role("button", name="Jog joint_1 in positive").hover()
     page.mouse.down()
     wait_for(page, server, "press")
 
 
-def wait_for(page: Page, server: FakeServer, op: str) -> None:
-    for _ in range(100):
-        if server.of(op):
+def give_token(page: Page, server: FakeServer, token: str) -> None:
+    """Send a token, and wait until the page shows the status that was sent after it."""
+    server.send_token(token)
+    server.send_status()
+    number = f"{server.number:,}".replace(",", "\u202f")
+    expect(page.get_by_role("banner").get_by_text(number)).to_be_visible()
+
+
+def wait_for(page: Page, server: FakeServer, op: str, count: int = 1) -> None:
+    """Wait for messages of the page."""
+    for _ in range(500):
+        if len(server.of(op)) >= count:
             return
         page.wait_for_timeout(10)
     pytest.fail(f"the page sent no {op!r}: {server.received}")
@@ -58,9 +69,9 @@ def wait_for(page: Page, server: FakeServer, op: str) -> None:
 def test_held_button_sends_a_press_and_echoes_each_token(opened: Opened) -> None:
     page, server = opened
     hold_jog(page, server)
-    for token in ("t2", "t3"):
-        server.send_token(token)
-        page.wait_for_timeout(20)
+    server.send_token("t2")
+    server.send_token("t3")
+    wait_for(page, server, "beat", 2)
     assert server.of("press") == [
         {
             "op": "press",
@@ -82,8 +93,7 @@ def test_jog_continues_while_the_axis_does_not_follow_the_application(opened: Op
     server.send_status()
     page.wait_for_timeout(SETTLE)
     server.send_token("t2")
-    page.wait_for_timeout(20)
-    assert [beat["token"] for beat in server.of("beat")] == ["t2"]
+    wait_for(page, server, "beat")
     assert server.of("release") == []
 
 
@@ -156,15 +166,14 @@ def assert_released(page: Page, server: FakeServer) -> None:
 def test_late_tokens_release_the_jog(opened: Opened) -> None:
     page, server = opened
     hold_jog(page, server)
-    page.wait_for_timeout(250)
+    page.evaluate("window.testTime += 250")
     server.send_token("late")
     assert_released(page, server)
 
 
 def test_held_arrow_key_jogs_the_focused_axis(opened: Opened) -> None:
     page, server = opened
-    server.send_token("t1")
-    page.wait_for_timeout(20)
+    give_token(page, server, "t1")
     page.get_by_role("group", name="Jog joint_2").focus()
     page.keyboard.down("ArrowLeft")
     page.keyboard.down("ArrowLeft")  # a repetition
@@ -190,10 +199,10 @@ def test_refused_jog_shows_the_text_of_the_server(opened: Opened) -> None:
 def test_jog_on_a_touch_screen_needs_two_touches(browser: Browser) -> None:
     context = browser.new_context(viewport={"width": 390, "height": 844}, has_touch=True)
     page = context.new_page()
+    page.add_init_script(HELD_TIME)
     server = FakeServer(page)
     open_view(page, "axes")
-    server.send_token("t1")
-    page.wait_for_timeout(20)
+    give_token(page, server, "t1")
     jog = centre(page, "Jog joint_1 in positive")
     pad = centre(page, "HOLD TO ENABLE")
     session = context.new_cdp_session(page)
@@ -206,8 +215,7 @@ def test_jog_on_a_touch_screen_needs_two_touches(browser: Browser) -> None:
     expect(page.get_by_text("Hold the enable field")).to_be_visible()
     touch("touchEnd")
     assert server.of("press") == []
-    server.send_token("t2")
-    page.wait_for_timeout(20)
+    give_token(page, server, "t2")
     touch("touchStart", pad)
     touch("touchStart", pad, jog)
     wait_for(page, server, "press")
@@ -228,6 +236,7 @@ def test_escape_stops_in_an_input_and_in_a_dialog(opened: Opened) -> None:
     page.keyboard.press("Escape")
     page.get_by_role("button", name="Enable", exact=True).first.click()
     page.keyboard.press("Escape")
+    wait_for(page, server, "stop", 2)
     page.wait_for_timeout(SETTLE)
     assert len(server.of("stop")) == 2
     assert server.of("request") == []

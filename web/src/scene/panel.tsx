@@ -32,7 +32,7 @@ export function ScenePanel({ connection }: { connection: Connection }) {
 
 async function load(signal: AbortSignal): Promise<Loading> {
   const reply = await fetch("/scene", { signal });
-  if (!reply.ok) return { reason: `HTTP ${reply.status}` };
+  if (reply.status !== 200) return { reason: `HTTP ${reply.status}` };
   return { scene: decodeScene(await reply.arrayBuffer()) };
 }
 

@@ -39,10 +39,7 @@ function Tools({ list }: { list: ObjectList }) {
         type="button"
         class={list.onlyFavourites.value ? "button primary" : "button"}
         aria-pressed={list.onlyFavourites.value}
-        onClick={() => {
-          list.onlyFavourites.value = !list.onlyFavourites.value;
-          if (list.next.value !== null) void list.load(true);
-        }}
+        onClick={() => list.toggleOnlyFavourites()}
       >
         ★ {t.favourites}
       </button>
