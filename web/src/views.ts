@@ -2,6 +2,7 @@
 
 import type { ComponentType } from "preact";
 import type { Connection } from "./connection.ts";
+import { Recordings } from "./recordings/recordings.tsx";
 import { Scope } from "./scope/scope.tsx";
 import { text } from "./strings.ts";
 import { Axes } from "./views/axes.tsx";
@@ -39,5 +40,11 @@ export const views: View[] = [
     label: text.navigation.scope,
     icon: "M3 4h18v16H3zM6 14c2-8 4-8 6-2s4 6 6-2",
     component: Scope,
+  },
+  {
+    key: "recordings",
+    label: text.navigation.recordings,
+    icon: "M4 5h16v14H4zM9 5v14M15 5v14M4 10h5M4 14h5M15 10h5M15 14h5",
+    component: Recordings,
   },
 ];
