@@ -40,7 +40,7 @@ export function AxisCard(props: CardProps) {
         <h2 id={headline} class="mono cut">
           {name}
         </h2>
-        <span class="muted small">{info?.mode ?? ""}</span>
+        <span class="muted small">{info === undefined ? "" : (text.axes.modes[info.mode] ?? info.mode)}</span>
         {info !== undefined && (
           <a class="small" href={address("devices", info.device)}>
             {text.axes.device} {info.device}
@@ -131,10 +131,15 @@ function Controls(props: CardProps) {
   return (
     <>
       <div class="row wrap">
-        <EnableButton {...props} enabled={enabled.value} disabled={!operator} />
+        <EnableButton
+          {...props}
+          enabled={enabled.value}
+          faulted={faulted.value}
+          disabled={!operator}
+        />
         <button
           type="button"
-          class="button small"
+          class={faulted.value ? "button small primary" : "button small"}
           disabled={!operator || !faulted.value}
           onClick={() => connection.request([axis], "reset")}
         >
@@ -150,8 +155,8 @@ function Controls(props: CardProps) {
   );
 }
 
-function EnableButton(props: CardProps & { enabled: boolean; disabled: boolean }) {
-  const { connection, axis, name, enabled, disabled } = props;
+function EnableButton(props: CardProps & { enabled: boolean; faulted: boolean; disabled: boolean }) {
+  const { connection, axis, name, enabled, faulted, disabled } = props;
   const onClick = async () => {
     if (enabled) {
       connection.request([axis], "disable");
@@ -167,7 +172,7 @@ function EnableButton(props: CardProps & { enabled: boolean; disabled: boolean }
   return (
     <button
       type="button"
-      class={enabled ? "button small" : "button small primary"}
+      class={enabled || faulted ? "button small" : "button small primary"}
       disabled={disabled}
       onClick={() => void onClick()}
     >

@@ -18,6 +18,7 @@ export interface Reading {
 export class ObjectList {
   readonly entries = signal<readonly ObjectEntry[]>([]);
   readonly next = signal<ObjectPage["next"]>(null);
+  readonly notes = signal<readonly string[]>([]);
   readonly loading = signal(false);
   readonly search = signal("");
   readonly onlyFavourites = signal(false);
@@ -97,6 +98,7 @@ export class ObjectList {
     const page = await this.connection.call<ObjectPage>("objects", params);
     this.entries.value = [...this.entries.value, ...page.entries];
     this.next.value = page.next;
+    this.notes.value = [...new Set([...this.notes.value, ...page.notes])];
   }
 
   private note(entry: ObjectEntry, reading: Reading): void {

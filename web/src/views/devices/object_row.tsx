@@ -108,7 +108,7 @@ function Editor({ list, entry, reading, onClose }: EditorProps) {
       notifyError(error);
     }
   };
-  const range = rangeOf(entry);
+  const range = optionsOf(entry).length > 0 ? null : rangeOf(entry);
   return (
     <form class="object-editor" onSubmit={(event) => void submit(event)}>
       <Input entry={entry} id={id} value={entered.value} onInput={(value) => (entered.value = value)} />

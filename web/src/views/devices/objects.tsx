@@ -78,7 +78,7 @@ function Entries({ list, operator }: { list: ObjectList; operator: boolean }) {
 
 function Footer({ list }: { list: ObjectList }) {
   return (
-    <div class="row object-footer muted small">
+    <div class="row wrap object-footer muted small">
       <span>
         {list.entries.value.length} {text.devices.objects.loaded}
       </span>
@@ -91,6 +91,11 @@ function Footer({ list }: { list: ObjectList }) {
         >
           {text.devices.objects.more}
         </button>
+      )}
+      {list.notes.value.length > 0 && (
+        <span>
+          {text.devices.objects.notes} {list.notes.value.join("; ")}
+        </span>
       )}
     </div>
   );
