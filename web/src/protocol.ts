@@ -96,10 +96,10 @@ export interface StateRequest {
   state: AxisRequest;
 }
 
-/** Request the poses of the 3D scene (kind 3) at a rate [Hz]; 0 ends them. */
+/** Request the poses of the 3D scene (kind 3), or end them. */
 export interface PosesRequest {
   op: "poses";
-  rate: number;
+  on: boolean;
 }
 
 /** Push a body of a simulated robot until the next push; a force of 0 ends it. */

@@ -10,7 +10,6 @@ import { decodePoses, decodeScene, type SceneData } from "./decode.ts";
 import type { Push, Viewer } from "./viewer.ts";
 
 const PUSH_INTERVAL = 33; // [ms]
-const RATE = 30; // [Hz]
 
 type Loading = { scene: SceneData } | { reason: string } | null;
 
@@ -89,7 +88,7 @@ function attach(
 }
 
 function run(connection: Connection, viewer: Viewer, options: Attachment): (() => void)[] {
-  const request = () => void connection.send({ op: "poses", rate: RATE });
+  const request = () => void connection.send({ op: "poses", on: true });
   options.created(viewer);
   if (options.canPush) {
     viewer.onPush = throttled((push) => void connection.send({ op: "push", ...push }));
@@ -98,7 +97,7 @@ function run(connection: Connection, viewer: Viewer, options: Attachment): (() =
   return [
     connection.onBinary(KIND_POSES, (buffer) => viewer.show(decodePoses(buffer))),
     connection.on("hello", request),
-    () => void connection.send({ op: "poses", rate: 0 }),
+    () => void connection.send({ op: "poses", on: false }),
     () => options.created(null),
     () => viewer.dispose(),
   ];
