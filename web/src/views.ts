@@ -5,6 +5,7 @@ import type { Connection } from "./connection.ts";
 import { Recordings } from "./recordings/recordings.tsx";
 import { Scope } from "./scope/scope.tsx";
 import { text } from "./strings.ts";
+import { Tune } from "./tune/tune.tsx";
 import { Axes } from "./views/axes.tsx";
 import { Devices } from "./views/devices.tsx";
 import { Overview } from "./views/overview.tsx";
@@ -40,6 +41,12 @@ export const views: View[] = [
     label: text.navigation.scope,
     icon: "M3 4h18v16H3zM6 14c2-8 4-8 6-2s4 6 6-2",
     component: Scope,
+  },
+  {
+    key: "tune",
+    label: text.navigation.tune,
+    icon: "M6 3v10M6 17v4M12 3v4M12 11v10M18 3v12M18 19v2M3.500 15h5M9.500 9h5M15.500 17h5",
+    component: Tune,
   },
   {
     key: "recordings",
