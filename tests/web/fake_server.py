@@ -38,6 +38,7 @@ class FakeServer:
         self.reason_no_jog: str | None = None
         self.axes = [f"joint_{number}" for number in range(1, axes + 1)]
         self.enabled = True
+        self.jogged = False  # the first axis is in a jog: it does not follow the application
         self.state = "running"
         self.run = "run-1"
         self.number = 480_000
@@ -191,8 +192,8 @@ def make_axis_status(server: FakeServer, at: int, name: str, now: float) -> Mess
     return {
         "name": name,
         "state": state,
-        "enabled": enabled,
-        "jogged": False,
+        "enabled": enabled and not (server.jogged and at == 0),
+        "jogged": server.jogged and at == 0,
         "fault": "0x8611: following error" if fault else "",
         "stop_reason": "the drive left operation because of a fault" if fault else "",
         "position": 1.2 * math.sin(phase),

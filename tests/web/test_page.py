@@ -75,6 +75,18 @@ def test_held_button_sends_a_press_and_echoes_each_token(opened: Opened) -> None
     assert [beat["token"] for beat in server.of("beat")] == ["t2", "t3"]
 
 
+def test_jog_continues_while_the_axis_does_not_follow_the_application(opened: Opened) -> None:
+    page, server = opened
+    hold_jog(page, server)
+    server.jogged = True
+    server.send_status()
+    page.wait_for_timeout(SETTLE)
+    server.send_token("t2")
+    page.wait_for_timeout(20)
+    assert [beat["token"] for beat in server.of("beat")] == ["t2"]
+    assert server.of("release") == []
+
+
 DISPATCH = """([kind, target]) => {
     const button = document.querySelector(".jog-button.held");
     const goal = { window, document, button }[target];

@@ -252,6 +252,7 @@ export const text = {
     noLimit: "no limit configured",
     fault: "Fault",
     stopped: "Last stop",
+    mode: "Mode",
     jogged: "jogging",
     modes: { 1: "PP", 3: "PV", 4: "TQ", 6: "HM", 8: "CSP", 9: "CSV", 10: "CST" } as Record<
       number,

@@ -272,14 +272,12 @@ class Client:
         """
         return self.call("set_parameters", law=law, values=dict(values))  # type: ignore[no-any-return]
 
-    def home(self, axes: Sequence[str], *, method: int | None = None) -> messages.Done:
-        """Start the homing of axes. The loop must run in the background.
+    def home(self, axes: Sequence[str]) -> messages.Done:
+        """Start the homing of axes by name, as their `Drives` define it.
 
-        Args:
-            axes: Names of the axes.
-            method: Homing method (0x6098); None: that of the drive.
+        The loop must run in the background.
         """
-        return self.call("home", axes=list(axes), method=method)  # type: ignore[no-any-return]
+        return self.call("home", axes=list(axes))  # type: ignore[no-any-return]
 
     def move(
         self, axes: Sequence[str], positions: Sequence[float], velocity: float | None = None

@@ -1,6 +1,7 @@
 /** The most important numbers of the loop. */
 
 import type { Connection } from "../../connection.ts";
+import { isPowered } from "../../logic/axis_state.ts";
 import { count, duration } from "../../logic/format.ts";
 import { LiveText } from "../../parts/common.tsx";
 import type { Device } from "../../remote.ts";
@@ -28,7 +29,7 @@ export function Summary({ connection, devices }: { connection: Connection; devic
       />
       <Tile
         label={t.axes}
-        of={() => `${axes().filter(({ enabled }) => enabled).length} / ${axes().length}`}
+        of={() => `${axes().filter(isPowered).length} / ${axes().length}`}
       />
       <Tile label={t.faults} of={() => String(faults())} bad={() => faults() > 0} />
     </dl>
