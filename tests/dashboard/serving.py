@@ -9,6 +9,7 @@ import sys
 import threading
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 import httpx
@@ -25,6 +26,8 @@ from websockets.sync.client import ClientConnection, connect
 
 from catenary.dashboard.app import make_app
 from catenary.dashboard.hub import Hub
+from catenary.dashboard.options import Panels
+from catenary.dashboard.panels import make_scene, panel_routes
 from catenary.dashboard.requests import Requests
 from catenary.dashboard.security import Access, Role
 from catenary.dashboard.server import Options, make_access, open_socket
@@ -161,13 +164,17 @@ def decode_frame(data: bytes) -> DecodedFrame:
 
 
 @contextlib.contextmanager
-def serving(share: str, *, port: int = 0, viewer_only: bool = False) -> Iterator[Page]:
+def serving(
+    share: str, *, port: int = 0, viewer_only: bool = False, panels: Panels | None = None
+) -> Iterator[Page]:
     """Run a server in a thread."""
     listening = open_socket("127.0.0.1", port)
     access = make_access(Options(port=listening.getsockname()[1], viewer_only=viewer_only))
-    hub = Hub(Source(share), Requests(share))
+    panels = panels or Panels()
+    hub = Hub(Source(share), Requests(share), scene=make_scene(panels))
     settings = uvicorn.Config(
-        make_app(access, hub), log_level="warning", ws="websockets-sansio", ws_max_size=64 << 10,
+        make_app(access, hub, partial(panel_routes, panels)), log_level="warning",
+        ws="websockets-sansio", ws_max_size=64 << 10,
         ws_per_message_deflate=False, timeout_graceful_shutdown=1,
     )  # fmt: skip
     server = uvicorn.Server(settings)

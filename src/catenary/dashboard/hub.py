@@ -19,8 +19,10 @@ from catenary.share import Reader, SharedEvent
 if TYPE_CHECKING:
     from catenary.dashboard.client import Client
     from catenary.dashboard.requests import Requests
+    from catenary.dashboard.scene_feed import SceneFeed
 
 TICK = 1 / 60  # [s]
+POSES_INTERVAL = 1 / 30  # [s]
 STATUS_INTERVAL = 0.05  # [s]
 TIMING_INTERVAL = 0.5  # [s]
 CLIENTS_MAX = 32
@@ -34,10 +36,15 @@ class Hub:
         source: connection to the share.
         requests: connection to the program of the loop.
         problem: returns the error of the program, or "".
+        scene: 3D scene; None: there is none.
     """
 
     def __init__(
-        self, source: Source, requests: Requests, problem: Callable[[], str] = str
+        self,
+        source: Source,
+        requests: Requests,
+        problem: Callable[[], str] = str,
+        scene: SceneFeed | None = None,
     ) -> None:
         self.source = source
         self.requests = requests
@@ -47,7 +54,8 @@ class Hub:
         self._notes = AxisNotes()
         self._events: list[SharedEvent] = []
         self._token = 0
-        self._status_due = self._timing_due = 0.0
+        self.scene = scene
+        self._status_due = self._timing_due = self._poses_due = 0.0
         self._tasks: set[asyncio.Task[None]] = set()
 
     async def run(self) -> None:
@@ -70,6 +78,7 @@ class Hub:
         if self.subscriptions is not None:
             self.subscriptions.deliver(reader, now)
         self._send_token(reader)
+        self._send_poses(reader, now)
         for client in list(self.clients):
             client.follow_motion()
         if now >= self._status_due:
@@ -176,6 +185,15 @@ class Hub:
         )
         for client in self.clients:
             client.outbox.put_if_idle(text)
+
+    def _send_poses(self, reader: Reader, now: float) -> None:
+        wanting = [client for client in self.clients if client.wants_poses]
+        if self.scene is None or not wanting or now < self._poses_due or reader.number == 0:
+            return
+        self._poses_due = now + POSES_INTERVAL
+        data = self.scene.poses(reader)
+        for client in wanting if data else ():
+            client.outbox.put_latest(data)
 
     async def _send_timing(self) -> None:
         try:

@@ -6,9 +6,10 @@ import io
 import socket
 import ssl
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
+from catenary.dashboard.options import Panels
 from catenary.dashboard.security import Access, Role, is_loopback, load_key
 from catenary.errors import ConfigurationError
 from catenary.share.folder import own_folder, prepare
@@ -24,6 +25,7 @@ class Options:
     """Options of the server.
 
     `cert`, `key`: files of TLS, in PEM format. `uid`: owner of the share; None: this user or root.
+    `panels`: files for the 3D view and the recordings.
     """
 
     host: str = "127.0.0.1"
@@ -33,6 +35,7 @@ class Options:
     viewer_only: bool = False
     new_links: bool = False
     uid: int | None = None
+    panels: Panels = field(default_factory=Panels)
 
 
 def require_packages() -> None:
@@ -168,19 +171,22 @@ def run_server(
     """
     require_packages()
     from dataclasses import replace
+    from functools import partial
 
     import uvicorn
 
     from catenary.dashboard.app import make_app
     from catenary.dashboard.hub import Hub
+    from catenary.dashboard.panels import make_scene, panel_routes
     from catenary.dashboard.requests import Requests
     from catenary.dashboard.source import Source
 
     with open_socket(options.host, options.port) as listening:
         access = make_access(replace(options, port=listening.getsockname()[1]))
-        hub = Hub(Source(share, uid=options.uid), Requests(share, options.uid), problem)
+        scene = make_scene(options.panels)
+        hub = Hub(Source(share, uid=options.uid), Requests(share, options.uid), problem, scene)
         settings = uvicorn.Config(
-            make_app(access, hub),
+            make_app(access, hub, partial(panel_routes, options.panels)),
             log_level="warning",
             ssl_certfile=options.cert,
             ssl_keyfile=options.key,
