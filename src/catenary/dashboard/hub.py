@@ -5,21 +5,20 @@ from __future__ import annotations
 import asyncio
 import time
 from collections.abc import Callable, Coroutine
-from typing import TYPE_CHECKING
+from typing import Protocol
 
 import msgspec
 
 from catenary.dashboard.messages import encode_message
+from catenary.dashboard.outbox import Outbox
+from catenary.dashboard.requests import FAILURES, Requests
+from catenary.dashboard.scene_feed import SceneFeed
+from catenary.dashboard.security import Role
 from catenary.dashboard.source import Source
 from catenary.dashboard.status import AxisNotes, axis_statuses, cycle_status
 from catenary.dashboard.subscriptions import Subscriptions
 from catenary.errors import CatenaryError
 from catenary.share import Reader, SharedEvent
-
-if TYPE_CHECKING:
-    from catenary.dashboard.client import Client
-    from catenary.dashboard.requests import Requests
-    from catenary.dashboard.scene_feed import SceneFeed
 
 TICK = 1 / 60  # [s]
 POSES_INTERVAL = 1 / 30  # [s]
@@ -27,6 +26,24 @@ STATUS_INTERVAL = 0.05  # [s]
 TIMING_INTERVAL = 0.5  # [s]
 CLIENTS_MAX = 32
 EVENTS_KEPT = 256
+ADVICE_SECONDS = 1.0  # limit for the advice of new events
+
+
+class Client(Protocol):
+    """Part of a client that the hub needs."""
+
+    role: Role
+    outbox: Outbox
+    wants_poses: bool
+
+    def reason_no_jog(self) -> str | None:
+        """Return why the client cannot jog; None if it can."""
+
+    def follow_motion(self) -> None:
+        """Report changes of the jogs of the client."""
+
+    def forget_motion(self) -> None:
+        """Drop the jogs of the client."""
 
 
 class Hub:
@@ -52,7 +69,9 @@ class Hub:
         self.clients: set[Client] = set()
         self._problem = problem
         self._notes = AxisNotes()
-        self._events: list[SharedEvent] = []
+        self._events: list[dict[str, object]] = []
+        self._fresh: list[SharedEvent] = []
+        self._advising = False
         self._token = 0
         self.scene = scene
         self._status_due = self._timing_due = self._poses_due = 0.0
@@ -74,7 +93,7 @@ class Hub:
         reader = self.source.reader
         if reader is None:
             return
-        self._send_events()
+        self._take_events()
         if self.subscriptions is not None:
             self.subscriptions.deliver(reader, now)
         self._send_token(reader)
@@ -104,12 +123,12 @@ class Hub:
 
     def event_rows(self) -> list[dict[str, object]]:
         """Return the newest events, oldest first."""
-        return [msgspec.structs.asdict(event) for event in self._events]
+        return list(self._events)
 
     def _change(self) -> None:
         """Tell all clients that the share has ended or returned."""
         reader = self.source.reader
-        self._notes, self._events, self._token = AxisNotes(), [], 0
+        self._notes, self._events, self._fresh, self._token = AxisNotes(), [], [], 0
         self.subscriptions = None if reader is None else Subscriptions(reader.layout)
         self.requests.reset()
         if reader is not None:
@@ -121,11 +140,13 @@ class Hub:
     def _greet(self, client: Client) -> None:
         reader = self.source.reader
         if reader is None:
-            client.send(encode_message("gone", reason=self._problem() or self.source.reason))
+            client.outbox.put_text(
+                encode_message("gone", reason=self._problem() or self.source.reason)
+            )
             return
-        client.send(self._hello(reader, client))
+        client.outbox.put_text(self._hello(reader, client))
         for event in self._events:
-            client.send(event_message(event))
+            client.outbox.put_text(encode_message("event", **event))
 
     def _hello(self, reader: Reader, client: Client) -> str:
         layout = reader.layout
@@ -149,11 +170,39 @@ class Hub:
             remote=self.requests.is_available(),
         )
 
-    def _send_events(self) -> None:
-        for event in self.source.new_events():
+    def _take_events(self) -> None:
+        """Note new events, and send them when their advice is known."""
+        events = self.source.new_events()
+        for event in events:
             self._notes.add(event)
-            self._events = [*self._events[1 - EVENTS_KEPT :], event]
-            self._send_all(event_message(event))
+        self._fresh += events
+        if self._fresh and not self._advising:
+            self._start(self._send_events(self._fresh))
+            self._fresh = []
+
+    async def _send_events(self, events: list[SharedEvent]) -> None:
+        """Send events with the advice of the program; without advice if it does not answer."""
+        self._advising, notes = True, self._notes
+        try:
+            advice = await self._advice(events[0].serial - 1)
+        finally:
+            self._advising = False
+        if notes is not self._notes:
+            return  # the share has changed
+        for event in events:
+            row = {**msgspec.structs.asdict(event), "advice": advice.get(event.serial, "")}
+            self._events = [*self._events[1 - EVENTS_KEPT :], row]
+            self._send_all(encode_message("event", **row))
+
+    async def _advice(self, after: int) -> dict[int, str]:
+        """Return the advice for the events after a serial number."""
+        if not self.requests.is_available():
+            return {}
+        try:
+            found = await self.requests.call("events", {"after": after}, timeout=ADVICE_SECONDS)
+        except FAILURES:
+            return {}
+        return {each["serial"]: each["advice"] for each in msgspec.to_builtins(found)["events"]}
 
     def _send_token(self, reader: Reader) -> None:
         if self.source.reason_no_jog is not None:
@@ -168,7 +217,7 @@ class Hub:
             text = encode_message("token", token=str(token))
             for client in self.clients:
                 if client.role == "operator":
-                    client.send(text)
+                    client.outbox.put_text(text)
 
     def _send_status(self, reader: Reader) -> None:
         if not self.clients or reader.number == 0:
@@ -198,7 +247,7 @@ class Hub:
     async def _send_timing(self) -> None:
         try:
             timing = await self.requests.call("timing", {"histograms": True})
-        except (CatenaryError, OSError):
+        except FAILURES:
             return  # the page shows that the program does not answer
         self._send_all(encode_message("timing", **msgspec.to_builtins(timing)))
 
@@ -207,21 +256,15 @@ class Hub:
         notes = self._notes
         try:
             axes = await self.requests.call("axes", {})
-        except (CatenaryError, OSError):
+        except FAILURES:
             return  # without it, the text of a fault does not name the error code
         notes.devices = {axis["name"]: axis["device"] for axis in msgspec.to_builtins(axes)}
 
     def _send_all(self, text: str) -> None:
         for client in self.clients:
-            client.send(text)
+            client.outbox.put_text(text)
 
     def _start(self, work: Coroutine[None, None, None]) -> None:
         task = asyncio.get_running_loop().create_task(work)
         self._tasks.add(task)
         task.add_done_callback(self._tasks.discard)
-
-
-def event_message(event: SharedEvent) -> str:
-    """Return the message about an event."""
-    content = msgspec.structs.asdict(event)
-    return encode_message("event", advice="", **content)

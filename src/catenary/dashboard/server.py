@@ -6,15 +6,23 @@ import io
 import socket
 import ssl
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from catenary.dashboard.options import Panels
 from catenary.dashboard.security import Access, Role, is_loopback, load_key
 from catenary.errors import ConfigurationError
 from catenary.share.folder import own_folder, prepare
 
+if TYPE_CHECKING:
+    import uvicorn
+
+    from catenary.dashboard.hub import Hub
+
 PORT = 8710
+CONNECTIONS_MAX = 128
 MESSAGE_MAX = 64 << 10  # bytes of a message of a browser
 PING_SECONDS = 10.0
 NEEDED = ("starlette", "uvicorn", "websockets", "segno")
@@ -152,6 +160,36 @@ def announcement(access: Access, *, draw: bool = True) -> str:
     return "\n".join(lines)
 
 
+def make_server(access: Access, hub: Hub, options: Options) -> uvicorn.Server:
+    """Return a server that is not started.
+
+    Args:
+        access: tokens and roles.
+        hub: connection to the share.
+        options: options of the server.
+    """
+    import uvicorn
+
+    from catenary.dashboard.app import make_app
+    from catenary.dashboard.panels import panel_routes
+
+    settings = uvicorn.Config(
+        make_app(access, hub, partial(panel_routes, options.panels)),
+        log_level="warning",
+        ssl_certfile=options.cert,
+        ssl_keyfile=options.key,
+        ws="websockets-sansio",
+        ws_max_size=MESSAGE_MAX,
+        ws_per_message_deflate=False,
+        ws_ping_interval=PING_SECONDS,
+        ws_ping_timeout=PING_SECONDS,
+        limit_concurrency=CONNECTIONS_MAX,
+        timeout_graceful_shutdown=2,
+        server_header=False,
+    )
+    return uvicorn.Server(settings)
+
+
 def run_server(
     share: str,
     options: Options,
@@ -170,14 +208,8 @@ def run_server(
         ConfigurationError: an option is not valid, or a package is missing.
     """
     require_packages()
-    from dataclasses import replace
-    from functools import partial
-
-    import uvicorn
-
-    from catenary.dashboard.app import make_app
     from catenary.dashboard.hub import Hub
-    from catenary.dashboard.panels import make_scene, panel_routes
+    from catenary.dashboard.panels import make_scene
     from catenary.dashboard.requests import Requests
     from catenary.dashboard.source import Source
 
@@ -185,22 +217,6 @@ def run_server(
         access = make_access(replace(options, port=listening.getsockname()[1]))
         scene = make_scene(options.panels)
         hub = Hub(Source(share, uid=options.uid), Requests(share, options.uid), problem, scene)
-        settings = uvicorn.Config(
-            make_app(access, hub, partial(panel_routes, options.panels)),
-            log_level="warning",
-            ssl_certfile=options.cert,
-            ssl_keyfile=options.key,
-            ws="websockets-sansio",
-            ws_max_size=MESSAGE_MAX,
-            ws_per_message_deflate=False,
-            ws_ping_interval=PING_SECONDS,
-            ws_ping_timeout=PING_SECONDS,
-            limit_concurrency=128,
-            timeout_graceful_shutdown=2,
-            server_header=False,
-        )
+        server = make_server(access, hub, options)
         announce(access)
-        try:
-            uvicorn.Server(settings).run(sockets=[listening])
-        except KeyboardInterrupt:
-            return  # uvicorn raises the signal again after its shutdown
+        server.run(sockets=[listening])

@@ -272,14 +272,12 @@ class Client:
         """
         return self.call("set_parameters", law=law, values=dict(values))  # type: ignore[no-any-return]
 
-    def home(self, axes: Sequence[str], *, method: int | None = None) -> messages.Done:
-        """Start the homing of axes. The loop must run in the background.
+    def home(self, axes: Sequence[str]) -> messages.Done:
+        """Start the homing of axes by name, as their `Drives` define it.
 
-        Args:
-            axes: Names of the axes.
-            method: Homing method (0x6098); None: that of the drive.
+        The loop must run in the background.
         """
-        return self.call("home", axes=list(axes), method=method)  # type: ignore[no-any-return]
+        return self.call("home", axes=list(axes))  # type: ignore[no-any-return]
 
     def move(
         self, axes: Sequence[str], positions: Sequence[float], velocity: float | None = None
@@ -304,6 +302,25 @@ class Client:
             connected: True to plug the cable, False to pull it.
         """
         return self.call("virtual_cable", position=position, port=port, connected=connected)  # type: ignore[no-any-return]
+
+    def virtual_push(
+        self,
+        body: str,
+        force: Sequence[float],
+        point: Sequence[float] = (0.0, 0.0, 0.0),
+        seconds: float = 0.2,
+    ) -> messages.Done:
+        """Push a body of the simulated mechanism. Another push of the body replaces it.
+
+        Args:
+            body: Name of the body in the model.
+            force: (3,) in the frame of the world [N].
+            point: (3,) point of the body on which the force acts, in its frame [m].
+            seconds: Duration [s], at most 10 s.
+        """
+        return self.call(  # type: ignore[no-any-return]
+            "virtual_push", body=body, force=list(force), point=list(point), seconds=seconds
+        )
 
     def virtual_power(self, position: int, on: bool) -> messages.Done:
         """Switch a device of a virtual segment on or off.

@@ -293,6 +293,7 @@ RESULTS: dict[str, Any] = {
     "move": Done,
     "virtual_cable": Done,
     "virtual_power": Done,
+    "virtual_push": Done,
 }
 WRITES = (  # methods that change something; events name their peers
     "sdo_write",
@@ -304,4 +305,5 @@ WRITES = (  # methods that change something; events name their peers
     "move",
     "virtual_cable",
     "virtual_power",
+    "virtual_push",
 )
