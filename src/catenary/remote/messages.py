@@ -295,7 +295,7 @@ RESULTS: dict[str, Any] = {
     "virtual_power": Done,
     "virtual_push": Done,
 }
-WRITES = (  # methods that change something; events name their peers
+WRITES = (  # methods that change something; events name their peers. Pushes are too frequent
     "sdo_write",
     "set_state",
     "reset_error",
@@ -305,5 +305,4 @@ WRITES = (  # methods that change something; events name their peers
     "move",
     "virtual_cable",
     "virtual_power",
-    "virtual_push",
 )
