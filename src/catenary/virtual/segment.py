@@ -311,7 +311,10 @@ class Segment:
         """
         if not 0 <= device < len(self._devices):
             raise ValueError(f"there is no device {device}; it has {len(self._devices)} devices")
-        self._core.switch_power(device, on)
+        if on:
+            self._devices[device].switch_on()
+        else:
+            self._devices[device].switch_off()
 
     def _plug_first(self, devices: int) -> None:
         for number in range(len(self._devices)):
