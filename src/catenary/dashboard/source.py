@@ -120,10 +120,10 @@ class Source:
 def reason_no_commands(reader: Reader) -> str | None:
     """Return why the program of a share accepts no jogs from this user; None if it does."""
     try:
-        token = reader.token
+        _ = reader.token  # opens the desk, so that a later stop need not
     except CatenaryError as error:
         return error.message
-    return None if token else "the program has opened its share without jog=True"
+    return None if reader.layout.jog else "the program has opened its share without jog=True"
 
 
 def existing_shares(uid: int | None = None) -> list[str]:

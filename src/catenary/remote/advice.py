@@ -32,7 +32,7 @@ def advice_for(event: SharedEvent) -> str:
     if event.kind != "AxisStopped":
         return ADVICE.get(event.kind, "")
     try:
-        reason = StopReason(event.details["reason"])
+        reason = StopReason(int(str(event.details["reason"])))
     except (KeyError, ValueError):  # written by another version
         return ""
     return STOPS.get(reason, "")

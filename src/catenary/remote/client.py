@@ -11,11 +11,11 @@ from typing import Any
 from catenary.errors import ResponseTimeout, ShareError
 from catenary.remote import messages
 from catenary.remote.connection import (
+    Answer,
     decode_response,
     encode_request,
     lost,
     open_connection,
-    result_of,
     retry_time,
 )
 from catenary.remote.messages import MESSAGE_SIZE, TIMEOUT
@@ -105,7 +105,7 @@ class Client:
             try:
                 self._connection.settimeout(timeout + GRACE)
                 self._connection.send(message)
-                return result_of(method, self._response(method, timeout))
+                return self._answer(timeout).result(method)
             except TimeoutError as error:
                 raise ResponseTimeout(
                     f"the program of the share {self.name!r} did not answer {method!r} within "
@@ -115,18 +115,20 @@ class Client:
             except OSError as error:
                 raise lost(self.name) from error
 
-    def _response(self, method: str, timeout: float) -> messages.Response:
-        """Receive the response to the last request; discard late ones to earlier requests."""
+    def _answer(self, timeout: float) -> Answer:
+        """Receive the answer to the last request; discard late ones to earlier requests."""
         end = time.monotonic() + timeout + GRACE
-        while True:
+        answer = Answer()
+        while not answer.complete:
             message = self._connection.recv(MESSAGE_SIZE)
             if not message:
                 raise lost(self.name)
             response = decode_response(message)
-            if response.serial == self._serial:
-                return response
-            if time.monotonic() > end:
+            if response.serial in (self._serial, 0):  # 0: for the connection, not a request
+                answer.add(response)
+            elif time.monotonic() > end:
                 raise TimeoutError
+        return answer
 
     # Program and segment
 
@@ -302,6 +304,25 @@ class Client:
             connected: True to plug the cable, False to pull it.
         """
         return self.call("virtual_cable", position=position, port=port, connected=connected)  # type: ignore[no-any-return]
+
+    def virtual_push(
+        self,
+        body: str,
+        force: Sequence[float],
+        point: Sequence[float] = (0.0, 0.0, 0.0),
+        seconds: float = 0.2,
+    ) -> messages.Done:
+        """Push a body of the simulated mechanism. Another push of the body replaces it.
+
+        Args:
+            body: Name of the body in the model.
+            force: (3,) in the frame of the world [N].
+            point: (3,) point of the body on which the force acts, in its frame [m].
+            seconds: Duration [s], at most 10 s.
+        """
+        return self.call(  # type: ignore[no-any-return]
+            "virtual_push", body=body, force=list(force), point=list(point), seconds=seconds
+        )
 
     def virtual_power(self, position: int, on: bool) -> messages.Done:
         """Switch a device of a virtual segment on or off.

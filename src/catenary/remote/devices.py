@@ -59,6 +59,7 @@ def _device(program: Program, sub: SubDevice, reading: Reading) -> messages.Devi
         position=sub.position,
         network=program.network.number,
         name=sub.name,
+        order=description.order,
         group=description.group,
         vendor=sub.identity.vendor,
         product=sub.identity.product,

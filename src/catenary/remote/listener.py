@@ -8,6 +8,8 @@ from __future__ import annotations
 
 import os
 import socket
+import time
+from collections import deque
 from contextlib import suppress
 from pathlib import Path
 from typing import NamedTuple
@@ -17,6 +19,8 @@ from catenary.share.desk_socket import CREDENTIALS
 from catenary.share.folder import draft_path
 
 BACKLOG = 16
+STALL_TIMEOUT = 2.0  # [s]
+OUTBOX_MAX = 64  # messages
 GROUP_WRITES, OTHERS_WRITE = 0o020, 0o002
 KIND = socket.SOCK_SEQPACKET | socket.SOCK_NONBLOCK | socket.SOCK_CLOEXEC
 
@@ -87,6 +91,8 @@ class Connection:
         self.open = True
         self.pending = 0  # requests without an answer
         self._socket = connected
+        self._outbox: deque[bytes] = deque()
+        self._stalled_at = 0.0  # [s] since when the client has not read; 0: it reads
 
     def fileno(self) -> int:
         return self._socket.fileno()
@@ -108,12 +114,31 @@ class Connection:
             return None
         return message
 
-    def send(self, message: bytes) -> None:
-        """Send a message. A client that does not read its messages loses the connection."""
-        if not self.open:
-            return
+    @property
+    def has_mail(self) -> bool:
+        """True if messages wait to be sent."""
+        return self.open and bool(self._outbox)
+
+    def send(self, *messages: bytes) -> None:
+        """Queue messages, and send what the client has room for."""
+        self._outbox.extend(messages)
+        self.flush(time.monotonic())
+
+    def flush(self, now: float) -> None:
+        """Send queued messages. A client that reads none for STALL_TIMEOUT loses the connection.
+
+        Args:
+            now: Present time [s].
+        """
         try:
-            self._socket.send(message)
+            while self.has_mail:
+                self._socket.send(self._outbox[0])
+                self._outbox.popleft()
+                self._stalled_at = 0.0
+        except BlockingIOError:
+            self._stalled_at = self._stalled_at or now
+            if now - self._stalled_at > STALL_TIMEOUT or len(self._outbox) > OUTBOX_MAX:
+                self.close()
         except OSError:
             self.close()
 

@@ -11,16 +11,15 @@ from catenary.remote.advice import advice_for
 from catenary.remote.program import Program, Work
 from catenary.target import segment_of
 
+BUCKETS = 128  # of a histogram in a message
 QUANTILES = {"median": "p50", "p99": "p99", "p999": "p999", "max": "max"}
 
 
 def hello(program: Program) -> messages.Hello:
     """Return the identity of the program, and what it allows."""
-    import catenary
-
     layout, session = program.share.layout, program.network.session
     return messages.Hello(
-        version=catenary.__version__,
+        version=program.version,
         pid=layout.writer.pid,
         program=layout.writer.command,
         share=layout.name,
@@ -74,7 +73,7 @@ def timing(program: Program, histograms: bool = False) -> Work[messages.Timing]:
     counted: dict[str, list[tuple[float, float, int]]] = {}
     for phase in figures if histograms else ():
         yield None
-        counted[phase] = program.network.histogram(phase)
+        counted[phase] = merged(program.network.histogram(phase))
     return messages.Timing(
         figures=figures,
         counters=found.counters,
@@ -82,6 +81,13 @@ def timing(program: Program, histograms: bool = False) -> Work[messages.Timing]:
         scheduling=found.scheduling,
         histograms=counted,
     )
+
+
+def merged(buckets: list[tuple[float, float, int]]) -> list[tuple[float, float, int]]:
+    """Return a histogram of at most BUCKETS buckets; merge neighbours if there are more."""
+    size = -(-len(buckets) // BUCKETS) or 1
+    groups = [buckets[at : at + size] for at in range(0, len(buckets), size)]
+    return [(group[0][0], group[-1][1], sum(each[2] for each in group)) for group in groups]
 
 
 def clocks(program: Program) -> messages.Clocks:

@@ -16,6 +16,7 @@ from catenary.procedure.sdo import download, upload
 from catenary.procedure.sdo_information import (
     FAILURES,
     DescribedObject,
+    describe_entry,
     describe_object,
     read_object_list,
 )
@@ -53,6 +54,10 @@ def objects(
         except FAILURES as error:
             notes.append(error.message)
         else:
+            program.types |= {
+                (sub.identity, each.index, each.subindex): each.data_type
+                for each in described.entries
+            }
             entries += (found := _entries(sub, described))
             notes += described.notes
             size += len(msgspec.msgpack.encode(found))
@@ -104,7 +109,6 @@ def _entry(
 ) -> messages.ObjectEntry:
     known = sub.description.documented_object(entry.index, entry.subindex)
     kind = _base_type(entry.data_type)
-    bounded = isinstance(kind, Integer)
     return messages.ObjectEntry(
         index=entry.index,
         subindex=entry.subindex,
@@ -115,8 +119,8 @@ def _entry(
         access=access_text(entry.access),
         unit=known.unit if known is not None else "",
         options=_options(known),
-        minimum=kind.minimum if isinstance(kind, Integer) and bounded else None,
-        maximum=kind.maximum if isinstance(kind, Integer) and bounded else None,
+        minimum=kind.minimum if isinstance(kind, Integer) else None,
+        maximum=kind.maximum if isinstance(kind, Integer) else None,
     )
 
 
@@ -138,7 +142,7 @@ def sdo_read(
     _check_place(index, subindex)
     channel, sub = program.channel(position), program.device(position)
     known = sub.description.documented_object(index, subindex)
-    kind = by_name(type) if type is not None else _known_type(known)
+    kind = yield from _type_of(program, sub, channel, (index, subindex), type)
     data = yield from program.ask(upload(channel, index, subindex))
     try:
         value = None if kind is None else kind.decode(data)
@@ -153,15 +157,15 @@ def sdo_write(
     program: Program,
     position: int,
     index: int,
-    subindex: int,
     value: Any,
+    subindex: int = 0,
     type: str | None = None,
 ) -> Work[messages.SdoValue]:
     """Write an object; see `Client.sdo_write`."""
     _check_place(index, subindex)
     channel, sub = program.channel(position), program.device(position)
     known = sub.description.documented_object(index, subindex)
-    kind = by_name(type) if type is not None else _known_type(known)
+    kind = yield from _type_of(program, sub, channel, (index, subindex), type)
     data = _encoded(value, kind)
     _refuse_in_use(program, sub, index, subindex)
     yield from program.ask(download(channel, index, subindex, data))
@@ -231,8 +235,24 @@ def _options(known: ObjectInformation | None) -> dict[str, str]:
     return {str(value): text for value, text in known.enumeration[:OPTIONS_MAX]}
 
 
-def _known_type(known: ObjectInformation | None) -> DataType[Value] | None:
-    return None if known is None else _base_type(known.data_type)
+def _type_of(
+    program: Program,
+    sub: SubDevice,
+    channel: MailboxChannel,
+    place: tuple[int, int],
+    name: str | None,
+) -> Work[DataType[Value] | None]:
+    """Return the type with a name, or that of an entry as the device or its ESI describes it."""
+    if name is not None:
+        return by_name(name)
+    known = sub.description.documented_object(*place)
+    if known is not None and known.data_type:
+        return _base_type(known.data_type)
+    key = (sub.identity, *place)
+    if key not in program.types and channel.layout.sdo_information:
+        entry, _ = yield from program.ask(describe_entry(channel, *place))
+        program.types[key] = 0 if entry is None else entry.data_type
+    return _base_type(program.types.get(key, 0))
 
 
 def _base_type(data_type: int) -> DataType[Value] | None:

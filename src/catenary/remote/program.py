@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable, Generator
+from importlib.metadata import version
 from typing import TypeAlias, TypeVar
 
 from catenary.bus import SubDevice
@@ -31,8 +32,11 @@ class Program:
         self.share = share
         self.network = network
         self.events = events  # returns the events after a serial number, and the number of lost
-        # Printed before the first cycle: it takes milliseconds
+        # Both take milliseconds, so they are made before the first cycle
         self.plan_text = str(network.plan)
+        self.version = version("catenary")
+        # Data types of entries, by identity, index and subindex
+        self.types: dict[tuple[object, int, int], int] = {}
         # Indices and notes of the dictionaries that clients have listed, by identity
         self.dictionaries: dict[object, tuple[tuple[int, ...], list[str]]] = {}
 

@@ -1,10 +1,10 @@
 """Remote service: one thread that answers the requests of all clients of a share.
 
-Theory of operation. The thread runs in passes. A pass receives at most one message, from the clients
-in turn, and continues the requests for at most SLICE. After it, the thread sleeps for PAUSE, so
-that it never holds the interpreter for long. Therefore at most 1 / PAUSE messages are received per
-second. Further ones stay in the sockets of their senders, which then block. Requests beyond the
-rate limit receive BusyError with the time after which to repeat them.
+Theory of operation. The thread runs in passes. A pass receives at most one message, from the
+clients in turn, and continues the requests for at most SLICE. After it, the thread sleeps for
+PAUSE, so that it never holds the interpreter for long. Therefore at most 1 / PAUSE messages are
+received per second. Further ones stay in the sockets of their senders, which then block. Requests
+beyond the rate limit receive BusyError with the time after which to repeat them.
 
 A request that waits for a device stays pending, and does not delay the others. Each has a deadline.
 Clients that do not read, or send messages that are too long, lose their connection.
@@ -28,7 +28,7 @@ from catenary.remote.limits import RateLimit
 from catenary.remote.listener import Connection, Listener
 from catenary.remote.messages import VERSION, WRITES, Request
 from catenary.remote.methods import Methods
-from catenary.remote.task import Task, encode_response, failure_of
+from catenary.remote.task import Task, encode_error
 
 SLICE = 200e-6  # [s] of work in one pass
 PAUSE = 0.002  # [s] between two passes
@@ -76,15 +76,19 @@ class Service:
         step_behind()
         try:
             while not self._ended.is_set():
-                if self._receive(PAUSE if self._tasks else IDLE) or self._tasks:
+                if self._receive(PAUSE if self._is_busy else IDLE) or self._is_busy:
                     self._continue()
                     self._ended.wait(PAUSE)
         finally:
             self._release()
 
+    @property
+    def _is_busy(self) -> bool:
+        return bool(self._tasks) or any(client.has_mail for client in self._clients)
+
     def _release(self) -> None:
         for task in self._tasks:
-            task.connection.send(task.cancel(ShareError("the loop of the share has ended")))
+            task.connection.send(*task.cancel(ShareError("the loop of the share has ended")))
         for client in self._clients:
             client.close()
         self._listener.close()
@@ -92,9 +96,8 @@ class Service:
     def _receive(self, timeout: float) -> bool:
         """Receive at most one message, or accept one client. Return False if there is none."""
         self._clients = deque(client for client in self._clients if client.open)
-        sources = {source.fileno(): source for source in (self._listener, *self._clients)}
         poll = select.poll()
-        for number in (self._wake, *sources):
+        for number in (self._wake, self._listener.fileno(), *(c.fileno() for c in self._clients)):
             poll.register(number, select.POLLIN)
         ready = {number for number, _ in poll.poll(timeout * 1000)}
         if self._listener.fileno() in ready:
@@ -117,7 +120,7 @@ class Service:
             self._clients.append(client)
             return
         busy = BusyError("the share has too many clients", retry=IDLE)
-        client.send(encode_response(0, error=failure_of(busy)))
+        client.send(encode_error(0, busy))
         client.close()
 
     def _begin(self, client: Connection, message: bytes) -> None:
@@ -125,17 +128,17 @@ class Service:
         try:
             request = msgspec.msgpack.decode(message, type=Request)
         except (msgspec.MsgspecError, ValueError, RecursionError) as error:
-            return client.send(encode_response(0, error=failure_of(ValueError(str(error)))))
+            return client.send(encode_error(0, ValueError(f"invalid request: {error}")))
         refusal = self._refusal(client, request, pause)
         if refusal is not None:
-            return client.send(encode_response(request.serial, error=failure_of(refusal)))
+            return client.send(encode_error(request.serial, refusal))
         task = Task(client, request)
         client.pending += 1
-        response = task.start(self._methods)
-        if response is None:
+        answer = task.start(self._methods)
+        if answer is None:
             self._tasks.append(task)
         else:
-            self._answer(task, response)
+            self._answer(task, answer)
 
     def _refusal(self, client: Connection, request: Request, pause: float) -> ShareError | None:
         """Return the error for a request that is not begun; None if it is accepted."""
@@ -151,15 +154,18 @@ class Service:
         return None
 
     def _continue(self) -> None:
-        """Continue the pending requests in turn, for at most SLICE."""
+        """Send queued messages and continue the pending requests in turn, for at most SLICE."""
+        for client in self._clients:
+            if client.has_mail:
+                client.flush(time.monotonic())
         until = time.perf_counter() + SLICE
         for _ in range(len(self._tasks)):
             task = self._tasks.popleft()
-            response = task.step(until)
-            if response is None and task.connection.open:
+            answer = task.step(until)
+            if answer is not None:
+                self._answer(task, answer)
+            elif task.connection.open:
                 self._tasks.append(task)
-            elif response is not None:
-                self._answer(task, response)
             else:
                 self._drop(task)
             if time.perf_counter() >= until:
@@ -169,8 +175,8 @@ class Service:
         """End a request whose client has gone. A transfer in progress continues to its end."""
         task.cancel(ShareError("the client has closed its connection"))
 
-    def _answer(self, task: Task, response: bytes) -> None:
+    def _answer(self, task: Task, answer: list[bytes]) -> None:
         task.connection.pending -= 1
-        task.connection.send(response)
+        task.connection.send(*answer)
         if task.succeeded and task.request.method in WRITES:
             self._on_write(task)

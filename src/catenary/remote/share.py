@@ -13,6 +13,7 @@ from catenary.remote.program import Program
 from catenary.remote.service import Service
 from catenary.remote.task import Task
 from catenary.share import folder
+from catenary.share.process import command_of
 
 TEXT_MAX = 200  # characters of the arguments in an event
 
@@ -78,11 +79,12 @@ class Share(share.Share):
     def _report_write(self, task: Task) -> None:
         """Publish an event that names the client of a completed write."""
         params, peer = task.request.params, task.connection.peer
+        program = "".join(c if c.isprintable() else "?" for c in command_of(peer.pid))
         words = ", ".join(f"{name}={value!r}" for name, value in params.items())
         self.report(
             Incident(
                 kind="RemoteWrite",
-                message=f"{peer}: {task.request.method}({words[:TEXT_MAX]})",
+                message=f"{peer} ({program[:TEXT_MAX]}): {task.request.method}({words[:TEXT_MAX]})",
                 time=self._network.session.engine.now() * 1e-9,
                 position=params.get("position"),
                 details={"pid": peer.pid, "uid": peer.uid, "method": task.request.method},

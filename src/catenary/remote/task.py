@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import inspect
 import logging
 import time
 from collections.abc import Callable, Generator
@@ -13,7 +12,8 @@ import msgspec
 from catenary.errors import CatenaryError, ResponseTimeout
 from catenary.remote.listener import Connection
 from catenary.remote.messages import (
-    MESSAGE_SIZE,
+    PART_SIZE,
+    RESULT_SIZE,
     TIMEOUT_MAX,
     VERSION,
     Failure,
@@ -35,8 +35,8 @@ class Task:
         self._deadline = time.monotonic() + request.timeout
         self._work: Generator[bool | None, None, Any] | None = None
 
-    def start(self, methods: Methods) -> bytes | None:
-        """Begin the request. Return the response if it is already complete."""
+    def start(self, methods: Methods) -> list[bytes] | None:
+        """Begin the request. Return the messages of its answer if it is already complete."""
         request = self.request
         if not 0 <= request.timeout <= TIMEOUT_MAX:
             return self._failed(
@@ -44,10 +44,10 @@ class Task:
             )
         return self._attempt(lambda: methods.start(request.method, request.params))
 
-    def step(self, until: float) -> bytes | None:
+    def step(self, until: float) -> list[bytes] | None:
         """Continue the request until it waits, ends, or the time `until` has come.
 
-        Return the response if it is complete. At the deadline, it is an error.
+        Return the messages of its answer if it is complete. At the deadline, it is an error.
 
         Args:
             until: End of the slice, on the clock of `time.perf_counter` [s].
@@ -65,23 +65,23 @@ class Task:
             if waits or time.perf_counter() >= until:
                 return None
 
-    def cancel(self, error: Exception) -> bytes:
-        """End the request, and return an error as its response."""
+    def cancel(self, error: Exception) -> list[bytes]:
+        """End the request, and return the messages of this answer."""
         if self._work is not None:
             self._work.close()
         return self._failed(error)
 
-    def _attempt(self, call: Callable[[], Any]) -> bytes | None:
+    def _attempt(self, call: Callable[[], Any]) -> list[bytes] | None:
         try:
             result = call()
         except Exception as error:  # the service must survive an error in a method
             return self._failed(error)
-        if inspect.isgenerator(result):
-            self._work = result
-            return None
-        return self._response(result)
+        if not isinstance(result, Generator):
+            return self._response(result)
+        self._work = result
+        return None
 
-    def _expire(self) -> bytes:
+    def _expire(self) -> list[bytes]:
         return self.cancel(
             ResponseTimeout(
                 f"{self.request.method}: no result within {self.request.timeout:g} s",
@@ -90,22 +90,28 @@ class Task:
             )
         )
 
-    def _response(self, result: object) -> bytes:
+    def _response(self, result: object) -> list[bytes]:
         encoded = msgspec.msgpack.encode(result)
-        response = encode_response(self.request.serial, result=encoded)
-        if len(response) > MESSAGE_SIZE:
-            text = f"the result has {len(response)} bytes; the maximum is {MESSAGE_SIZE}"
+        if len(encoded) > RESULT_SIZE:
+            text = f"the result has {len(encoded)} bytes; the maximum is {RESULT_SIZE}"
             return self._failed(ValueError(f"{self.request.method}: {text}"))
         self.succeeded = True
-        return response
+        serial = self.request.serial
+        return [
+            msgspec.msgpack.encode(
+                Response(VERSION, serial, None, part, more=at + PART_SIZE < len(encoded))
+            )
+            for at in range(0, len(encoded), PART_SIZE)
+            for part in (encoded[at : at + PART_SIZE],)
+        ]
 
-    def _failed(self, error: Exception) -> bytes:
-        return encode_response(self.request.serial, error=failure_of(error))
+    def _failed(self, error: Exception) -> list[bytes]:
+        return [encode_error(self.request.serial, error)]
 
 
-def encode_response(serial: int, *, result: bytes = b"\xc0", error: Failure | None = None) -> bytes:
-    """Encode a response: a result that is already encoded, or an error."""
-    return msgspec.msgpack.encode(Response(VERSION, serial, error, msgspec.Raw(result)))
+def encode_error(serial: int, error: Exception) -> bytes:
+    """Encode an error as the answer to a request."""
+    return msgspec.msgpack.encode(Response(VERSION, serial, failure_of(error)))
 
 
 def failure_of(error: Exception) -> Failure:
