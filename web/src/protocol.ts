@@ -102,17 +102,6 @@ export interface PosesRequest {
   on: boolean;
 }
 
-/** Push a body of a simulated robot until the next push; a force of 0 ends it. */
-export interface PushRequest {
-  op: "push";
-  /** Number of the body in the scene. */
-  body: number;
-  /** In the frame of the body [m]. */
-  point: [number, number, number];
-  /** In the frame of the world [N]. */
-  force: [number, number, number];
-}
-
 export interface Ping {
   op: "ping";
   t: number;
@@ -127,7 +116,6 @@ export type ClientMessage =
   | Stop
   | StateRequest
   | PosesRequest
-  | PushRequest
   | Ping;
 
 // WebSocket /ws: server to client
