@@ -35,9 +35,7 @@ def page(browser: Browser, address: str) -> Iterator[Page]:
     page = context.new_page()
     errors: list[str] = []
     page.on("pageerror", lambda error: errors.append(str(error)))
-    page.on(
-        "console", lambda entry: "Content Security" in entry.text and errors.append(entry.text)
-    )
+    page.on("console", lambda entry: "Content Security" in entry.text and errors.append(entry.text))
     page.goto(f"{address}/#/scope")
     page.locator(".scope-chart").first.wait_for()
     yield page

@@ -318,7 +318,8 @@ export const text = {
       status: "AL status",
     },
     state: "State",
-    stateBody: "The device leaves the cyclic exchange below OP. Its axes stop without regard to the program.",
+    stateBody:
+      "Below OP, the device has no outputs, and its axes stop. The loop may end if its program requires this device.",
     setState: "Request",
     resetError: "Acknowledge error",
     ports: "Ports and cables",
