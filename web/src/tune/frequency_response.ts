@@ -19,6 +19,7 @@ export interface Margins {
 const DEGREES = 180 / Math.PI;
 const SEGMENTS = 8; // at least, so that the coherence has a meaning
 const SMALLEST = 64; // rows of a segment
+const COHERENT = 0.6; // smallest coherence of frequencies that count for the margins
 const EXCITED = 1e-6; // part of the largest power; other frequencies are left out
 
 /** Return the response of `output` to `input`, which are sampled with `period` [s]; null if too short. */
@@ -55,16 +56,24 @@ export function openLoop(closed: FrequencyResponse): FrequencyResponse {
   return { ...closed, real, imaginary, ...bode(real, imaginary) };
 }
 
-/** Return gain and phase margin of an open loop, between the measured frequencies. */
-export function margins({ frequency, gain, phase }: FrequencyResponse): Margins {
+/** Return gain and phase margin of an open loop, between the measured frequencies with coherence. */
+export function margins(loop: FrequencyResponse): Margins {
+  const coherent = (values: number[]) => values.filter((_, index) => (loop.coherence[index] ?? 1) >= COHERENT);
+  const frequency = coherent(loop.frequency);
+  const { gain, phase } = bode(coherent(loop.real), coherent(loop.imaginary));
   const unity = crossing(gain, 0);
   const opposite = crossing(phase, -180);
   return {
     gain: -at(gain, opposite),
     gainFrequency: at(frequency, opposite),
-    phase: 180 + at(phase, unity),
+    phase: wrapped(180 + at(phase, unity)),
     phaseFrequency: at(frequency, unity),
   };
+}
+
+/** Return the same angle between -180 and 180 degrees. */
+function wrapped(angle: number): number {
+  return angle - 360 * Math.round(angle / 360);
 }
 
 function bode(real: number[], imaginary: number[]): { gain: number[]; phase: number[] } {
