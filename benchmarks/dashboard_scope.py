@@ -20,6 +20,9 @@ from benchmarks.synthetic_dashboard import FIELDS, serving
 STATIC = Path(__file__).parents[1] / "src/catenary/dashboard/static"
 BROWSER = "/usr/bin/chromium"
 ARGUMENTS = [
+    *("--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run", "--disable-sync"),
+    *("--disable-background-networking", "--disable-component-update"),
+]
     "--no-sandbox",
     "--disable-gpu",
     "--disable-quic",
