@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from benchmarks.dashboard_scope import layout, lost_rows
+from benchmarks.dashboard_scope import collect_errors, layout, lost_rows
 from benchmarks.synthetic_dashboard import PERIOD, serving
 
 if TYPE_CHECKING:
@@ -33,9 +33,13 @@ def page(browser: Browser, address: str) -> Iterator[Page]:
     """Scope with its first arrangement; the test fails for an error of the page or its policy."""
     context = browser.new_context(viewport={"width": 1280, "height": 900})
     page = context.new_page()
+<<<<<<< HEAD
     errors: list[str] = []
     page.on("pageerror", lambda error: errors.append(str(error)))
     page.on("console", lambda entry: "Content Security" in entry.text and errors.append(entry.text))
+=======
+    errors = collect_errors(page)
+>>>>>>> 880c296011ec0db65fc76ac8046e974b255384ac
     page.goto(f"{address}/#/scope")
     page.locator(".scope-chart").first.wait_for()
     yield page
