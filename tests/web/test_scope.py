@@ -33,13 +33,7 @@ def page(browser: Browser, address: str) -> Iterator[Page]:
     """Scope with its first arrangement; the test fails for an error of the page or its policy."""
     context = browser.new_context(viewport={"width": 1280, "height": 900})
     page = context.new_page()
-<<<<<<< HEAD
-    errors: list[str] = []
-    page.on("pageerror", lambda error: errors.append(str(error)))
-    page.on("console", lambda entry: "Content Security" in entry.text and errors.append(entry.text))
-=======
     errors = collect_errors(page)
->>>>>>> 880c296011ec0db65fc76ac8046e974b255384ac
     page.goto(f"{address}/#/scope")
     page.locator(".scope-chart").first.wait_for()
     yield page
