@@ -11,10 +11,12 @@ from catenary.cli import (
     alias,
     bench,
     check,
+    dashboard,
     demo,
     diag,
     doctor,
     esi,
+    foxglove,
     graph,
     init,
     plot,
@@ -25,6 +27,7 @@ from catenary.cli import (
     sdo,
     sii,
     state,
+    top,
     virtual,
 )
 from catenary.cli.failure import USAGE, report, silence_stdout
@@ -35,7 +38,7 @@ DESCRIPTION = "Real-time EtherCAT for Python."
 COMMANDS = (
     *(scan, state, graph, diag, sdo, reg, alias, sii, esi),
     *(init, check),
-    *(demo, doctor, bench, virtual, realtime, record, plot),
+    *(demo, dashboard, top, doctor, bench, virtual, realtime, record, plot, foxglove),
 )
 EPILOG = """\
 TARGET is one of
@@ -45,6 +48,7 @@ TARGET is one of
   virtual:FILE.toml  a virtual segment from a file (docs/reference/segment_file.md)
   virtual-realtime[:FILE.toml]  the same, on this machine's clock
   machine.toml       the target in a machine file (docs/reference/machine_file.md)
+  share:NAME         the running program that owns a share: scan, state, diag, sdo and reg read
   igh:0              the IgH kernel master 0 (docs/how_to/igh.md): scan and sdo
 
 example:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Literal, NamedTuple, Protocol, runtime_checkable
 
@@ -18,6 +19,8 @@ from catenary.virtual.plant import Plant
 from catenary.virtual.service import Service, ServiceThread
 from catenary.virtual.wiring import Place, Wiring
 
+SECOND = 1e9
+LONGEST_PUSH = 10.0  # [s]
 ClockKind = Literal["virtual", "monotonic"]
 # Time from the loss of light until the loop is closed [s], with enhanced link detection of the
 # ET1100 (about 15 us: datasheet, section I, chapter 6) and with an ordinary PHY.
@@ -227,6 +230,39 @@ class Segment:
         """
         self._faults.add(fault)
 
+    def push(
+        self,
+        body: str,
+        force: Sequence[float],
+        *,
+        point: Sequence[float] = (0.0, 0.0, 0.0),
+        for_: float = 0.2,
+    ) -> None:
+        """Push a body of the plant. Another push of the same body replaces it.
+
+        Args:
+            body: name of the body in the model.
+            force: (3,) in the frame of the world [N].
+            point: (3,) point of the body on which the force acts, in its frame [m].
+            for_: duration [s].
+
+        Raises:
+            ValueError: There is no plant or no such body, or a value is out of range.
+        """
+        if self.plant is None:
+            raise ValueError("the segment has no plant; use Segment(..., plant=Plant(...))")
+        _check_push(force, point, for_)
+        self.plant.body_number(body)
+        plant, agenda = self.plant, self._service.agenda
+
+        def begin() -> None:
+            agenda.after(round(for_ * SECOND), plant.push(body, force, point))
+
+        if self._core.is_virtual:
+            begin()
+        else:  # in the thread that may change devices
+            agenda.after(0, begin)
+
     @property
     def faults_done(self) -> bool:
         """True if no begin or end of a fault is pending. Active faults without end are ignored."""
@@ -253,6 +289,33 @@ class Segment:
         """Plug in the uplinks of the first `devices` devices (None: all), and unplug the others."""
         self._plug_first(len(self._devices) if devices is None else devices)
 
+    def plug_port(self, device: int, port: int, plugged: bool) -> None:
+        """Plug or unplug the cable at a port. Any thread may call it.
+
+        Args:
+            device: Position of the device.
+            port: Number of the port.
+            plugged: True to plug the cable in.
+
+        Raises:
+            ValueError: No cable belongs to the port.
+        """
+        number = self._faults.wiring.cable_at(device, port)
+        self._wires.plug_cable(number, plugged)
+
+    def switch_power(self, device: int, on: bool) -> None:
+        """Switch a device on or off. Any thread may call it.
+
+        Raises:
+            ValueError: There is no such device.
+        """
+        if not 0 <= device < len(self._devices):
+            raise ValueError(f"there is no device {device}; it has {len(self._devices)} devices")
+        if on:
+            self._devices[device].switch_on()
+        else:
+            self._devices[device].switch_off()
+
     def _plug_first(self, devices: int) -> None:
         for number in range(len(self._devices)):
             self._wires.plug_cable(number, number < devices, at_once=True)
@@ -271,6 +334,14 @@ def _detection_ns(given: float | str) -> int:
             f'link_loss_detection must be "enhanced", "standard" or 0 to 1 s, not {given!r}'
         )
     return round(seconds * 1e9)
+
+
+def _check_push(force: Sequence[float], point: Sequence[float], duration: float) -> None:
+    for name, values in (("force", force), ("point", point)):
+        if len(values) != 3 or not all(math.isfinite(value) for value in values):
+            raise ValueError(f"{name} must be three finite numbers, not {list(values)}")
+    if not 0 < duration <= LONGEST_PUSH:
+        raise ValueError(f"for_ must be above 0 and at most {LONGEST_PUSH:g} s, not {duration}")
 
 
 def demo_segment(*, clock: ClockKind = "virtual", ring: bool = False) -> Segment:
