@@ -56,7 +56,7 @@ def now(page: Page) -> str:
 
 
 def wait_for_change(page: Page, selector: str, before: str) -> None:
-    """Wait until an element has another text. The policy of the page forbids `wait_for_function`."""
+    """Wait until an element has another text. The policy forbids `wait_for_function`."""
     from playwright.sync_api import expect
 
     expect(page.locator(selector).first).not_to_have_text(before, timeout=20_000)
