@@ -55,8 +55,15 @@ def now(page: Page) -> str:
     return page.locator(".scope-table td").first.inner_text()
 
 
+def wait_for_change(page: Page, selector: str, before: str) -> None:
+    """Wait until an element has another text. The policy forbids `wait_for_function`."""
+    from playwright.sync_api import expect
+
+    expect(page.locator(selector).first).not_to_have_text(before, timeout=20_000)
+
+
 def wait_for_samples(page: Page) -> None:
-    page.wait_for_function("document.querySelector('.scope-table td').textContent !== '–'")
+    wait_for_change(page, ".scope-table td", "–")
 
 
 def test_198_signals_arrive_without_a_lost_sample(page: Page, address: str) -> None:
@@ -117,9 +124,7 @@ def test_pause_keeps_the_samples_and_run_continues(page: Page) -> None:
     page.wait_for_timeout(500)
     assert now(page) == before
     page.get_by_role("button", name="Run", exact=True).click()
-    page.wait_for_function(
-        "before => document.querySelector('.scope-table td').textContent !== before", arg=before
-    )
+    wait_for_change(page, ".scope-table td", before)
 
 
 def test_single_trigger_captures_once(page: Page) -> None:
@@ -158,9 +163,7 @@ def test_cursors_show_the_difference(page: Page) -> None:
     assert "Δ 1.67" in before
     page.locator(".scope-plot").first.focus()
     page.keyboard.press("Shift+ArrowLeft")
-    page.wait_for_function(
-        "before => document.querySelector('.scope-cursors').innerText !== before", arg=before
-    )
+    wait_for_change(page, ".scope-cursors", before)
 
 
 def test_arrangement_survives_a_reload(page: Page) -> None:
