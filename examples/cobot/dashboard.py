@@ -104,7 +104,7 @@ def main(name, seconds):
     """Run the robot until `seconds` have passed; None: until Ctrl-C."""
     model = control.Dynamics(HERE / "arm.xml", axes=JOINTS)
     segment = read_segment(HERE / "segment.toml", clock="monotonic", ring=True)
-    stop = cat.StopPolicy(raise_faults=False, on_axis_stopped="event", lost_limit=20)
+    stop = cat.StopPolicy(raise_faults=False, on_axis_stopped="event", lost_limit=20, late_limit=0.5)
     with (
         cat.MainDevice(segment.first, segment.second) as bus,
         cat.Share(name, jog=True) as share,
