@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shutil
+import socket
 import subprocess
 from pathlib import Path
 
@@ -106,3 +107,9 @@ def test_a_server_with_tls_gives_secure_cookies(name: str, tmp_path: Path) -> No
             f"{url}/login", json=body, headers={"Origin": page.url}, verify=False, timeout=DEADLINE
         )
         assert foreign.status_code == 403
+
+
+def test_messages_are_sent_without_delay() -> None:
+    """Asyncio sets TCP_NODELAY only if the socket names its protocol."""
+    with open_socket("127.0.0.1", 0) as listening:
+        assert listening.proto == socket.IPPROTO_TCP

@@ -191,7 +191,7 @@ async def call(page: Page, request: Request, role: Role) -> Response:
     if isinstance(body, Response):
         return body
     if not is_allowed(body.method, role):
-        return refusal(403, f"a {role} cannot call {body.method!r}")
+        return refusal(403, f"the role {role} cannot call {body.method!r}")
     try:
         return json_response({"result": await page.hub.requests.call(body.method, body.params)})
     except BusyError as error:

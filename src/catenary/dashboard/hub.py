@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import time
 from collections.abc import Callable, Coroutine
+from concurrent.futures import ThreadPoolExecutor
 from typing import Protocol
 
 import msgspec
@@ -17,7 +18,7 @@ from catenary.dashboard.security import Role
 from catenary.dashboard.source import Source
 from catenary.dashboard.status import AxisNotes, axis_statuses, cycle_status
 from catenary.dashboard.subscriptions import Subscriptions
-from catenary.errors import CatenaryError
+from catenary.errors import CatenaryError, ShareError
 from catenary.share import Reader, SharedEvent
 
 TICK = 1 / 60  # [s]
@@ -25,6 +26,7 @@ POSES_INTERVAL = 1 / 30  # [s]
 STATUS_INTERVAL = 0.05  # [s]
 TIMING_INTERVAL = 0.5  # [s]
 CLIENTS_MAX = 32
+SPARE = 8  # threads for clients that are leaving
 EVENTS_KEPT = 256
 ADVICE_SECONDS = 1.0  # limit for the advice of new events
 
@@ -68,6 +70,9 @@ class Hub:
         self.subscriptions: Subscriptions | None = None
         self.clients: set[Client] = set()
         self._problem = problem
+        self._reason = ""
+        # Locks of the desk must not wait for requests to devices, so motion has its own threads.
+        self.workers = ThreadPoolExecutor(CLIENTS_MAX + SPARE, "dashboard motion")
         self._notes = AxisNotes()
         self._events: list[dict[str, object]] = []
         self._fresh: list[SharedEvent] = []
@@ -80,11 +85,20 @@ class Hub:
     async def run(self) -> None:
         """Serve the clients until the task is cancelled."""
         try:
+            due = time.monotonic()
             while True:
-                self.step(time.monotonic())
-                await asyncio.sleep(TICK)
+                now = time.monotonic()
+                try:
+                    self.step(now)
+                except ShareError as error:
+                    self.source.drop(error.message)
+                    self._change()
+                due = max(due + TICK, now)  # without catching up after a pause
+                await asyncio.sleep(due - time.monotonic())
         finally:
             self.source.close()
+            self.requests.close()
+            self.workers.shutdown(wait=False)
 
     def step(self, now: float) -> None:
         """Send what is due. `now` is a monotonic time [s]."""
@@ -92,6 +106,7 @@ class Hub:
             self._change()
         reader = self.source.reader
         if reader is None:
+            self._send_reason()
             return
         self._take_events()
         if self.subscriptions is not None:
@@ -100,8 +115,8 @@ class Hub:
         self._send_poses(reader, now)
         for client in list(self.clients):
             client.follow_motion()
-        if now >= self._status_due:
-            self._status_due = now + STATUS_INTERVAL
+        if now >= self._status_due - TICK / 2:
+            self._status_due = max(self._status_due + STATUS_INTERVAL, now)
             self._send_status(reader)
         if now >= self._timing_due and self.clients:
             self._timing_due = now + TIMING_INTERVAL
@@ -133,9 +148,18 @@ class Hub:
         self.requests.reset()
         if reader is not None:
             self._start(self._find_devices())
+        self._reason = ""
         for client in list(self.clients):
             client.forget_motion()
-            self._greet(client)
+            if reader is not None:
+                self._greet(client)
+
+    def _send_reason(self) -> None:
+        """Send why there is no share, if the reason has changed."""
+        reason = self._problem() or self.source.reason
+        if reason != self._reason:
+            self._reason = reason
+            self._send_all(encode_message("gone", reason=reason))
 
     def _greet(self, client: Client) -> None:
         reader = self.source.reader
