@@ -1,8 +1,5 @@
 /** Tune: parameters of laws, and the step response of an axis. */
 
-import "uplot/dist/uPlot.min.css";
-import "../scope/scope.css";
-import "./tune.css";
 import { useState } from "preact/hooks";
 import type { Connection } from "../connection.ts";
 import type { AxisInfo } from "../remote.ts";

@@ -2,6 +2,7 @@
 
 import { useComputed } from "@preact/signals";
 import type { Connection } from "../../connection.ts";
+import { shortened } from "../../logic/format.ts";
 import { isPowered } from "../../logic/axis_state.ts";
 import { positionRange, signedRange } from "../../logic/range.ts";
 import { notifyError } from "../../notices.ts";
@@ -34,12 +35,11 @@ const TONES: Readonly<Record<string, Tone>> = {
 
 export function AxisCard(props: CardProps) {
   const { connection, axis, name, info } = props;
-  const headline = `axis-${axis}`;
   return (
-    <section class="panel axis" aria-labelledby={headline}>
+    <section class="panel axis" aria-label={name}>
       <header>
-        <h2 id={headline} class="cut grow" title={name}>
-          {name}
+        <h2 class="two-lines grow" title={name}>
+          {shortened(name)}
         </h2>
         <State connection={connection} axis={axis} />
       </header>
