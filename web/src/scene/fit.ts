@@ -5,7 +5,7 @@ import { Box3, type Group, MathUtils, type Mesh, type PerspectiveCamera, Vector3
 /** Direction from the robot to the camera. */
 export const VIEW = new Vector3(1.1, -1.5, 0.7).normalize();
 
-const HEIGHT = 0.62; // part of the view that the robot fills at most
+const HEIGHT = 0.66; // part of the view that the robot fills at most
 const WIDTH = 0.8;
 
 /** Return the corners of the boxes around the shapes of the robot, in the world [m]. */
