@@ -6,6 +6,7 @@ import os
 import signal
 import subprocess
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -152,6 +153,15 @@ def test_the_command_starts_where_ctrl_c_is_handled() -> None:
     assert done.stdout == "['catenary', 'catenary.cli', 'catenary.cli.console']\n"
 
 
+@pytest.fixture
+def hangups_are_delivered() -> Iterator[None]:
+    """Programs inherit an ignored SIGHUP, for example from nohup."""
+    before = signal.signal(signal.SIGHUP, signal.SIG_DFL)
+    yield
+    signal.signal(signal.SIGHUP, before)
+
+
+@pytest.mark.usefixtures("hangups_are_delivered")
 def test_sighup_on_a_wire(veth: tuple[str, str], tmp_path: Path) -> None:
     with served(veth[1], tmp_path), looping(veth[0], tmp_path) as loop:
         os.kill(loop.pid, signal.SIGHUP)
@@ -162,6 +172,7 @@ def test_sighup_on_a_wire(veth: tuple[str, str], tmp_path: Path) -> None:
 
 STATES = """
 import sys
+from collections.abc import Iterator
 import catenary as cat
 
 with cat.MainDevice(sys.argv[1]) as main:
