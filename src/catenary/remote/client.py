@@ -6,6 +6,7 @@ import socket
 import threading
 import time
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from typing import Any
 
 from catenary.errors import ResponseTimeout, ShareError
@@ -104,7 +105,8 @@ class Client:
             message = encode_request(self._serial, method, timeout, params)
             try:
                 self._connection.settimeout(timeout + GRACE)
-                self._connection.send(message)
+                with suppress(BrokenPipeError):  # the service may have sent the reason
+                    self._connection.send(message)
                 return self._answer(timeout).result(method)
             except TimeoutError as error:
                 raise ResponseTimeout(
