@@ -213,9 +213,12 @@ def test_a_move_in_the_background() -> None:
 
 
 def test_a_move_needs_the_background() -> None:
-    with program(background=False) as own, connect(own.name) as client:
-        with pytest.raises(LoopError, match="iterates its loop itself"):
-            client.move(list(own.arm.names), [0.1])
+    with (
+        program(background=False) as own,
+        connect(own.name) as client,
+        pytest.raises(LoopError, match="iterates its loop itself"),
+    ):
+        client.move(list(own.arm.names), [0.1])
 
 
 def test_parameters_of_a_law_are_set_together() -> None:

@@ -15,7 +15,7 @@ import msgspec
 import pytest
 
 from catenary.errors import BusyError
-from catenary.remote import connect
+from catenary.remote import Client, connect
 from catenary.remote.connection import decode_response, encode_request, open_connection
 from catenary.remote.messages import MESSAGE_SIZE, VERSION, Request, Response
 from catenary.remote.service import CLIENTS, PENDING_EACH
@@ -110,9 +110,13 @@ def test_a_flood_is_answered_with_busy(hostile: socket.socket) -> None:
 def test_busy_names_the_time_to_wait(running: Running) -> None:
     with connect(running.name, timeout=0.0) as client:
         with pytest.raises(BusyError) as caught:
-            for _ in range(300):
-                client.call("axes", timeout=0.001)
+            call_often(client)
         assert 0.0 < caught.value.retry < 0.1
+
+
+def call_often(client: Client) -> None:
+    for _ in range(300):
+        client.call("axes", timeout=0.001)
 
 
 def test_a_client_repeats_busy_requests(running: Running) -> None:
@@ -127,9 +131,13 @@ def test_a_client_that_never_reads_loses_its_connection(running: Running) -> Non
         silent.settimeout(10.0)
         message = encode_request(1, "objects", 5.0, {"position": SERVO, "count": 500})
         end = time.monotonic() + 20.0
-        with pytest.raises(OSError, match="Broken pipe|reset by peer"):
-            while time.monotonic() < end:
-                silent.send(message)
+        with pytest.raises(OSError, match=r"Broken pipe|reset by peer"):
+            send_until(silent, message, end)
+
+
+def send_until(connection: socket.socket, message: bytes, end: float) -> None:
+    while time.monotonic() < end:
+        connection.send(message)
 
 
 def test_too_many_clients_are_refused(running: Running) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from catenary import share
 from catenary.errors import ShareError
 from catenary.loop.network import Network
 from catenary.plan.sink import Incident
@@ -12,7 +11,7 @@ from catenary.remote.methods import Methods
 from catenary.remote.program import Program
 from catenary.remote.service import Service
 from catenary.remote.task import Task
-from catenary.share import folder
+from catenary.share import folder, share
 from catenary.share.process import command_of
 
 TEXT_MAX = 200  # characters of the arguments in an event

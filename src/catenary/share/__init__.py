@@ -12,7 +12,6 @@ from catenary.share.lease import Lease
 from catenary.share.mutex import Mutex
 from catenary.share.process import Process
 from catenary.share.reader import Reader, attach
-from catenary.share.share import Share
 
 __all__ = [
     "AxisCommand",
@@ -22,7 +21,6 @@ __all__ = [
     "Process",
     "Reader",
     "Reason",
-    "Share",
     "ShareField",
     "ShareLayout",
     "SharedEvent",
