@@ -153,6 +153,7 @@ def test_power_is_switched_at_once_without_a_link() -> None:
     segment = Segment([Coupler(), DigitalOutputs()])
     segment.switch_power(1, False)
     main = MainDevice(segment)
+    main.let_pass(2000)  # the coupler detects the loss of the link
     assert main.exchange(EcatCommand.BRD, 0, 0x0130, bytes(2)).working_counter == 1
     with pytest.raises(ValueError, match="no device 2"):
         segment.switch_power(2, True)
