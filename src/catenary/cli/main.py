@@ -11,10 +11,12 @@ from catenary.cli import (
     alias,
     bench,
     check,
+    dashboard,
     demo,
     diag,
     doctor,
     esi,
+    foxglove,
     graph,
     init,
     plot,
@@ -25,6 +27,7 @@ from catenary.cli import (
     sdo,
     sii,
     state,
+    top,
     virtual,
 )
 from catenary.cli.failure import USAGE, report, silence_stdout
@@ -35,7 +38,7 @@ DESCRIPTION = "Real-time EtherCAT for Python."
 COMMANDS = (
     *(scan, state, graph, diag, sdo, reg, alias, sii, esi),
     *(init, check),
-    *(demo, doctor, bench, virtual, realtime, record, plot),
+    *(demo, dashboard, top, doctor, bench, virtual, realtime, record, plot, foxglove),
 )
 EPILOG = """\
 TARGET is one of
