@@ -11,8 +11,10 @@
 
 #include <stdint.h>
 
+#include "motion.h"
+
 #define CAT_SINK_CAPSULE "catenary.sink"
-#define CAT_SINK_VERSION 1u
+#define CAT_SINK_VERSION 2u
 
 typedef struct cat_sink {
     uint32_t version;                 /* CAT_SINK_VERSION */
@@ -25,6 +27,13 @@ typedef struct cat_sink {
      * values and the commanded values. `target`: the requested values. */
     void (*put)(void *self, uint64_t number, const void *record, const void *actual,
                 const void *target);
+
+    /* Requests of other processes, checked by the core in every cycle: the header, followed by
+     * `motion_axes` slots, at a multiple of 64 bytes. NULL: none. The memory must stay mapped, and a
+     * client must not be able to truncate it. */
+    cat_motion *motion;
+    uint32_t motion_axes;             /* number of axes of the engine */
+    uint32_t jog;                     /* 1: jogs and requests to enable or reset are accepted */
 } cat_sink;
 
 #endif

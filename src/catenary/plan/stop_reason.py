@@ -21,6 +21,7 @@ class StopReason(IntEnum):
     FAULT = 10
     STOP_REQUEST = 11
     COMMAND_TIMEOUT = 12
+    OPERATOR = 13
 
     @property
     def text(self) -> str:
@@ -42,6 +43,7 @@ TEXTS: dict[StopReason, str] = {
     StopReason.FAULT: "the drive is in fault",
     StopReason.STOP_REQUEST: "a stop was requested",
     StopReason.COMMAND_TIMEOUT: "the last loop.update() is older than command_timeout",
+    StopReason.OPERATOR: "an operator requested a quick stop",
 }
 
 # Stops by the core itself: the iteration raises, unless on_axis_stopped is "event". Faults, lost
@@ -56,5 +58,6 @@ UNASKED = frozenset(
         StopReason.MODE_CHANGE,
         StopReason.NOT_ENABLED,
         StopReason.COMMAND_TIMEOUT,
+        StopReason.OPERATOR,
     }
 )

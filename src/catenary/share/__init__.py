@@ -7,6 +7,7 @@ with cat.attach("arm") as arm: ...                                          # an
 from catenary.share.command_table import Reason
 from catenary.share.commands import AxisCommand, LeaseEnd
 from catenary.share.events import SharedEvent
+from catenary.share.jog import Jog, JogStatus, RequestStatus, StateRequest
 from catenary.share.layout import ShareField, ShareLayout
 from catenary.share.lease import Lease
 from catenary.share.mutex import Mutex
@@ -16,15 +17,19 @@ from catenary.share.share import Share
 
 __all__ = [
     "AxisCommand",
+    "Jog",
+    "JogStatus",
     "Lease",
     "LeaseEnd",
     "Mutex",
     "Process",
     "Reader",
     "Reason",
+    "RequestStatus",
     "Share",
     "ShareField",
     "ShareLayout",
     "SharedEvent",
+    "StateRequest",
     "attach",
 ]

@@ -22,3 +22,6 @@ class Words:
 
         The store publishes all data written before it.
         """
+
+    def add(self, k: int, value: int) -> int:
+        """Add to word `k` in one atomic operation, modulo 2^64. Return its previous value."""

@@ -14,6 +14,7 @@ from libc.stdint cimport uint8_t, uint64_t
 cdef extern from "atomics.h" nogil:
     uint64_t cat_load_acquire64(const uint64_t *p)
     void cat_store_release64(uint64_t *p, uint64_t v)
+    uint64_t cat_add64(uint64_t *p, uint64_t v)
     void cat_fence()
 
 cdef enum:
@@ -57,6 +58,9 @@ cdef class Words:
     def store(self, uint64_t k, uint64_t value):
         cat_store_release64(self.place(k), value)
         cat_fence()
+
+    def add(self, uint64_t k, uint64_t value):
+        return cat_add64(self.place(k), value)
 
     def __dealloc__(self):
         PyBuffer_Release(&self.buffer)

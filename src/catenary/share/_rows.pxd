@@ -30,6 +30,12 @@ cdef extern from "ring.h" nogil:
     int ring_wait(const ring_view *v, uint64_t seen, int64_t deadline)
 
 cdef extern from "sink.h" nogil:
+    ctypedef struct cat_motion:
+        pass
+
+    ctypedef struct cat_motion_slot:
+        pass
+
     const char *CAT_SINK_CAPSULE
     const uint32_t CAT_SINK_VERSION
 
@@ -41,6 +47,9 @@ cdef extern from "sink.h" nogil:
         void *self
         void (*put)(void *self, uint64_t number, const void *record, const void *actual,
                     const void *target) noexcept nogil
+        cat_motion *motion
+        uint32_t motion_axes
+        uint32_t jog
 
 cdef class Ring:
     """A ring of `count` rows (a power of two) of `size` bytes, at byte `offset` of a buffer.
@@ -64,4 +73,6 @@ cdef class CycleWriter(Ring):
     `sizes` contains the sizes of the record, the actual values and the targets [bytes].
     """
     cdef cat_sink sink
+    cdef Py_buffer motion      # memory of the motion words; its `buf` is NULL without them
+    cdef connect_motion(self, memory, uint64_t offset, uint32_t axes, bint jog)
     cdef cycle_rows rows

@@ -65,7 +65,15 @@ class CycleWriter(Ring):
         sizes: tuple[int, int, int],
         *,
         writable: bool,
-    ) -> None: ...
+        motion: tuple[object, int, int] | None = None,
+        jog: bool = False,
+    ) -> None:
+        """Make a writer.
+
+        `motion`: memory of the motion words (native/motion.h), their offset, and the number of axes.
+        `jog`: the core accepts jogs.
+        """
+
     @property
     def capsule(self) -> object:
         """Capsule of the sink table; it keeps the writer and its memory alive."""

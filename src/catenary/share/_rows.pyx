@@ -130,7 +130,8 @@ cdef void release_owner(object capsule) noexcept:
 
 
 cdef class CycleWriter(Ring):
-    def __init__(self, memory, uint64_t offset, uint64_t count, uint64_t size, sizes, *, writable):
+    def __init__(self, memory, uint64_t offset, uint64_t count, uint64_t size, sizes, *, writable,
+                 motion=None, jog=False):
         record_size, actual_size, target_size = sizes
         _, actual_at, target_at, whole = row_parts(record_size, actual_size, target_size)
         if not writable or whole != size:
@@ -149,6 +150,25 @@ cdef class CycleWriter(Ring):
         self.sink.target_size = target_size
         self.sink.self = &self.rows
         self.sink.put = put
+        if motion is not None:
+            self.connect_motion(*motion, jog)
+
+    cdef connect_motion(self, memory, uint64_t offset, uint32_t axes, bint jog):
+        """Point the sink at the motion words of the desk, and keep their memory mapped."""
+        cdef uint64_t size = sizeof(cat_motion) + <uint64_t>axes * sizeof(cat_motion_slot)
+        if self.motion.buf != NULL:
+            raise ValueError("the motion words are set already")
+        PyObject_GetBuffer(memory, &self.motion, PyBUF_WRITABLE)
+        if offset % 64 or offset > <uint64_t>self.motion.len or size > self.motion.len - offset:
+            raise ValueError(f"motion words of {axes} axes at offset {offset} do not fit in"
+                             f" {self.motion.len} bytes")
+        self.sink.motion = <cat_motion *>(<uint8_t *>self.motion.buf + offset)
+        self.sink.motion_axes = axes
+        self.sink.jog = jog
+
+    def __dealloc__(self):
+        if self.motion.buf != NULL:
+            PyBuffer_Release(&self.motion)
 
     @property
     def capsule(self):

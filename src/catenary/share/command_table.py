@@ -9,6 +9,9 @@ its lease; 0: none), the places (one for each client) and one ring for each plac
 these parts while they hold the mutex. One atomic word (`_atomic_words.pyx`) publishes a lease to
 the loop. The loop writes two words of a place: the number of commands that it has read, and the
 lease that it has ended. When it closes, it sets `closed`.
+
+The last part contains the motion words (native/motion.h). The core of the loop reads them in every
+cycle: jogs, heartbeats, requested states and the stop word.
 """
 
 from __future__ import annotations
@@ -55,6 +58,31 @@ PLACE = np.dtype(
     ]
 )
 
+MOTION = np.dtype(  # cat_motion of native/motion.h
+    [
+        ("stop", "<u8"),
+        ("stopper", "<u8"),
+        ("of_clients", "<u8", (6,)),
+        ("token", "<u8"),
+        ("of_core", "<u8", (7,)),
+    ]
+)
+SLOT = np.dtype(  # cat_motion_slot
+    [
+        ("press", "<u8"),
+        ("begun", "<u8"),
+        ("heartbeat", "<u8"),
+        ("released", "<u8"),
+        ("velocity", "<f8"),
+        ("distance", "<f8"),
+        ("acceleration", "<f8"),
+        ("request", "<u8"),
+        ("answer", "<u8"),
+        ("taken", "<u8"),
+        ("of_core", "<u8", (6,)),
+    ]
+)
+
 Values = npt.NDArray[np.float64]
 
 
@@ -86,6 +114,7 @@ class Geometry(NamedTuple):
     places: int
     rings: int
     ring_size: int
+    motion: int
     size: int
 
 
@@ -103,11 +132,39 @@ def geometry(axes: int) -> Geometry:
     places = memory_aligned(holders + 8 * axes)
     rings = memory_aligned(places + PLACES * PLACE.itemsize)
     ring_size = memory_aligned(_rows.memory_size(COMMANDS, row_dtype(axes).itemsize))
-    return Geometry(closed, holders, places, rings, ring_size, rings + PLACES * ring_size)
+    motion = rings + PLACES * ring_size
+    size = motion + MOTION.itemsize + axes * SLOT.itemsize
+    return Geometry(closed, holders, places, rings, ring_size, motion, size)
 
 
 def memory_aligned(offset: int) -> int:
     return -(-offset // 64) * 64
+
+
+class MotionWords:
+    """View of the motion words of a desk (native/motion.h): global ones, and one of each axis."""
+
+    def __init__(self, memory: mmap.mmap, offset: int, axes: int) -> None:
+        slots = offset + MOTION.itemsize
+        self.stop, self.stopper, self.token = (
+            Words(memory, offset + field_offset(MOTION, name), 1)
+            for name in ("stop", "stopper", "token")
+        )
+        self.press, self.begun, self.heartbeat, self.released, self.request = (
+            Words(memory, slots + field_offset(SLOT, name), axes, SLOT.itemsize)
+            for name in ("press", "begun", "heartbeat", "released", "request")
+        )
+        self.answer, self.taken = (
+            Words(memory, slots + field_offset(SLOT, name), axes, SLOT.itemsize)
+            for name in ("answer", "taken")
+        )
+        self.slots = np.frombuffer(memory, SLOT, axes, slots)  # for the real numbers
+
+
+def field_offset(kind: np.dtype[np.void], name: str) -> int:
+    """Return the offset of a field in a structured type [bytes]."""
+    assert kind.fields is not None
+    return kind.fields[name][1]
 
 
 class Desk:
@@ -139,6 +196,8 @@ class Desk:
             )
             for k in range(PLACES)
         ]
+        self.motion = MotionWords(memory, where.motion, axes)
+        self.motion_place = (memory, where.motion, axes)  # for the sink of the loop
 
     def client(self, place: int) -> Process:
         """Return the client that holds the place, or that held it last."""
@@ -189,8 +248,7 @@ class Desk:
 
     def _words(self, places: int, name: str) -> Words:
         """Return one field of all places."""
-        assert PLACE.fields is not None
-        return Words(self._memory, places + PLACE.fields[name][1], PLACES, PLACE.itemsize)
+        return Words(self._memory, places + field_offset(PLACE, name), PLACES, PLACE.itemsize)
 
 
 def make_desk(layout: ShareLayout) -> tuple[Desk, int]:

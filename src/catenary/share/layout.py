@@ -25,7 +25,7 @@ from catenary.share import _rows
 from catenary.share.process import Process
 
 MAGIC = b"CATSHARE"
-VERSION = 2
+VERSION = 3
 HEADER = struct.Struct("<8sIIQ")
 ALIGNMENT = 4096
 EVENT_SIZE = 1024  # bytes of an event
@@ -80,6 +80,7 @@ class ShareLayout(msgspec.Struct, frozen=True):
     writer: Process
     rows: RingPlace
     events: RingPlace
+    jog: bool = False  # True if the core accepts jogs
 
     @property
     def dtype(self) -> np.dtype[np.void]:
@@ -100,7 +101,13 @@ class ShareLayout(msgspec.Struct, frozen=True):
 
 
 def make_layout(
-    name: str, sink: SinkLayout, *, history: float, opened: float, writer: Process
+    name: str,
+    sink: SinkLayout,
+    *,
+    history: float,
+    opened: float,
+    writer: Process,
+    jog: bool = False,
 ) -> ShareLayout:
     """Return the layout of a segment for a loop.
 
@@ -110,6 +117,7 @@ def make_layout(
         history: time span of the cycles that the ring keeps [s].
         opened: time at which the share was opened, UTC [s].
         writer: process of the loop.
+        jog: True if the core accepts jogs.
     """
     blocks = (sink.record_size, sink.actual_size, sink.target_size)
     *starts, row_size = _rows.row_parts(*blocks)
@@ -133,6 +141,7 @@ def make_layout(
             writer=writer,
             rows=RingPlace(rows_at, count, row_size),
             events=RingPlace(events_at, EVENT_COUNT, EVENT_SIZE),
+            jog=jog,
         )
 
     return made(len(msgspec.json.encode(made(0))) + ALIGNMENT)

@@ -13,6 +13,15 @@ import numpy.typing as npt
 
 from catenary.errors import LeaseError
 from catenary.share.command_table import COMMANDS, PLACES, QUANTITIES, Desk, Reason
+from catenary.share.jog import (
+    STATES,
+    Jog,
+    State,
+    StateRequest,
+    checked_values,
+    press,
+    request_state,
+)
 from catenary.share.layout import ShareLayout
 from catenary.share.process import this_process
 
@@ -35,6 +44,7 @@ class Lease:
         self._numbers = list(axes)
         self._for_ns = round(for_ * 1e9)
         self._pid = os.getpid()
+        self._jogs: dict[int, Jog] = {}  # the last one of each axis
         with locked(desk):
             try:
                 self._place = self._take_place()
@@ -80,6 +90,71 @@ class Lease:
         row["lease"] = self._serial
         self._renew(row.tobytes())
 
+    def jog(
+        self,
+        axis: str | int,
+        velocity: float,
+        *,
+        distance: float | None = None,
+        acceleration: float | None = None,
+        token: int | None = None,
+    ) -> Jog:
+        """Request a motion of one axis by the core of the loop, and renew the lease.
+
+        The axis must be enabled, at rest, and in mode csp, csv or pv. While it is jogged, it
+        ignores the targets of the application. The motion needs heartbeats: see `Jog.beat`. Read
+        the answer of the core in `Jog.status`.
+
+        Args:
+            axis: name or number of an axis of the lease.
+            velocity: signed velocity, limited to the limit of the axis [rad/s or m/s].
+            distance: distance to move [rad or m]; None: move until release.
+            acceleration: acceleration, limited to that of the axis [rad/s² or m/s²]; None: that of
+                the axis.
+            token: the token that the operator's device has echoed; None: the newest token, for a
+                program on this machine.
+
+        Returns:
+            Handle of the jog.
+
+        Raises:
+            LeaseError: the lease has ended, or the desk is locked for too long.
+            ValueError: the axis is not part of the lease, or a value is out of range.
+        """
+        [number] = self._numbers_of([axis])
+        values = checked_values(velocity, distance, acceleration)
+        words = self._desk.motion
+        with self._renewed():
+            serial = press(words, number, values, token)
+        jog = Jog(words, number, serial, self.renew, self._layout.axes[number])
+        self._jogs[number] = jog
+        return jog
+
+    def request(self, state: State, axes: Sequence[str | int] | None = None) -> StateRequest:
+        """Request a state of axes from the core of the loop, and renew the lease.
+
+        A later request of the application replaces it. "enable" and "reset" are refused unless the
+        share was opened with `jog=True`. An axis in mode cst cannot be enabled in this way.
+
+        Args:
+            state: "disable", "enable", "quick_stop" or "reset" (disabled, with a fault reset).
+            axes: names or numbers of axes of the lease; None: all of them.
+
+        Returns:
+            Handle of the request.
+
+        Raises:
+            LeaseError: the lease has ended, or the desk is locked for too long.
+            ValueError: the state is unknown, or an axis is not part of the lease.
+        """
+        if state not in STATES:
+            raise ValueError(f"state={state!r}: must be one of {', '.join(STATES)}")
+        numbers = self._numbers if axes is None else self._numbers_of(axes)
+        words = self._desk.motion
+        with self._renewed():
+            requests = {number: request_state(words, number, STATES[state]) for number in numbers}
+        return StateRequest(words, requests)
+
     def renew(self) -> None:
         """Renew the lease for its full duration.
 
@@ -88,12 +163,14 @@ class Lease:
         self._renew(None)
 
     def release(self) -> None:
-        """Release the axes. A no-op if the lease has ended, or in a forked child.
+        """Release the axes and their jogs. A no-op if the lease has ended, or in a forked child.
 
         Raises LeaseError if the desk is locked for too long.
         """
         if os.getpid() != self._pid:
             return
+        for jog in self._jogs.values():
+            jog.release()
         with locked(self._desk):
             if self._is_valid():
                 free(self._desk, self._place, Reason.RELEASED)
@@ -110,7 +187,16 @@ class Lease:
         self.release()
 
     def _renew(self, row: bytes | None) -> None:
-        """Renew the lease, and write a row unless it is None.
+        """Renew the lease, and write a row unless it is None."""
+        with self._renewed():
+            if row is None:
+                return
+            self._check_taken()
+            self._desk.rings[self._place].write(row)
+
+    @contextmanager
+    def _renewed(self) -> Iterator[None]:
+        """Lock the desk for a block, after the renewal of the lease.
 
         The mutex protects the place against reassignment.
         """
@@ -125,10 +211,18 @@ class Lease:
                     f"{self._for_ns * 1e-9:g} s, or pass a longer for_=",
                 )
             desk.deadlines_ns.store(place, now + self._for_ns)
-            if row is None:
-                return
-            self._check_taken()
-            desk.rings[place].write(row)
+            yield
+
+    def _numbers_of(self, axes: Sequence[str | int]) -> list[int]:
+        """Return the indices of axes in the layout. Raises ValueError for an axis without lease."""
+        numbers = axis_numbers(self._layout, axes)
+        for number in numbers:
+            if number not in self._numbers:
+                raise ValueError(
+                    f"axis {self._layout.axes[number]!r} is not part of this lease on "
+                    f"{', '.join(self.axes)}"
+                )
+        return numbers
 
     def _check_taken(self) -> None:
         """Raise LeaseError if the loop does not read commands.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import time
 from collections.abc import Iterable, Sequence
 from types import TracebackType
@@ -211,9 +212,35 @@ class Reader:
         """
         if not self.alive:
             raise ShareError(f"the loop of the share {self.layout.name!r} has ended")
+        return lease_of(self._opened_desk(), self.layout, axes, for_)
+
+    def stop(self) -> None:
+        """Stop all axes at the next cycle, with a quick stop. It needs no lease.
+
+        Each axis needs a new request to be enabled again. The first call opens the memory for
+        commands, unless `token` or `lease` has opened it.
+
+        Raises ShareError if the loop does not accept commands from this user.
+        """
+        motion = self._opened_desk().motion
+        motion.stopper.store(0, os.getpid())
+        motion.stop.add(0, 1)
+
+    @property
+    def token(self) -> int:
+        """Newest token of the core, a number of 48 bits; 0 before the first cycle.
+
+        A heartbeat of a jog echoes it (`Jog.beat`). The core issues a token every 50 ms.
+
+        Raises ShareError if the loop does not accept commands from this user.
+        """
+        return self._opened_desk().motion.token.load(0)
+
+    def _opened_desk(self) -> Desk:
+        """Return the desk of the loop. The first call opens it."""
         if self._desk is None:
             self._desk = open_desk(self.layout, self._socket, self._owner)
-        return lease_of(self._desk, self.layout, axes, for_)
+        return self._desk
 
     def _has_news(self, deadline_ns: int) -> bool:
         """Wait for a new cycle. Return False at the deadline, or when the ring has ended."""

@@ -42,13 +42,17 @@ class Share:
         history: time span of the cycles that readers can access [s].
         mode: permissions as for chmod. 0o600: this user only. 0o640: the group can read.
             0o660: the group can read and command. Only this user can ever write to the cycles.
+        jog: accept jogs from clients, and their requests to enable and reset axes. They can always
+            stop and disable axes.
 
     Raises:
         ShareError: on entry, if the name belongs to a running process or another user.
         ValueError: an argument is out of range.
     """
 
-    def __init__(self, name: str, *, history: float = HISTORY, mode: int = 0o600) -> None:
+    def __init__(
+        self, name: str, *, history: float = HISTORY, mode: int = 0o600, jog: bool = False
+    ) -> None:
         if not history > 0:
             raise ValueError(f"history={history} s: must be positive")
         if not 0 <= mode <= 0o777:
@@ -58,6 +62,7 @@ class Share:
         self._socket_file = folder.file_name(folder.SOCKET, name)
         self._history = history
         self._mode = mode
+        self._jog = jog
         self._entered = False
         self._pid = 0  # process that entered the block
         self._segment: Segment | None = None
@@ -166,12 +171,20 @@ class Share:
             history=self._history,
             opened=time.time(),
             writer=this_process(),
+            jog=self._jog,
         )
         segment, desk, listening = self._make_files(made)
         blocks = (layout.record_size, layout.actual_size, layout.target_size)
         rows, events = made.rows, made.events
         cycles = CycleWriter(
-            segment.memory, rows.offset, rows.count, rows.size, blocks, writable=True
+            segment.memory,
+            rows.offset,
+            rows.count,
+            rows.size,
+            blocks,
+            writable=True,
+            motion=desk.motion_place,
+            jog=self._jog,
         )
         self._publish(segment, listening)
         self._socket = listening

@@ -1,0 +1,106 @@
+"""Messages of the WebSocket as frozen values; web/src/protocol.ts has the same names."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal, TypeAlias
+
+import msgspec
+
+SIGNALS_MAX = 256  # of a subscription
+RATE_MAX = 60.0  # frames per second
+
+Id = Annotated[int, msgspec.Meta(ge=0, le=0xFFFF)]
+Number = Annotated[int, msgspec.Meta(ge=0, le=1 << 53)]
+Name = Annotated[str, msgspec.Meta(max_length=200)]
+TokenText = Annotated[str, msgspec.Meta(pattern="^[0-9]{1,15}$")]
+StateName = Literal["enable", "disable", "reset", "quick_stop"]
+
+
+class Message(msgspec.Struct, frozen=True, tag_field="op", forbid_unknown_fields=True):
+    """Base of the messages of a client."""
+
+
+class Subscribe(Message, tag="subscribe"):
+    """Request for frames with the values of signals."""
+
+    id: Id
+    signals: Annotated[list[Name], msgspec.Meta(min_length=1, max_length=SIGNALS_MAX)]
+    full: bool
+    rate: Annotated[float, msgspec.Meta(ge=1.0, le=RATE_MAX)] = RATE_MAX
+
+
+class Unsubscribe(Message, tag="unsubscribe"):
+    """End of a subscription."""
+
+    id: Id
+
+
+class Press(Message, tag="press"):
+    """Start of a jog. Without a distance, it lasts until the release."""
+
+    axis: Number
+    velocity: float  # signed [rad/s or m/s]
+    token: TokenText
+    press: Number
+    distance: float | None = None  # [rad or m]
+    acceleration: float | None = None  # [rad/s² or m/s²]
+
+
+class Beat(Message, tag="beat"):
+    """Heartbeat of a jog, with the newest token that the client has received."""
+
+    axis: Number
+    press: Number
+    token: TokenText
+
+
+class Release(Message, tag="release"):
+    """End of a jog."""
+
+    axis: Number
+    press: Number
+
+
+class Stop(Message, tag="stop"):
+    """Quick stop of all axes."""
+
+
+class Request(Message, tag="request"):
+    """Request for a state of axes; `axes` None: all."""
+
+    state: StateName
+    axes: list[Number] | None = None
+
+
+class Ping(Message, tag="ping"):
+    """Request for a pong with the same `t`."""
+
+    t: float
+
+
+ClientMessage: TypeAlias = (
+    Subscribe | Unsubscribe | Press | Beat | Release | Stop | Request | Ping
+)
+OPERATOR_ONLY = (Press, Beat, Release, Stop, Request)
+
+_decoder = msgspec.json.Decoder(ClientMessage)
+
+
+def decode_message(text: str | bytes) -> ClientMessage:
+    """Decode a message of a client. Raises msgspec.MsgspecError if it is not valid."""
+    return _decoder.decode(text)
+
+
+def encode_message(op: str, **content: object) -> str:
+    """Encode a message to a client. NaN and infinity become null.
+
+    Args:
+        op: kind of the message.
+        content: its other fields.
+    """
+    return msgspec.json.encode({"op": op, **content}).decode()
+
+
+def op_of(message: ClientMessage) -> str:
+    """Return the `op` of a message."""
+    return str(type(message).__struct_config__.tag)

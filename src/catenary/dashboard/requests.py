@@ -1,0 +1,134 @@
+"""Requests to the program of a loop, with an allow-list for each role."""
+
+from __future__ import annotations
+
+import asyncio
+import threading
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+from catenary.dashboard.security import Role
+from catenary.errors import CatenaryError
+
+if TYPE_CHECKING:
+    from catenary.remote import Client
+
+CONNECTIONS = 6
+CALLS_MAX = 32  # that wait or run
+READS = frozenset(
+    {
+        *("hello", "devices", "axes", "objects", "sdo_read", "registers", "diagnosis"),
+        *("emergencies", "events", "timing", "clocks", "plan", "laws"),
+    }
+)
+WRITES = frozenset(
+    {
+        *("sdo_write", "set_state", "reset_error", "clear_counters", "set_parameters", "home"),
+        *("virtual_cable", "virtual_power"),
+    }
+)
+
+
+class Requests:
+    """Connections to the program of a share, one for each request in progress.
+
+    Args:
+        share: name of the share.
+        uid: owner of the share; None: this user or root.
+    """
+
+    def __init__(self, share: str, uid: int | None = None) -> None:
+        self._share = share
+        self._uid = uid
+        self._idle: list[Client] = []
+        self._lock = threading.Lock()
+        self._generation = 0
+        self._running = asyncio.Semaphore(CONNECTIONS)
+        self._waiting = 0
+        self._answers = True
+
+    def is_available(self) -> bool:
+        """Return False if the last request found no service in the program."""
+        return self._answers
+
+    def reset(self) -> None:
+        """Close the connections, because the share has changed."""
+        with self._lock:
+            self._generation += 1
+            idle, self._idle = self._idle, []
+        for client in idle:
+            client.close()
+        self._answers = True
+
+    async def call(self, method: str, params: Mapping[str, object]) -> object:
+        """Return the result of a method of `catenary.remote.Client`.
+
+        Args:
+            method: name of the method.
+            params: its arguments.
+
+        Raises:
+            CatenaryError: the program refused the request, or does not answer.
+            BusyError: too many requests are waiting.
+        """
+        if self._waiting >= CALLS_MAX:
+            raise BusyError
+        self._waiting += 1
+        try:
+            async with self._running:
+                return await asyncio.to_thread(self._call, method, params)
+        finally:
+            self._waiting -= 1
+
+    def _call(self, method: str, params: Mapping[str, object]) -> object:
+        client, generation = self._take()
+        try:
+            result = client.call(method, **params)
+        except BaseException:
+            client.close()
+            raise
+        self._give_back(client, generation)
+        return result
+
+    def _take(self) -> tuple[Client, int]:
+        from catenary.remote import connect
+
+        with self._lock:
+            generation = self._generation
+            if self._idle:
+                return self._idle.pop(), generation
+        try:
+            client = connect(self._share, uid=self._uid)
+        except CatenaryError:
+            self._answers = False
+            raise
+        self._answers = True
+        return client, generation
+
+    def _give_back(self, client: Client, generation: int) -> None:
+        with self._lock:
+            if generation == self._generation:
+                self._idle.append(client)
+                return
+        client.close()
+
+
+class BusyError(CatenaryError):
+    """Too many requests are waiting."""
+
+    def __init__(self) -> None:
+        super().__init__(f"{CALLS_MAX} requests are already waiting", hint="try again")
+
+
+def is_allowed(method: str, role: Role) -> bool:
+    """Return True if a role may call a method."""
+    return method in READS or (role == "operator" and method in WRITES)
+
+
+def error_body(error: Exception) -> dict[str, str]:
+    """Return an error as the page receives it."""
+    return {
+        "kind": type(error).__name__,
+        "message": str(getattr(error, "message", "") or error),
+        "hint": str(getattr(error, "hint", "")),
+    }
