@@ -11,6 +11,7 @@ from catenary.cli import (
     alias,
     bench,
     check,
+    dashboard,
     demo,
     diag,
     doctor,
@@ -35,7 +36,7 @@ DESCRIPTION = "Real-time EtherCAT for Python."
 COMMANDS = (
     *(scan, state, graph, diag, sdo, reg, alias, sii, esi),
     *(init, check),
-    *(demo, doctor, bench, virtual, realtime, record, plot),
+    *(demo, dashboard, doctor, bench, virtual, realtime, record, plot),
 )
 EPILOG = """\
 TARGET is one of

@@ -7,6 +7,7 @@ import contextlib
 from collections.abc import AsyncIterator, Awaitable, Callable
 from dataclasses import dataclass
 from importlib.metadata import version
+from typing import TypeVar
 
 import msgspec
 from starlette.applications import Starlette
@@ -29,6 +30,7 @@ from catenary.errors import CatenaryError
 BODY_MAX = 64 << 10  # bytes
 RETRY_SECONDS = 0.2
 INDEX = "index.html"
+T = TypeVar("T")
 Handler = Callable[["Page", Request, Role], Awaitable[Response]]
 
 
@@ -221,7 +223,7 @@ async def serve(page: Page, socket: WebSocket) -> None:
     await Client(page.hub, socket, role, access.refusal).run()
 
 
-async def read_body[T](request: Request, kind: type[T]) -> T | Response:
+async def read_body(request: Request, kind: type[T]) -> T | Response:
     """Return the decoded body of a request, or the response to an invalid one."""
     content = b""
     async for part in request.stream():

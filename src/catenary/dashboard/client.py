@@ -92,7 +92,8 @@ class Client:
             status = change.status
             self._report_jog(change.axis, change.press, status.name, status.text)
             if status.over:
-                self._enqueue(Release(change.axis, change.press), partial(self._motion.end, change.axis))
+                end = Release(change.axis, change.press)
+                self._enqueue(end, partial(self._motion.end, change.axis))
         for text in self._motion.refusals():
             self._refuse("request", RuntimeError(text))
 

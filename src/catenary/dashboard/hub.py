@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import time
+from collections.abc import Callable, Coroutine
 from typing import TYPE_CHECKING
 
 import msgspec
@@ -32,14 +33,17 @@ class Hub:
     Args:
         source: connection to the share.
         requests: connection to the program of the loop.
+        problem: returns the error of the program, or "".
     """
 
-    def __init__(self, source: Source, requests: Requests) -> None:
+    def __init__(
+        self, source: Source, requests: Requests, problem: Callable[[], str] = str
+    ) -> None:
         self.source = source
         self.requests = requests
         self.subscriptions: Subscriptions | None = None
         self.clients: set[Client] = set()
-        self.problem = ""  # error of the host process, if there is one
+        self._problem = problem
         self._notes = AxisNotes()
         self._events: list[SharedEvent] = []
         self._token = 0
@@ -89,6 +93,10 @@ class Hub:
         if self.subscriptions is not None:
             self.subscriptions.remove(client)
 
+    def event_rows(self) -> list[dict[str, object]]:
+        """Return the newest events, oldest first."""
+        return [msgspec.structs.asdict(event) for event in self._events]
+
     def _change(self) -> None:
         """Tell all clients that the share has ended or returned."""
         reader = self.source.reader
@@ -104,7 +112,7 @@ class Hub:
     def _greet(self, client: Client) -> None:
         reader = self.source.reader
         if reader is None:
-            client.send(encode_message("gone", reason=self.problem or self.source.reason))
+            client.send(encode_message("gone", reason=self._problem() or self.source.reason))
             return
         client.send(self._hello(reader, client))
         for event in self._events:
@@ -189,8 +197,8 @@ class Hub:
         for client in self.clients:
             client.send(text)
 
-    def _start(self, work: object) -> None:
-        task = asyncio.ensure_future(work)  # type: ignore[arg-type]
+    def _start(self, work: Coroutine[None, None, None]) -> None:
+        task = asyncio.get_running_loop().create_task(work)
         self._tasks.add(task)
         task.add_done_callback(self._tasks.discard)
 
@@ -199,5 +207,3 @@ def event_message(event: SharedEvent) -> str:
     """Return the message about an event."""
     content = msgspec.structs.asdict(event)
     return encode_message("event", advice="", **content)
-
-

@@ -16,11 +16,7 @@ TokenText = Annotated[str, msgspec.Meta(pattern="^[0-9]{1,15}$")]
 StateName = Literal["enable", "disable", "reset", "quick_stop"]
 
 
-class Message(msgspec.Struct, frozen=True, tag_field="op", forbid_unknown_fields=True):
-    """Base of the messages of a client."""
-
-
-class Subscribe(Message, tag="subscribe"):
+class Subscribe(msgspec.Struct, frozen=True, tag_field="op", tag="subscribe"):
     """Request for frames with the values of signals."""
 
     id: Id
@@ -29,13 +25,13 @@ class Subscribe(Message, tag="subscribe"):
     rate: Annotated[float, msgspec.Meta(ge=1.0, le=RATE_MAX)] = RATE_MAX
 
 
-class Unsubscribe(Message, tag="unsubscribe"):
+class Unsubscribe(msgspec.Struct, frozen=True, tag_field="op", tag="unsubscribe"):
     """End of a subscription."""
 
     id: Id
 
 
-class Press(Message, tag="press"):
+class Press(msgspec.Struct, frozen=True, tag_field="op", tag="press"):
     """Start of a jog. Without a distance, it lasts until the release."""
 
     axis: Number
@@ -46,7 +42,7 @@ class Press(Message, tag="press"):
     acceleration: float | None = None  # [rad/s² or m/s²]
 
 
-class Beat(Message, tag="beat"):
+class Beat(msgspec.Struct, frozen=True, tag_field="op", tag="beat"):
     """Heartbeat of a jog, with the newest token that the client has received."""
 
     axis: Number
@@ -54,36 +50,34 @@ class Beat(Message, tag="beat"):
     token: TokenText
 
 
-class Release(Message, tag="release"):
+class Release(msgspec.Struct, frozen=True, tag_field="op", tag="release"):
     """End of a jog."""
 
     axis: Number
     press: Number
 
 
-class Stop(Message, tag="stop"):
+class Stop(msgspec.Struct, frozen=True, tag_field="op", tag="stop"):
     """Quick stop of all axes."""
 
 
-class Request(Message, tag="request"):
+class Request(msgspec.Struct, frozen=True, tag_field="op", tag="request"):
     """Request for a state of axes; `axes` None: all."""
 
     state: StateName
     axes: list[Number] | None = None
 
 
-class Ping(Message, tag="ping"):
+class Ping(msgspec.Struct, frozen=True, tag_field="op", tag="ping"):
     """Request for a pong with the same `t`."""
 
     t: float
 
 
-ClientMessage: TypeAlias = (
-    Subscribe | Unsubscribe | Press | Beat | Release | Stop | Request | Ping
-)
+ClientMessage: TypeAlias = Subscribe | Unsubscribe | Press | Beat | Release | Stop | Request | Ping
 OPERATOR_ONLY = (Press, Beat, Release, Stop, Request)
 
-_decoder = msgspec.json.Decoder(ClientMessage)
+_decoder: msgspec.json.Decoder[ClientMessage] = msgspec.json.Decoder(ClientMessage)
 
 
 def decode_message(text: str | bytes) -> ClientMessage:

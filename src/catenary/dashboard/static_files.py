@@ -10,6 +10,7 @@ from pathlib import Path
 
 FOLDER = Path(__file__).with_name("static")
 COMPRESSED = ("text/", "application/javascript", "application/json", "image/svg")
+BINARY = "application/octet-stream"
 TYPES = {".js": "text/javascript", ".css": "text/css", ".html": "text/html", ".txt": "text/plain"}
 
 
@@ -30,7 +31,9 @@ def read_static_files(folder: Path = FOLDER) -> dict[str, StaticFile]:
 
 def _read(path: Path) -> StaticFile:
     content = path.read_bytes()
-    kind = TYPES.get(path.suffix) or mimetypes.guess_type(path.name)[0] or "application/octet-stream"
+    kind = (
+        TYPES.get(path.suffix) or mimetypes.guess_type(path.name)[0] or "application/octet-stream"
+    )
     is_text = kind.startswith(COMPRESSED)
     compressed = gzip.compress(content, mtime=0) if is_text else None
     tag = f'"{hashlib.sha256(content).hexdigest()[:32]}"'

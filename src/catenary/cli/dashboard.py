@@ -1,0 +1,174 @@
+"""`catenary dashboard`: serve the operator's page of a running loop, or of a target."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import shutil
+import signal
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from catenary.cli.arguments import number
+from catenary.cli.failure import UsageError
+from catenary.cli.parsers import Commands, add_command
+
+if TYPE_CHECKING:
+    from catenary.dashboard.security import Access
+
+BROWSERS = ("chromium", "chromium-browser", "google-chrome", "brave-browser", "microsoft-edge")
+INTERFACES = Path("/sys/class/net")
+
+DESCRIPTION = """\
+Serves a page with which any browser watches and moves the machine of a running loop
+(Loop(..., sink=cat.Share(NAME, jog=True))). SHARE is the name of the share; without it, the only
+existing share is used. With a TARGET or a machine file, starts a program that operates all devices
+with conservative limits, and ends it with the server. Drives stay disabled until an operator
+enables them. The page is not an emergency stop (ISO 13850). Needs catenary[dashboard].
+docs/how_to/dashboard.md describes roles and remote access."""
+
+EXAMPLE = """\
+catenary dashboard arm
+catenary dashboard virtual
+catenary dashboard machine.toml
+catenary dashboard arm --host 0.0.0.0 --cert cert.pem --key key.pem"""
+
+
+def add_parser(commands: Commands) -> None:
+    parser = add_command(
+        commands,
+        "dashboard",
+        help="serve the operator's page for browsers",
+        description=" ".join(DESCRIPTION.splitlines()),
+        example=EXAMPLE,
+    )
+    parser.add_argument(
+        "source",
+        metavar="SHARE",
+        nargs="?",
+        help="name of a share, or a target: eth0, virtual, machine.toml ...",
+    )
+    parser.add_argument(
+        "--host", default="127.0.0.1", help="address to listen on (127.0.0.1: this machine only)"
+    )
+    parser.add_argument("--port", type=port, default=8710, help="port (8710; 0: a free one)")
+    parser.add_argument("--cert", type=Path, metavar="FILE", help="certificate of TLS, PEM")
+    parser.add_argument("--key", type=Path, metavar="FILE", help="private key of TLS, PEM")
+    parser.add_argument("--viewer-only", action="store_true", help="offer no operator role")
+    parser.add_argument(
+        "--new-links", action="store_true", help="make new links; former links become invalid"
+    )
+    parser.add_argument(
+        "--window", action="store_true", help="open the page in a window of Chromium"
+    )
+    parser.add_argument(
+        "--uid", type=number, help="user ID of the share's owner (default: yours, then root's)"
+    )
+    parser.set_defaults(run=run)
+
+
+def port(text: str) -> int:
+    value = number(text)
+    if not 0 <= value <= 0xFFFF:
+        raise argparse.ArgumentTypeError(f"port {text} is outside 0 to 65535")
+    return value
+
+
+def run(arguments: argparse.Namespace) -> int:
+    from catenary.dashboard.server import Options, require_packages, run_server
+    from catenary.operate import OperateProcess
+
+    require_packages()
+    options = Options(
+        host=arguments.host,
+        port=arguments.port,
+        cert=arguments.cert,
+        key=arguments.key,
+        viewer_only=arguments.viewer_only,
+        new_links=arguments.new_links,
+        uid=arguments.uid,
+    )
+    announce = Announcer(window=arguments.window)
+    source = arguments.source or only_share(arguments.uid)
+    with interrupted_by_sigterm():
+        if not is_target(source):
+            run_server(source.removeprefix("share:"), options, announce)
+            return 0
+        share = f"dashboard-{os.getpid()}"
+        with OperateProcess(source, share, show) as program:
+            run_server(share, options, announce, program.problem)
+        return 0
+
+
+class Announcer:
+    """Printer of the links, which also opens the window.
+
+    Args:
+        window: True to open the page as a window.
+    """
+
+    def __init__(self, *, window: bool) -> None:
+        self._browser = find_browser() if window else None
+
+    def __call__(self, access: Access) -> None:
+        """Print the links of a server, and open the window."""
+        from catenary.dashboard.server import announcement, link
+
+        print(announcement(access, draw=sys.stdout.isatty()), flush=True)
+        if self._browser is not None:
+            page = link(access, access.roles[0])
+            subprocess.Popen([self._browser, f"--app={page}"], start_new_session=True)
+
+
+def find_browser() -> str:
+    """Return a browser based on Chromium. Raises UsageError if there is none."""
+    for name in BROWSERS:
+        if (path := shutil.which(name)) is not None:
+            return path
+    raise UsageError("--window needs Chromium", hint="install it, or open the printed link")
+
+
+def is_target(source: str) -> bool:
+    """Return True if a name is a target and not the name of a share."""
+    from catenary.dashboard.source import existing_shares
+
+    if source.startswith("share:") or source in existing_shares():
+        return False
+    looks_like_one = source.endswith(".toml") or any(mark in source for mark in ":,")
+    known = source in ("virtual", "virtual-realtime") or (INTERFACES / source).exists()
+    return looks_like_one or known
+
+
+def only_share(uid: int | None) -> str:
+    """Return the name of the only share. Raises UsageError if there are none or several."""
+    from catenary.dashboard.source import existing_shares
+
+    names = existing_shares(uid)
+    if len(names) == 1:
+        return names[0]
+    found = f"there are several: {', '.join(names)}" if names else "there is none"
+    raise UsageError(
+        f"SHARE is missing, and {found}",
+        hint="catenary dashboard NAME, or catenary dashboard virtual to try the page",
+    )
+
+
+def show(text: str) -> None:
+    """Print a report of the program that operates a target."""
+    print(text, file=sys.stderr, flush=True)
+
+
+@contextmanager
+def interrupted_by_sigterm() -> Iterator[None]:
+    """Let SIGTERM end the block like Ctrl-C, so that the program of a target ends in order."""
+    before = signal.signal(signal.SIGTERM, signal.default_int_handler)
+    try:
+        yield
+    except KeyboardInterrupt:
+        return
+    finally:
+        signal.signal(signal.SIGTERM, before)

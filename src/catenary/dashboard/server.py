@@ -1,0 +1,200 @@
+"""Start of the server: address, TLS, links and their QR code."""
+
+from __future__ import annotations
+
+import io
+import socket
+import ssl
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from catenary.dashboard.security import Access, Role, is_loopback, load_key
+from catenary.errors import ConfigurationError
+from catenary.share.folder import own_folder, prepare
+
+PORT = 8710
+MESSAGE_MAX = 64 << 10  # bytes of a message of a browser
+PING_SECONDS = 10.0
+NEEDED = ("starlette", "uvicorn", "websockets", "segno")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Options:
+    """Options of the server.
+
+    `cert`, `key`: files of TLS, in PEM format. `uid`: owner of the share; None: this user or root.
+    """
+
+    host: str = "127.0.0.1"
+    port: int = PORT
+    cert: Path | None = None
+    key: Path | None = None
+    viewer_only: bool = False
+    new_links: bool = False
+    uid: int | None = None
+
+
+def require_packages() -> None:
+    """Raise ConfigurationError if a package of the extra `dashboard` is missing."""
+    from importlib.util import find_spec
+
+    missing = [name for name in NEEDED if find_spec(name) is None]
+    if missing:
+        raise ConfigurationError(
+            f"the page needs {', '.join(missing)}", hint="pip install 'catenary[dashboard]'"
+        )
+
+
+def make_access(options: Options) -> Access:
+    """Return the tokens and roles of a server.
+
+    Raises:
+        ConfigurationError: only one of `cert` and `key` is given, or TLS cannot use them.
+        PermissionError: the stored key is not private.
+    """
+    if (options.cert is None) != (options.key is None):
+        raise ConfigurationError("TLS needs --cert and --key")
+    if options.cert is not None and options.key is not None:
+        check_certificate(options.cert, options.key)
+    folder = own_folder()
+    prepare(folder, 0o600)
+    return Access(
+        load_key(folder, renew=options.new_links),
+        host=options.host,
+        port=options.port,
+        tls=options.cert is not None,
+        viewer_only=options.viewer_only,
+    )
+
+
+def check_certificate(cert: Path, key: Path) -> None:
+    """Raise ConfigurationError if TLS cannot use a certificate and its key."""
+    try:
+        ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER).load_cert_chain(cert, key)
+    except (OSError, ssl.SSLError) as error:
+        raise ConfigurationError(
+            f"TLS cannot use {cert} with {key}: {error}",
+            hint="pass the certificate and its private key in PEM format",
+        ) from error
+
+
+def open_socket(host: str, port: int) -> socket.socket:
+    """Return a listening socket. Port 0 selects a free port.
+
+    Raises:
+        ConfigurationError: the address is not available.
+    """
+    try:
+        found = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE)
+        family, _, _, _, address = found[0]
+        listening = socket.socket(family)
+        listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        listening.bind(address)
+        listening.listen(64)
+    except OSError as error:
+        raise ConfigurationError(
+            f"cannot listen on {host}, port {port}: {error.strerror or error}",
+            hint="another server may use the port: pass --port, or --port 0 for a free one",
+        ) from error
+    return listening
+
+
+def link(access: Access, role: Role) -> str:
+    """Return the link of a role. Its fragment contains the token."""
+    scheme = "https" if access.tls else "http"
+    return f"{scheme}://{shown_host(access.host)}:{access.port}/#token={access.token(role)}"
+
+
+def shown_host(host: str) -> str:
+    """Return a host as in a link; for "all addresses", the address of this machine."""
+    if host in ("0.0.0.0", "::"):
+        host = own_address()
+    return f"[{host}]" if ":" in host else host
+
+
+def own_address() -> str:
+    """Return the address with which this machine reaches others; its name if there is none."""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        try:
+            probe.connect(("192.0.2.1", 9))  # selects a route; UDP sends nothing here
+            address: str = probe.getsockname()[0]
+        except OSError:
+            return socket.gethostname()
+    return address
+
+
+def qr_code(text: str) -> str:
+    """Return the QR code of a text for a terminal."""
+    import segno
+
+    drawing = io.StringIO()
+    segno.make(text, micro=False, error="l").terminal(drawing, compact=True, border=1)
+    return drawing.getvalue()
+
+
+def announcement(access: Access, *, draw: bool = True) -> str:
+    """Return the text with the links.
+
+    Args:
+        access: tokens and roles.
+        draw: True to add the QR code of the first link, unless only this machine can open it.
+    """
+    lines = [f"{role}: {link(access, role)}" for role in access.roles]
+    if access.refusal is not None:
+        lines.append(f"no operators: {access.refusal}")
+    if draw and not is_loopback(access.host):
+        lines.append(qr_code(link(access, access.roles[0])))
+    lines.append("The page is not an emergency stop (ISO 13850). Press Ctrl-C to end the server.")
+    return "\n".join(lines)
+
+
+def run_server(
+    share: str,
+    options: Options,
+    announce: Callable[[Access], None],
+    problem: Callable[[], str] = str,
+) -> None:
+    """Serve the page of a share until a signal ends the server.
+
+    Args:
+        share: name of the share. It need not exist yet.
+        options: options of the server.
+        announce: called when the server listens.
+        problem: returns the error of the program of the loop, or "".
+
+    Raises:
+        ConfigurationError: an option is not valid, or a package is missing.
+    """
+    require_packages()
+    from dataclasses import replace
+
+    import uvicorn
+
+    from catenary.dashboard.app import make_app
+    from catenary.dashboard.hub import Hub
+    from catenary.dashboard.requests import Requests
+    from catenary.dashboard.source import Source
+
+    with open_socket(options.host, options.port) as listening:
+        access = make_access(replace(options, port=listening.getsockname()[1]))
+        hub = Hub(Source(share, uid=options.uid), Requests(share, options.uid), problem)
+        settings = uvicorn.Config(
+            make_app(access, hub),
+            log_level="warning",
+            ssl_certfile=options.cert,
+            ssl_keyfile=options.key,
+            ws="websockets-sansio",
+            ws_max_size=MESSAGE_MAX,
+            ws_per_message_deflate=False,
+            ws_ping_interval=PING_SECONDS,
+            ws_ping_timeout=PING_SECONDS,
+            limit_concurrency=128,
+            timeout_graceful_shutdown=2,
+            server_header=False,
+        )
+        announce(access)
+        try:
+            uvicorn.Server(settings).run(sockets=[listening])
+        except KeyboardInterrupt:
+            return  # uvicorn raises the signal again after its shutdown

@@ -1,0 +1,71 @@
+"""Parent's side of `python -m catenary.operate`."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable
+from types import TracebackType
+from typing import Self
+
+from catenary.realtime.child import start_python
+
+FOREVER = 1e9  # [s]
+END_SECONDS = 15.0  # to stop the axes and close the segment
+
+
+class OperateProcess:
+    """Owner of a process that operates a target, and of a thread that reads its reports.
+
+    Args:
+        target: name of a target, or a machine file.
+        share: name of the share that the process creates.
+        show: receives each note and error as text, in the thread.
+    """
+
+    def __init__(self, target: str, share: str, show: Callable[[str], None]) -> None:
+        self._show = show
+        self._problem = ""
+        self._target = target
+        self._ending = False
+        self._child = start_python(["-m", "catenary.operate", target, share])
+        self._thread = threading.Thread(target=self._read, name="operate reports", daemon=True)
+        self._thread.start()
+
+    @property
+    def pid(self) -> int:
+        """Process id."""
+        return self._child.pid
+
+    def problem(self) -> str:
+        """Return the error that ended the process; "" while it runs without one."""
+        return self._problem
+
+    def end(self) -> None:
+        """End the process in order: axes are stopped, the segment is closed."""
+        self._ending = True
+        self._child.process.terminate()
+        self._thread.join(END_SECONDS)
+        self._child.end()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        self.end()
+
+    def _read(self) -> None:
+        while (line := self._child.read_line(FOREVER)) is not None:
+            kind, _, text = line.partition(" ")
+            if kind == "error":
+                self._problem = f"the program for {self._target} has ended: {text}"
+            if text:
+                self._show(f"{kind}: {text}")
+        if not self._ending and not self._problem:
+            status = self._child.process.wait()
+            self._problem = f"the program for {self._target} has ended with status {status}"
+            self._show(f"error: {self._problem}")
