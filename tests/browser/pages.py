@@ -1,0 +1,95 @@
+"""The page in a browser: what it shows, and everything it must not report."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+from playwright.sync_api import Browser, BrowserContext, Locator, Page, expect
+
+from tests.browser.processes import Dashboard
+
+SECONDS = 60_000  # [ms] generous, because a machine may be busy
+WIDTHS = {390: 844, 820: 1180, 1280: 800}  # width → height
+REPORT_VIOLATIONS = """
+document.addEventListener("securitypolicyviolation", (event) =>
+  console.error("CSP: " + event.violatedDirective + " " + event.blockedURI));
+"""
+# A connection that the server has ended is no error of the page.
+EXPECTED = ("net::ERR_CONNECTION_REFUSED", "WebSocket connection to")
+
+
+class Operator:
+    """Owner of a page and of the list of its errors.
+
+    Args:
+        context: browser context of the page.
+        dashboard: server of the page.
+    """
+
+    def __init__(self, context: BrowserContext, dashboard: Dashboard) -> None:
+        self.dashboard = dashboard
+        self.problems: list[str] = []
+        context.add_init_script(REPORT_VIOLATIONS)
+        self.page: Page = context.new_page()
+        self.page.set_default_timeout(SECONDS)
+        self.page.on("console", self._note)
+        self.page.on("pageerror", lambda error: self.problems.append(str(error)))
+
+    def _note(self, message: Any) -> None:
+        if message.type == "error" and not any(each in message.text for each in EXPECTED):
+            self.problems.append(message.text)
+
+    def open(self, view: str = "", role: str = "operator") -> Operator:
+        """Open the link of a role, then a view."""
+        self.page.goto(self.dashboard.links[role])
+        expect(self.page.get_by_role("navigation")).to_be_visible(timeout=SECONDS)
+        if view:
+            self.show(view)
+        return self
+
+    def show(self, view: str) -> None:
+        self.page.get_by_role("navigation").get_by_role("link", name=view, exact=True).click()
+        expect(self.page.get_by_role("main", name=view)).to_be_visible(timeout=SECONDS)
+
+    def axis(self, name: str) -> Locator:
+        """Return the card of an axis."""
+        return self.page.get_by_role("region", name=name, exact=True)
+
+    def enable(self, name: str) -> None:
+        """Enable an axis, and answer the question of the page."""
+        self.axis(name).get_by_role("button", name="Enable", exact=True).click()
+        self.page.get_by_role("dialog").get_by_role("button", name="Enable", exact=True).click()
+        expect(self.axis(name)).to_contain_text("Operation enabled", timeout=SECONDS)
+
+    def plus(self, name: str) -> Locator:
+        """Return the button that jogs an axis in positive direction."""
+        return self.axis(name).locator(".jog-button").last
+
+    def hold(self, name: str) -> None:
+        """Press the mouse on the jog button of an axis, and keep it pressed."""
+        button = self.plus(name)
+        expect(button).to_be_enabled(timeout=SECONDS)
+        button.scroll_into_view_if_needed()
+        button.hover()
+        self.page.mouse.down()
+
+    def answer(self, name: str) -> Locator:
+        """Return the text with the status of the last jog of an axis."""
+        return self.axis(name).locator(".answer")
+
+
+@contextmanager
+def operator(
+    browser: Browser, dashboard: Dashboard, *, width: int = 1280, touch: bool = False
+) -> Iterator[Operator]:
+    """Open an isolated browser context. Fail if the page has reported an error."""
+    viewport = {"width": width, "height": WIDTHS[width]}
+    context = browser.new_context(viewport=viewport, has_touch=touch, is_mobile=touch)  # type: ignore[arg-type]
+    try:
+        yield (shown := Operator(context, dashboard))
+        assert not shown.problems
+    finally:
+        if browser.is_connected():
+            context.close()
