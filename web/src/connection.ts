@@ -1,0 +1,292 @@
+/** Connection to the server of the dashboard. It reconnects by itself. */
+
+import { signal } from "@preact/signals";
+import { decodeFrame, type Frame } from "./frame.ts";
+import type {
+  AxisRequest,
+  CallAnswer,
+  ClientMessage,
+  ErrorBody,
+  Event,
+  Hello,
+  ServerMessage,
+  Session,
+  Status,
+  Timing,
+} from "./protocol.ts";
+import { KIND_DECIMATED, KIND_FULL } from "./protocol.ts";
+
+/** "login": the server requires a token. "gone": the server answers, the share has ended. */
+export type LinkState = "connecting" | "open" | "gone" | "lost" | "login";
+export type Kind = ServerMessage["op"];
+export type MessageOf<K extends Kind> = Extract<ServerMessage, { op: K }>;
+
+export interface SubscribeOptions {
+  full: boolean; // every sample; otherwise minimum and maximum of intervals
+  rate: number; // frames per second
+}
+
+export interface JogRequest {
+  velocity: number; // signed [rad/s or m/s]
+  distance: number | null; // [rad or m]; null: until release
+  acceleration: number | null; // null: limit of the axis
+}
+
+interface Subscription extends SubscribeOptions {
+  signals: string[];
+  callback: (frame: Frame) => void;
+}
+
+export const BACKOFF_FIRST = 100; // [ms]
+export const BACKOFF_LAST = 2000; // [ms]
+export const EVENTS_KEPT = 500;
+export const SILENCE = 3000; // [ms] without any message: the connection counts as lost
+const PING_INTERVAL = 1000; // [ms]
+
+/** Error that the server or the loop reported. */
+export class RemoteError extends Error {
+  readonly kind: string;
+  readonly hint: string;
+
+  constructor(reply: ErrorBody) {
+    super(reply.message);
+    this.kind = reply.kind;
+    this.hint = reply.hint;
+  }
+}
+
+export class Connection {
+  readonly state = signal<LinkState>("connecting");
+  readonly reason = signal<string | null>(null); // why the share is gone
+  readonly session = signal<Session | null>(null);
+  readonly hello = signal<Hello | null>(null);
+  readonly status = signal<Status | null>(null);
+  readonly timing = signal<Timing | null>(null);
+  readonly events = signal<readonly Event[]>([]); // newest first
+  readonly delay = signal<number | null>(null); // round trip to the server [ms]
+
+  private socket: WebSocket | null = null;
+  private backoff = BACKOFF_FIRST;
+  private nextId = 1;
+  private nextPress = 1;
+  private received = 0;
+  private readonly subscriptions = new Map<number, Subscription>();
+  private readonly callbacks = new Map<Kind, Set<(message: never) => void>>();
+  private readonly binary = new Map<number, Set<(buffer: ArrayBuffer) => void>>();
+
+  /** Exchange the token of the URL fragment for a cookie, then connect. */
+  async start(): Promise<void> {
+    const token = new URLSearchParams(location.hash.slice(1)).get("token");
+    if (token !== null) {
+      history.replaceState(null, "", location.pathname + location.search);
+      await this.login(token);
+      return;
+    }
+    await this.connect();
+  }
+
+  /** Return true if the server accepted the token. */
+  async login(token: string): Promise<boolean> {
+    try {
+      const reply = await post("/login", { token });
+      if (!reply.ok) {
+        this.state.value = "login";
+        return false;
+      }
+    } catch {
+      this.retry();
+      return true;
+    }
+    await this.connect();
+    return true;
+  }
+
+  /** Register a callback for messages of one kind, and return a function that removes it. */
+  on<K extends Kind>(kind: K, callback: (message: MessageOf<K>) => void): () => void {
+    return added(this.callbacks, kind, callback as (message: never) => void);
+  }
+
+  /** Register a callback for binary frames whose first byte is `kind`. */
+  onBinary(kind: number, callback: (buffer: ArrayBuffer) => void): () => void {
+    return added(this.binary, kind, callback);
+  }
+
+  /** Call a method of the loop's process. Throws RemoteError. */
+  async call<T>(method: string, params: object = {}): Promise<T> {
+    return this.post<T>("/api/call", { method, params });
+  }
+
+  /** Post JSON, and return the result. Throws RemoteError. */
+  async post<T>(path: string, body: object = {}): Promise<T> {
+    const reply = await post(path, body);
+    if (reply.status === 401) this.state.value = "login";
+    const answer = (await reply.json()) as CallAnswer<T>;
+    if ("error" in answer) throw new RemoteError(answer.error);
+    return answer.result;
+  }
+
+  /** Subscribe to signals such as "position[0]", and return a function that ends the subscription. */
+  subscribe(
+    signals: string[],
+    options: SubscribeOptions,
+    callback: (frame: Frame) => void,
+  ): () => void {
+    const id = this.nextId;
+    this.nextId = (this.nextId % 0x7fff) + 1;
+    this.subscriptions.set(id, { signals, ...options, callback });
+    if (this.state.value === "open") this.announce(id);
+    return () => {
+      this.subscriptions.delete(id);
+      this.send({ op: "unsubscribe", id });
+    };
+  }
+
+  /** Request a jog. Return its press number, or null if there is no connection. */
+  press(axis: number, jog: JogRequest, token: string): number | null {
+    const press = this.nextPress++;
+    return this.send({ op: "press", axis, ...jog, token, press }) ? press : null;
+  }
+
+  /** Echo a token of the loop: the jog continues until 200 ms after its issue. */
+  beat(axis: number, press: number, token: string): void {
+    this.send({ op: "beat", axis, press, token });
+  }
+
+  release(axis: number, press: number): void {
+    this.send({ op: "release", axis, press });
+  }
+
+  /** Quick stop of all axes. Return false if there is no connection. */
+  stop(): boolean {
+    return this.send({ op: "stop" });
+  }
+
+  request(axes: number[] | null, state: AxisRequest): void {
+    this.send({ op: "request", axes, state });
+  }
+
+  send(message: ClientMessage): boolean {
+    if (this.socket?.readyState !== WebSocket.OPEN) return false;
+    this.socket.send(JSON.stringify(message));
+    return true;
+  }
+
+  private async connect(): Promise<void> {
+    let reply: Response;
+    try {
+      reply = await fetch("/api/session", { signal: AbortSignal.timeout(SILENCE) });
+    } catch {
+      this.retry();
+      return;
+    }
+    if (reply.status === 401 || reply.status === 403) {
+      this.state.value = "login";
+      return;
+    }
+    if (!reply.ok) {
+      this.retry();
+      return;
+    }
+    this.session.value = (await reply.json()) as Session;
+    this.open();
+  }
+
+  private open(): void {
+    const scheme = location.protocol === "https:" ? "wss" : "ws";
+    const socket = new WebSocket(`${scheme}://${location.host}/ws`);
+    this.socket = socket;
+    this.received = performance.now();
+    socket.binaryType = "arraybuffer";
+    socket.onmessage = (event: MessageEvent<string | ArrayBuffer>) => {
+      this.received = performance.now();
+      if (typeof event.data === "string") this.receive(JSON.parse(event.data) as ServerMessage);
+      else this.receiveBinary(event.data);
+    };
+    const watch = setInterval(() => this.watch(socket), PING_INTERVAL);
+    socket.onclose = () => {
+      clearInterval(watch);
+      if (this.socket !== socket) return;
+      this.socket = null;
+      this.retry();
+    };
+  }
+
+  private watch(socket: WebSocket): void {
+    if (performance.now() - this.received > SILENCE) {
+      socket.onclose?.(new CloseEvent("close"));
+      socket.close();
+      return;
+    }
+    this.send({ op: "ping", t: performance.now() });
+  }
+
+  private retry(): void {
+    this.state.value = "lost";
+    this.delay.value = null;
+    setTimeout(() => void this.connect(), this.backoff);
+    this.backoff = Math.min(2 * this.backoff, BACKOFF_LAST);
+  }
+
+  private receive(message: ServerMessage): void {
+    if (message.op === "hello") this.receiveHello(message);
+    else if (message.op === "gone") this.receiveGone(message.reason);
+    else if (message.op === "status") this.status.value = message;
+    else if (message.op === "timing") this.timing.value = message;
+    else if (message.op === "event") this.receiveEvent(message);
+    else if (message.op === "pong") this.delay.value = performance.now() - message.t;
+    for (const callback of this.callbacks.get(message.op) ?? []) callback(message as never);
+  }
+
+  private receiveHello(message: Hello): void {
+    if (this.hello.value?.run !== message.run) {
+      this.events.value = [];
+      this.status.value = null;
+      this.timing.value = null;
+    }
+    this.backoff = BACKOFF_FIRST;
+    this.hello.value = message;
+    this.reason.value = null;
+    this.state.value = "open";
+    for (const id of this.subscriptions.keys()) this.announce(id);
+  }
+
+  private receiveGone(reason: string): void {
+    this.reason.value = reason;
+    this.state.value = "gone";
+  }
+
+  private receiveEvent(event: Event): void {
+    if (this.events.value.some((known) => known.serial === event.serial)) return;
+    this.events.value = [event, ...this.events.value].slice(0, EVENTS_KEPT);
+  }
+
+  private receiveBinary(buffer: ArrayBuffer): void {
+    const kind = new Uint8Array(buffer)[0] ?? 0;
+    for (const callback of this.binary.get(kind) ?? []) callback(buffer);
+    if (kind !== KIND_FULL && kind !== KIND_DECIMATED) return;
+    const frame = decodeFrame(buffer);
+    this.subscriptions.get(frame.id)?.callback(frame);
+  }
+
+  private announce(id: number): void {
+    const subscription = this.subscriptions.get(id);
+    if (subscription === undefined) return;
+    const { signals, full, rate } = subscription;
+    this.send({ op: "subscribe", id, signals, full, rate });
+  }
+}
+
+function post(path: string, body: object): Promise<Response> {
+  return fetch(path, {
+    method: "POST",
+    headers: { "Content-Type": "application/json" },
+    body: JSON.stringify(body),
+  });
+}
+
+function added<K, V>(registry: Map<K, Set<V>>, key: K, callback: V): () => void {
+  const callbacks = registry.get(key) ?? new Set<V>();
+  registry.set(key, callbacks);
+  callbacks.add(callback);
+  return () => callbacks.delete(callback);
+}

@@ -1,0 +1,71 @@
+/** Scope: any signals of the share at the full cycle rate. */
+
+import "uplot/dist/uPlot.min.css";
+import "./scope.css";
+import { useEffect, useState } from "preact/hooks";
+import type { Connection } from "../connection.ts";
+import { text } from "../strings.ts";
+import { Chart } from "./chart.tsx";
+import { Toolbar, TriggerBar } from "./controls.tsx";
+import { modelOf, type ScopeModel } from "./model.ts";
+import { Picker } from "./picker.tsx";
+import { Measurements } from "./table.tsx";
+
+export function Scope({ connection }: { connection: Connection }) {
+  const model = modelOf(connection);
+  const theme = useTheme();
+  useFrames(model);
+  const layout = model.layout.value;
+  if (layout === null) return <p class="scope-note">{text.scope.empty}</p>;
+  return (
+    <div class="scope">
+      <h1 class="visually-hidden">{text.scope.title}</h1>
+      <Toolbar model={model} />
+      <TriggerBar model={model} />
+      <details class="scope-side" open={matchMedia("(min-width: 820px)").matches}>
+        <summary>{text.scope.signals}</summary>
+        <Picker model={model} />
+      </details>
+      <div class="scope-charts">
+        {layout.charts.map((chart, index) => (
+          <Chart key={chart.id} model={model} chart={chart} number={index + 1} theme={theme} />
+        ))}
+        <TimeCaption model={model} />
+      </div>
+      <Measurements model={model} />
+    </div>
+  );
+}
+
+function TimeCaption({ model }: { model: ScopeModel }) {
+  const captured = model.triggerState.value === "triggered" || model.triggerState.value === "complete";
+  return <p class="scope-time">{captured ? text.scope.fromTrigger : text.scope.time(model.origin.toFixed(0))}</p>;
+}
+
+/** Draw a frame before each repaint while the view is on the screen. */
+function useFrames(model: ScopeModel): void {
+  useEffect(() => {
+    let request = requestAnimationFrame(function draw() {
+      model.frame();
+      request = requestAnimationFrame(draw);
+    });
+    return () => cancelAnimationFrame(request);
+  }, [model]);
+}
+
+/** Return a number that changes with the colours of the page. */
+function useTheme(): number {
+  const [theme, setTheme] = useState(0);
+  useEffect(() => {
+    const changed = () => setTheme((each) => each + 1);
+    const dark = matchMedia("(prefers-color-scheme: dark)");
+    const observer = new MutationObserver(changed);
+    observer.observe(document.documentElement, { attributes: true, attributeFilter: ["data-theme", "class"] });
+    dark.addEventListener("change", changed);
+    return () => {
+      observer.disconnect();
+      dark.removeEventListener("change", changed);
+    };
+  }, []);
+  return theme;
+}
