@@ -55,7 +55,7 @@ def test_buffers_have_the_types_and_lengths_of_the_views() -> None:
         **dict.fromkeys(("input_integers", "output_integers"), "q"),
         **dict.fromkeys(("statusword", "controlword_bits", "unit_counter"), "H"),
         **dict.fromkeys(("mode_actual", "mode_target"), "b"),
-        **dict.fromkeys(("axis_state", "axis_flags", "requested_state", "stop_reason"), "B"),
+        **dict.fromkeys(("axis_state", "axis_flags", "requested_state", "stop_reason", "jogged"), "B"),
         "stop_cycle": "Q",
         **dict.fromkeys(("input_bits", "output_bits", "unit_valid"), "B"),
         **dict.fromkeys(("input_bytes", "output_bytes"), "B"),

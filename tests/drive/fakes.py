@@ -131,6 +131,7 @@ def views_of(tables: RequestTables) -> Views:
         axis_state=np.zeros(n, np.uint8),
         axis_flags=np.zeros(n, np.uint8),
         stop_reason=np.zeros(n, np.uint8),
+        jogged=np.zeros(n, np.uint8),
         stop_cycle=np.zeros(n, np.uint64),
         target_position=reals[3],
         target_velocity=reals[4],

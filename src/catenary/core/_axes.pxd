@@ -2,7 +2,8 @@ from libc.stdint cimport int8_t, int64_t, uint8_t, uint16_t, uint32_t, uint64_t
 
 from catenary.core._handover cimport actual_t, target_t
 from catenary.core._memory cimport cat_memory
-from catenary.core._native cimport cat_image
+from catenary.core._motion cimport motion_t
+from catenary.core._native cimport cat_image, cat_link
 from catenary.core._numbers cimport number_t
 
 cdef enum:  # bits of axis_flags; 6 and 7: the requested state in force
@@ -79,6 +80,8 @@ cdef struct axis_t:
     uint8_t holding            # stopped by the core and held in CSP (on_loss)
     uint8_t clear_reset        # keep bit 7 clear for one cycle, to create an edge
     uint8_t followed
+    uint8_t jogged             # an operator moves it; it ignores the application
+    uint8_t yielded            # holds after a jog, until the application commits a target for it
     uint8_t worked             # was followed since OPERATION_ENABLED or since a mode change
     uint8_t shows_following    # the drive has shown bit 12, so it implements the bit
     uint8_t followed_at_stop   # bit 12 was set when the stop began
@@ -164,10 +167,16 @@ cdef struct axes_t:
     uint8_t background         # the targets come from a program in the background
     uint8_t velocity_counts    # the last velocity update is within the command timeout
     uint8_t torque_counts
+    const cat_link *link       # clock of the motion requests
+    motion_t motion            # requests of other processes
     uint32_t stop_asked        # number of stop requests, from any thread
     uint32_t stop_seen
     uint32_t cycle_flags       # flags of the cycle that its axes set
     uint32_t moving
+
+cdef inline bint follows_application(const axis_t *a) noexcept nogil:
+    """Return True if the axis follows the set-points of the application."""
+    return a.followed and not a.jogged
 
 cdef class Axes:
     """Owner of the axis records and column tables."""

@@ -6,7 +6,8 @@ quantity in the image; a quantity may be absent. `axes_read` runs after the inpu
 decodes the actual values and unwraps position counters of any width to 64 bits (`counts`,
 `last_raw`); then _guard.pyx judges the axis. `axes_write` runs before the outputs: requests
 (_guard.pyx), set-points (_setpoints.pyx), controlword, bytes. A set-point is written only if it
-differs from the last one (`put_t`). `axes_apply_late` applies late stop requests to outputs that a
+differs from the last one (`put_t`). Requests of other processes come between those of the
+application and a stop (_jog.pyx). `axes_apply_late` applies late stop requests to outputs that a
 law has computed. `axes_report` reports the axes after the frames. `cycle_flags` collects the flags
 of the cycle, `handed_over` counts the cycles of a hand-over, and `stop_asked` counts stop requests
 of any thread. Areas are bytes of an image that are copied without interpretation. _axes.pxd defines
@@ -31,6 +32,8 @@ from catenary.core._guard cimport (
     CSP,
     CST,
     NO_MODE,
+    STOP_OPERATOR,
+    STOP_REQUEST,
     TORQUE,
     VELOCITY,
     guard_controlword,
@@ -42,7 +45,9 @@ from catenary.core._guard cimport (
     quantity_of,
 )
 from catenary.core._handover cimport LIMITED_SOME, REFUSED_SOME
+from catenary.core._jog cimport jog_judge, jog_take_requests
 from catenary.core._memory cimport cat_memory, cat_memory_free, memory_take
+from catenary.core._motion cimport jog_t, motion_stop_requested
 from catenary.core._native cimport cat_load_acquire32
 from catenary.core._numbers cimport REAL as REAL_KIND
 from catenary.core._numbers cimport (
@@ -184,7 +189,7 @@ cdef void axes_read(axes_t *x, actual_t *out, uint64_t number, int64_t instant) 
         out.position[i] = a.position
         out.velocity[i] = a.velocity
         out.torque[i] = a.torque
-        out.enabled[i] = a.followed
+        out.enabled[i] = follows_application(a)
     read_columns(x, out)
     read_areas(x, out)
 
@@ -207,10 +212,11 @@ cdef void axes_report(axes_t *x, actual_t *out) noexcept nogil:
         out.controlword[i] = a.controlword_sent
         out.mode[i] = a.mode_shown
         out.state[i] = a.state
-        out.enabled[i] = a.followed
+        out.enabled[i] = follows_application(a)
+        out.jogged[i] = a.followed and a.jogged
         out.stop_reason[i] = a.stop_reason
         out.stop_cycle[i] = a.stop_cycle
-        out.flags[i] = a.flags | (FOLLOWED if a.followed else 0) | (a.requested_state << REQUESTED_SHIFT)
+        out.flags[i] = a.flags | (FOLLOWED if follows_application(a) else 0) | (a.requested_state << REQUESTED_SHIFT)
 
 
 # ---- outputs
@@ -248,12 +254,16 @@ cdef inline void lead_axis(axes_t *x, axis_t *a, uint16_t bits) noexcept nogil:
 
 
 cdef inline bint apply_stop(axes_t *x) noexcept nogil:
-    """Stop all axes if requested since the last call; return True if they were stopped."""
+    """Stop all axes if the application or an operator has requested it since the last call.
+
+    Return True if they were stopped.
+    """
     cdef uint32_t asked = cat_load_acquire32(&x.stop_asked)
-    if asked == x.stop_seen:
+    cdef bint by_operator = motion_stop_requested(&x.motion)
+    if asked == x.stop_seen and not by_operator:
         return False
+    guard_stop(x, STOP_REQUEST if asked != x.stop_seen else STOP_OPERATOR)
     x.stop_seen = asked
-    guard_stop(x)
     return True
 
 
@@ -295,7 +305,7 @@ cdef void write_velocity_offsets(axes_t *x) noexcept nogil:
         a = &x.axes[i]
         if not a.velocity_offset.present:
             continue
-        if a.followed and not a.flags & FALLBACK:
+        if follows_application(a) and not a.flags & FALLBACK:
             a.offset_sent = number_value(&a.velocity_offset, x.image.outputs)
             continue
         a.offset_sent = 0.0
@@ -328,7 +338,11 @@ cdef void axes_write(axes_t *x, const target_t *target, bint fresh, uint64_t num
         x.handed_over = 0
     for i in range(x.axis_count):
         guard_orders(x, &x.axes[i], target, i)
+    if x.motion.words != NULL:
+        jog_take_requests(x, target)
     apply_stop(x)
+    if x.motion.words != NULL:
+        jog_judge(x)
     for i in range(x.axis_count):
         a = &x.axes[i]
         axis_setpoints(x, a, target, i, fresh)
@@ -437,7 +451,7 @@ cdef void axes_follow_now(const axes_t *x, target_t *target) noexcept nogil:
     cdef uint32_t i
     for i in range(x.axis_count):
         a = &x.axes[i]
-        follow(target, i, a.followed, a.followed_since,
+        follow(target, i, follows_application(a), a.followed_since,
                a.commanded_position if a.state == OPERATION_ENABLED else a.position,
                a.commanded_velocity, a.commanded_torque)
 
@@ -465,6 +479,7 @@ cdef class Axes:
         cdef cat_memory *memory = &self.memory
         inputs, outputs = len(plan.input_columns), len(plan.output_columns)
         self.c.axes = <axis_t *>memory_take(memory, len(plan.axes) + 1, sizeof(axis_t))
+        self.c.motion.jogs = <jog_t *>memory_take(memory, len(plan.axes) + 1, sizeof(jog_t))
         self.c.input_columns = <column_t *>memory_take(memory, inputs + 1, sizeof(column_t))
         self.c.output_columns = <column_t *>memory_take(memory, outputs + 1, sizeof(column_t))
         self.c.input_areas = <area_t *>memory_take(memory, len(plan.input_areas) + 1, sizeof(area_t))

@@ -2,6 +2,7 @@
 """C tables passed in capsules, checked once before the cycle uses them."""
 
 from cpython.pycapsule cimport PyCapsule_GetPointer
+from libc.stdint cimport uint32_t, uintptr_t
 
 from catenary.core._native cimport (
     CAT_IMAGE_CAPSULE,
@@ -38,12 +39,17 @@ cdef cat_image *image_in(object capsule, plan) except NULL:
     return image
 
 
-cdef const cat_sink *sink_in(object capsule, tuple sizes) except NULL:
-    """Return the sink table of a capsule; check its block sizes [bytes]."""
+cdef const cat_sink *sink_in(object capsule, tuple sizes, uint32_t axes) except NULL:
+    """Return the sink table of a capsule; check its block sizes [bytes] and its motion words."""
     cdef const cat_sink *sink = <const cat_sink *>PyCapsule_GetPointer(capsule, CAT_SINK_CAPSULE)
     if sink.version != CAT_SINK_VERSION:
         raise ValueError(f"sink: table version {sink.version}, expected {CAT_SINK_VERSION}")
     asked = (sink.record_size, sink.actual_size, sink.target_size)
     if asked != sizes:
         raise ValueError(f"sink: blocks of {asked} bytes, the engine has {sizes}")
+    if sink.motion != NULL and (sink.motion_axes != axes or <uintptr_t>sink.motion % 64):
+        raise ValueError(
+            f"sink: motion words of {sink.motion_axes} axes, the engine has {axes}; they must begin at"
+            " a multiple of 64 bytes"
+        )
     return sink

@@ -8,7 +8,7 @@ from catenary.core._frames cimport Frames
 from catenary.core._handover cimport Handover, actual_header_t, handover_t
 from catenary.core._acyclic_queue cimport AcyclicQueue
 from catenary.core._law cimport Law
-from catenary.core._native cimport cat_image, cat_link
+from catenary.core._native cimport cat_image, cat_link, cat_sink
 from catenary.core._stream cimport Stream
 from catenary.core._thread cimport cat_scheduling, thread_t
 
@@ -80,6 +80,7 @@ cdef class Engine:
     cdef memory_text(self)
     cdef int check_reserve(self, int64_t budget) except -1
     cdef bint is_law_used(self, Law law) noexcept
+    cdef void attach_motion(self, const cat_sink *sink) noexcept
     cdef bint is_stream_used(self, Stream stream) noexcept
     cdef connect(self, plan)
     cdef void begin_iteration(self) noexcept

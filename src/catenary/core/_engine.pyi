@@ -309,8 +309,13 @@ class Engine:
 
         Raises:
             RuntimeError: The engine is running.
-            ValueError: The table has another version or other block sizes.
+            ValueError: The table has another version, other block sizes, or motion words of
+                another number of axes.
         """
+
+    @property
+    def stopper(self) -> int:
+        """Process that last requested a stop through the motion words of the sink; 0 if unknown."""
 
     @property
     def sink_sizes(self) -> tuple[int, int, int]:

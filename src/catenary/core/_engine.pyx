@@ -80,11 +80,13 @@ from catenary.core._native cimport (
     cat_futex_wake,
     cat_link,
     cat_load_acquire32,
+    cat_load_relaxed64,
     cat_pointer_is_used,
     cat_pointer_offer,
     cat_sink,
     cat_store_release32,
 )
+from catenary.core._motion cimport motion_attach
 from catenary.core._stream cimport Stream
 from catenary.core._thread cimport (
     cat_scheduling,
@@ -98,6 +100,7 @@ from catenary.core._thread cimport (
 
 cdef enum:
     SIGNALS_NS = 10_000_000    # longest run of native cycles between two calls of signal handlers
+    PIDS = 1 << 22             # Linux has no larger process numbers
     SILENCE_NS = 1_000_000_000 # plus four periods: longest wait for a cycle of a live thread
 
 
@@ -186,6 +189,7 @@ cdef class Engine:
         if self.frames is not None:
             self.frames.c.acyclic = &self.acyclic.c
         self.axes.c.image = self.image
+        self.axes.c.link = self.link
         if self.clock is not None:
             self.frames.carry_time(&self.clock.c)
             c.clock = &self.clock.c
@@ -835,9 +839,26 @@ cdef class Engine:
         if self.running:
             raise RuntimeError("the engine is running: stop it before you set or remove a sink")
         if capsule is not None:
-            sink = sink_in(capsule, self.sink_sizes)
+            sink = sink_in(capsule, self.sink_sizes, self.axes.c.axis_count)
         self.e.cycle.sink = sink
+        self.attach_motion(sink)
         self.sink = capsule
+
+    cdef void attach_motion(self, const cat_sink *sink) noexcept:
+        """Connect the motion words of a sink, or none. Every jog ends."""
+        cdef uint32_t i
+        cdef bytes seed = os.urandom(sizeof(uint64_t))
+        for i in range(self.axes.c.axis_count):
+            self.axes.c.axes[i].jogged = 0
+        motion_attach(&self.axes.c.motion, sink, self.axes.c.axis_count,
+                      (<uint64_t *><const char *>seed)[0])
+
+    @property
+    def stopper(self):
+        if self.axes.c.motion.words == NULL:
+            return 0
+        pid = cat_load_relaxed64(&self.axes.c.motion.words.stopper)
+        return pid if pid < PIDS else 0
 
     # ---- streams
 

@@ -54,6 +54,7 @@ cdef enum:  # plan.stop_reason.StopReason
     STOP_FAULT = 10
     STOP_REQUEST = 11
     STOP_COMMAND_TIMEOUT = 12
+    STOP_OPERATOR = 13
 
 cdef enum:  # commands of a stop, IEC 61800-7-201 table 26
     DISABLE_VOLTAGE = 0x00
@@ -63,7 +64,9 @@ cdef enum:  # commands of a stop, IEC 61800-7-201 table 26
 cdef void guard_observe(axes_t *x, axis_t *a, uint8_t state_before,
                         uint64_t number) noexcept nogil
 cdef void guard_take_orders(axes_t *x, axis_t *a, const target_t *t, uint32_t i) noexcept nogil
-cdef void guard_stop(axes_t *x) noexcept nogil
+cdef void guard_stop(axes_t *x, uint8_t reason) noexcept nogil
+cdef void apply_state(axes_t *x, axis_t *a, uint8_t requested_state) noexcept nogil
+cdef void begin_setpoints(axis_t *a) noexcept nogil
 cdef uint16_t guard_lead(axes_t *x, axis_t *a, uint16_t bits) noexcept nogil
 cdef void stop_axis(axes_t *x, axis_t *a, uint8_t reason) noexcept nogil
 cdef void lose_axis(axes_t *x, axis_t *a, uint8_t reason) noexcept nogil

@@ -108,28 +108,31 @@ cdef void take_mode(axes_t *x, axis_t *a, int8_t mode) noexcept nogil:
     a.followed = 0
 
 
+cdef void apply_state(axes_t *x, axis_t *a, uint8_t requested_state) noexcept nogil:
+    """Put a newly requested state in force; a stop of the core ends."""
+    if a.requested_state == ENABLED and requested_state != ENABLED:
+        begin_stop(a)
+    a.requested_state = requested_state
+    # Only an edge resets: a request in every cycle must not keep bit 7 clear for ever.
+    a.clear_reset = a.state == FAULT and a.command & FAULT_RESET != 0
+    a.flags &= ~(DROPPED | MODE_REFUSED)
+    a.stop_reason = STOP_NONE
+    a.mode_refused = NO_MODE
+    a.stopping = 0
+    a.holding = 0
+    a.armed = 0
+    a.climbing_cycles = 0
+    if a.requested_state != ENABLED:
+        a.followed = 0
+    if a.lost:
+        stop_axis(x, a, STOP_DEVICE_LOST)  # the request must not take effect later
+
+
 cdef void take_request(axes_t *x, axis_t *a, const target_t *t, uint32_t i) noexcept nogil:
     """Process a new request, and count how long a request to enable has been pending."""
-    cdef uint8_t requested_state
     if t.request[i] != a.request:
         a.request = t.request[i]
-        requested_state = t.requested_state[i] if t.requested_state[i] <= RESET else DISABLED
-        if a.requested_state == ENABLED and requested_state != ENABLED:
-            begin_stop(a)
-        a.requested_state = requested_state
-        # Only an edge resets: a request in every cycle must not keep bit 7 clear for ever.
-        a.clear_reset = a.state == FAULT and a.command & FAULT_RESET != 0
-        a.flags &= ~(DROPPED | MODE_REFUSED)
-        a.stop_reason = STOP_NONE
-        a.mode_refused = NO_MODE
-        a.stopping = 0
-        a.holding = 0
-        a.armed = 0
-        a.climbing_cycles = 0
-        if a.requested_state != ENABLED:
-            a.followed = 0
-        if a.lost:
-            stop_axis(x, a, STOP_DEVICE_LOST)  # the request must not take effect later
+        apply_state(x, a, t.requested_state[i] if t.requested_state[i] <= RESET else DISABLED)
     if a.requested_state == ENABLED and not a.followed and not a.holding:
         if not t.header.hold:
             if is_commanded(x, a.mode):
@@ -149,11 +152,11 @@ cdef void guard_take_orders(axes_t *x, axis_t *a, const target_t *t, uint32_t i)
     take_request(x, a, t, i)
 
 
-cdef void guard_stop(axes_t *x) noexcept nogil:
-    """Stop every axis; each needs a new request afterwards."""
+cdef void guard_stop(axes_t *x, uint8_t reason) noexcept nogil:
+    """Stop every axis for a reason; each needs a new request afterwards."""
     cdef uint32_t i
     for i in range(x.axis_count):
-        stop_axis(x, &x.axes[i], STOP_REQUEST)
+        stop_axis(x, &x.axes[i], reason)
 
 
 cdef uint16_t stop_command(axes_t *x, axis_t *a) noexcept nogil:
@@ -252,6 +255,7 @@ cdef void begin_setpoints(axis_t *a) noexcept nogil:
     a.waiting_cycles = 0
     a.returning = 0
     a.worked = 0
+    a.yielded = 0
     a.gap_cycles = 0
 
 

@@ -66,6 +66,7 @@ cdef struct actual_t:           # a header and the arrays of ACTUAL (_handover.p
     uint8_t *flags
     uint8_t *stop_reason
     uint8_t *enabled           # bit 0 of flags, for laws
+    uint8_t *jogged            # an operator moves the axis
     uint8_t *input_bits
     uint8_t *input_bytes
     uint8_t *unit_valid

@@ -53,6 +53,7 @@ ACTUAL = (
     ("flags", "u1", "axes", "axis_flags", None, "axis_flags"),
     ("stop_reason", "u1", "axes", "stop_reason", None, None),
     ("enabled", "u1", "axes", None, "enabled", "enabled"),
+    ("jogged", "u1", "axes", "jogged", None, "jogged"),
     ("input_bits", "u1", "input_bits", "input_bits", "bits", "bits"),
     ("input_bytes", "u1", "input_bytes", "input_bytes", None, "bytes"),
     ("unit_valid", "u1", "units", "unit_valid", None, "unit_valid"),

@@ -8,6 +8,7 @@ cdef extern from "atomics.h" nogil:
     uint32_t cat_load_relaxed32(const uint32_t *p)
     uint64_t cat_load_acquire64(const uint64_t *p)
     void cat_store_release64(uint64_t *p, uint64_t v)
+    uint64_t cat_load_relaxed64(const uint64_t *p)
     void *cat_load_acquire_pointer(void **p)
     void cat_store_release_pointer(void **p, void *v)
     void cat_store_release32(uint32_t *p, uint32_t v)
@@ -132,6 +133,29 @@ cdef extern from "pointer_handover.h" nogil:
     void cat_pointer_release(cat_pointer *p)
 
 
+cdef extern from "motion.h" nogil:
+    const uint64_t CAT_MOTION_TOKEN_MASK
+    const int CAT_MOTION_PRESS_SHIFT
+    const int CAT_MOTION_STATUS_BITS
+
+    ctypedef struct cat_motion:
+        uint64_t stop
+        uint64_t stopper
+        uint64_t token
+
+    ctypedef struct cat_motion_slot:
+        uint64_t press
+        uint64_t begun
+        uint64_t heartbeat
+        uint64_t released
+        double velocity
+        double distance
+        double acceleration
+        uint64_t request
+        uint64_t answer
+        uint64_t taken
+
+
 cdef extern from "sink.h" nogil:
     const char *CAT_SINK_CAPSULE
     const uint32_t CAT_SINK_VERSION
@@ -144,6 +168,9 @@ cdef extern from "sink.h" nogil:
         void *self
         void (*put)(void *self, uint64_t number, const void *record, const void *actual,
                     const void *target) noexcept nogil
+        cat_motion *motion
+        uint32_t motion_axes
+        uint32_t jog
 
 
 cdef extern from "law.h" nogil:

@@ -1,7 +1,7 @@
 # cython: boundscheck=False, wraparound=False, cdivision=True
 """Set-points of one axis in one cycle: commanded_position, commanded_velocity, commanded_torque.
 
-Theory of operation. A followed axis gets the committed set-point, within its limits. In six
+Theory of operation. A followed axis gets the committed set-point, within its limits. In seven
 situations other values are sent:
 
 - not powered: actual position, zero velocity and torque; in SWITCHED_ON a committed torque is sent,
@@ -13,6 +13,8 @@ situations other values are sent:
 - background (`x.background`): a thread repeats the set-points of a program. CSP falls back without a
   late limit while nothing is committed. In CSV and CST a set-point is valid until the last update is
   older than the command timeout; then CSV decelerates and CST is stopped (`is_timed_out`);
+- jog (`jogged`): an operator moves the axis (_jog.pyx). Afterwards it holds until the application
+  commits a target for it, without a late limit (`yielded`);
 - stopping: another state was requested, or the core stopped the axis.
 
 In the profile modes the drive computes the trajectory. In PP the command stays until another one is
@@ -31,7 +33,7 @@ Budget: 10 ns per axis that follows.
 from libc.math cimport INFINITY, copysign, fabs, fmax, fmin, isfinite, sqrt
 from libc.stdint cimport uint8_t, uint32_t, uint64_t
 
-from catenary.core._axes cimport DROPPED, FALLBACK, LIMITED, MODE_REFUSED, REFUSED
+from catenary.core._axes cimport DROPPED, FALLBACK, MODE_REFUSED, REFUSED
 from catenary.core._cia402 cimport ENABLED, OPERATION_ENABLED, QUICK_STOP_ACTIVE, SWITCHED_ON
 from catenary.core._guard cimport (
     CSP,
@@ -58,25 +60,10 @@ from catenary.core._guard cimport (
     stop_axis,
     stop_command,
 )
+from catenary.core._jog cimport jog_setpoint
+from catenary.core._limits cimport approach, clamp, within_limits
 
 cdef double STEP_TOLERANCE = 1.000001  # a step of exactly the limit is accepted
-
-
-cdef inline double clamp(axis_t *a, double value, double low, double high) noexcept nogil:
-    if value < low:
-        a.flags |= LIMITED
-        return low
-    if value > high:
-        a.flags |= LIMITED
-        return high
-    return value
-
-
-cdef inline double approach(double value, double target, double step) noexcept nogil:
-    """Return `value` moved towards `target` by at most `step`."""
-    if fabs(target - value) <= step:
-        return target
-    return value + copysign(step, target - value)
 
 
 # ---- fallback: no valid set-point
@@ -89,15 +76,6 @@ cdef double towards_limits(const axis_t *a, double position, double velocity,
     if a.position_min > -INFINITY and velocity < 0:
         velocity = fmax(velocity, -sqrt(2 * deceleration * fmax(position - a.position_min, 0.0)))
     return velocity
-
-
-cdef inline double within_limits(axis_t *a, double target) noexcept nogil:
-    """Return a target within the position limits.
-
-    A command that is outside its limits may stay or return, but not move further away.
-    """
-    cdef double held = a.commanded_position
-    return clamp(a, target, fmin(a.position_min, held), fmax(a.position_max, held))
 
 
 cdef void return_to(axes_t *x, axis_t *a, double target, double velocity) noexcept nogil:
@@ -225,6 +203,7 @@ cdef void follow_position(axes_t *x, axis_t *a, const target_t *t, double target
         if t.header.streamed:
             a.previous_velocity = 0.0  # the pause between two rows is unknown
     a.accepted = min(a.accepted + 1, 2)
+    a.yielded = 0
     a.refused_cycles = 0
     a.fallback_cycles = 0
     a.ghost = target + a.setpoint_velocity * x.period * <double>age
@@ -263,6 +242,7 @@ cdef void follow_velocity(axes_t *x, axis_t *a, double target) noexcept nogil:
     if a.fallback_cycles:
         a.returning = a.accepted > 0 and a.mode == CSV
     a.accepted = 2
+    a.yielded = 0
     a.refused_cycles = 0
     a.fallback_cycles = 0
     target = clamp(a, target, -a.velocity_limit, a.velocity_limit)
@@ -321,6 +301,8 @@ cdef void follow(axes_t *x, axis_t *a, const target_t *t, uint32_t i, bint fresh
         target = t.torque[i]
     if x.background and not x.handed_over and quantity != POSITION:
         fresh = is_commanded(x, a.mode)
+    if a.yielded:  # a velocity from before the end of the jog was not meant for now
+        fresh = fresh and (t.header.updated if x.background else t.header.seen) >= a.followed_since
     if not fresh or not is_number(a, target):
         fall_back(x, a, not x.handed_over and a.refused_cycles == 0 and is_commanded(x, a.mode))
     elif quantity == POSITION:
@@ -349,6 +331,9 @@ cdef void judge_lateness(axes_t *x, axis_t *a) noexcept nogil:
     """Stop a followed axis that has been without set-points for too long."""
     cdef uint8_t quantity = quantity_of(a.mode)
     cdef uint32_t limit = x.late_limit_position
+    if a.yielded:
+        a.late_cycles = 0
+        return
     if quantity == VELOCITY:
         limit = x.late_limit_velocity
     elif quantity == TORQUE:
@@ -456,7 +441,11 @@ cdef void axis_setpoints(axes_t *x, axis_t *a, const target_t *t, uint32_t i,
         a.commanded_velocity = 0.0
     if quantity != TORQUE:
         a.commanded_torque = 0.0
-    if a.followed:
+    if a.followed and a.jogged:
+        jog_setpoint(x, a, t, i)
+        if quantity == VELOCITY:
+            limit_velocity(x, a)
+    elif a.followed:
         follow(x, a, t, i, fresh)
         if a.followed:
             judge_lateness(x, a)

@@ -254,6 +254,15 @@ class Drives(Request):
         return (self._bound().axis_flags & 1).astype(np.bool_) & self.present
 
     @property
+    def jogged(self) -> npt.NDArray[np.bool_]:
+        """Array (n,) with True for each axis that an operator moves (`catenary.Share(jog=True)`).
+
+        Such an axis ignores its targets, and is not `enabled`. Its targets follow the commanded
+        values. At the end of the jog, it holds until a target is committed for it.
+        """
+        return self._bound().jogged.astype(np.bool_)
+
+    @property
     def limited(self) -> npt.NDArray[np.bool_]:
         """Array (n,) with True for each axis whose set-points were limited in the last cycle."""
         return (self._bound().axis_flags & 2).astype(np.bool_)

@@ -125,6 +125,11 @@ def require_enabled(port: AxisPort) -> None:
             f"{port.name} cannot move: a law or a stream sets its targets",
             hint="end it first: stop() of the run that loop.start() returned, or stream.close()",
         )
+    if port.jogged:
+        raise DriveError(
+            f"{port.name} cannot move: an operator jogs the axis",
+            hint="wait until Drives.jogged is False for the axis",
+        )
     if not port.followed or port.stop_cause() is not None:
         raise DriveError(
             f"{port.name} cannot move: it is not enabled ({port.state_text()})",

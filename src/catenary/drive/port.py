@@ -119,6 +119,11 @@ class AxisPort:
         return bool(self._views.axis_flags.item(self._index) & FOLLOWED)
 
     @property
+    def jogged(self) -> bool:
+        """True if an operator moves the axis."""
+        return bool(self._views.jogged.item(self._index))
+
+    @property
     def at_rest(self) -> bool:
         """True if the velocity is below that of a standstill, or too small to be measured."""
         return not abs(self.velocity) > self._standstill
@@ -158,6 +163,8 @@ class AxisPort:
         views, i = self._views, self._index
         if views.axis_state.item(i) in IN_FAULT:
             return "the drive is in fault"
+        if views.jogged.item(i):
+            return "an operator jogs the axis"
         if views.axis_flags.item(i) >> REQUESTED_SHIFT == RequestedState.ENABLED:
             return None
         reason = StopReason(views.stop_reason.item(i))

@@ -123,11 +123,12 @@ class Recovery:
             self._drives.disable()
 
     def _start(self, waited: float, ready: bool) -> None:
-        if ready and self._drives.enabled.all():
+        enabled = self._drives.enabled | self._drives.jogged
+        if ready and enabled.all():
             self.phase = Phase.RUNNING
         elif waited > self._patience:
-            names = zip(self._drives.names, self._drives.enabled, strict=True)
-            missing = [name for name, enabled in names if not enabled]
+            names = zip(self._drives.names, enabled, strict=True)
+            missing = [name for name, is_enabled in names if not is_enabled]
             if missing:
                 what = f"not enabled within {self._patience:g} s: {', '.join(missing)}"
             else:

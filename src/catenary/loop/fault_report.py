@@ -66,7 +66,7 @@ class FaultReport:
         self._exchange = exchange
         self._laws = laws
         self._policy = policy
-        self._axis_watch = AxisWatch(views, plan.axes)
+        self._axis_watch = AxisWatch(views, plan.axes, lambda: engine.stopper)
 
     def error(self, flags: int, *, enabling: bool = False) -> CatenaryError | None:
         """Put the events of a cycle, and return the exception that ends the loop, if any.

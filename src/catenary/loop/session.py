@@ -184,7 +184,13 @@ class Session:
             self._request(REQUEST_RESET, ~in_position & self._in_fault())
             self._await(lambda: ~in_position & self._in_fault())
         self._request(REQUEST_ENABLED, np.ones_like(in_position))
-        self._await(lambda: in_position & (self.views.axis_flags & AXIS_FOLLOWED == 0))
+        self._await(
+            lambda: (
+                in_position
+                & (self.views.axis_flags & AXIS_FOLLOWED == 0)
+                & (self.views.jogged == 0)
+            )
+        )
 
     def _request(self, state: int, axes: npt.NDArray[np.bool_]) -> None:
         self.views.requested_state[axes] = state

@@ -41,6 +41,7 @@ ADVICE: dict[StopReason, str] = {
         "update torques more often than that from a thread, use a law (loop.start), change to "
         "CSP, or give StopPolicy(command_timeout=...) a longer time [s]"
     ),
+    StopReason.OPERATOR: "ask the operator; the axes wait for a new request",
     StopReason.NOT_ENABLED: "check main supply, safe torque off and enable input of the drive",
 }
 CONTINUE = (
@@ -59,7 +60,7 @@ def stopped_error(stops: Sequence[StoppedAxis], cycle: CyclePlan, log: Log) -> D
     """
     alike: dict[str, list[str]] = {}
     for stop in stops:
-        what = f"stopped in cycle {stop.cycle}: {stop.reason.text}{_details(stop, cycle, log)}"
+        what = f"stopped in cycle {stop.cycle}: {stop.cause}{_details(stop, cycle, log)}"
         alike.setdefault(what, []).append(stop.name)
     report = "; ".join(
         f"{', '.join(names)} {'was' if len(names) == 1 else 'were'} {what}"

@@ -206,6 +206,7 @@ class Views:
     axis_flags: Bytes
     stop_reason: Bytes  # (n,) plan.stop_reason.StopReason of the last stop, 0 after a new request
     stop_cycle: Cycles  # (n,) number of the cycle of that stop
+    jogged: Bytes  # (n,) 1 while an operator moves the axis, which ignores its targets
     target_position: Reals
     target_velocity: Reals
     target_torque: Reals

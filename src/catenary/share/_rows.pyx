@@ -151,7 +151,8 @@ cdef class CycleWriter(Ring):
         self.sink.self = &self.rows
         self.sink.put = put
         if motion is not None:
-            self.connect_motion(*motion, jog)
+            place, offset, axes = motion
+            self.connect_motion(place, offset, axes, jog)
 
     cdef connect_motion(self, memory, uint64_t offset, uint32_t axes, bint jog):
         """Point the sink at the motion words of the desk, and keep their memory mapped."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -26,11 +26,18 @@ class StoppedAxis(NamedTuple):
     reason: StopReason
     cycle: int
     requested: bool  # True if the application or the loop requested it
+    stopper: int = 0  # process of the operator that requested it; 0 if unknown
 
     @property
     def message(self) -> str:
         """Axis, cycle and reason, as text."""
-        return f"{self.name} was stopped in cycle {self.cycle}: {self.reason.text}"
+        return f"{self.name} was stopped in cycle {self.cycle}: {self.cause}"
+
+    @property
+    def cause(self) -> str:
+        """Reason, and the process of the operator if it is known, as text."""
+        by_operator = self.reason is StopReason.OPERATOR and self.stopper
+        return self.reason.text + (f" (process {self.stopper})" if by_operator else "")
 
     def event(self, now: float, sub: SubDevice) -> AxisStopped:
         """Return the event of the stop.
@@ -67,8 +74,9 @@ class RefusedMode(NamedTuple):
 class AxisWatch:
     """Watch of the axes. It remembers the stops and refused modes already returned."""
 
-    def __init__(self, views: Views, axes: Sequence[AxisPlan]) -> None:
+    def __init__(self, views: Views, axes: Sequence[AxisPlan], stopper: Callable[[], int]) -> None:
         self._views = views
+        self._stopper = stopper
         self._axes = axes
         self._reasons = views.stop_reason.copy()
         self._cycles = views.stop_cycle.copy()
@@ -106,6 +114,7 @@ class AxisWatch:
             reason,
             self._views.stop_cycle.item(axis),
             requested=reason is StopReason.STOP_REQUEST and by_request,
+            stopper=self._stopper(),
         )
 
     def _refusal(self, axis: int) -> RefusedMode:

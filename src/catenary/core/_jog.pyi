@@ -1,0 +1,1 @@
+"""Jogs and requested states of operators; private to the core."""

@@ -1,0 +1,1 @@
+"""Motion words of the desk; private to the core."""
