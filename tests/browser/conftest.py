@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from contextlib import AbstractContextManager, ExitStack
+from contextlib import AbstractContextManager, ExitStack, contextmanager
 from dataclasses import dataclass, field
 from functools import partial
 from typing import TYPE_CHECKING
@@ -75,14 +75,28 @@ class Rig:
         """Wait until a servo moves. Return False if it does not."""
         return comes_true(lambda: self.velocity(axis) > 10 * STANDSTILL)
 
+    @contextmanager
+    def operating(self, axis: str = NAMES[0], **options: object) -> Iterator[Operator]:
+        """Open the axes of the page, with this axis enabled."""
+        with self.open(**options) as shown:
+            shown.open("Axes").require_enabled(axis)
+            yield shown
+
     def stands(self, axis: int = 0) -> bool:
         """Wait until a servo stands still. Return False if it does not."""
         return comes_true(lambda: self.velocity(axis) < STANDSTILL)
 
 
+@pytest.fixture(scope="package")
+def shared_rig(browser: Browser) -> Iterator[Rig]:
+    """Machine of all tests that leave it and its page intact."""
+    with ExitStack() as stack:
+        yield local_rig(stack, browser)
+
+
 @pytest.fixture
 def local(browser: Browser) -> Iterator[Rig]:
-    """Machine whose servos are in the process of its loop."""
+    """Machine of one test, with the servos in the process of its loop."""
     with ExitStack() as stack:
         yield local_rig(stack, browser)
 

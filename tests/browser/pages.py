@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import Any
+from typing import Any, Literal
 
 from playwright.sync_api import Browser, BrowserContext, Locator, Page, expect
 
@@ -12,6 +13,7 @@ from tests.browser.processes import Dashboard
 
 SECONDS = 60_000  # [ms] generous, because a machine may be busy
 WIDTHS = {390: 844, 820: 1180, 1280: 800}  # width → height
+SWITCH = re.compile("^(Enable|Disable)$")
 REPORT_VIOLATIONS = """
 document.addEventListener("securitypolicyviolation", (event) =>
   console.error("CSP: " + event.violatedDirective + " " + event.blockedURI));
@@ -57,11 +59,15 @@ class Operator:
         """Return the card of an axis."""
         return self.page.get_by_role("region", name=name, exact=True)
 
-    def enable(self, name: str) -> None:
-        """Enable an axis, and answer the question of the page."""
-        self.axis(name).get_by_role("button", name="Enable", exact=True).click()
-        self.page.get_by_role("dialog").get_by_role("button", name="Enable", exact=True).click()
-        expect(self.axis(name)).to_contain_text("Operation enabled", timeout=SECONDS)
+    def require_enabled(self, name: str) -> None:
+        """Enable an axis unless it is enabled, and answer the question of the page."""
+        card = self.axis(name)
+        expect(card.get_by_role("button", name=SWITCH)).to_be_enabled(timeout=SECONDS)
+        if card.get_by_role("button", name="Disable", exact=True).count() == 0:
+            card.get_by_role("button", name="Enable", exact=True).click()
+            dialog = self.page.get_by_role("dialog")
+            dialog.get_by_role("button", name="Enable", exact=True).click()
+        expect(card).to_contain_text("Operation enabled", timeout=SECONDS)
 
     def plus(self, name: str) -> Locator:
         """Return the button that jogs an axis in positive direction."""
@@ -82,11 +88,29 @@ class Operator:
 
 @contextmanager
 def operator(
-    browser: Browser, dashboard: Dashboard, *, width: int = 1280, touch: bool = False
+    browser: Browser,
+    dashboard: Dashboard,
+    *,
+    width: int = 1280,
+    touch: bool = False,
+    scheme: Literal["light", "dark"] = "light",
 ) -> Iterator[Operator]:
-    """Open an isolated browser context. Fail if the page has reported an error."""
+    """Open an isolated browser context. Fail if the page has reported an error.
+
+    Args:
+        browser: the browser.
+        dashboard: server of the page.
+        width: width of the screen [pixels].
+        touch: True for a touch screen.
+        scheme: colour scheme of the system.
+    """
     viewport = {"width": width, "height": WIDTHS[width]}
-    context = browser.new_context(viewport=viewport, has_touch=touch, is_mobile=touch)  # type: ignore[arg-type]
+    context = browser.new_context(
+        viewport=viewport,  # type: ignore[arg-type]
+        has_touch=touch,
+        is_mobile=touch,
+        color_scheme=scheme,
+    )
     try:
         yield (shown := Operator(context, dashboard))
         assert not shown.problems
