@@ -30,7 +30,7 @@ FIXTURE_OF = {
     "rtlab": "rtlab",
     "browser": "chromium",
 }
-PAGE_PACKAGES = ("starlette", "uvicorn", "websockets", "segno", "playwright")
+PAGE_PACKAGES = ("starlette", "uvicorn", "websockets", "segno", "httpx", "playwright")
 
 # no deadlines, because no time is asserted; the same examples each time in CI
 hypothesis.settings.register_profile(

@@ -5,11 +5,19 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
-from playwright.sync_api import Browser, BrowserContext, Locator, Page, expect
+import pytest
 
 from tests.browser.processes import Dashboard
+
+if TYPE_CHECKING:
+    from playwright.sync_api import Browser, BrowserContext, Locator, Page
+
+# Tests import this module: they are skipped if Playwright is absent.
+expect = pytest.importorskip(
+    "playwright.sync_api", reason="playwright is not installed (pip install -e '.[test]')"
+).expect
 
 SECONDS = 60_000  # [ms] generous, because a machine may be busy
 WIDTHS = {390: 844, 820: 1180, 1280: 800}  # width → height
