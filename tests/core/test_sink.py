@@ -33,6 +33,9 @@ class Table(ctypes.Structure):
         ("target_size", ctypes.c_uint32),
         ("self", ctypes.c_void_p),
         ("put", PUT),
+        ("motion", ctypes.c_void_p),
+        ("motion_axes", ctypes.c_uint32),
+        ("jog", ctypes.c_uint32),
     )
 
 
@@ -43,7 +46,7 @@ class Sink:
         self.engine = b.engine
         self.look = look
         self.given: list[tuple[int, np.void, np.ndarray, np.ndarray, int]] = []
-        self.table = Table(1, *b.engine.sink_sizes, None, PUT(self.put))
+        self.table = Table(2, *b.engine.sink_sizes, None, PUT(self.put))
         self.capsule = capsule_of(self.table, NAME)
 
     def put(self, _, number, record, actual, target) -> None:
@@ -152,8 +155,8 @@ def test_refuses_a_table_of_another_version_or_of_other_blocks() -> None:
     sink.table.actual_size += 8
     with pytest.raises(ValueError, match=r"sink: blocks of .* bytes, the engine has"):
         b.engine.set_sink(sink.capsule)
-    sink.table.version = 2
-    with pytest.raises(ValueError, match="version 2, expected 1"):
+    sink.table.version = 1
+    with pytest.raises(ValueError, match="version 1, expected 2"):
         b.engine.set_sink(sink.capsule)
     other = b"catenary.link"
     with pytest.raises(ValueError, match="incorrect name"):

@@ -152,6 +152,8 @@ class Lease:
         numbers = self._numbers if axes is None else self._numbers_of(axes)
         words = self._desk.motion
         with self._renewed():
+            if state == "quick_stop":
+                words.stopper.store(0, self._pid)
             requests = {number: request_state(words, number, STATES[state]) for number in numbers}
         return StateRequest(words, requests)
 

@@ -74,7 +74,16 @@ class RefusedMode(NamedTuple):
 class AxisWatch:
     """Watch of the axes. It remembers the stops and refused modes already returned."""
 
-    def __init__(self, views: Views, axes: Sequence[AxisPlan], stopper: Callable[[], int]) -> None:
+    def __init__(
+        self, views: Views, axes: Sequence[AxisPlan], stopper: Callable[[], int] = lambda: 0
+    ) -> None:
+        """Make a watch of axes.
+
+        Args:
+            views: Values of the axes.
+            axes: Plans of the axes.
+            stopper: Returns the process that last requested a stop; 0 if unknown.
+        """
         self._views = views
         self._stopper = stopper
         self._axes = axes
@@ -114,7 +123,7 @@ class AxisWatch:
             reason,
             self._views.stop_cycle.item(axis),
             requested=reason is StopReason.STOP_REQUEST and by_request,
-            stopper=self._stopper(),
+            stopper=self._stopper() if reason is StopReason.OPERATOR else 0,
         )
 
     def _refusal(self, axis: int) -> RefusedMode:
