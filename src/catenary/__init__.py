@@ -18,7 +18,18 @@ would prevent a process from entering a network namespace.
 TYPE_CHECKING = not __name__
 
 if TYPE_CHECKING:
-    from catenary import control, drive, errors, esi, realtime, record, share, types, virtual
+    from catenary import (
+        control,
+        drive,
+        errors,
+        esi,
+        realtime,
+        record,
+        remote,
+        share,
+        types,
+        virtual,
+    )
     from catenary.bus import SubDevice
     from catenary.bus import event_types as events
     from catenary.drive import DistributedClock, Drives, Inputs, Outputs, ProcessData, StartUp
@@ -36,7 +47,9 @@ if TYPE_CHECKING:
     from catenary.link.interfaces import interfaces
     from catenary.loop import ClockOptions, Cycle, Loop, Scheduling, StopPolicy, law
     from catenary.machine import Machine
-    from catenary.share import Share, attach
+    from catenary.remote import connect, connect_async
+    from catenary.remote.share import Share
+    from catenary.share import attach
     from catenary.target import MainDevice
     from catenary.virtual import Segment
 
@@ -69,6 +82,8 @@ __all__ = [
     "SubDevice",
     "WorkingCounterError",
     "attach",
+    "connect",
+    "connect_async",
     "control",
     "drive",
     "errors",
@@ -78,12 +93,24 @@ __all__ = [
     "law",
     "realtime",
     "record",
+    "remote",
     "share",
     "types",
     "virtual",
 ]
 
-_MODULES = ("control", "drive", "errors", "esi", "realtime", "record", "share", "types", "virtual")
+_MODULES = (
+    "control",
+    "drive",
+    "errors",
+    "esi",
+    "realtime",
+    "record",
+    "remote",
+    "share",
+    "types",
+    "virtual",
+)
 _DRIVE = ("DistributedClock", "Drives", "Inputs", "Outputs", "ProcessData", "StartUp")
 _ERRORS = (  # errors that a loop raises; the others are in catenary.errors
     "CatenaryError",
@@ -105,9 +132,11 @@ _HOMES = {
     "Machine": "catenary.machine",
     "MainDevice": "catenary.target",
     "Segment": "catenary.virtual",
-    "Share": "catenary.share",
+    "Share": "catenary.remote.share",
     "SubDevice": "catenary.bus",
     "attach": "catenary.share",
+    "connect": "catenary.remote",
+    "connect_async": "catenary.remote",
     "interfaces": "catenary.link.interfaces",
 }
 

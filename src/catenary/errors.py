@@ -230,5 +230,13 @@ class LeaseError(ShareError):
     """Axes that another client commands, or that this client no longer commands."""
 
 
+class BusyError(ShareError):
+    """Requests to a share that exceed its limit. Repeat the request after `retry` [s]."""
+
+    def __init__(self, message: str, *, retry: float = 0.01, hint: str = "") -> None:
+        super().__init__(message, hint=hint)
+        self.retry = retry
+
+
 class RecordingError(CatenaryError):
     """A recording that cannot be written or read."""

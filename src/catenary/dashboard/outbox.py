@@ -24,6 +24,11 @@ class Outbox:
         self._dropped: dict[int, int] = {}  # rows, by id of the subscription
         self._filled = asyncio.Event()
 
+    @property
+    def size(self) -> int:
+        """Size of the waiting messages [bytes]."""
+        return self._frames + self._texts
+
     def put_text(self, text: str) -> None:
         """Append a message."""
         self._texts += len(text)

@@ -45,6 +45,11 @@ class Subscriptions:
         self._layout = layout
         self._groups: dict[Key, Group] = {}
 
+    @property
+    def group_count(self) -> int:
+        """Number of different subscriptions."""
+        return len(self._groups)
+
     def add(self, client: object, request: Subscribe, deliver: Deliver, newest: int) -> None:
         """Add a subscription. It replaces one of the same client with the same id.
 
