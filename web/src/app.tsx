@@ -3,10 +3,11 @@
 import "./app.css";
 import { render } from "preact";
 import { Connection } from "./connection.ts";
-import { views } from "./views.ts";
+import { Shell } from "./shell.tsx";
+import { applyTheme } from "./theme.ts";
 
 const connection = new Connection();
 const root = document.getElementById("app");
-const First = views[0]?.component;
-if (root !== null && First !== undefined) render(<First connection={connection} />, root);
+applyTheme();
+if (root !== null) render(<Shell connection={connection} />, root);
 void connection.start();

@@ -1,6 +1,6 @@
 /** Connection to the server of the dashboard. It reconnects by itself. */
 
-import { signal } from "@preact/signals";
+import { computed, signal } from "@preact/signals";
 import { decodeFrame, type Frame } from "./frame.ts";
 import type {
   AxisRequest,
@@ -63,6 +63,9 @@ export class Connection {
   readonly status = signal<Status | null>(null);
   readonly timing = signal<Timing | null>(null);
   readonly events = signal<readonly Event[]>([]); // newest first
+  readonly role = computed(() => this.hello.value?.role ?? this.session.value?.role ?? null);
+  readonly running = computed(() => this.status.value?.state !== "stalled");
+  readonly losing = computed(() => (this.status.value?.lost_in_row ?? 0) > 0);
   readonly delay = signal<number | null>(null); // round trip to the server [ms]
 
   private socket: WebSocket | null = null;

@@ -105,3 +105,8 @@ export interface ClockInfo {
 export interface Finding {
   [name: string]: unknown;
 }
+
+export interface Emergency {
+  code: number;
+  text: string;
+}

@@ -20,13 +20,13 @@ export function Chart({ model, chart, number, theme }: Props) {
   return (
     <section class={active ? "scope-chart active" : "scope-chart"} aria-label={text.scope.chart(number)}>
       <header>
-        <button type="button" aria-pressed={active} title={active ? text.scope.selected : text.scope.select}
+        <button type="button" class="button small" aria-pressed={active} title={active ? text.scope.selected : text.scope.select}
           onClick={() => (model.active.value = chart.id)}>
           {text.scope.chart(number)}
         </button>
         <Legend model={model} chart={chart} />
-        <button type="button" title={text.scope.fitHint} onClick={() => fit(model, chart.id)}>{text.scope.fit}</button>
-        <button type="button" aria-label={text.scope.removeChart} title={text.scope.removeChart}
+        <button type="button" class="button small" title={text.scope.fitHint} onClick={() => fit(model, chart.id)}>{text.scope.fit}</button>
+        <button type="button" class="button small" aria-label={text.scope.removeChart} title={text.scope.removeChart}
           onClick={() => model.change(withoutChart(model.layout.value!, chart.id))}>×</button>
       </header>
       <PlotArea model={model} chart={chart} number={number} theme={theme} />
@@ -49,7 +49,7 @@ function Legend({ model, chart }: { model: ScopeModel; chart: ChartLayout }) {
           <li key={id}>
             <Swatch colour={index} />
             <span>{label}</span>
-            <button type="button" aria-label={text.scope.removeTrace(label)}
+            <button type="button" class="button small" aria-label={text.scope.removeTrace(label)}
               onClick={() => model.change(toggled(model.layout.value!, chart.id, id))}>×</button>
           </li>
         );

@@ -13,19 +13,19 @@ export function Toolbar({ model }: { model: ScopeModel }) {
   const paused = model.acquisition.paused.value;
   return (
     <div class="scope-toolbar" role="toolbar" aria-label={text.scope.toolbar}>
-      <button type="button" class="primary" aria-pressed={paused} onClick={() => (paused ? model.live() : model.pause())}>
+      <button type="button" class="button primary" aria-pressed={paused} onClick={() => (paused ? model.live() : model.pause())}>
         {paused ? text.scope.run : text.scope.pause}
       </button>
       <label>
         {text.scope.window}
-        <select value={layout.window} onChange={(event) => model.change({ ...layout, window: Number(event.currentTarget.value) })}>
+        <select class="field" value={layout.window} onChange={(event) => model.change({ ...layout, window: Number(event.currentTarget.value) })}>
           {WINDOWS.map((seconds) => <option key={seconds} value={seconds}>{seconds} s</option>)}
         </select>
       </label>
-      <button type="button" aria-pressed={model.cursors.value[0] !== null} onClick={() => model.toggleCursors()}>
+      <button type="button" class="button small" aria-pressed={model.cursors.value[0] !== null} onClick={() => model.toggleCursors()}>
         {text.scope.cursors}
       </button>
-      <button type="button" disabled={layout.charts.length >= MAX_CHARTS} onClick={() => addChart(model)}>
+      <button type="button" class="button small" disabled={layout.charts.length >= MAX_CHARTS} onClick={() => addChart(model)}>
         {text.scope.addChart}
       </button>
       <Export model={model} />
@@ -63,18 +63,18 @@ function Export({ model }: { model: ScopeModel }) {
   const offset = model.utcOffset;
   return (
     <details class="scope-menu">
-      <summary>{text.scope.export}</summary>
+      <summary class="button small">{text.scope.export}</summary>
       <div>
         <label>
           {text.scope.exportRange}
-          <select value={String(all)} onChange={(event) => setAll(event.currentTarget.value === "true")}>
+          <select class="field" value={String(all)} onChange={(event) => setAll(event.currentTarget.value === "true")}>
             <option value="false">{text.scope.ranges.visible}</option>
             <option value="true">{text.scope.ranges.all}</option>
           </select>
         </label>
-        <button type="button" onClick={(event) => saveImage(model, event.currentTarget)}>{text.scope.png}</button>
-        <button type="button" onClick={() => saveCsv(samples())}>{text.scope.csv}</button>
-        <button type="button" onClick={() => saveMcap(samples(), offset)}>{text.scope.mcap}</button>
+        <button type="button" class="button small" onClick={(event) => saveImage(model, event.currentTarget)}>{text.scope.png}</button>
+        <button type="button" class="button small" onClick={() => saveCsv(samples())}>{text.scope.csv}</button>
+        <button type="button" class="button small" onClick={() => saveMcap(samples(), offset)}>{text.scope.mcap}</button>
       </div>
     </details>
   );
@@ -127,7 +127,7 @@ function TriggerFields({ model, trigger, change }: FieldProps) {
     <>
       <label>
         {text.scope.signal}
-        <select value={trigger.signal} onChange={(event) => change({ signal: event.currentTarget.value })}>
+        <select class="field" value={trigger.signal} onChange={(event) => change({ signal: event.currentTarget.value })}>
           {signals.map((id) => <option key={id} value={id}>{known.get(id)?.label ?? id}</option>)}
         </select>
       </label>
@@ -141,7 +141,7 @@ function TriggerFields({ model, trigger, change }: FieldProps) {
           onChange={(event) => change({ pre: Number(event.currentTarget.value) })} />
         <output>{Math.round(trigger.pre * 100)} %</output>
       </label>
-      <button type="button" onClick={() => model.arm()}>{text.scope.arm}</button>
+      <button type="button" class="button small" onClick={() => model.arm()}>{text.scope.arm}</button>
       <span role="status" class={`scope-state ${state ?? ""}`}>{state !== null && text.scope.states[state]}</span>
     </>
   );
@@ -157,7 +157,7 @@ function NumberField({ label, value, onChange }: NumberProps) {
   return (
     <label>
       {label}
-      <input type="number" step="any" value={value}
+      <input class="field" type="number" step="any" value={value}
         onChange={(event) => {
           const entered = event.currentTarget.valueAsNumber;
           if (Number.isFinite(entered)) onChange(entered);
@@ -177,7 +177,7 @@ function Choice<T extends string>({ label, value, options, onChange }: ChoicePro
   return (
     <label>
       {label}
-      <select value={value} onChange={(event) => onChange(event.currentTarget.value as T)}>
+      <select class="field" value={value} onChange={(event) => onChange(event.currentTarget.value as T)}>
         {Object.entries<string>(options).map(([key, name]) => <option key={key} value={key}>{name}</option>)}
       </select>
     </label>

@@ -11,7 +11,7 @@ import type { RingStore } from "./store.ts";
 import { Trigger, type TriggerState } from "./trigger.ts";
 import { TimeView, type Span } from "./view.ts";
 
-const BUDGET = 4; // [ms] of drawing in one frame; further charts follow in the next frame
+const BUDGET = 3; // [ms] of drawing in one frame; further charts follow in the next frame
 
 export interface MeasuredRow {
   signal: string;
@@ -37,8 +37,6 @@ export class ScopeModel {
   });
   readonly plots = new Map<number, Plot>();
   readonly rows = new Map<string, MeasuredRow>();
-  /** Script time of the last frames [ms]. */
-  readonly frameTimes: number[] = [];
   private readonly view = new TimeView(5);
   private trigger: Trigger | null = null;
   private captured: { span: Span; origin: number } | null = null;
@@ -46,6 +44,7 @@ export class ScopeModel {
   private pending = 0; // charts to draw until the screen shows the newest state
   private nextRow = 0;
   private drawn = -1;
+  private frames = 0;
 
   constructor(private readonly connection: Connection) {
     this.acquisition = new Acquisition(connection);
@@ -163,9 +162,8 @@ export class ScopeModel {
       this.pending = this.plots.size;
     }
     this.drawPlots(begin);
-    this.measureRow();
-    this.frameTimes.push(performance.now() - begin);
-    if (this.frameTimes.length > 600) this.frameTimes.shift();
+    this.frames++;
+    if (performance.now() - begin < BUDGET || this.frames % 4 === 0) this.measureRow();
   }
 
   private open(): void {
@@ -214,7 +212,8 @@ export class ScopeModel {
     while (this.pending > 0 && plots.length > 0) {
       plots[this.nextPlot++ % plots.length]!.draw(scene);
       this.pending--;
-      if (!scene.fine && performance.now() - begin > BUDGET) break;
+      const next = plots[this.nextPlot % plots.length]!.cost;
+      if (performance.now() - begin + next > BUDGET) break;
     }
   }
 

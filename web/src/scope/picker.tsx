@@ -12,7 +12,7 @@ export function Picker({ model }: { model: ScopeModel }) {
   const full = traceCount(model.layout.value!) >= MAX_TRACES;
   return (
     <div class="scope-picker">
-      <input type="search" value={query} aria-label={text.scope.search} placeholder={text.scope.search}
+      <input class="field" type="search" value={query} aria-label={text.scope.search} placeholder={text.scope.search}
         onInput={(event) => setQuery(event.currentTarget.value)} />
       {full && <p class="scope-note" role="status">{text.scope.full}</p>}
       {groups.length === 0 && <p class="scope-note">{text.scope.noMatch}</p>}

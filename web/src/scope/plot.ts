@@ -31,12 +31,14 @@ interface Palette {
 }
 
 const AXIS_SIZE = 58; // [px]
-const SLOW = 5; // [ms]
-const FAST = 2; // [ms]
+const SLOW = 3; // [ms]
+const FAST = 1; // [ms]
 const EMPTY: uPlot.AlignedData = [[0, 1]];
 
 export class Plot {
   readonly canvas: uPlot;
+  /** Mean script time of a drawing [ms]. */
+  cost = 0;
   private traces: PlotTrace[] = [];
   private units: string[] = [];
   private readonly ranges = new Map<string, ValueRange>();
@@ -82,7 +84,8 @@ export class Plot {
         if (!Number.isNaN(low)) this.canvas.setScale(scaleKey(unit), { min: low, max: high });
       }
     });
-    this.adapt(performance.now() - begin);
+    this.cost += 0.2 * (performance.now() - begin - this.cost);
+    this.adapt();
   }
 
   /** Return the time at a horizontal position inside the plotting area [CSS px]. */
@@ -114,9 +117,9 @@ export class Plot {
     });
   }
 
-  private adapt(spent: number): void {
-    if (spent > SLOW && this.coarseness < 4) this.coarseness *= 2;
-    else if (spent < FAST && this.coarseness > 1) this.coarseness /= 2;
+  private adapt(): void {
+    if (this.cost > SLOW && this.coarseness < 4) this.coarseness *= 2;
+    else if (this.cost < FAST && this.coarseness > 1) this.coarseness /= 2;
   }
 
   private paint(): void {

@@ -19,10 +19,10 @@ export function Scope({ connection }: { connection: Connection }) {
   if (layout === null) return <p class="scope-note">{text.scope.empty}</p>;
   return (
     <div class="scope">
-      <h1 class="visually-hidden">{text.scope.title}</h1>
+      <h1>{text.scope.title}</h1>
       <Toolbar model={model} />
       <TriggerBar model={model} />
-      <details class="scope-side" open={matchMedia("(min-width: 820px)").matches}>
+      <details class="scope-side" open={matchMedia("(min-width: 821px)").matches}>
         <summary>{text.scope.signals}</summary>
         <Picker model={model} />
       </details>
@@ -58,14 +58,8 @@ function useTheme(): number {
   const [theme, setTheme] = useState(0);
   useEffect(() => {
     const changed = () => setTheme((each) => each + 1);
-    const dark = matchMedia("(prefers-color-scheme: dark)");
-    const observer = new MutationObserver(changed);
-    observer.observe(document.documentElement, { attributes: true, attributeFilter: ["data-theme", "class"] });
-    dark.addEventListener("change", changed);
-    return () => {
-      observer.disconnect();
-      dark.removeEventListener("change", changed);
-    };
+    window.addEventListener("themechange", changed);
+    return () => window.removeEventListener("themechange", changed);
   }, []);
   return theme;
 }

@@ -28,6 +28,7 @@ export function drawTrace(
   const perUnit = area.height / (scale.high - scale.low);
   const { begin, end } = store;
   const floor = area.top + area.height;
+  const exit = (out.step - 1) * store.period * perSecond; // a group ends at its last row
   let connected = false;
   let last = 0;
   context.beginPath();
@@ -48,7 +49,7 @@ export function drawTrace(
     const near = upFirst ? top : bottom;
     if (connected) context.lineTo(x, near);
     else context.moveTo(x, near);
-    if (bottom - top > 0.5 || !connected) context.lineTo(x, last);
+    if (bottom - top > 0.5 || !connected) context.lineTo(x + exit, last);
     connected = true;
   }
   context.stroke();

@@ -1,0 +1,92 @@
+/** Header: connection, cycle, role, and the quick stop. */
+
+import type { Connection, LinkState } from "./connection.ts";
+import { count, duration } from "./logic/format.ts";
+import { LiveText, type Tone } from "./parts/common.tsx";
+import { StopButton } from "./stop.tsx";
+import { text } from "./strings.ts";
+
+const TONES: Record<LinkState, Tone> = {
+  connecting: "warn",
+  open: "ok",
+  gone: "warn",
+  lost: "bad",
+  login: "warn",
+};
+
+export function Header({ connection }: { connection: Connection }) {
+  return (
+    <header class="head">
+      <div class="brand">
+        <img class="logo" src="/icon.svg" alt="" />
+        <div class="grow">
+          <h1 class="cut">{connection.hello.value?.share ?? text.name}</h1>
+          <div class="small muted cut">{connection.hello.value?.program ?? ""}</div>
+        </div>
+      </div>
+      <dl class="facts">
+        <ConnectionFact connection={connection} />
+        <LoopFact connection={connection} />
+        <div>
+          <dt>{text.header.cycle}</dt>
+          <dd>
+            <LiveText of={() => count(connection.status.value?.number)} />
+          </dd>
+        </div>
+        <div class="optional">
+          <dt>{text.header.lateness}</dt>
+          <dd>
+            <LiveText of={() => duration(connection.status.value?.lateness)} />
+          </dd>
+        </div>
+        <RoleFact connection={connection} />
+      </dl>
+      <StopButton connection={connection} />
+    </header>
+  );
+}
+
+function ConnectionFact({ connection }: { connection: Connection }) {
+  const state = connection.state.value;
+  return (
+    <div>
+      <dt>{text.header.connection}</dt>
+      <dd role="status">
+        <span class={`dot ${TONES[state]}`} aria-hidden="true" />
+        {text.connection[state]}
+      </dd>
+    </div>
+  );
+}
+
+function LoopFact({ connection }: { connection: Connection }) {
+  const open = connection.state.value === "open";
+  const lost = connection.losing.value;
+  const tone: Tone = !open ? "" : !connection.running.value ? "bad" : lost ? "warn" : "ok";
+  const shown: string = !open
+    ? text.header.unknown
+    : !connection.running.value
+      ? text.header.stalled
+      : lost
+        ? text.header.losing
+        : text.header.running;
+  return (
+    <div>
+      <dt>{text.header.bus}</dt>
+      <dd>
+        <span class={`dot ${tone}`} aria-hidden="true" />
+        {shown}
+      </dd>
+    </div>
+  );
+}
+
+function RoleFact({ connection }: { connection: Connection }) {
+  const role = connection.role.value;
+  return (
+    <div>
+      <dt>{text.header.role}</dt>
+      <dd>{role === null ? text.header.unknown : text.header.roles[role]}</dd>
+    </div>
+  );
+}

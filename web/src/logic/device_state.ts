@@ -1,0 +1,15 @@
+/** Colours of device states. */
+
+import type { Device } from "../remote.ts";
+
+export function stateTone(device: Pick<Device, "state" | "error" | "lost">): "ok" | "warn" | "bad" {
+  if (device.error || device.lost || device.state === "") return "bad";
+  return device.state === "OP" ? "ok" : "warn";
+}
+
+/** Return all errors that the ports of a device counted. */
+export function portErrors(
+  ports: readonly { rx_errors: number | null; lost_links: number | null }[],
+): number {
+  return ports.reduce((sum, port) => sum + (port.rx_errors ?? 0) + (port.lost_links ?? 0), 0);
+}

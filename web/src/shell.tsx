@@ -1,0 +1,112 @@
+/** Frame of the page: header, navigation, messages, and the chosen view. */
+
+import { useEffect } from "preact/hooks";
+import type { Connection } from "./connection.ts";
+import { Header } from "./header.tsx";
+import { Login } from "./login.tsx";
+import { dismiss, notices, notify } from "./notices.ts";
+import { Icon } from "./parts/common.tsx";
+import { ConfirmDialog } from "./parts/confirm.tsx";
+import { address, route } from "./route.ts";
+import { text } from "./strings.ts";
+import { choice, nextTheme } from "./theme.ts";
+import { views } from "./views.ts";
+
+const THEME_ICON = "M12 3a9 9 0 1 0 0 18zM12 3a9 9 0 0 1 0 18";
+
+export function Shell({ connection }: { connection: Connection }) {
+  useEffect(
+    () =>
+      connection.on("error", ({ message, hint }) => notify(message, { hint, kind: "bad" })),
+    [connection],
+  );
+  if (connection.state.value === "login") return <Login connection={connection} />;
+  const view = views.find(({ key }) => key === route.value[0]) ?? views[0];
+  if (view === undefined) return null;
+  const Shown = view.component;
+  return (
+    <div class="shell">
+      <Header connection={connection} />
+      <Rail shown={view.key} />
+      <main class={isLive(connection) ? "main" : "main stale"} id="main" aria-label={view.label}>
+        <Banner connection={connection} />
+        <Shown connection={connection} />
+      </main>
+      <Notices />
+      <ConfirmDialog />
+    </div>
+  );
+}
+
+function isLive(connection: Connection): boolean {
+  return connection.state.value === "open" && connection.running.value;
+}
+
+function Rail({ shown }: { shown: string }) {
+  return (
+    <div class="rail">
+      <nav aria-label={text.navigation.label}>
+        {views.map(({ key, label, icon }) => (
+          <a key={key} href={address(key)} aria-current={key === shown ? "page" : undefined}>
+            <Icon path={icon} />
+            {label}
+          </a>
+        ))}
+        <button type="button" class="theme" onClick={nextTheme} aria-label={text.theme.label}>
+          <Icon path={THEME_ICON} />
+          {text.theme[choice.value]}
+        </button>
+      </nav>
+    </div>
+  );
+}
+
+/** Why the values on the page are old, if they are. */
+function Banner({ connection }: { connection: Connection }) {
+  const state = connection.state.value;
+  if (state === "gone") {
+    return (
+      <div class="banner" role="alert">
+        <strong>{text.banner.gone}</strong> <span>{connection.reason.value}</span>
+      </div>
+    );
+  }
+  if (state === "lost") {
+    return (
+      <div class="banner bad" role="alert">
+        <strong>{text.banner.lost}</strong> <span>{text.banner.lostHint}</span>
+      </div>
+    );
+  }
+  if (state === "open" && !connection.running.value) {
+    return (
+      <div class="banner bad" role="alert">
+        <strong>{text.banner.stalled}</strong> <span>{text.banner.stalledHint}</span>
+      </div>
+    );
+  }
+  return null;
+}
+
+function Notices() {
+  return (
+    <div class="notices" role="log" aria-live="polite" aria-label={text.common.messages}>
+      {notices.value.map(({ id, kind, message, hint }) => (
+        <div key={id} class={`notice ${kind}`}>
+          <div class="grow">
+            <div>{message}</div>
+            {hint !== "" && <div class="muted small">{hint}</div>}
+          </div>
+          <button
+            type="button"
+            class="button quiet small"
+            aria-label={text.common.dismiss}
+            onClick={() => dismiss(id)}
+          >
+            ✕
+          </button>
+        </div>
+      ))}
+    </div>
+  );
+}

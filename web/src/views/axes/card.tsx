@@ -1,0 +1,208 @@
+/** Card of one axis: values against limits, state, and its controls. */
+
+import { useComputed } from "@preact/signals";
+import type { Connection } from "../../connection.ts";
+import { positionRange, signedRange } from "../../logic/range.ts";
+import { notifyError } from "../../notices.ts";
+import { Chip, type Tone } from "../../parts/common.tsx";
+import { confirmed } from "../../parts/confirm.tsx";
+import type { AxisStatus } from "../../protocol.ts";
+import type { AxisInfo } from "../../remote.ts";
+import { address } from "../../route.ts";
+import { text } from "../../strings.ts";
+import { Bar } from "./bar.tsx";
+import { JogControls } from "./jog_controls.tsx";
+import type { Jogging, Unit } from "./jogging.ts";
+
+export interface CardProps {
+  connection: Connection;
+  jogging: Jogging;
+  axis: number;
+  name: string;
+  info: AxisInfo | undefined;
+  unit: Unit;
+  noJog: string | null; // why this session cannot jog
+}
+
+const TONES: Readonly<Record<string, Tone>> = {
+  OPERATION_ENABLED: "ok",
+  QUICK_STOP_ACTIVE: "warn",
+  FAULT_REACTION_ACTIVE: "bad",
+  FAULT: "bad",
+};
+
+export function AxisCard(props: CardProps) {
+  const { connection, axis, name, info } = props;
+  const headline = `axis-${axis}`;
+  return (
+    <section class="panel axis" aria-labelledby={headline}>
+      <header>
+        <h2 id={headline} class="mono cut">
+          {name}
+        </h2>
+        <span class="muted small">{info?.mode ?? ""}</span>
+        {info !== undefined && (
+          <a class="small" href={address("devices", info.device)}>
+            {text.axes.device} {info.device}
+          </a>
+        )}
+        <State connection={connection} axis={axis} />
+      </header>
+      <div class="body">
+        <Bars {...props} />
+        <Trouble connection={connection} axis={axis} />
+        <Controls {...props} />
+      </div>
+    </section>
+  );
+}
+
+function State({ connection, axis }: { connection: Connection; axis: number }) {
+  const state = useComputed(() => connection.status.value?.axes[axis]?.state ?? "");
+  const jogged = useComputed(() => connection.status.value?.axes[axis]?.jogged ?? false);
+  return (
+    <span class="row right">
+      {jogged.value && <Chip tone="info">{text.axes.jogged}</Chip>}
+      <Chip tone={TONES[state.value] ?? ""}>{readable(state.value)}</Chip>
+    </span>
+  );
+}
+
+function Bars({ connection, axis, info, unit }: CardProps) {
+  const read = (key: "position" | "velocity" | "torque" | "commanded_position") => () =>
+    connection.status.value?.axes[axis]?.[key] ?? null;
+  const force = unit === "rad" ? "N·m" : "N";
+  return (
+    <div class="live">
+      <Bar
+        label={text.axes.position}
+        unit={unit}
+        read={read("position")}
+        target={read("commanded_position")}
+        range={(value) =>
+          positionRange(info?.position_min, info?.position_max, value, unit === "rad" ? Math.PI : 0.1)
+        }
+        centred={false}
+      />
+      <Bar
+        label={text.axes.velocity}
+        unit={`${unit}/s`}
+        read={read("velocity")}
+        range={(value) => signedRange(info?.velocity_limit, value, unit === "rad" ? 1 : 0.05)}
+        centred
+      />
+      <Bar
+        label={unit === "rad" ? text.axes.torque : text.axes.force}
+        unit={force}
+        read={read("torque")}
+        range={(value) => signedRange(info?.torque_limit, value, 1)}
+        centred
+      />
+    </div>
+  );
+}
+
+/** Fault and stop reason, if there are any. */
+function Trouble({ connection, axis }: { connection: Connection; axis: number }) {
+  const fault = useComputed(() => connection.status.value?.axes[axis]?.fault ?? "");
+  const reason = useComputed(() => connection.status.value?.axes[axis]?.stop_reason ?? "");
+  return (
+    <div class="trouble" role="status">
+      {fault.value !== "" && (
+        <p class="bad-text">
+          {text.axes.fault}: {fault.value}
+        </p>
+      )}
+      {reason.value !== "" && (
+        <p class="muted">
+          {text.axes.stopped}: {reason.value}
+        </p>
+      )}
+    </div>
+  );
+}
+
+function Controls(props: CardProps) {
+  const { connection, jogging, axis, noJog } = props;
+  const enabled = useComputed(() => connection.status.value?.axes[axis]?.enabled ?? false);
+  const faulted = useComputed(() => (connection.status.value?.axes[axis]?.fault ?? "") !== "");
+  const operator = connection.role.value === "operator";
+  const answer = jogging.answers.value.get(axis);
+  return (
+    <>
+      <div class="row wrap">
+        <EnableButton {...props} enabled={enabled.value} disabled={!operator} />
+        <button
+          type="button"
+          class="button small"
+          disabled={!operator || !faulted.value}
+          onClick={() => connection.request([axis], "reset")}
+        >
+          {text.axes.reset}
+        </button>
+        <HomeButton {...props} disabled={!operator || !enabled.value} />
+      </div>
+      <JogControls {...props} disabled={!operator || noJog !== null || !enabled.value} />
+      <p class={isRefused(answer?.status) ? "answer bad-text" : "answer muted"} role="status">
+        {answer?.text ?? ""}
+      </p>
+    </>
+  );
+}
+
+function EnableButton(props: CardProps & { enabled: boolean; disabled: boolean }) {
+  const { connection, axis, name, enabled, disabled } = props;
+  const onClick = async () => {
+    if (enabled) {
+      connection.request([axis], "disable");
+      return;
+    }
+    const question = {
+      title: `${text.axes.enable} ${name}?`,
+      body: text.axes.enableBody,
+      action: text.axes.enable,
+    };
+    if (await confirmed(question)) connection.request([axis], "enable");
+  };
+  return (
+    <button
+      type="button"
+      class={enabled ? "button small" : "button small primary"}
+      disabled={disabled}
+      onClick={() => void onClick()}
+    >
+      {enabled ? text.axes.disable : text.axes.enable}
+    </button>
+  );
+}
+
+function HomeButton({ connection, name, disabled }: CardProps & { disabled: boolean }) {
+  const onClick = async () => {
+    const question = {
+      title: `${text.axes.home} ${name}?`,
+      body: text.axes.homeBody,
+      action: text.axes.home,
+    };
+    if (await confirmed(question)) await connection.call("home", { axes: [name] }).catch(notifyError);
+  };
+  return (
+    <button
+      type="button"
+      class="button small"
+      disabled={disabled}
+      onClick={() => void onClick()}
+    >
+      {text.axes.home}
+    </button>
+  );
+}
+
+function isRefused(status: string | undefined): boolean {
+  return status !== undefined && (status.startsWith("REFUSED") || status === "EXPIRED");
+}
+
+/** Return a state as words: "OPERATION_ENABLED" → "Operation enabled". */
+export function readable(state: AxisStatus["state"]): string {
+  if (state === "") return text.common.unknown;
+  return (state[0] ?? "") + state.slice(1).toLowerCase().replaceAll("_", " ");
+}

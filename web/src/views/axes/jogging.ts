@@ -1,0 +1,132 @@
+/** Jogs of the page: one dead-man control, and every cause that ends its jog. */
+
+import { batch, signal } from "@preact/signals";
+import type { Connection, JogRequest } from "../../connection.ts";
+import { Deadman } from "../../logic/deadman.ts";
+import type { JogMessage } from "../../protocol.ts";
+import type { AxisInfo } from "../../remote.ts";
+import { text } from "../../strings.ts";
+
+export type Unit = "rad" | "m";
+export type StepSize = "hold" | "small" | "medium" | "large";
+
+export const SPEED_FALLBACK: Record<Unit, number> = { rad: 1, m: 0.05 }; // full speed without a limit
+export const STEPS: Record<Unit, Record<Exclude<StepSize, "hold">, number>> = {
+  rad: { small: Math.PI / 1800, medium: Math.PI / 180, large: Math.PI / 18 },
+  m: { small: 1e-4, medium: 1e-3, large: 1e-2 },
+};
+
+export interface Answer {
+  status: string;
+  text: string;
+}
+
+export class Jogging {
+  readonly speed = signal(10); // percent of the velocity limit
+  readonly step = signal<StepSize>("hold");
+  readonly held = signal<{ axis: number; sign: 1 | -1 } | null>(null);
+  readonly enabling = signal(false); // the enabling touch
+  readonly answers = signal<ReadonlyMap<number, Answer>>(new Map());
+  private readonly deadman: Deadman;
+  private readonly connection: Connection;
+
+  constructor(connection: Connection) {
+    this.connection = connection;
+    this.deadman = new Deadman(connection, () => performance.now());
+  }
+
+  /** Begin to serve tokens and to watch for causes of a release. Return a function that ends both. */
+  attach(): () => void {
+    const release = () => this.release();
+    const onVisibility = () => document.hidden && this.release();
+    window.addEventListener("blur", release);
+    window.addEventListener("pagehide", release);
+    document.addEventListener("freeze", release);
+    document.addEventListener("visibilitychange", onVisibility);
+    const ends = [
+      this.connection.on("token", ({ token }) => this.receiveToken(token)),
+      this.connection.on("jog", (message) => this.receiveAnswer(message)),
+      this.connection.on("hello", () => this.disconnect()),
+      this.connection.on("gone", () => this.disconnect()),
+      this.connection.state.subscribe((state) => state !== "open" && this.disconnect()),
+    ];
+    return () => {
+      this.release();
+      window.removeEventListener("blur", release);
+      window.removeEventListener("pagehide", release);
+      document.removeEventListener("freeze", release);
+      document.removeEventListener("visibilitychange", onVisibility);
+      for (const end of ends) end();
+    };
+  }
+
+  /** Begin a jog of an axis while a control is held. */
+  press(axis: number, sign: 1 | -1, jog: JogRequest, touch: boolean): void {
+    const refusal = this.deadman.press(axis, jog, { touch });
+    if (refusal === "busy") return;
+    batch(() => {
+      this.held.value = refusal === null ? { axis, sign } : null;
+      if (refusal === null) this.forget(axis);
+      else this.answer(axis, { status: "REFUSED", text: text.jog.refusals[refusal] });
+    });
+  }
+
+  release(): void {
+    this.deadman.release();
+    this.held.value = null;
+  }
+
+  enable(on: boolean): void {
+    this.enabling.value = on;
+    this.deadman.enable(on);
+    this.follow();
+  }
+
+  /** Return the jog that the controls of the page describe. */
+  request(info: AxisInfo | undefined, unit: Unit, sign: 1 | -1): JogRequest {
+    const step = this.step.value;
+    return {
+      velocity: sign * speedOf(info, unit, this.speed.value),
+      distance: step === "hold" ? null : STEPS[unit][step],
+      acceleration: null,
+    };
+  }
+
+  private receiveToken(token: string): void {
+    this.deadman.receiveToken(token);
+    this.follow();
+  }
+
+  private receiveAnswer({ axis, press, status, text }: JogMessage): void {
+    this.deadman.receiveStatus(press, status);
+    this.follow();
+    this.answer(axis, { status, text });
+  }
+
+  private disconnect(): void {
+    this.deadman.disconnect();
+    this.follow();
+  }
+
+  /** Show that the jog ended, if it did. */
+  private follow(): void {
+    if (this.deadman.held === null) this.held.value = null;
+  }
+
+  private answer(axis: number, answer: Answer): void {
+    this.answers.value = new Map(this.answers.value).set(axis, answer);
+  }
+
+  private forget(axis: number): void {
+    const answers = new Map(this.answers.value);
+    answers.delete(axis);
+    this.answers.value = answers;
+  }
+}
+
+/** Return the speed of a jog [rad/s or m/s]. */
+export function speedOf(info: AxisInfo | undefined, unit: Unit, percent: number): number {
+  const limit = info?.velocity_limit;
+  const full = limit != null && Number.isFinite(limit) && limit > 0 ? limit : SPEED_FALLBACK[unit];
+  return (full * percent) / 100;
+}
