@@ -51,9 +51,9 @@ function ConnectionFact({ connection }: { connection: Connection }) {
   return (
     <div>
       <dt>{text.header.connection}</dt>
-      <dd role="status">
+      <dd>
         <span class={`dot ${TONES[state]}`} aria-hidden="true" />
-        {text.connection[state]}
+        <span role="status">{text.connection[state]}</span>
       </dd>
     </div>
   );
