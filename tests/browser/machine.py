@@ -21,6 +21,7 @@ POLICY = cat.StopPolicy(
     lost_limit=1000, late_limit=0.0, raise_faults=False, on_axis_stopped="event"
 )
 VELOCITY_LIMIT, ACCELERATION = 10.0, 20.0
+WATCHDOG = 0.5  # [s]
 
 
 class Body:
@@ -64,7 +65,7 @@ def run(main: cat.MainDevice, share_name: str, names: list[str], body: Body) -> 
     )
     with (
         cat.Share(share_name, jog=True) as share,
-        cat.Loop(arm, period=PERIOD, sink=share, stop=POLICY, priority=None) as loop,
+        cat.Loop(arm, period=PERIOD, sink=share, stop=POLICY, watchdog=WATCHDOG) as loop,
     ):
         body.run(loop)
 

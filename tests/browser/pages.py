@@ -121,7 +121,7 @@ def operator(
     )
     try:
         yield (shown := Operator(context, dashboard))
-        assert not shown.problems
+        assert not shown.problems, shown.problems
     finally:
         if browser.is_connected():
             context.close()

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
     from tests.browser.pages import Operator
 
-STANDSTILL = 1e-2  # [rad/s]
+STANDSTILL, MOTION = 1e-2, 5e-2  # [rad/s]
 NAMES = ("shoulder", "elbow")
 
 Opener = Callable[..., AbstractContextManager["Operator"]]
@@ -51,7 +51,7 @@ class Rig:
 
     def moves(self, axis: int = 0) -> bool:
         """Wait until a servo moves. Return False if it does not."""
-        return comes_true(lambda: self.velocity(axis) > 10 * STANDSTILL)
+        return comes_true(lambda: self.velocity(axis) > MOTION)
 
     @contextmanager
     def operating(self, axis: str = NAMES[0], **options: object) -> Iterator[Operator]:
