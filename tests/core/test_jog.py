@@ -524,6 +524,32 @@ def test_without_permission_an_operator_gives_no_power(state: int) -> None:
     assert b.drives[0].state != 4
 
 
+def test_in_a_hand_over_an_operator_enables_nothing() -> None:
+    b, operator = made()
+    operator.request(DISABLE)
+    b.steps(5)
+    operator.request(ENABLE)
+    b.engine.run(20)  # as while a loop is left
+    assert operator.taken() is RequestStatus.REFUSED_HANDOVER
+    b.steps(20)
+    assert b.drives[0].state != 4
+
+
+def test_a_reset_of_an_axis_without_a_fault_changes_nothing() -> None:
+    b, operator = made()
+    operator.request(RESET)
+    b.steps(5)
+    assert operator.taken() is RequestStatus.TAKEN
+    assert b.drives[0].state == 4
+
+
+def test_a_velocity_axis_without_an_actual_position_can_be_jogged() -> None:
+    b, operator = made(CSV, actual_position=None, target_position=None)
+    operator.press(0.5)
+    jogged(b, operator, 100)
+    assert velocity_of(b) == 0.5
+
+
 def test_an_operator_resets_a_fault_without_motion() -> None:
     b, operator = made()
     b.drives[0].state = 7

@@ -80,7 +80,7 @@ cdef class Engine:
     cdef memory_text(self)
     cdef int check_reserve(self, int64_t budget) except -1
     cdef bint is_law_used(self, Law law) noexcept
-    cdef void attach_motion(self, const cat_sink *sink) noexcept
+    cdef int attach_motion(self, const cat_sink *sink) except -1
     cdef bint is_stream_used(self, Stream stream) noexcept
     cdef connect(self, plan)
     cdef void begin_iteration(self) noexcept

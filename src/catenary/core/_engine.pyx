@@ -844,7 +844,7 @@ cdef class Engine:
         self.attach_motion(sink)
         self.sink = capsule
 
-    cdef void attach_motion(self, const cat_sink *sink) noexcept:
+    cdef int attach_motion(self, const cat_sink *sink) except -1:
         """Connect the motion words of a sink, or none. Every jog ends."""
         cdef uint32_t i
         cdef bytes seed = os.urandom(sizeof(uint64_t))
@@ -852,6 +852,7 @@ cdef class Engine:
             self.axes.c.axes[i].jogged = 0
         motion_attach(&self.axes.c.motion, sink, self.axes.c.axis_count,
                       (<uint64_t *><const char *>seed)[0])
+        return 0
 
     @property
     def stopper(self):

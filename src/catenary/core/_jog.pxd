@@ -22,6 +22,7 @@ cdef enum:  # share.jog.JogStatus
 cdef enum:  # share.jog.RequestStatus
     TAKEN = 1
     REFUSED_LOST = 22
+    REFUSED_HANDOVER = 23
 
 cdef void jog_take_requests(axes_t *x, const target_t *t) noexcept nogil
 cdef void jog_judge(axes_t *x) noexcept nogil

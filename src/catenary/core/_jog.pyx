@@ -27,7 +27,7 @@ from libc.stdint cimport int64_t, uint8_t, uint32_t, uint64_t
 from libc.string cimport memcpy
 
 from catenary.core._axes cimport LIMITED, axes_t, axis_t
-from catenary.core._cia402 cimport ENABLED, QUICK_STOP, RESET
+from catenary.core._cia402 cimport ENABLED, FAULT, FAULT_REACTION_ACTIVE, QUICK_STOP, RESET
 from catenary.core._guard cimport (
     CSP,
     CSV,
@@ -43,7 +43,7 @@ from catenary.core._guard cimport (
 )
 from catenary.core._handover cimport target_t
 from catenary.core._limits cimport approach, within_limits
-from catenary.core._motion cimport jog_t, motion_extends, motion_issue, motion_t
+from catenary.core._motion cimport jog_t, motion_begin, motion_extends, motion_t
 from catenary.core._native cimport (
     CAT_MOTION_STATUS_BITS,
     cat_fence,
@@ -66,31 +66,42 @@ cdef struct press_t:               # copy of the parameters of a press
 
 # ---- requested states
 
-cdef uint8_t state_refusal(const axes_t *x, const axis_t *a, uint8_t state) noexcept nogil:
-    """Return the status with which a requested state is answered."""
+cdef uint8_t state_refusal(const axes_t *x, const axis_t *a, uint8_t state, bint hold) noexcept nogil:
+    """Return the status with which a requested state is answered. `hold`: in a hand-over, because
+    the program starts, ends or waits."""
     if state > RESET:
         return REFUSED_INVALID
     if (state == ENABLED or state == RESET) and not x.motion.allowed:
         return REFUSED_NOT_ALLOWED
     if state == ENABLED and quantity_of(a.mode_wanted) == TORQUE:
         return REFUSED_MODE  # only the application knows the torque that holds the load
+    if state == ENABLED and hold:
+        return REFUSED_HANDOVER
     if a.lost:
         return REFUSED_LOST
     return TAKEN
 
 
-cdef void take_state(axes_t *x, axis_t *a, cat_motion_slot *slot, uint64_t request) noexcept nogil:
+cdef void put_in_force(axes_t *x, axis_t *a, uint8_t state) noexcept nogil:
+    """Put a requested state of an operator in force, unless it changes nothing."""
+    if state == QUICK_STOP:
+        if a.requested_state == ENABLED:
+            stop_axis(x, a, STOP_OPERATOR)
+    elif state == RESET:
+        if a.state == FAULT or a.state == FAULT_REACTION_ACTIVE:
+            apply_state(x, a, RESET)
+    elif state != ENABLED or a.requested_state != ENABLED:
+        apply_state(x, a, state)
+        a.armed = state == ENABLED  # it starts with velocity 0
+
+
+cdef void take_state(axes_t *x, axis_t *a, cat_motion_slot *slot, uint64_t request,
+                     bint hold) noexcept nogil:
     """Take a newly requested state of an operator, and answer it."""
     cdef uint8_t state = <uint8_t>(request & 0xFF)
-    cdef uint8_t status = state_refusal(x, a, state)
+    cdef uint8_t status = state_refusal(x, a, state, hold)
     if status == TAKEN:
-        if state == QUICK_STOP:
-            if a.requested_state == ENABLED:
-                stop_axis(x, a, STOP_OPERATOR)
-        elif state != ENABLED or a.requested_state != ENABLED:
-            apply_state(x, a, state)
-            if state == ENABLED:
-                a.armed = 1  # it starts with velocity 0
+        put_in_force(x, a, state)
     cat_store_release64(&slot.taken, (request & ~<uint64_t>0xFF) | status)
 
 
@@ -209,14 +220,13 @@ cdef void jog_take_requests(axes_t *x, const target_t *t) noexcept nogil:
     cdef cat_motion_slot *slot
     cdef uint64_t request
     cdef uint32_t i
-    m.now = x.link.now(x.link.self)
-    motion_issue(m, m.now)
+    motion_begin(m, x.link.now(x.link.self))
     for i in range(x.axis_count):
         slot = &m.slots[i]
         request = cat_load_acquire64(&slot.request)
         if request != m.jogs[i].request:
             m.jogs[i].request = request
-            take_state(x, &x.axes[i], slot, request)
+            take_state(x, &x.axes[i], slot, request, t.header.hold)
         if cat_load_acquire64(&slot.press) != m.jogs[i].press:
             take_press(x, &x.axes[i], i, t, m.now)
 
@@ -287,9 +297,9 @@ cdef double braking_velocity(double room, double deceleration, double period) no
 cdef inline double room_to_limit(const axis_t *a, double velocity) noexcept nogil:
     """Return the distance to the position limit ahead; infinite if there is none."""
     cdef double position = a.commanded_position if a.mode == CSP else a.position
-    if velocity > 0:
-        return a.position_max - position
-    return position - a.position_min
+    if velocity > 0:  # without a limit, the position may be unknown
+        return a.position_max - position if a.position_max < INFINITY else INFINITY
+    return position - a.position_min if a.position_min > -INFINITY else INFINITY
 
 
 cdef double next_speed(axes_t *x, axis_t *a, jog_t *j) noexcept nogil:

@@ -34,7 +34,7 @@ cdef struct motion_t:
     token_t tokens[TOKENS]
 
 cdef void motion_attach(motion_t *m, const cat_sink *sink, uint32_t axes, uint64_t seed) noexcept nogil
-cdef void motion_issue(motion_t *m, int64_t now) noexcept nogil
+cdef void motion_begin(motion_t *m, int64_t now) noexcept nogil
 cdef bint motion_extends(const motion_t *m, uint64_t heartbeat, uint64_t press, int64_t now,
                          int64_t *deadline) noexcept nogil
 cdef bint motion_stop_requested(motion_t *m) noexcept nogil

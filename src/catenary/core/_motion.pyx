@@ -60,11 +60,11 @@ cdef uint64_t next_random(motion_t *m) noexcept nogil:
     return z ^ (z >> 31)
 
 
-cdef void motion_issue(motion_t *m, int64_t now) noexcept nogil:
-    """Issue a token if the newest one is 50 ms old."""
+cdef void motion_begin(motion_t *m, int64_t now) noexcept nogil:
+    """Begin a cycle at a time of the link's clock. Issue a token if the newest one is 50 ms old."""
     cdef token_t *token = &m.tokens[m.newest]
-    cdef int64_t age = now - token.issued
-    if token.value != 0 and 0 <= age < TOKEN_NS:
+    m.now = now
+    if token.value != 0 and now - token.issued < TOKEN_NS:
         return
     m.newest = (m.newest + 1) % TOKENS
     token = &m.tokens[m.newest]

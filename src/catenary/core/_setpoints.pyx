@@ -191,7 +191,7 @@ cdef void follow_position(axes_t *x, axis_t *a, const target_t *t, double target
         a.commanded_position = within_limits(a, target)
         a.refused_cycles = 0
         return
-    if not is_accepted(x, a, target, between):
+    if not is_accepted(x, a, target, 1 if a.yielded else between):  # a pause after a jog has no limit
         fall_back(x, a, False)
         return
     a.previous_velocity = a.setpoint_velocity

@@ -31,7 +31,7 @@ def row_parts(uint64_t record_size, uint64_t actual_size, uint64_t target_size):
 
 cdef class Ring:
     def __cinit__(self, memory, uint64_t offset, uint64_t count, uint64_t size, *args, writable=False,
-                  **others):
+                  motion=None, jog=False):
         """Map the ring. Raises ValueError if it does not fit, or if a value is invalid."""
         PyObject_GetBuffer(memory, &self.buffer, PyBUF_WRITABLE if writable else PyBUF_SIMPLE)
         if not (1 <= count <= COUNT_MAX and 1 <= size <= SIZE_MAX) or count & (count - 1):

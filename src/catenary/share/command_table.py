@@ -133,7 +133,7 @@ def geometry(axes: int) -> Geometry:
     rings = memory_aligned(places + PLACES * PLACE.itemsize)
     ring_size = memory_aligned(_rows.memory_size(COMMANDS, row_dtype(axes).itemsize))
     motion = rings + PLACES * ring_size
-    size = motion + MOTION.itemsize + axes * SLOT.itemsize
+    size = motion + MOTION.itemsize + max(axes, 1) * SLOT.itemsize
     return Geometry(closed, holders, places, rings, ring_size, motion, size)
 
 
@@ -146,16 +146,17 @@ class MotionWords:
 
     def __init__(self, memory: mmap.mmap, offset: int, axes: int) -> None:
         slots = offset + MOTION.itemsize
+        count = max(axes, 1)  # a loop without axes has an unused slot
         self.stop, self.stopper, self.token = (
             Words(memory, offset + field_offset(MOTION, name), 1)
             for name in ("stop", "stopper", "token")
         )
         self.press, self.begun, self.heartbeat, self.released, self.request = (
-            Words(memory, slots + field_offset(SLOT, name), axes, SLOT.itemsize)
+            Words(memory, slots + field_offset(SLOT, name), count, SLOT.itemsize)
             for name in ("press", "begun", "heartbeat", "released", "request")
         )
         self.answer, self.taken = (
-            Words(memory, slots + field_offset(SLOT, name), axes, SLOT.itemsize)
+            Words(memory, slots + field_offset(SLOT, name), count, SLOT.itemsize)
             for name in ("answer", "taken")
         )
         self.slots = np.frombuffer(memory, SLOT, axes, slots)  # for the real numbers

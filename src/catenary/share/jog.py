@@ -87,6 +87,7 @@ class RequestStatus(IntEnum):
     REFUSED_MODE = 18
     REFUSED_INVALID = 21
     REFUSED_LOST = 22
+    REFUSED_HANDOVER = 23
 
     @property
     def text(self) -> str:
@@ -101,6 +102,7 @@ REQUEST_TEXTS: dict[RequestStatus, str] = {
     RequestStatus.REFUSED_MODE: "refused: the program must enable an axis in this mode",
     RequestStatus.REFUSED_INVALID: "refused: the requested state is not valid",
     RequestStatus.REFUSED_LOST: "refused: the device does not answer",
+    RequestStatus.REFUSED_HANDOVER: "refused: the program starts, ends or waits",
 }
 
 
