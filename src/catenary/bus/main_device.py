@@ -90,6 +90,11 @@ class MainDevice:
         return self._link
 
     @property
+    def source(self) -> LinkSource:
+        """Source of the link, such as an interface or a virtual segment."""
+        return self._source
+
+    @property
     def is_open(self) -> bool:
         """True while the link is open."""
         return self._link is not None

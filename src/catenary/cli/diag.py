@@ -6,6 +6,7 @@ import argparse
 import json
 from typing import TYPE_CHECKING
 
+from catenary.cli import share_target
 from catenary.cli.arguments import positive_seconds
 from catenary.cli.parsers import (
     Commands,
@@ -52,6 +53,8 @@ def run(arguments: argparse.Namespace) -> int:
     from catenary.procedure.error_counters import clear_error_counters
     from catenary.target import MainDevice
 
+    if share_target.names_share(arguments.target):
+        return share_target.diag(arguments)
     sent = 0
     reads = not arguments.clear
     with MainDevice(arguments.target, force=reads or arguments.force) as main:

@@ -46,6 +46,7 @@ TARGET is one of
   virtual:FILE.toml  a virtual segment from a file (docs/reference/segment_file.md)
   virtual-realtime[:FILE.toml]  the same, on this machine's clock
   machine.toml       the target in a machine file (docs/reference/machine_file.md)
+  share:NAME         the running program that owns a share: scan, state, diag, sdo and reg read
   igh:0              the IgH kernel master 0 (docs/how_to/igh.md): scan and sdo
 
 example:

@@ -8,6 +8,7 @@ import re
 from collections.abc import Iterable, Iterator
 from typing import TYPE_CHECKING
 
+from catenary.cli import share_target
 from catenary.cli.arguments import number, positive_number
 from catenary.cli.failure import UsageError
 from catenary.cli.parsers import (
@@ -89,22 +90,28 @@ def _add_place(parser: argparse.ArgumentParser) -> None:
 
 
 def run_read(arguments: argparse.Namespace) -> int:
-    from catenary.cli.devices import device_at
-    from catenary.procedure.registers import read_register
-    from catenary.target import MainDevice
-
     address, size, register = place(arguments.address, arguments.size)
     if size is None:
         raise UsageError(
             f"no known register starts at 0x{address:04X}", hint="give the number of bytes: SIZE"
         )
     _check(address, size)
+    data = _read(arguments, address, size)
+    print(as_json(arguments, address, register, data) if arguments.json else show(register, data))
+    return 0
+
+
+def _read(arguments: argparse.Namespace, address: int, size: int) -> bytes:
+    from catenary.cli.devices import device_at
+    from catenary.procedure.registers import read_register
+    from catenary.target import MainDevice
+
+    if share_target.names_share(arguments.target):
+        return share_target.read_register(arguments, address, size)
     with MainDevice(arguments.target, force=True) as main:  # this command only reads
         note_other_masters(main)
         device = device_at(main.passive_scan(names=False), arguments.position)
-        data = main.converse(read_register(device.station, address, size))
-    print(as_json(arguments, address, register, data) if arguments.json else show(register, data))
-    return 0
+        return main.converse(read_register(device.station, address, size))
 
 
 def run_write(arguments: argparse.Namespace) -> int:

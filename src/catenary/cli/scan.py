@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import sys
 
+from catenary.cli import share_target
 from catenary.cli.parsers import Commands, add_command, add_force, add_json, add_target
 
 
@@ -27,6 +28,8 @@ def run(arguments: argparse.Namespace) -> int:
     from catenary.cli.failure import one_line, with_hint
     from catenary.target import MainDevice
 
+    if share_target.names_share(arguments.target):
+        return share_target.scan(arguments)
     with MainDevice(arguments.target, force=arguments.force) as main:
         devices = main.scan(strict=False)
         print(as_json(devices) if arguments.json else as_table(devices))

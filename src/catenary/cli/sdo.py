@@ -7,13 +7,16 @@ import json
 import sys
 from typing import TYPE_CHECKING
 
+from catenary.cli import share_target
 from catenary.cli.arguments import Entry, entry, position
 from catenary.cli.failure import UsageError, one_line
 from catenary.cli.parsers import Commands, add_command, add_force, add_json, add_target
+from catenary.cli.share_target import names_share
 from catenary.cli.text import escaped
 
 if TYPE_CHECKING:
     from catenary.model.device import ObjectInformation
+    from catenary.remote.messages import SdoValue
     from catenary.types import DataType, Value
 
 NUMBER_SIZES = (1, 2, 4, 8)  # sizes of numbers [bytes]
@@ -115,6 +118,8 @@ def run_read(arguments: argparse.Namespace) -> int:
 
     kind = _data_type(arguments.type)
     at: Entry = arguments.entry
+    if names_share(arguments.target):
+        return _show(arguments, share_target.sdo_read(arguments))
     with MainDevice(arguments.target, force=arguments.force) as main:
         device = device_at(main.scan(strict=False), arguments.position)
         data = device.sdo.read(at.index, at.subindex)
@@ -134,6 +139,9 @@ def run_write(arguments: argparse.Namespace) -> int:
     from catenary.target import MainDevice
 
     kind = _data_type(arguments.type)
+    if names_share(arguments.target):
+        written = share_target.sdo_write(arguments)
+        return _show(arguments, written) if arguments.json else 0
     if kind is None:
         raise UsageError(
             "sdo write needs --type", hint="add --type UDINT, or --type BYTES for hexadecimal bytes"
@@ -158,6 +166,8 @@ def run_list(arguments: argparse.Namespace) -> int:
     from catenary.cli.dictionary import as_json, as_lines, rows_of
     from catenary.target import MainDevice
 
+    if names_share(arguments.target):
+        return share_target.sdo_list(arguments)
     with MainDevice(arguments.target, force=arguments.force) as main:
         device = device_at(main.scan(strict=False), arguments.position)
         notes: list[str] = []
@@ -170,6 +180,15 @@ def run_list(arguments: argparse.Namespace) -> int:
                 print(line)
     for note in notes:
         print(f"note: {one_line(note)}", file=sys.stderr)
+    return 0
+
+
+def _show(arguments: argparse.Namespace, found: SdoValue) -> int:
+    """Print the value that the program of a share has read."""
+    if arguments.json:
+        print(_as_json(arguments, found.data, found.value))
+    else:
+        print(explain(found.data) if found.value is None else escaped(found.text))
     return 0
 
 

@@ -8,6 +8,7 @@ import sys
 from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
+from catenary.cli import share_target
 from catenary.cli.arguments import position
 from catenary.cli.parsers import (
     Commands,
@@ -63,6 +64,8 @@ def run(arguments: argparse.Namespace) -> int:
     from catenary.target import MainDevice
     from catenary.wire.al import AlState
 
+    if share_target.names_share(arguments.target):
+        return share_target.state(arguments)
     reads = arguments.state is None
     with MainDevice(arguments.target, force=reads or arguments.force) as main:
         if reads:

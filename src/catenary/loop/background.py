@@ -74,6 +74,7 @@ class Background:
         for session in self._sessions:
             session.engine.background = True
             session.end_background = self.end
+            session.update = self.update
         self._iteration.commit_lock = self._commit
         self._thread.start()
 

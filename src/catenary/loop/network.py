@@ -28,7 +28,7 @@ from catenary.loop.timing import Timing
 from catenary.plan.cycle import ExecutionMode, ReceiveMode
 from catenary.plan.options import PlanOptions, period_in_ns
 from catenary.plan.planner import Plan, make_plan
-from catenary.plan.sink import Sink
+from catenary.plan.sink import ServingSink, Sink
 from catenary.wire.al import AlState
 
 ENDING = CYCLE_WORKING_COUNTER | CYCLE_DROPPED | CYCLE_STOPPED | CYCLE_NONE | CYCLE_LAW_FAILED
@@ -122,7 +122,9 @@ class Network:
     ) -> None:
         self.main = main
         self.current_session: Session | None = None
-        self._requests = requests
+        self.number = 0  # of this network in the loop
+        self.count = 1  # networks of the loop
+        self.requests = requests
         self._settings = settings
         self._cpu = cpu
         self._sink = sink
@@ -192,7 +194,7 @@ class Network:
         session = Session(
             self.main,
             carried(plan) if is_carried else plan,
-            self._requests,
+            self.requests,
             abandon=abandon,
             stop=self._settings.stop,
             exchange=CarriedExchange if is_carried else FrameExchange,
@@ -200,17 +202,19 @@ class Network:
         session.switch_interval = self._settings.scheduling.switch_interval
         for law in self._settings.laws:
             session.laws.compile(law)
+        self.current_session = session
         if self._sink is not None:
             session.publish(self._sink)
-        self.current_session = session
+        if isinstance(self._sink, ServingSink):
+            self._sink.serve(self)
         return session
 
     def _make_plan(self) -> Plan:
         """Update the mappings from the devices, and return the plan of the requests."""
         its = self._settings
-        self.main.read_mappings(*self._requests, period=its.period)
+        self.main.read_mappings(*self.requests, period=its.period)
         devices = [sub.description for sub in self.main.subs]
-        return make_plan(devices, self._requests, its.plan_options(self.main, self._cpu))
+        return make_plan(devices, self.requests, its.plan_options(self.main, self._cpu))
 
     def advance(self, flags: int) -> None:
         """Judge a cycle that ran without an iteration, and raise its error, if any.

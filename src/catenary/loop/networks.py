@@ -178,12 +178,15 @@ def make_networks(
     if count > 1:
         refuse_for_several(settings)
         settings = replace(settings, clocks=clocks_of_several(settings.clocks))
-    return tuple(
+    networks = tuple(
         Network(main, mine, settings, cpu=one, sink=its)
         for (main, mine), one, its in zip(
             groups, cpus_for(count, cpu), one_sink_each(sink, count), strict=True
         )
     )
+    for number, network in enumerate(networks):
+        network.number, network.count = number, count
+    return networks
 
 
 def refuse_for_several(settings: Settings) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import ExitStack
+from contextlib import AbstractContextManager, ExitStack
 
 import numpy as np
 import numpy.typing as npt
@@ -87,6 +87,8 @@ class Session:
         self._publisher: Publisher | None = None
         self._counted: Mapping[str, int] = {}  # counters of the engine when the loop was entered
         self.end_background: Callable[[], None] = _no_background  # ends the thread that iterates
+        # In the background: begins a consistent set of targets, as `Loop.update`
+        self.update: Callable[[], AbstractContextManager[None]] | None = None
         self.service.cycle = self.cycle
 
     def _bind(self, requests: Sequence[ProcessDataRequest]) -> Views:

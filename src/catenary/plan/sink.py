@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Literal, Protocol
+from typing import Literal, Protocol, runtime_checkable
 
 Block = Literal["record", "actual", "target"]
 
@@ -61,3 +61,11 @@ class Sink(Protocol):
 
     def close(self) -> None:
         """End the publication. Another `open` may follow."""
+
+
+@runtime_checkable
+class ServingSink(Sink, Protocol):
+    """Sink that also serves requests to the loop of its data."""
+
+    def serve(self, network: object) -> None:
+        """Receive the `loop.Network` after `open`, before its first cycle. `close` ends it."""

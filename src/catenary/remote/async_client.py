@@ -11,14 +11,14 @@ from typing import Any
 from catenary.errors import CatenaryError, ResponseTimeout, ShareError
 from catenary.remote.client import GRACE
 from catenary.remote.connection import (
+    Answer,
     decode_response,
     encode_request,
     lost,
     open_connection,
-    result_of,
     retry_time,
 )
-from catenary.remote.messages import MESSAGE_SIZE, TIMEOUT, Response
+from catenary.remote.messages import MESSAGE_SIZE, TIMEOUT
 
 
 async def connect_async(
@@ -61,7 +61,7 @@ class AsyncClient:
         self._connection.setblocking(False)
         self._timeout = timeout
         self._serial = 0
-        self._waiting: dict[int, asyncio.Future[Response]] = {}
+        self._waiting: dict[int, tuple[Answer, asyncio.Future[Answer]]] = {}
         self._error: CatenaryError | None = None
         self._receiver = asyncio.get_running_loop().create_task(self._receive())
 
@@ -110,11 +110,12 @@ class AsyncClient:
         self._serial += 1
         serial = self._serial
         message = encode_request(serial, method, timeout, params)
-        answer = self._waiting[serial] = loop.create_future()
+        complete: asyncio.Future[Answer] = loop.create_future()
+        self._waiting[serial] = Answer(), complete
         try:
             async with asyncio.timeout(timeout + GRACE):
                 await loop.sock_sendall(self._connection, message)
-                return result_of(method, await answer)
+                return (await complete).result(method)
         except TimeoutError as error:
             raise ResponseTimeout(
                 f"the program of the share {self.name!r} did not answer {method!r} within "
@@ -132,9 +133,11 @@ class AsyncClient:
         try:
             while message := await loop.sock_recv(self._connection, MESSAGE_SIZE):
                 response = decode_response(message)
-                answer = self._waiting.get(response.serial)
-                if answer is not None and not answer.done():
-                    answer.set_result(response)
+                if response.serial in self._waiting:
+                    answer, complete = self._waiting[response.serial]
+                    answer.add(response)
+                    if answer.complete and not complete.done():
+                        complete.set_result(answer)
             self._fail(lost(self.name))
         except OSError:
             self._fail(lost(self.name))
@@ -143,6 +146,6 @@ class AsyncClient:
 
     def _fail(self, error: CatenaryError) -> None:
         self._error = self._error or error
-        for answer in self._waiting.values():
-            if not answer.done():
-                answer.set_exception(error)
+        for _, complete in self._waiting.values():
+            if not complete.done():
+                complete.set_exception(error)

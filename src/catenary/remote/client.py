@@ -11,11 +11,11 @@ from typing import Any
 from catenary.errors import ResponseTimeout, ShareError
 from catenary.remote import messages
 from catenary.remote.connection import (
+    Answer,
     decode_response,
     encode_request,
     lost,
     open_connection,
-    result_of,
     retry_time,
 )
 from catenary.remote.messages import MESSAGE_SIZE, TIMEOUT
@@ -105,7 +105,7 @@ class Client:
             try:
                 self._connection.settimeout(timeout + GRACE)
                 self._connection.send(message)
-                return result_of(method, self._response(method, timeout))
+                return self._answer(timeout).result(method)
             except TimeoutError as error:
                 raise ResponseTimeout(
                     f"the program of the share {self.name!r} did not answer {method!r} within "
@@ -115,18 +115,20 @@ class Client:
             except OSError as error:
                 raise lost(self.name) from error
 
-    def _response(self, method: str, timeout: float) -> messages.Response:
-        """Receive the response to the last request; discard late ones to earlier requests."""
+    def _answer(self, timeout: float) -> Answer:
+        """Receive the answer to the last request; discard late ones to earlier requests."""
         end = time.monotonic() + timeout + GRACE
-        while True:
+        answer = Answer()
+        while not answer.complete:
             message = self._connection.recv(MESSAGE_SIZE)
             if not message:
                 raise lost(self.name)
             response = decode_response(message)
-            if response.serial == self._serial:
-                return response
-            if time.monotonic() > end:
+            if response.serial in (self._serial, 0):  # 0: for the connection, not a request
+                answer.add(response)
+            elif time.monotonic() > end:
                 raise TimeoutError
+        return answer
 
     # Program and segment
 
@@ -272,14 +274,12 @@ class Client:
         """
         return self.call("set_parameters", law=law, values=dict(values))  # type: ignore[no-any-return]
 
-    def home(self, axes: Sequence[str], *, method: int | None = None) -> messages.Done:
-        """Start the homing of axes. The loop must run in the background.
+    def home(self, axes: Sequence[str]) -> messages.Done:
+        """Start the homing of axes by name, as their `Drives` define it.
 
-        Args:
-            axes: Names of the axes.
-            method: Homing method (0x6098); None: that of the drive.
+        The loop must run in the background.
         """
-        return self.call("home", axes=list(axes), method=method)  # type: ignore[no-any-return]
+        return self.call("home", axes=list(axes))  # type: ignore[no-any-return]
 
     def move(
         self, axes: Sequence[str], positions: Sequence[float], velocity: float | None = None

@@ -11,7 +11,15 @@ import msgspec
 
 from catenary import errors
 from catenary.errors import BusyError, CatenaryError, ShareError
-from catenary.remote.messages import MESSAGE_SIZE, RESULTS, VERSION, Failure, Request, Response
+from catenary.remote.messages import (
+    MESSAGE_SIZE,
+    RESULT_SIZE,
+    RESULTS,
+    VERSION,
+    Failure,
+    Request,
+    Response,
+)
 from catenary.share import folder
 from catenary.share.desk_socket import CREDENTIALS
 
@@ -101,17 +109,38 @@ def decode_response(message: bytes) -> Response:
     return found
 
 
-def result_of(method: str, response: Response) -> Any:
-    """Return the result of a response as the type in `RESULTS`, or raise its error.
+class Answer:
+    """Parts of the answer to one request, until the last one has arrived."""
+
+    def __init__(self) -> None:
+        self.complete = False
+        self._error: Failure | None = None
+        self._parts = bytearray()
+
+    def add(self, response: Response) -> None:
+        """Add the next part. Raises ShareError if the result is too long."""
+        self._error = response.error
+        self._parts += response.part
+        self.complete = not response.more
+        if len(self._parts) > RESULT_SIZE:
+            raise ShareError(f"the program sent a result of more than {RESULT_SIZE} bytes")
+
+    def result(self, method: str) -> Any:
+        """Return the result as the type in `RESULTS`, or raise the error of the request."""
+        if self._error is not None:
+            raise error_of(self._error)
+        return decode_result(method, bytes(self._parts))
+
+
+def decode_result(method: str, encoded: bytes) -> Any:
+    """Decode a result as the type in `RESULTS`. Raises ShareError if it is invalid.
 
     Args:
         method: Name of the method.
-        response: Response to the request.
+        encoded: The whole result.
     """
-    if response.error is not None:
-        raise error_of(response.error)
     try:
-        return msgspec.msgpack.decode(response.result, type=RESULTS[method])
+        return msgspec.msgpack.decode(encoded, type=RESULTS[method])
     except (msgspec.MsgspecError, ValueError, RecursionError) as error:
         raise ShareError(f"the program sent an invalid result of {method!r}: {error}") from error
 

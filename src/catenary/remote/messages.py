@@ -1,7 +1,8 @@
 """Messages of the remote service of a share, as frozen values: msgpack arrays and maps.
 
-A client sends a `Request` in one packet of a SOCK_SEQPACKET socket. The service answers with one
-`Response`. `RESULTS` names the type of each method's result. JSON has the same field names.
+A client sends a `Request` in one packet of a SOCK_SEQPACKET socket. The service answers with one or
+more `Response` packets, whose parts form the encoded result. `RESULTS` names the type of each
+method's result. JSON has the same field names.
 """
 
 from __future__ import annotations
@@ -12,11 +13,13 @@ import msgspec
 
 VERSION = 1
 MESSAGE_SIZE = 64 * 1024  # largest message [bytes]
+PART_SIZE = 32 * 1024  # largest part of a result [bytes]
+RESULT_SIZE = 1024 * 1024  # largest result [bytes]
 TIMEOUT = 5.0  # default deadline of a request [s]
 TIMEOUT_MAX = 60.0  # [s]
 
-Scalar: TypeAlias = bool | int | float | str | bytes | None
-Value: TypeAlias = Scalar | list[Any]
+Detail: TypeAlias = bool | int | float | str | None
+Value: TypeAlias = Any  # a number, text, bytes, or None; msgspec refuses their union
 
 
 class Request(msgspec.Struct, frozen=True, array_like=True):
@@ -35,16 +38,17 @@ class Failure(msgspec.Struct, frozen=True, kw_only=True):
     kind: str
     message: str
     hint: str = ""
-    details: dict[str, Scalar] = {}  # further arguments of the class
+    details: dict[str, Detail] = {}  # further arguments of the class
 
 
 class Response(msgspec.Struct, frozen=True, array_like=True):
-    """Answer to a request: a result, or an error."""
+    """Part of the answer to a request: a part of the encoded result, or an error."""
 
     version: int
     serial: int
     error: Failure | None = None
-    result: msgspec.Raw = msgspec.Raw(b"\xc0")  # nil
+    part: bytes = b""
+    more: bool = False  # True if another part follows
 
 
 class Hello(msgspec.Struct, frozen=True, kw_only=True):
@@ -80,6 +84,7 @@ class Device(msgspec.Struct, frozen=True, kw_only=True):
     position: int
     network: int
     name: str
+    order: str
     group: str
     vendor: int
     product: int

@@ -8,6 +8,7 @@ import msgspec
 
 from catenary.errors import ShareError
 from catenary.plan.sink import Incident
+from catenary.share._rows import Ring
 from catenary.share.layout import EVENT_SIZE
 
 ELLIPSIS = " ..."
@@ -64,6 +65,25 @@ def encodable(value: object) -> object:
     The text of a device must not stop a loop.
     """
     return value.encode(errors="replace").decode() if isinstance(value, str) else value
+
+
+def read_events(ring: Ring, after: int) -> tuple[list[SharedEvent], int]:
+    """Read the events of a ring after serial `after` that still exist, oldest first.
+
+    Args:
+        ring: ring of the events.
+        after: serial number.
+
+    Returns:
+        The events, and how many between `after` and the last one were overwritten.
+
+    Raises:
+        ShareError: an event is damaged.
+    """
+    rows, lost = ring.copy_after(after)
+    return [
+        decode_event(rows[at : at + EVENT_SIZE]) for at in range(0, len(rows), EVENT_SIZE)
+    ], lost
 
 
 def decode_event(row: bytes | bytearray) -> SharedEvent:

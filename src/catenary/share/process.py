@@ -39,7 +39,7 @@ def is_running(pid: int) -> bool:
 def this_process() -> Process:
     """Return the identity of the calling process."""
     pid = os.getpid()
-    return Process(pid, _start_time(pid) or 0, _boot_id(), _command(pid))
+    return Process(pid, _start_time(pid) or 0, _boot_id(), command_of(pid))
 
 
 def _start_time(pid: int) -> int | None:
@@ -60,7 +60,7 @@ def _boot_id() -> str:
         return ""
 
 
-def _command(pid: int) -> str:
+def command_of(pid: int) -> str:
     """Return the name of the program; for Python, that of the script or module."""
     try:
         words = Path(f"/proc/{pid}/cmdline").read_bytes().decode(errors="replace").split("\0")

@@ -17,7 +17,7 @@ from catenary.share._rows import CycleWriter, Ring
 from catenary.share.command_table import Desk, Values, make_desk
 from catenary.share.commands import AxisCommand, Commanded, CommandReader, LeaseEnd, apply
 from catenary.share.desk_socket import DeskSocket
-from catenary.share.events import encode_event
+from catenary.share.events import SharedEvent, encode_event, read_events
 from catenary.share.layout import ShareLayout, decode_head, encode_head, make_layout
 from catenary.share.memory import Segment
 from catenary.share.process import this_process
@@ -87,7 +87,7 @@ class Share:
         traceback: TracebackType | None,
     ) -> None:
         self._entered = False
-        if self._is_a_copy():
+        if self.is_inherited:
             return
         self.close()
         if self._segment is not None:
@@ -206,7 +206,7 @@ class Share:
 
         The data remains readable until the next loop opens or the `with` block ends.
         """
-        if self._is_a_copy():
+        if self.is_inherited:
             return
         with self._reporting:
             for ring in (self._events, self._cycles):
@@ -219,8 +219,19 @@ class Share:
                 self._socket.close()
                 self._socket = None
 
-    def _is_a_copy(self) -> bool:
-        """Return True in a forked child, which must not end the share of its parent."""
+    @property
+    def mode(self) -> int:
+        """Permissions of the share as for chmod."""
+        return self._mode
+
+    def shared_events(self, after: int) -> tuple[list[SharedEvent], int]:
+        """Return the events of the open loop after serial `after`, as `Reader.events`."""
+        with self._reporting:
+            return ([], 0) if self._events is None else read_events(self._events, after)
+
+    @property
+    def is_inherited(self) -> bool:
+        """True in a forked child, which must not end the share of its parent."""
         return self._pid != os.getpid()
 
     def _make_files(self, made: ShareLayout) -> tuple[Segment, Desk, DeskSocket]:

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 VIRTUAL = "virtual"
 VIRTUAL_REALTIME = "virtual-realtime"
 IGH = "igh"
+SHARE = "share"
 
 
 def parse(target: str) -> LinkSource:
@@ -34,6 +35,12 @@ def parse(target: str) -> LinkSource:
         return _virtual(rest, realtime=kind == VIRTUAL_REALTIME)
     if "," in target:
         return _ring(target)
+    if kind == SHARE:
+        raise ConfigurationError(
+            f"{target!r} is a running program, not a segment",
+            hint="these commands accept a share: scan, state, diag, sdo, reg read; in Python, use "
+            "cat.connect",
+        )
     if kind == IGH:
         return _kernel_master(target, rest)
     if not kind or colon or any(letter.isspace() or letter == "/" for letter in kind):

@@ -253,6 +253,33 @@ class Segment:
         """Plug in the uplinks of the first `devices` devices (None: all), and unplug the others."""
         self._plug_first(len(self._devices) if devices is None else devices)
 
+    def plug_port(self, device: int, port: int, plugged: bool) -> None:
+        """Plug or unplug the cable at a port. Any thread may call it.
+
+        Args:
+            device: Position of the device.
+            port: Number of the port.
+            plugged: True to plug the cable in.
+
+        Raises:
+            ValueError: No cable belongs to the port.
+        """
+        number = self._faults.wiring.cable_at(device, port)
+        self._wires.plug_cable(number, plugged)
+
+    def switch_power(self, device: int, on: bool) -> None:
+        """Switch a device on or off. Any thread may call it.
+
+        Raises:
+            ValueError: There is no such device.
+        """
+        if not 0 <= device < len(self._devices):
+            raise ValueError(f"there is no device {device}; it has {len(self._devices)} devices")
+        if on:
+            self._devices[device].switch_on()
+        else:
+            self._devices[device].switch_off()
+
     def _plug_first(self, devices: int) -> None:
         for number in range(len(self._devices)):
             self._wires.plug_cable(number, number < devices, at_once=True)

@@ -105,6 +105,21 @@ class Wiring:
         known = ", ".join(f"{_name(c.up)}-{_name(c.down)}" for c in self.cables[:40])
         raise ValueError(f"between: {one} and {other} are not neighbours; the cables are {known}")
 
+    def cable_at(self, device: int, port: int) -> int:
+        """Return the number of the cable at a port.
+
+        Args:
+            device: A device.
+            port: Number of the port.
+
+        Raises:
+            ValueError: No cable belongs to the port.
+        """
+        for number, cable in enumerate(self.cables):
+            if (device, port) in (cable.up, cable.down):
+                return number
+        raise ValueError(f"no cable belongs to port {port} of device {device}")
+
     def at_port(self, device: int, port: int) -> bool:
         """Return True if a cable is connected to this port."""
         return any((device, port) in (cable.up, cable.down) for cable in self.cables)

@@ -37,6 +37,11 @@ class LawRunner:
         self._compiled: dict[Law, CompiledLaw] = {}
         self._run: LawRun | None = None
 
+    @property
+    def current(self) -> LawRun | None:
+        """The law that was started last; None before the first one, and after a failure."""
+        return self._run
+
     def compile(self, law: Law) -> CompiledLaw:
         """Compile a law once, and return the result."""
         if law not in self._compiled:
