@@ -2,7 +2,8 @@
 #
 # PYTHON=/path/to/python3.12 selects another interpreter and recreates .venv.
 # `make docs` builds the documentation site into out/docs.
-# TEST="-k axis" passes options to pytest, and COBOT=--realtime to `make cobot`. `make rtlab` runs
+# TEST="-k axis" passes options to pytest, and COBOT=--realtime to `make cobot`. `make dashboard`
+# serves the operator's page of a virtual segment, or of a target: DASHBOARD=eth0. `make rtlab` runs
 # the benchmarks on a real-time kernel in QEMU. TABLE=quick or TABLE=pyigh,tasks selects tables, and
 # RTLAB="--out FOLDER" selects the folder of the results. TABLE=igh needs IGH=path, the path of a
 # build of IgH's master.
@@ -10,6 +11,7 @@ PYTHON ?= python3
 VENV := .venv
 TEST ?=
 COBOT ?=
+DASHBOARD ?= virtual
 TABLE ?= all
 RTLAB ?=
 IGH ?=
@@ -31,13 +33,16 @@ ifeq ($(wildcard $(VENV)/.built)$(filter clean,$(MAKECMDGOALS)),)
   endif
 endif
 
-.PHONY: demo cobot rtlab test lint docs hooks build clean
+.PHONY: demo cobot dashboard rtlab test lint docs hooks build clean
 
 demo: $(VENV)/.built
 	@$(VENV)/bin/catenary demo
 
 cobot: $(VENV)/.with-cobot
 	@$(VENV)/bin/python -m catenary.realtime.private_network examples/cobot/cobot.py $(COBOT)
+
+dashboard: $(VENV)/.with-dashboard
+	@$(VENV)/bin/catenary dashboard $(DASHBOARD)
 
 rtlab: $(VENV)/.with-test
 	@$(VENV)/bin/python -m tools.rtlab $(TABLE) $(if $(IGH),--igh $(abspath $(IGH))) $(RTLAB)

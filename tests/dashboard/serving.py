@@ -8,6 +8,7 @@ import struct
 import sys
 import threading
 from collections.abc import Iterator
+from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -20,14 +21,12 @@ from tests.share.processes import Program
 pytest.importorskip("starlette")
 pytest.importorskip("uvicorn")
 
-import uvicorn
 from websockets.sync.client import ClientConnection, connect
 
-from catenary.dashboard.app import make_app
 from catenary.dashboard.hub import Hub
 from catenary.dashboard.requests import Requests
 from catenary.dashboard.security import Access, Role
-from catenary.dashboard.server import Options, make_access, open_socket
+from catenary.dashboard.server import Options, make_access, make_server, open_socket
 from catenary.dashboard.source import Source
 
 PROGRAM = Path(__file__).with_name("loop_program.py")
@@ -59,23 +58,31 @@ class Page:
 
     def client(self, role: Role | None = "operator") -> httpx.Client:
         """Return an HTTP client, logged in unless `role` is None."""
-        client = httpx.Client(base_url=self.url, headers={"Origin": self.url}, timeout=DEADLINE)
-        if role is not None:
-            answer = client.post("/login", json={"token": self.access.token(role)})
-            assert answer.status_code == 204, answer.text
-        return client
+        name, _, value = ("" if role is None else self.cookie(role)).partition("=")
+        cookies = {name: value} if name else {}
+        headers = {"Origin": self.url}
+        return httpx.Client(base_url=self.url, headers=headers, cookies=cookies, timeout=DEADLINE)
+
+    def cookie(self, role: Role) -> str:
+        """Log in, and return the cookie as NAME=VALUE."""
+        return log_in(self.url, self.access.token(role))
 
     def socket(self, role: Role = "operator") -> Socket:
-        with self.client(role) as client:
-            cookie = client.cookies[self.access.cookie_name]
-        return Socket.of(self.url, f"{self.access.cookie_name}={cookie}")
+        return Socket.of(self.url, self.cookie(role))
+
+
+def log_in(url: str, token: str) -> str:
+    answer = httpx.post(f"{url}/login", json={"token": token}, headers={"Origin": url})
+    assert answer.status_code == 204, answer.text
+    return answer.headers["set-cookie"].partition(";")[0]
 
 
 class Socket:
     """WebSocket of a browser."""
 
-    def __init__(self, connection: ClientConnection) -> None:
-        self.connection = connection
+    def __init__(self, manager: AbstractContextManager[ClientConnection]) -> None:
+        self._manager = manager
+        self.connection: ClientConnection
 
     @classmethod
     def of(cls, url: str, cookie: str) -> Socket:
@@ -92,9 +99,7 @@ class Socket:
     @classmethod
     def open(cls, url: str, token: str) -> Socket:
         """Log in, and connect."""
-        answer = httpx.post(f"{url}/login", json={"token": token}, headers={"Origin": url})
-        assert answer.status_code == 204
-        return cls.of(url, answer.headers["set-cookie"].partition(";")[0])
+        return cls.of(url, log_in(url, token))
 
     def any(self) -> dict[str, object]:
         """Return the next message; skip frames."""
@@ -128,10 +133,11 @@ class Socket:
                 return decode_frame(received)
 
     def __enter__(self) -> Socket:
+        self.connection = self._manager.__enter__()
         return self
 
     def __exit__(self, *_: object) -> None:
-        self.connection.close()
+        self._manager.__exit__(None, None, None)
 
 
 @dataclass
@@ -161,16 +167,13 @@ def decode_frame(data: bytes) -> DecodedFrame:
 
 
 @contextlib.contextmanager
-def serving(share: str, *, port: int = 0, viewer_only: bool = False) -> Iterator[Page]:
+def serving(share: str, *, port: int = 0, **files: Path) -> Iterator[Page]:
     """Run a server in a thread."""
     listening = open_socket("127.0.0.1", port)
-    access = make_access(Options(port=listening.getsockname()[1], viewer_only=viewer_only))
+    options = Options(port=listening.getsockname()[1], **files)  # type: ignore[arg-type]
+    access = make_access(options)
     hub = Hub(Source(share), Requests(share))
-    settings = uvicorn.Config(
-        make_app(access, hub), log_level="warning", ws="websockets-sansio", ws_max_size=64 << 10,
-        ws_per_message_deflate=False, timeout_graceful_shutdown=1,
-    )  # fmt: skip
-    server = uvicorn.Server(settings)
+    server = make_server(access, hub, options)
     thread = threading.Thread(target=server.run, kwargs={"sockets": [listening]})
     thread.start()
     try:

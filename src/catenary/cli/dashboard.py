@@ -97,11 +97,11 @@ def run(arguments: argparse.Namespace) -> int:
     with interrupted_by_sigterm():
         if not is_target(source):
             run_server(source.removeprefix("share:"), options, announce)
-            return 0
-        share = f"dashboard-{os.getpid()}"
-        with OperateProcess(source, share, show) as program:
-            run_server(share, options, announce, program.problem)
-        return 0
+        else:
+            share = f"dashboard-{os.getpid()}"
+            with OperateProcess(source, share, show) as program:
+                run_server(share, options, announce, program.problem)
+    return 0
 
 
 class Announcer:

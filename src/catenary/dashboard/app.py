@@ -22,7 +22,7 @@ from catenary.dashboard.guard import Guard
 from catenary.dashboard.hub import Hub
 from catenary.dashboard.limits import RateLimit
 from catenary.dashboard.report import make_report
-from catenary.dashboard.requests import BusyError, error_body, is_allowed
+from catenary.dashboard.requests import FAILURES, BusyError, error_body, is_allowed
 from catenary.dashboard.security import SESSION_SECONDS, Access, Role
 from catenary.dashboard.static_files import StaticFile, read_static_files
 from catenary.errors import CatenaryError
@@ -76,6 +76,7 @@ def make_app(access: Access, hub: Hub, routes: tuple[BaseRoute, ...] = ()) -> Gu
         task.cancel()
 
     app = Starlette(routes=[*routes_of(page), *routes], lifespan=lifespan)
+    app.router.redirect_slashes = False
     app.state.page = page
     return Guard(app, access)
 
@@ -183,12 +184,12 @@ async def call(page: Page, request: Request, role: Role) -> Response:
     if isinstance(body, Response):
         return body
     if not is_allowed(body.method, role):
-        return refusal(403, f"a {role} cannot call {body.method!r}")
+        return refusal(403, f"the role {role} cannot call {body.method!r}")
     try:
         return json_response({"result": await page.hub.requests.call(body.method, body.params)})
     except BusyError as error:
         return json_response({"error": error_body(error), "retry": RETRY_SECONDS}, 429)
-    except (CatenaryError, ValueError, TypeError, OSError) as error:
+    except FAILURES as error:
         retry = getattr(error, "retry", None)
         extra = {} if retry is None else {"retry": retry}
         return json_response({"error": error_body(error), **extra}, 400)

@@ -5,26 +5,42 @@ from __future__ import annotations
 import asyncio
 import time
 from collections.abc import Callable, Coroutine
-from typing import TYPE_CHECKING
+from typing import Protocol
 
 import msgspec
 
 from catenary.dashboard.messages import encode_message
+from catenary.dashboard.outbox import Outbox
+from catenary.dashboard.requests import FAILURES, Requests
+from catenary.dashboard.security import Role
 from catenary.dashboard.source import Source
 from catenary.dashboard.status import AxisNotes, axis_statuses, cycle_status
 from catenary.dashboard.subscriptions import Subscriptions
-from catenary.errors import CatenaryError
+from catenary.errors import CatenaryError, ShareError
 from catenary.share import Reader, SharedEvent
-
-if TYPE_CHECKING:
-    from catenary.dashboard.client import Client
-    from catenary.dashboard.requests import Requests
 
 TICK = 1 / 60  # [s]
 STATUS_INTERVAL = 0.05  # [s]
 TIMING_INTERVAL = 0.5  # [s]
 CLIENTS_MAX = 32
 EVENTS_KEPT = 256
+ADVICE_SECONDS = 1.0  # limit for the advice of new events
+
+
+class Client(Protocol):
+    """Part of a client that the hub needs."""
+
+    role: Role
+    outbox: Outbox
+
+    def reason_no_jog(self) -> str | None:
+        """Return why the client cannot jog; None if it can."""
+
+    def follow_motion(self) -> None:
+        """Report changes of the jogs of the client."""
+
+    def forget_motion(self) -> None:
+        """Drop the jogs of the client."""
 
 
 class Hub:
@@ -44,8 +60,11 @@ class Hub:
         self.subscriptions: Subscriptions | None = None
         self.clients: set[Client] = set()
         self._problem = problem
+        self._reason = ""
         self._notes = AxisNotes()
-        self._events: list[SharedEvent] = []
+        self._events: list[dict[str, object]] = []
+        self._fresh: list[SharedEvent] = []
+        self._advising = False
         self._token = 0
         self._status_due = self._timing_due = 0.0
         self._tasks: set[asyncio.Task[None]] = set()
@@ -53,9 +72,16 @@ class Hub:
     async def run(self) -> None:
         """Serve the clients until the task is cancelled."""
         try:
+            due = time.monotonic()
             while True:
-                self.step(time.monotonic())
-                await asyncio.sleep(TICK)
+                now = time.monotonic()
+                try:
+                    self.step(now)
+                except ShareError as error:
+                    self.source.drop(error.message)
+                    self._change()
+                due = max(due + TICK, now)  # without catching up after a pause
+                await asyncio.sleep(due - time.monotonic())
         finally:
             self.source.close()
 
@@ -65,15 +91,16 @@ class Hub:
             self._change()
         reader = self.source.reader
         if reader is None:
+            self._send_reason()
             return
-        self._send_events()
+        self._take_events()
         if self.subscriptions is not None:
             self.subscriptions.deliver(reader, now)
         self._send_token(reader)
         for client in list(self.clients):
             client.follow_motion()
-        if now >= self._status_due:
-            self._status_due = now + STATUS_INTERVAL
+        if now >= self._status_due - TICK / 2:
+            self._status_due = max(self._status_due + STATUS_INTERVAL, now)
             self._send_status(reader)
         if now >= self._timing_due and self.clients:
             self._timing_due = now + TIMING_INTERVAL
@@ -95,28 +122,39 @@ class Hub:
 
     def event_rows(self) -> list[dict[str, object]]:
         """Return the newest events, oldest first."""
-        return [msgspec.structs.asdict(event) for event in self._events]
+        return list(self._events)
 
     def _change(self) -> None:
         """Tell all clients that the share has ended or returned."""
         reader = self.source.reader
-        self._notes, self._events, self._token = AxisNotes(), [], 0
+        self._notes, self._events, self._fresh, self._token = AxisNotes(), [], [], 0
         self.subscriptions = None if reader is None else Subscriptions(reader.layout)
         self.requests.reset()
         if reader is not None:
             self._start(self._find_devices())
+        self._reason = ""
         for client in list(self.clients):
             client.forget_motion()
-            self._greet(client)
+            if reader is not None:
+                self._greet(client)
+
+    def _send_reason(self) -> None:
+        """Send why there is no share, if the reason has changed."""
+        reason = self._problem() or self.source.reason
+        if reason != self._reason:
+            self._reason = reason
+            self._send_all(encode_message("gone", reason=reason))
 
     def _greet(self, client: Client) -> None:
         reader = self.source.reader
         if reader is None:
-            client.send(encode_message("gone", reason=self._problem() or self.source.reason))
+            client.outbox.put_text(
+                encode_message("gone", reason=self._problem() or self.source.reason)
+            )
             return
-        client.send(self._hello(reader, client))
+        client.outbox.put_text(self._hello(reader, client))
         for event in self._events:
-            client.send(event_message(event))
+            client.outbox.put_text(encode_message("event", **event))
 
     def _hello(self, reader: Reader, client: Client) -> str:
         layout = reader.layout
@@ -140,11 +178,39 @@ class Hub:
             remote=self.requests.is_available(),
         )
 
-    def _send_events(self) -> None:
-        for event in self.source.new_events():
+    def _take_events(self) -> None:
+        """Note new events, and send them when their advice is known."""
+        events = self.source.new_events()
+        for event in events:
             self._notes.add(event)
-            self._events = [*self._events[1 - EVENTS_KEPT :], event]
-            self._send_all(event_message(event))
+        self._fresh += events
+        if self._fresh and not self._advising:
+            self._start(self._send_events(self._fresh))
+            self._fresh = []
+
+    async def _send_events(self, events: list[SharedEvent]) -> None:
+        """Send events with the advice of the program; without advice if it does not answer."""
+        self._advising, notes = True, self._notes
+        try:
+            advice = await self._advice(events[0].serial - 1)
+        finally:
+            self._advising = False
+        if notes is not self._notes:
+            return  # the share has changed
+        for event in events:
+            row = {**msgspec.structs.asdict(event), "advice": advice.get(event.serial, "")}
+            self._events = [*self._events[1 - EVENTS_KEPT :], row]
+            self._send_all(encode_message("event", **row))
+
+    async def _advice(self, after: int) -> dict[int, str]:
+        """Return the advice for the events after a serial number."""
+        if not self.requests.is_available():
+            return {}
+        try:
+            found = await self.requests.call("events", {"after": after}, timeout=ADVICE_SECONDS)
+        except FAILURES:
+            return {}
+        return {each["serial"]: each["advice"] for each in msgspec.to_builtins(found)["events"]}
 
     def _send_token(self, reader: Reader) -> None:
         if self.source.reason_no_jog is not None:
@@ -159,7 +225,7 @@ class Hub:
             text = encode_message("token", token=str(token))
             for client in self.clients:
                 if client.role == "operator":
-                    client.send(text)
+                    client.outbox.put_text(text)
 
     def _send_status(self, reader: Reader) -> None:
         if not self.clients or reader.number == 0:
@@ -180,7 +246,7 @@ class Hub:
     async def _send_timing(self) -> None:
         try:
             timing = await self.requests.call("timing", {"histograms": True})
-        except (CatenaryError, OSError):
+        except FAILURES:
             return  # the page shows that the program does not answer
         self._send_all(encode_message("timing", **msgspec.to_builtins(timing)))
 
@@ -189,21 +255,15 @@ class Hub:
         notes = self._notes
         try:
             axes = await self.requests.call("axes", {})
-        except (CatenaryError, OSError):
+        except FAILURES:
             return  # without it, the text of a fault does not name the error code
         notes.devices = {axis["name"]: axis["device"] for axis in msgspec.to_builtins(axes)}
 
     def _send_all(self, text: str) -> None:
         for client in self.clients:
-            client.send(text)
+            client.outbox.put_text(text)
 
     def _start(self, work: Coroutine[None, None, None]) -> None:
         task = asyncio.get_running_loop().create_task(work)
         self._tasks.add(task)
         task.add_done_callback(self._tasks.discard)
-
-
-def event_message(event: SharedEvent) -> str:
-    """Return the message about an event."""
-    content = msgspec.structs.asdict(event)
-    return encode_message("event", advice="", **content)

@@ -10,7 +10,7 @@ from platform import platform
 import msgspec
 
 from catenary.dashboard.hub import Hub
-from catenary.errors import CatenaryError
+from catenary.dashboard.requests import FAILURES
 
 SECTIONS = (
     ("Diagnosis", "diagnosis"),
@@ -35,7 +35,7 @@ async def make_report(hub: Hub) -> str:
     for title, method in SECTIONS:
         try:
             result = msgspec.to_builtins(await hub.requests.call(method, {}))
-        except (CatenaryError, OSError) as error:
+        except FAILURES as error:
             parts.append(section(title, f"<p>not available: {html.escape(str(error))}</p>"))
         else:
             parts.append(section(title, as_html(result)))

@@ -8,11 +8,12 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 from catenary.dashboard.security import Role
-from catenary.errors import CatenaryError
+from catenary.errors import CatenaryError, ResponseTimeout, ShareError
 
 if TYPE_CHECKING:
     from catenary.remote import Client
 
+FAILURES = (CatenaryError, OSError, RuntimeError, TypeError, ValueError)  # of a request
 CONNECTIONS = 6
 CALLS_MAX = 32  # that wait or run
 READS = frozenset(
@@ -60,34 +61,47 @@ class Requests:
             client.close()
         self._answers = True
 
-    async def call(self, method: str, params: Mapping[str, object]) -> object:
+    async def call(
+        self, method: str, params: Mapping[str, object], *, timeout: float | None = None
+    ) -> object:
         """Return the result of a method of `catenary.remote.Client`.
 
         Args:
             method: name of the method.
             params: its arguments.
+            timeout: deadline [s]; None: that of the client.
 
         Raises:
             CatenaryError: the program refused the request, or does not answer.
             BusyError: too many requests are waiting.
+            RuntimeError: the state of the program does not permit the request.
+            TypeError: the arguments do not fit the method.
+            ValueError: a value is not valid.
         """
         if self._waiting >= CALLS_MAX:
             raise BusyError
         self._waiting += 1
         try:
             async with self._running:
-                return await asyncio.to_thread(self._call, method, params)
+                return await asyncio.to_thread(self._call, method, params, timeout)
         finally:
             self._waiting -= 1
 
-    def _call(self, method: str, params: Mapping[str, object]) -> object:
+    def _call(self, method: str, params: Mapping[str, object], timeout: float | None) -> object:
+        if "timeout" in params:
+            raise ValueError("the server chooses the deadline; omit `timeout`")
         client, generation = self._take()
+        keep = False
         try:
-            result = client.call(method, **params)
-        except BaseException:
-            client.close()
+            result: object = client.call(method, timeout=timeout, **params)
+            keep = True
+        except (ShareError, ResponseTimeout, OSError):
             raise
-        self._give_back(client, generation)
+        except Exception:
+            keep = True  # the program has answered with an error
+            raise
+        finally:
+            self._give_back(client, generation, keep)
         return result
 
     def _take(self) -> tuple[Client, int]:
@@ -105,9 +119,9 @@ class Requests:
         self._answers = True
         return client, generation
 
-    def _give_back(self, client: Client, generation: int) -> None:
+    def _give_back(self, client: Client, generation: int, keep: bool) -> None:
         with self._lock:
-            if generation == self._generation:
+            if keep and generation == self._generation:
                 self._idle.append(client)
                 return
         client.close()

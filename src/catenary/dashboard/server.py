@@ -6,14 +6,21 @@ import io
 import socket
 import ssl
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from catenary.dashboard.security import Access, Role, is_loopback, load_key
 from catenary.errors import ConfigurationError
 from catenary.share.folder import own_folder, prepare
 
+if TYPE_CHECKING:
+    import uvicorn
+
+    from catenary.dashboard.hub import Hub
+
 PORT = 8710
+CONNECTIONS_MAX = 128
 MESSAGE_MAX = 64 << 10  # bytes of a message of a browser
 PING_SECONDS = 10.0
 NEEDED = ("starlette", "uvicorn", "websockets", "segno")
@@ -87,8 +94,8 @@ def open_socket(host: str, port: int) -> socket.socket:
     """
     try:
         found = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE)
-        family, _, _, _, address = found[0]
-        listening = socket.socket(family)
+        family, kind, protocol, _, address = found[0]
+        listening = socket.socket(family, kind, protocol)  # asyncio disables Nagle only for TCP
         listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         listening.bind(address)
         listening.listen(64)
@@ -149,6 +156,35 @@ def announcement(access: Access, *, draw: bool = True) -> str:
     return "\n".join(lines)
 
 
+def make_server(access: Access, hub: Hub, options: Options) -> uvicorn.Server:
+    """Return a server that is not started.
+
+    Args:
+        access: tokens and roles.
+        hub: connection to the share.
+        options: options of the server.
+    """
+    import uvicorn
+
+    from catenary.dashboard.app import make_app
+
+    settings = uvicorn.Config(
+        make_app(access, hub),
+        log_level="warning",
+        ssl_certfile=options.cert,
+        ssl_keyfile=options.key,
+        ws="websockets-sansio",
+        ws_max_size=MESSAGE_MAX,
+        ws_per_message_deflate=False,
+        ws_ping_interval=PING_SECONDS,
+        ws_ping_timeout=PING_SECONDS,
+        limit_concurrency=CONNECTIONS_MAX,
+        timeout_graceful_shutdown=2,
+        server_header=False,
+    )
+    return uvicorn.Server(settings)
+
+
 def run_server(
     share: str,
     options: Options,
@@ -167,11 +203,6 @@ def run_server(
         ConfigurationError: an option is not valid, or a package is missing.
     """
     require_packages()
-    from dataclasses import replace
-
-    import uvicorn
-
-    from catenary.dashboard.app import make_app
     from catenary.dashboard.hub import Hub
     from catenary.dashboard.requests import Requests
     from catenary.dashboard.source import Source
@@ -179,22 +210,6 @@ def run_server(
     with open_socket(options.host, options.port) as listening:
         access = make_access(replace(options, port=listening.getsockname()[1]))
         hub = Hub(Source(share, uid=options.uid), Requests(share, options.uid), problem)
-        settings = uvicorn.Config(
-            make_app(access, hub),
-            log_level="warning",
-            ssl_certfile=options.cert,
-            ssl_keyfile=options.key,
-            ws="websockets-sansio",
-            ws_max_size=MESSAGE_MAX,
-            ws_per_message_deflate=False,
-            ws_ping_interval=PING_SECONDS,
-            ws_ping_timeout=PING_SECONDS,
-            limit_concurrency=128,
-            timeout_graceful_shutdown=2,
-            server_header=False,
-        )
+        server = make_server(access, hub, options)
         announce(access)
-        try:
-            uvicorn.Server(settings).run(sockets=[listening])
-        except KeyboardInterrupt:
-            return  # uvicorn raises the signal again after its shutdown
+        server.run(sockets=[listening])

@@ -61,6 +61,13 @@ class Source:
             self.reader.close()
             self.reader = None
 
+    def drop(self, reason: str) -> None:
+        """Detach from a damaged share, and attach again only to a later run."""
+        if self.reader is not None:
+            self._ended_run = self.reader.layout.run
+        self.reason = reason
+        self.close()
+
     def silent(self) -> float:
         """Return the time since the last new cycle [s]; 0 while no share exists."""
         if self.reader is None:
@@ -107,9 +114,7 @@ class Source:
         if state == "running":
             return False
         writer = reader.layout.writer
-        self.reason = GONE[state].format(name=self.name, writer=writer)
-        self._ended_run = reader.layout.run
-        self.close()
+        self.drop(GONE[state].format(name=self.name, writer=writer))
         return True
 
     def _damaged(self, message: str) -> SharedEvent:
@@ -120,10 +125,10 @@ class Source:
 def reason_no_commands(reader: Reader) -> str | None:
     """Return why the program of a share accepts no jogs from this user; None if it does."""
     try:
-        token = reader.token
+        _ = reader.token  # opens the desk, so that a later stop need not
     except CatenaryError as error:
         return error.message
-    return None if token else "the program has opened its share without jog=True"
+    return None if reader.layout.jog else "the program has opened its share without jog=True"
 
 
 def existing_shares(uid: int | None = None) -> list[str]:

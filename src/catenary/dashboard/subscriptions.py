@@ -20,6 +20,7 @@ from catenary.share import Reader, ShareLayout
 
 GROUPS_MAX = 256
 ROWS_MAX = 4096  # of a frame
+EARLY = 0.008  # [s] half a tick of the hub: the nearest tick sends a frame
 
 Key = tuple[tuple[str, ...], bool, float]
 Deliver = Callable[[int, Frame], None]
@@ -95,7 +96,7 @@ class Subscriptions:
         """
         known: dict[int, tuple[Rows, int]] = {}
         for group in self._groups.values():
-            if now < group.due:
+            if now < group.due - EARLY:
                 continue
             group.due = max(group.due + group.interval, now)
             if group.after not in known:

@@ -24,7 +24,7 @@ class OperateProcess:
 
     def __init__(self, target: str, share: str, show: Callable[[str], None]) -> None:
         self._show = show
-        self._problem = ""
+        self._problem = f"the program for {target} is starting"
         self._target = target
         self._ending = False
         self._child = start_python(["-m", "catenary.operate", target, share])
@@ -37,7 +37,7 @@ class OperateProcess:
         return self._child.pid
 
     def problem(self) -> str:
-        """Return the error that ended the process; "" while it runs without one."""
+        """Return why there are no cycles: the start or the error of the process; "" otherwise."""
         return self._problem
 
     def end(self) -> None:
@@ -59,13 +59,16 @@ class OperateProcess:
         self.end()
 
     def _read(self) -> None:
+        failed = ""
         while (line := self._child.read_line(FOREVER)) is not None:
             kind, _, text = line.partition(" ")
-            if kind == "error":
-                self._problem = f"the program for {self._target} has ended: {text}"
+            if kind == "ready":
+                self._problem = ""
+            elif kind == "error":
+                self._problem = failed = f"the program for {self._target} has ended: {text}"
             if text:
                 self._show(f"{kind}: {text}")
-        if not self._ending and not self._problem:
+        if not self._ending and not failed:
             status = self._child.process.wait()
             self._problem = f"the program for {self._target} has ended with status {status}"
             self._show(f"error: {self._problem}")

@@ -17,7 +17,7 @@ from catenary.machine import Machine
 from catenary.machine.options import loop_options
 from catenary.machine.read import read_machine
 from catenary.operate.devices import make_requests
-from catenary.share import Share
+from catenary.remote.share import Share
 from catenary.target import MainDevice, is_machine_file
 
 LOOK_SECONDS = 0.2  # between two looks at the error of the loop

@@ -1,0 +1,83 @@
+"""Command line of `catenary dashboard`."""
+
+from __future__ import annotations
+
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from catenary.cli import dashboard
+from catenary.cli.failure import UsageError
+from catenary.cli.main import main, make_parser
+
+
+def test_help_names_the_safety_limit(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as ended:
+        main(["dashboard", "--help"])
+    assert ended.value.code == 0
+    text = " ".join(capsys.readouterr().out.split())
+    assert "not an emergency stop (ISO 13850)" in text
+    assert "--viewer-only" in text
+
+
+@pytest.mark.parametrize("port", ["-1", "65536", "x"])
+def test_an_impossible_port_is_refused(port: str) -> None:
+    with pytest.raises(SystemExit) as ended:
+        make_parser().parse_args(["dashboard", "arm", "--port", port])
+    assert ended.value.code == 2
+
+
+@pytest.mark.parametrize(
+    ("source", "answer"),
+    [
+        ("virtual", True),
+        ("virtual:cell.toml", True),
+        ("machine.toml", True),
+        ("igh:0", True),
+        ("eth0,eth1", True),
+        ("lo", True),
+        ("no-such-share", False),
+        ("share:virtual", False),
+    ],
+)
+def test_targets_and_shares(source: str, answer: bool) -> None:
+    assert dashboard.is_target(source) == answer
+
+
+def test_an_existing_share_precedes_an_interface(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("catenary.dashboard.source.names", lambda uid: ["lo"])
+    assert not dashboard.is_target("lo")
+
+
+def test_the_only_share_is_the_default(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("catenary.dashboard.source.names", lambda uid: ["arm"])
+    assert dashboard.only_share(None) == "arm"
+
+
+@pytest.mark.parametrize(("names", "text"), [([], "there is none"), (["a", "b"], "several: a, b")])
+def test_without_one_share_the_name_is_needed(
+    names: list[str], text: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("catenary.dashboard.source.names", lambda uid: names)
+    with pytest.raises(UsageError, match=text):
+        dashboard.only_share(None)
+
+
+def test_a_window_needs_chromium(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("shutil.which", lambda name: None)
+    with pytest.raises(UsageError, match="Chromium"):
+        dashboard.Announcer(window=True)
+
+
+@pytest.mark.parametrize("kind", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_ends_the_server_with_status_0(kind: signal.Signals, tmp_path: Path) -> None:
+    pytest.importorskip("starlette")
+    command = [sys.executable, "-m", "catenary.cli", "dashboard", "no-such-share", "--port", "0"]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as server:
+        assert server.stdout is not None
+        assert server.stdout.readline().startswith("operator: http://127.0.0.1:")
+        server.send_signal(kind)
+        assert server.wait(30) == 0
