@@ -77,9 +77,11 @@ def frame(subscription: int, signals: int, first: int, rows: int, lost: int = 0)
 class Session:
     """One WebSocket client; it owns the table of its subscriptions."""
 
-    def __init__(self, websocket: Any, axes: int) -> None:
+    def __init__(self, websocket: Any, axes: int, scene: Any = None) -> None:
         self.websocket = websocket
         self.axes = axes
+        self.scene = scene
+        self.poses = False
         self.subscriptions: dict[int, int] = {}
 
     async def run(self) -> None:
@@ -101,6 +103,8 @@ class Session:
             self.subscriptions[message["id"]] = len(message["signals"])
         elif message["op"] == "unsubscribe":
             self.subscriptions.pop(message["id"], None)
+        elif message["op"] == "poses":
+            self.poses = message["rate"] > 0
 
     async def send(self) -> None:
         """Send the samples since the last frame 60 times per second."""
@@ -111,13 +115,28 @@ class Session:
             now = int(clock() / PERIOD)
             for number, signals in list(self.subscriptions.items()):
                 await self.websocket.send_bytes(frame(number, signals, last, now - last))
+            if self.scene is not None and self.poses:
+                await self.websocket.send_bytes(self.pose_message(now))
             last = now
 
 
-def application(static: Path, axes: int) -> Any:
-    """Return the ASGI application."""
+    def pose_message(self, cycle: int) -> bytes:
+        """Return the poses at a cycle; the targets are 0.2 s ahead."""
+        actual, target = samples(self.axes, cycle, 1), samples(self.axes, cycle + 200, 1)
+        poses: bytes = self.scene.poses(cycle * PERIOD, actual[:, 0], target[:, 0])
+        return poses
+
+
+def application(static: Path, axes: int, scene: Any = None) -> Any:
+    """Return the ASGI application.
+
+    Args:
+        static: folder of the page.
+        axes: number of axes.
+        scene: `catenary.dashboard.scene.Scene` with as many axes; None: without 3D.
+    """
     from starlette.applications import Starlette
-    from starlette.responses import FileResponse, JSONResponse
+    from starlette.responses import FileResponse, JSONResponse, Response
     from starlette.routing import Route, WebSocketRoute
 
     async def session(_request: Any) -> Any:
@@ -129,12 +148,16 @@ def application(static: Path, axes: int) -> Any:
         name = Path(request.path_params["name"] or "index.html").name
         return FileResponse(static / name, headers={"Content-Security-Policy": CSP})
 
+    async def shapes(_request: Any) -> Any:
+        return Response(scene.data) if scene is not None else Response(status_code=404)
+
     async def socket(websocket: Any) -> None:
-        await Session(websocket, axes).run()
+        await Session(websocket, axes, scene).run()
 
     return Starlette(
         routes=[
             Route("/api/session", session),
+            Route("/scene", shapes),
             WebSocketRoute("/ws", socket),
             Route("/{name:path}", file),
         ]
@@ -142,11 +165,11 @@ def application(static: Path, axes: int) -> Any:
 
 
 @contextmanager
-def serving(static: Path, axes: int = 33) -> Iterator[str]:
-    """Serve the page in a thread, and return its address."""
+def serving(static: Path, axes: int = 33, scene: Any = None) -> Iterator[str]:
+    """Serve the page in a thread, and return its address. The arguments are of `application`."""
     import uvicorn
 
-    config = uvicorn.Config(application(static, axes), port=0, log_level="error")
+    config = uvicorn.Config(application(static, axes, scene), port=0, log_level="error")
     server = uvicorn.Server(config)
     thread = threading.Thread(target=server.run, daemon=True)
     thread.start()

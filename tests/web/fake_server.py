@@ -1,4 +1,4 @@
-"""Server of the page for browser tests: plausible answers, and a record of all messages of the page."""
+"""Server of the page for browser tests: plausible answers, and a record of all messages."""
 
 from __future__ import annotations
 
@@ -13,7 +13,12 @@ from playwright.sync_api import BrowserContext, Page, Route, WebSocketRoute
 
 STATIC = Path(__file__).parents[2] / "src/catenary/dashboard/static"
 ORIGIN = "http://catenary.test"
-TYPES = {".html": "text/html", ".js": "text/javascript", ".css": "text/css", ".svg": "image/svg+xml"}
+TYPES = {
+    ".html": "text/html",
+    ".js": "text/javascript",
+    ".css": "text/css",
+    ".svg": "image/svg+xml",
+}
 CSP = (
     "default-src 'none'; script-src 'self'; style-src 'self'; connect-src 'self'; img-src 'self'; "
     "frame-ancestors 'none'; require-trusted-types-for 'script'"
@@ -33,6 +38,7 @@ class FakeServer:
         self.reason_no_jog: str | None = None
         self.axes = [f"joint_{number}" for number in range(1, axes + 1)]
         self.enabled = True
+        self.jogged = False  # the first axis is in a jog: it does not follow the application
         self.state = "running"
         self.run = "run-1"
         self.number = 480_000
@@ -106,6 +112,8 @@ class FakeServer:
                     "version": "0.1.0",
                 }
             )
+        elif path == "/scene":
+            route.fulfill(status=204)
         elif path == "/login":
             route.fulfill(status=204 if "right" in (route.request.post_data or "") else 403)
         else:
@@ -118,7 +126,10 @@ class FakeServer:
 
     def _serve_file(self, route: Route, path: str) -> None:
         file = STATIC / (path.lstrip("/") or "index.html")
-        headers = {"Content-Security-Policy": CSP, "Content-Type": TYPES.get(file.suffix, "text/plain")}
+        headers = {
+            "Content-Security-Policy": CSP,
+            "Content-Type": TYPES.get(file.suffix, "text/plain"),
+        }
         route.fulfill(body=file.read_bytes(), headers=headers)
 
 
@@ -183,8 +194,8 @@ def make_axis_status(server: FakeServer, at: int, name: str, now: float) -> Mess
     return {
         "name": name,
         "state": state,
-        "enabled": enabled,
-        "jogged": False,
+        "enabled": enabled and not (server.jogged and at == 0),
+        "jogged": server.jogged and at == 0,
         "fault": "0x8611: following error" if fault else "",
         "stop_reason": "the drive left operation because of a fault" if fault else "",
         "position": 1.2 * math.sin(phase),
@@ -200,7 +211,7 @@ def make_axis(at: int, name: str) -> Message:
         "network": 0,
         "device": at + 1,
         "unit": "rad",
-        "mode": "CSP",
+        "mode": 8,
         "position_min": None if at == 5 else -2.9,
         "position_max": None if at == 5 else 2.9,
         "velocity_limit": 3.14,
@@ -221,11 +232,15 @@ def make_device(position: int, count: int, axes: list[str]) -> Message:
     if position == 3:
         parent, port = 1, 2
     last = position == count - 1
-    links = {0: True, 1: not (position == 2), 2: position == 1, 3: False}
+    links = {0: True, 1: position != 2, 2: position == 1, 3: False}
     return {
         "position": position,
         "network": 0,
-        "name": f"servo_{position}" if own else "EK1100" if position == 0 else f"EL{1000 + position}",
+        "name": f"servo_{position}"
+        if own
+        else "EK1100"
+        if position == 0
+        else f"EL{1000 + position}",
         "group": "Drives" if own else "Couplers",
         "vendor": 2,
         "product": 0x044C2C52,
@@ -258,11 +273,21 @@ def make_device(position: int, count: int, axes: list[str]) -> Message:
     }
 
 
-def make_clocks(count: int) -> list[Message]:
-    return [
-        {"position": position, "reference": position == 1, "offset_ns": (-1) ** position * 14}
+def name_of(position: int) -> str:
+    return "EK1100" if position == 0 else f"servo_{position}"
+
+
+def make_clocks(count: int) -> Message:
+    clocks = [
+        {
+            "position": position,
+            "name": f"servo_{position}",
+            "reference": position == 1,
+            "difference": None if position == 1 else (-1) ** position * 14e-9,
+        }
         for position in range(1, min(count, 5))
     ]
+    return {"clocks": clocks, "locked": True, "text": ""}
 
 
 def make_objects(params: Message) -> Message:
@@ -273,7 +298,7 @@ def make_objects(params: Message) -> Message:
             make_object(0x6060, "Modes of operation", "SINT", options={"8": "CSP", "9": "CSV"}),
             make_object(0x6065, "Following error window", "UDINT", unit="counts"),
         ]
-    return {"entries": entries, "next": [0x60FF, 0] if first == 0x6000 else None}
+    return {"entries": entries, "next": 0x60FF00 if first == 0x6000 else None, "notes": []}
 
 
 def make_object(
@@ -318,5 +343,7 @@ def make_histogram(median: float, number: int) -> list[list[float]]:
     total = sum(heights)
     counts = [round(number * each / total) for each in heights]
     return [
-        [low, high, count] for low, high, count in zip(edges, edges[1:], counts, strict=False) if count
+        [low, high, count]
+        for low, high, count in zip(edges, edges[1:], counts, strict=False)
+        if count
     ]

@@ -68,6 +68,8 @@ export class Connection {
   readonly losing = computed(() => (this.status.value?.lost_in_row ?? 0) > 0);
   readonly delay = signal<number | null>(null); // round trip to the server [ms]
 
+  readonly stops = signal(0); // number of quick stops that this page requested
+
   private socket: WebSocket | null = null;
   private backoff = BACKOFF_FIRST;
   private nextId = 1;
@@ -159,9 +161,11 @@ export class Connection {
     this.send({ op: "release", axis, press });
   }
 
-  /** Quick stop of all axes. Return false if there is no connection. */
+  /** Request a quick stop of all axes. Return false if there is no connection. */
   stop(): boolean {
-    return this.send({ op: "stop" });
+    const sent = this.send({ op: "stop" });
+    this.stops.value += 1;
+    return sent;
   }
 
   request(axes: number[] | null, state: AxisRequest): void {

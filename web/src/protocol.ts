@@ -96,6 +96,23 @@ export interface StateRequest {
   state: AxisRequest;
 }
 
+/** Request the poses of the 3D scene (kind 3) at a rate [Hz]; 0 ends them. */
+export interface PosesRequest {
+  op: "poses";
+  rate: number;
+}
+
+/** Push a body of a simulated robot until the next push; a force of 0 ends it. */
+export interface PushRequest {
+  op: "push";
+  /** Number of the body in the scene. */
+  body: number;
+  /** In the frame of the body [m]. */
+  point: [number, number, number];
+  /** In the frame of the world [N]. */
+  force: [number, number, number];
+}
+
 export interface Ping {
   op: "ping";
   t: number;
@@ -109,6 +126,8 @@ export type ClientMessage =
   | Release
   | Stop
   | StateRequest
+  | PosesRequest
+  | PushRequest
   | Ping;
 
 // WebSocket /ws: server to client

@@ -6,9 +6,9 @@ export interface Greeting {
   version: string;
   pid: number;
   program: string;
-  share: string | null;
+  share: string;
   period: number; // [s]
-  networks: string[];
+  networks: number;
   jog: boolean;
   virtual: boolean; // true: cables and power of the segment can be changed
   started: number; // UTC [s]
@@ -18,9 +18,9 @@ export interface Port {
   port: number;
   link: boolean;
   loop_closed: boolean;
-  rx_errors: number | null;
-  forwarded_errors: number | null;
-  lost_links: number | null;
+  rx_errors: number;
+  forwarded_errors: number;
+  lost_links: number;
 }
 
 export interface Device {
@@ -52,7 +52,7 @@ export interface AxisInfo {
   network: number;
   device: number;
   unit: "rad" | "m";
-  mode: string;
+  mode: number; // 0x6060
   position_min: number | null; // null: none
   position_max: number | null;
   velocity_limit: number | null;
@@ -77,7 +77,8 @@ export interface ObjectEntry {
 
 export interface ObjectPage {
   entries: ObjectEntry[];
-  next: [number, number] | number | null;
+  next: number | null; // `after` of the next page
+  notes: string[];
 }
 
 export interface ObjectValue {
@@ -98,15 +99,38 @@ export interface Diagnosis {
   text: string;
 }
 
-export interface ClockInfo {
-  [name: string]: unknown;
+/** Result of `catenary doctor`. */
+export interface Check {
+  id: string;
+  status: "PASS" | "WARN" | "FAIL" | "SKIP";
+  found: string;
+  advice: string;
 }
 
-export interface Finding {
-  [name: string]: unknown;
+export interface Examination {
+  checks: Check[];
 }
 
 export interface Emergency {
-  code: number;
+  error_code: number;
+  error_register: number;
   text: string;
+}
+
+export interface Clock {
+  position: number;
+  name: string;
+  reference: boolean;
+  difference: number | null; // [s]
+}
+
+export interface Clocks {
+  clocks: Clock[];
+  locked: boolean;
+  text: string;
+}
+
+/** Completion of a request. `note` describes a side effect. */
+export interface Done {
+  note: string;
 }

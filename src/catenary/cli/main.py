@@ -16,6 +16,7 @@ from catenary.cli import (
     diag,
     doctor,
     esi,
+    foxglove,
     graph,
     init,
     plot,
@@ -26,6 +27,7 @@ from catenary.cli import (
     sdo,
     sii,
     state,
+    top,
     virtual,
 )
 from catenary.cli.failure import USAGE, report, silence_stdout
@@ -36,7 +38,7 @@ DESCRIPTION = "Real-time EtherCAT for Python."
 COMMANDS = (
     *(scan, state, graph, diag, sdo, reg, alias, sii, esi),
     *(init, check),
-    *(demo, dashboard, doctor, bench, virtual, realtime, record, plot),
+    *(demo, dashboard, top, doctor, bench, virtual, realtime, record, plot, foxglove),
 )
 EPILOG = """\
 TARGET is one of

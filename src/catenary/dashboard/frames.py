@@ -16,6 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from catenary.record.layout import Layout
 from catenary.share import ShareLayout
 
 HEADER = struct.Struct("<BBHIIIdd")
@@ -51,7 +52,7 @@ class Frame:
         return HEADER.pack(*head, float(self.first), self.period) + self.body
 
 
-def find_columns(layout: ShareLayout, signals: Sequence[str]) -> list[Column]:
+def find_columns(layout: ShareLayout | Layout, signals: Sequence[str]) -> list[Column]:
     """Return field and index of each signal, such as "position[0]" or "number".
 
     Raises ValueError if the layout has no such signal.
@@ -59,7 +60,7 @@ def find_columns(layout: ShareLayout, signals: Sequence[str]) -> list[Column]:
     return [_find_column(layout, signal) for signal in signals]
 
 
-def _find_column(layout: ShareLayout, signal: str) -> Column:
+def _find_column(layout: ShareLayout | Layout, signal: str) -> Column:
     shapes = {field.name: field.shape for field in layout.fields}
     if shapes.get(signal) == ():
         return signal, None

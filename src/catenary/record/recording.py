@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import os
 from collections import defaultdict
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import reduce
 from pathlib import Path
@@ -34,6 +34,7 @@ from catenary.record.mcap_records import (
     LAYOUT_RECORD,
     METADATA,
     ChunkMessage,
+    Place,
     chunk_bytes,
     chunk_messages,
     chunk_records,
@@ -122,11 +123,17 @@ def read(path: str | os.PathLike[str], *, start: float = 0.0, end: float = np.in
     if not start <= LONGEST or math.isnan(end):
         raise ValueError(f"start={start} s and end={end} s must be valid times of a recording")
     with Path(path).open("rb") as stream, refusing_damage(stream.name):
-        return _Reader(stream, start, end).read()
+        return PartReader(stream, start, end).read(places(stream))
 
 
-class _Reader:
-    """Reader of one file, which collects the messages of the requested part."""
+class PartReader:
+    """Reader of one file, which collects the messages of the requested part.
+
+    Args:
+        stream: the file.
+        start: start of the part [s], counted from the first cycle.
+        end: end of the part [s].
+    """
 
     def __init__(self, stream: BinaryIO, start: float, end: float) -> None:
         self._stream = stream
@@ -138,9 +145,23 @@ class _Reader:
         self._began: int | None = None  # log time of the first cycle [ns]
         self._complete = False  # True if the last record is the end of the data section
 
-    def read(self) -> Recording:
-        """Read the file up to its end, or up to the first damaged record."""
-        for place in places(self._stream):
+    @property
+    def has_cycles(self) -> bool:
+        """True if a cycle has been read, or skipped because it is outside of the part."""
+        return self._began is not None
+
+    def channel(self, topic: str) -> int | None:
+        """Return the number of the channel of a topic; None if no chunk has described it."""
+        return next((number for number, each in self._topics.items() if each == topic), None)
+
+    def read(self, records: Iterable[Place]) -> Recording:
+        """Read records up to the first damaged one.
+
+        Args:
+            records: places of records in the order of the file. They include the metadata, and
+                all chunks up to the first one with a cycle.
+        """
+        for place in records:
             self._complete = place.opcode == DATA_END
             if place.opcode not in (METADATA, CHUNK):
                 continue

@@ -9,7 +9,7 @@ export function stateTone(device: Pick<Device, "state" | "error" | "lost">): "ok
 
 /** Return all errors that the ports of a device counted. */
 export function portErrors(
-  ports: readonly { rx_errors: number | null; lost_links: number | null }[],
+  ports: readonly { rx_errors: number; lost_links: number }[],
 ): number {
-  return ports.reduce((sum, port) => sum + (port.rx_errors ?? 0) + (port.lost_links ?? 0), 0);
+  return ports.reduce((sum, port) => sum + port.rx_errors + port.lost_links, 0);
 }

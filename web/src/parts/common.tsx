@@ -1,6 +1,5 @@
 /** Small parts that several views use. */
 
-import { useComputed } from "@preact/signals";
 import type { ComponentChildren } from "preact";
 import { text } from "../strings.ts";
 
@@ -10,10 +9,9 @@ export function Chip({ tone = "", children }: { tone?: Tone; children: Component
   return <span class={`chip ${tone}`}>{children}</span>;
 }
 
-/** Text that changes without rendering its surroundings again. */
+/** Text that changes with the signals that `of` reads, without rendering its surroundings again. */
 export function LiveText({ of }: { of: () => string }) {
-  const value = useComputed(of);
-  return <>{value}</>;
+  return <>{of()}</>;
 }
 
 export function Icon({ path }: { path: string }) {

@@ -23,9 +23,12 @@ export function confirmed(question: Question): Promise<boolean> {
 
 export function ConfirmDialog() {
   const dialog = useRef<HTMLDialogElement>(null);
+  const cancel = useRef<HTMLButtonElement>(null);
   const question = pending.value;
   useEffect(() => {
-    if (question !== null) dialog.current?.showModal();
+    if (question === null) return;
+    dialog.current?.showModal();
+    cancel.current?.focus();
   }, [question]);
   if (question === null) return null;
   const close = (yes: boolean) => {
@@ -37,7 +40,7 @@ export function ConfirmDialog() {
       <h2 id="confirm-title">{question.title}</h2>
       <p>{question.body}</p>
       <div class="actions">
-        <button type="button" class="button" autoFocus onClick={() => close(false)}>
+        <button ref={cancel} type="button" class="button" onClick={() => close(false)}>
           {text.common.cancel}
         </button>
         <button type="button" class="button primary" onClick={() => close(true)}>

@@ -4,12 +4,12 @@ import { useEffect, useRef } from "preact/hooks";
 import { text } from "../strings.ts";
 import { chartKey, Gestures } from "./gestures.ts";
 import { toggled, withoutChart, type ChartLayout } from "./layout.ts";
-import type { ScopeModel } from "./model.ts";
+import type { ChartsModel } from "./charts_model.ts";
 import { Plot } from "./plot.ts";
 import { COLOURS } from "./traces.ts";
 
 interface Props {
-  model: ScopeModel;
+  model: ChartsModel;
   chart: ChartLayout;
   number: number;
   theme: number; // changes with the colours
@@ -34,12 +34,12 @@ export function Chart({ model, chart, number, theme }: Props) {
   );
 }
 
-function fit(model: ScopeModel, id: number): void {
+function fit(model: ChartsModel, id: number): void {
   model.plots.get(id)?.fit();
   model.redraw();
 }
 
-function Legend({ model, chart }: { model: ScopeModel; chart: ChartLayout }) {
+function Legend({ model, chart }: { model: ChartsModel; chart: ChartLayout }) {
   const known = model.signals.value;
   return (
     <ul class="scope-legend">
@@ -85,7 +85,7 @@ function PlotArea({ model, chart, number, theme }: Props) {
   );
 }
 
-function mount(element: HTMLElement, model: ScopeModel, id: number, units: string[]): () => void {
+function mount(element: HTMLElement, model: ChartsModel, id: number, units: string[]): () => void {
   const plot = new Plot(element, units);
   const gestures = new Gestures(plot.canvas.over, model);
   const observer = new ResizeObserver(() => {

@@ -1,6 +1,6 @@
 /** Pointer, wheel and keyboard on a chart: zoom, pan, cursors. */
 
-import type { ScopeModel } from "./model.ts";
+import type { ChartsModel } from "./charts_model.ts";
 import type { Span } from "./view.ts";
 
 const NEAR = 9; // [px] around a cursor
@@ -18,7 +18,7 @@ export class Gestures {
   private readonly pointers = new Map<number, number>();
   private readonly box = document.createElement("div");
 
-  constructor(private readonly over: HTMLElement, private readonly model: ScopeModel) {
+  constructor(private readonly over: HTMLElement, private readonly model: ChartsModel) {
     this.box.className = "scope-selection";
     this.box.hidden = true;
     over.append(this.box);
@@ -130,7 +130,7 @@ export class Gestures {
 }
 
 /** Handle a key on a focused chart. Return true if the key has a meaning here. */
-export function chartKey(event: KeyboardEvent, model: ScopeModel): boolean {
+export function chartKey(event: KeyboardEvent, model: ChartsModel): boolean {
   const { start, end } = model.span;
   const length = end - start;
   const cursor = event.altKey ? 1 : 0;

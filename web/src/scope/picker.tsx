@@ -4,9 +4,9 @@ import { useState } from "preact/hooks";
 import { text } from "../strings.ts";
 import { search, type Group } from "./catalog.ts";
 import { MAX_TRACES, recording, toggled, traceCount } from "./layout.ts";
-import type { ScopeModel } from "./model.ts";
+import type { ChartsModel } from "./charts_model.ts";
 
-export function Picker({ model }: { model: ScopeModel }) {
+export function Picker({ model }: { model: ChartsModel }) {
   const [query, setQuery] = useState("");
   const groups = search(model.groups.value, query);
   const full = traceCount(model.layout.value!) >= MAX_TRACES;
@@ -24,7 +24,7 @@ export function Picker({ model }: { model: ScopeModel }) {
 }
 
 interface Props {
-  model: ScopeModel;
+  model: ChartsModel;
   group: Group;
   open: boolean;
   full: boolean;

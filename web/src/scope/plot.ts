@@ -192,7 +192,7 @@ export class Plot {
   private valueAxis(unit: string, index: number): uPlot.Axis {
     const { text, grid } = this.palette;
     return {
-      scale: scaleKey(unit), side: index === 0 ? 3 : 1, stroke: text, size: AXIS_SIZE, gap: 3,
+      space: 22, scale: scaleKey(unit), side: index === 0 ? 3 : 1, stroke: text, size: AXIS_SIZE, gap: 3,
       grid: { show: index === 0, stroke: grid, width: 1 }, ticks: { stroke: grid, width: 1, size: 4 },
       font: "11px system-ui, sans-serif", label: unit || "1", labelSize: 16, labelFont: "11px system-ui, sans-serif",
     };

@@ -7,6 +7,7 @@ import type { Connection } from "../connection.ts";
 import { text } from "../strings.ts";
 import { Chart } from "./chart.tsx";
 import { Toolbar, TriggerBar } from "./controls.tsx";
+import type { ChartsModel } from "./charts_model.ts";
 import { modelOf, type ScopeModel } from "./model.ts";
 import { Picker } from "./picker.tsx";
 import { Measurements } from "./table.tsx";
@@ -38,12 +39,12 @@ export function Scope({ connection }: { connection: Connection }) {
 }
 
 function TimeCaption({ model }: { model: ScopeModel }) {
-  const captured = model.triggerState.value === "triggered" || model.triggerState.value === "complete";
-  return <p class="scope-time">{captured ? text.scope.fromTrigger : text.scope.time(model.origin.toFixed(0))}</p>;
+  const triggered = model.triggerState.value !== null && model.triggerState.value !== "free" && model.captures.value > 0;
+  return <p class="scope-time">{triggered ? text.scope.fromTrigger : text.scope.time(model.origin.toFixed(0))}</p>;
 }
 
 /** Draw a frame before each repaint while the view is on the screen. */
-function useFrames(model: ScopeModel): void {
+export function useFrames(model: ChartsModel): void {
   useEffect(() => {
     let request = requestAnimationFrame(function draw() {
       model.frame();
@@ -54,7 +55,7 @@ function useFrames(model: ScopeModel): void {
 }
 
 /** Return a number that changes with the colours of the page. */
-function useTheme(): number {
+export function useTheme(): number {
   const [theme, setTheme] = useState(0);
   useEffect(() => {
     const changed = () => setTheme((each) => each + 1);

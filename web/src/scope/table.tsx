@@ -4,9 +4,9 @@ import { useEffect, useRef } from "preact/hooks";
 import { duration, MISSING } from "../logic/format.ts";
 import { text } from "../strings.ts";
 import { Swatch } from "./chart.tsx";
-import type { ScopeModel } from "./model.ts";
+import type { ChartsModel } from "./charts_model.ts";
 
-export function Measurements({ model }: { model: ScopeModel }) {
+export function Measurements({ model }: { model: ChartsModel }) {
   const charts = model.layout.value!.charts;
   const [a, b] = model.cursors.value;
   const columns = Object.entries(text.scope.columns).filter(([key]) => a !== null || !["a", "b", "difference"].includes(key));
@@ -35,7 +35,7 @@ function cursorLine(a: number, b: number): string {
 
 interface Props {
   id: string;
-  model: ScopeModel;
+  model: ChartsModel;
   signal: string;
   colour: number;
   cursors: boolean;

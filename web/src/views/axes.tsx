@@ -6,17 +6,13 @@ import type { Connection } from "../connection.ts";
 import { Segmented } from "../parts/common.tsx";
 import { confirmed } from "../parts/confirm.tsx";
 import type { AxisInfo } from "../remote.ts";
+import { ScenePanel } from "../scene/panel.tsx";
 import { useResource } from "../resource.ts";
 import { text } from "../strings.ts";
 import { AxisCard } from "./axes/card.tsx";
 import { Jogging, type StepSize, type Unit } from "./axes/jogging.ts";
 
-const STEP_NAMES: readonly (readonly [StepSize, string])[] = [
-  ["hold", text.jog.steps.hold],
-  ["small", text.jog.steps.small],
-  ["medium", text.jog.steps.medium],
-  ["large", text.jog.steps.large],
-];
+const STEP_SIZES: readonly StepSize[] = ["hold", "small", "medium", "large"];
 
 export function Axes({ connection }: { connection: Connection }) {
   const jogging = useMemo(() => new Jogging(connection), [connection]);
@@ -26,10 +22,13 @@ export function Axes({ connection }: { connection: Connection }) {
   const names = layout?.axes ?? [];
   const noJog = connection.hello.value?.reason_no_jog ?? null;
   const common = layout?.fields.find(({ name }) => name === "position")?.unit;
+  const kinds = new Set(infos.map(({ unit }) => unit));
+  const units = kinds.size > 1 ? "both" : kinds.has("m") ? "m" : "rad";
   if (names.length === 0) return <p class="empty">{text.axes.none}</p>;
   return (
     <>
-      <Toolbar connection={connection} jogging={jogging} noJog={noJog} />
+      <Toolbar {...{ connection, jogging, noJog, units }} />
+      <ScenePanel connection={connection} />
       <div class="axes-grid">
         {names.map((name, axis) => {
           const info = infos.find((each) => each.name === name);
@@ -48,9 +47,10 @@ interface ToolbarProps {
   connection: Connection;
   jogging: Jogging;
   noJog: string | null;
+  units: Unit | "both";
 }
 
-function Toolbar({ connection, jogging, noJog }: ToolbarProps) {
+function Toolbar({ connection, jogging, noJog, units }: ToolbarProps) {
   return (
     <div class="panel toolbar">
       {noJog === null ? (
@@ -69,7 +69,7 @@ function Toolbar({ connection, jogging, noJog }: ToolbarProps) {
           </label>
           <Segmented
             label={text.jog.step}
-            options={STEP_NAMES}
+            options={STEP_SIZES.map((size) => [size, text.jog.steps[units][size]])}
             value={jogging.step.value}
             onChange={(step) => (jogging.step.value = step)}
           />

@@ -2,7 +2,7 @@
 
 import { useSignalEffect } from "@preact/signals";
 import { useRef } from "preact/hooks";
-import { quantity } from "../../logic/format.ts";
+import { fixed, quantity } from "../../logic/format.ts";
 import { fraction, type Range } from "../../logic/range.ts";
 import { LiveText } from "../../parts/common.tsx";
 import { text } from "../../strings.ts";
@@ -36,6 +36,8 @@ function Track({ label, unit, read, range, target, centred }: BarProps) {
   const track = useRef<HTMLDivElement>(null);
   const fill = useRef<HTMLDivElement>(null);
   const tick = useRef<HTMLDivElement>(null);
+  const low = useRef<HTMLSpanElement>(null);
+  const high = useRef<HTMLSpanElement>(null);
   useSignalEffect(() => {
     const value = read();
     const goal = target?.() ?? null;
@@ -44,8 +46,11 @@ function Track({ label, unit, read, range, target, centred }: BarProps) {
     drawFill(fill.current, value, span, centred);
     drawTick(tick.current, goal, span);
     describe(track.current, value, span, unit);
+    write(low.current, limitText(span, span.low));
+    write(high.current, limitText(span, span.high));
   });
   return (
+    <div class="track-box">
     <div
       ref={track}
       class={centred ? "track centred" : "track"}
@@ -56,6 +61,8 @@ function Track({ label, unit, read, range, target, centred }: BarProps) {
     >
       <div ref={fill} class="fill" />
       {target !== undefined && <div ref={tick} class="tick" />}
+    </div>
+    <div class="track-ends" aria-hidden="true"><span ref={low} /><span ref={high} /></div>
     </div>
   );
 }
@@ -85,6 +92,16 @@ function describe(element: HTMLElement, value: number | null, span: Range, unit:
   element.ariaValueText = value === null ? text.common.unknown : `${quantity(value, unit)} ${unit}`;
   const limits = `${quantity(span.low, unit)} … ${quantity(span.high, unit)} ${unit}`;
   element.title = span.limited ? limits : `${limits} (${text.axes.noLimit})`;
+}
+
+/** Return an end of a bar as text; brackets: it is not a limit. */
+function limitText(span: Range, end: number): string {
+  const text = fixed(end, Math.abs(end) < 1 ? 3 : Math.abs(end) < 100 ? 2 : 0);
+  return span.limited ? text : `(${text})`;
+}
+
+function write(element: HTMLElement | null, text: string): void {
+  if (element !== null && element.textContent !== text) element.textContent = text;
 }
 
 function percent(share: number): string {

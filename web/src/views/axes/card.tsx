@@ -2,6 +2,7 @@
 
 import { useComputed } from "@preact/signals";
 import type { Connection } from "../../connection.ts";
+import { isPowered } from "../../logic/axis_state.ts";
 import { positionRange, signedRange } from "../../logic/range.ts";
 import { notifyError } from "../../notices.ts";
 import { Chip, type Tone } from "../../parts/common.tsx";
@@ -37,18 +38,25 @@ export function AxisCard(props: CardProps) {
   return (
     <section class="panel axis" aria-labelledby={headline}>
       <header>
-        <h2 id={headline} class="mono cut">
+        <h2 id={headline} class="cut grow" title={name}>
           {name}
         </h2>
-        <span class="muted small">{info?.mode ?? ""}</span>
-        {info !== undefined && (
-          <a class="small" href={address("devices", info.device)}>
-            {text.axes.device} {info.device}
-          </a>
-        )}
         <State connection={connection} axis={axis} />
       </header>
       <div class="body">
+        <p class="row small muted">
+          {info !== undefined && (
+            <>
+              <span>
+                {text.axes.mode} {text.axes.modes[info.mode] ?? info.mode}
+              </span>
+              <a href={address("devices", info.device)}>
+                {text.axes.device} {info.device}
+              </a>
+            </>
+          )}
+          <Jogged connection={connection} axis={axis} />
+        </p>
         <Bars {...props} />
         <Trouble connection={connection} axis={axis} />
         <Controls {...props} />
@@ -59,13 +67,12 @@ export function AxisCard(props: CardProps) {
 
 function State({ connection, axis }: { connection: Connection; axis: number }) {
   const state = useComputed(() => connection.status.value?.axes[axis]?.state ?? "");
+  return <Chip tone={TONES[state.value] ?? ""}>{readable(state.value)}</Chip>;
+}
+
+function Jogged({ connection, axis }: { connection: Connection; axis: number }) {
   const jogged = useComputed(() => connection.status.value?.axes[axis]?.jogged ?? false);
-  return (
-    <span class="row right">
-      {jogged.value && <Chip tone="info">{text.axes.jogged}</Chip>}
-      <Chip tone={TONES[state.value] ?? ""}>{readable(state.value)}</Chip>
-    </span>
-  );
+  return jogged.value ? <Chip tone="info">{text.axes.jogged}</Chip> : null;
 }
 
 function Bars({ connection, axis, info, unit }: CardProps) {
@@ -124,17 +131,25 @@ function Trouble({ connection, axis }: { connection: Connection; axis: number })
 
 function Controls(props: CardProps) {
   const { connection, jogging, axis, noJog } = props;
-  const enabled = useComputed(() => connection.status.value?.axes[axis]?.enabled ?? false);
+  const enabled = useComputed(() => {
+    const status = connection.status.value?.axes[axis];
+    return status !== undefined && isPowered(status);
+  });
   const faulted = useComputed(() => (connection.status.value?.axes[axis]?.fault ?? "") !== "");
   const operator = connection.role.value === "operator";
   const answer = jogging.answers.value.get(axis);
   return (
     <>
       <div class="row wrap">
-        <EnableButton {...props} enabled={enabled.value} disabled={!operator} />
+        <EnableButton
+          {...props}
+          enabled={enabled.value}
+          faulted={faulted.value}
+          disabled={!operator}
+        />
         <button
           type="button"
-          class="button small"
+          class={faulted.value ? "button small primary" : "button small"}
           disabled={!operator || !faulted.value}
           onClick={() => connection.request([axis], "reset")}
         >
@@ -150,8 +165,8 @@ function Controls(props: CardProps) {
   );
 }
 
-function EnableButton(props: CardProps & { enabled: boolean; disabled: boolean }) {
-  const { connection, axis, name, enabled, disabled } = props;
+function EnableButton(props: CardProps & { enabled: boolean; faulted: boolean; disabled: boolean }) {
+  const { connection, axis, name, enabled, faulted, disabled } = props;
   const onClick = async () => {
     if (enabled) {
       connection.request([axis], "disable");
@@ -167,7 +182,7 @@ function EnableButton(props: CardProps & { enabled: boolean; disabled: boolean }
   return (
     <button
       type="button"
-      class={enabled ? "button small" : "button small primary"}
+      class={enabled || faulted ? "button small" : "button small primary"}
       disabled={disabled}
       onClick={() => void onClick()}
     >

@@ -58,10 +58,9 @@ export function JogControls(props: JogControlsProps) {
 }
 
 function Speed({ jogging, info, unit }: { jogging: Jogging; info: AxisInfo | undefined; unit: Unit }) {
-  const speed = useComputed(() => fixed(speedOf(info, unit, jogging.speed.value), 3));
   return (
     <span class="jog-speed mono">
-      {speed} {unit}/s
+      {fixed(speedOf(info, unit, jogging.speed.value), 3)} {unit}/s
     </span>
   );
 }

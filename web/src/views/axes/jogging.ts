@@ -48,6 +48,7 @@ export class Jogging {
       this.connection.on("jog", (message) => this.receiveAnswer(message)),
       this.connection.on("hello", () => this.disconnect()),
       this.connection.on("gone", () => this.disconnect()),
+      this.connection.stops.subscribe(release),
       this.connection.state.subscribe((state) => state !== "open" && this.disconnect()),
     ];
     return () => {

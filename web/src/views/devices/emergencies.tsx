@@ -19,7 +19,11 @@ export function Emergencies({ connection, device }: { connection: Connection; de
     <ol class="events">
       {shown.map((emergency, at) => (
         <li key={at}>
-          <span class="mono">{hex(emergency.code, 4)}</span> {emergency.text}
+          <span class="mono">{hex(emergency.error_code, 4)}</span> {emergency.text}
+          <span class="muted small">
+            {" "}
+            {text.devices.emergencies.register} {hex(emergency.error_register, 2)}
+          </span>
         </li>
       ))}
     </ol>

@@ -18,6 +18,7 @@ export interface Reading {
 export class ObjectList {
   readonly entries = signal<readonly ObjectEntry[]>([]);
   readonly next = signal<ObjectPage["next"]>(null);
+  readonly notes = signal<readonly string[]>([]);
   readonly loading = signal(false);
   readonly search = signal("");
   readonly onlyFavourites = signal(false);
@@ -37,13 +38,13 @@ export class ObjectList {
     this.favourites.value = new Set(storedFavourites()[productOf(device)] ?? []);
   }
 
-  /** Load the next page; with `all`, load pages until the end. */
-  async load(all = false): Promise<void> {
+  /** Load the next page. While the list is filtered, load pages until the end. */
+  async load(): Promise<void> {
     if (this.loading.value) return;
     this.loading.value = true;
     try {
       do await this.loadPage();
-      while (all && this.next.value !== null);
+      while (this.isFiltered() && this.next.value !== null);
     } catch (error) {
       notifyError(error);
     }
@@ -53,7 +54,12 @@ export class ObjectList {
   /** Change the search text, and load the whole dictionary to search in it. */
   find(text: string): void {
     this.search.value = text;
-    if (text !== "" && this.next.value !== null) void this.load(true);
+    this.loadRest();
+  }
+
+  toggleOnlyFavourites(): void {
+    this.onlyFavourites.value = !this.onlyFavourites.value;
+    this.loadRest();
   }
 
   async read(entry: ObjectEntry): Promise<void> {
@@ -92,11 +98,20 @@ export class ObjectList {
     localStorage.setItem(FAVOURITES, JSON.stringify(all));
   }
 
+  private isFiltered(): boolean {
+    return this.search.value !== "" || this.onlyFavourites.value;
+  }
+
+  private loadRest(): void {
+    if (this.isFiltered() && this.next.value !== null) void this.load();
+  }
+
   private async loadPage(): Promise<void> {
     const params = { position: this.device.position, after: this.next.value, count: PAGE };
     const page = await this.connection.call<ObjectPage>("objects", params);
     this.entries.value = [...this.entries.value, ...page.entries];
     this.next.value = page.next;
+    this.notes.value = [...new Set([...this.notes.value, ...page.notes])];
   }
 
   private note(entry: ObjectEntry, reading: Reading): void {

@@ -1,6 +1,7 @@
 /** Entry of an object dictionary: its value, and a field to change it. */
 
 import { useComputed, useSignal } from "@preact/signals";
+import { useEffect, useRef } from "preact/hooks";
 import { familyOf, parseValue, rangeOf } from "../../logic/values.ts";
 import { notify, notifyError } from "../../notices.ts";
 import type { ObjectEntry } from "../../remote.ts";
@@ -108,7 +109,7 @@ function Editor({ list, entry, reading, onClose }: EditorProps) {
       notifyError(error);
     }
   };
-  const range = rangeOf(entry);
+  const range = optionsOf(entry).length > 0 ? null : rangeOf(entry);
   return (
     <form class="object-editor" onSubmit={(event) => void submit(event)}>
       <Input entry={entry} id={id} value={entered.value} onInput={(value) => (entered.value = value)} />
@@ -142,6 +143,8 @@ interface InputProps {
 function Input({ entry, id, value, onInput }: InputProps) {
   const options = optionsOf(entry);
   const label = `${keyOf(entry)} ${titleOf(entry)}`;
+  const field = useRef<HTMLInputElement>(null);
+  useEffect(() => field.current?.focus(), []);
   if (options.length > 0) {
     return (
       <select
@@ -168,7 +171,7 @@ function Input({ entry, id, value, onInput }: InputProps) {
       aria-describedby={`${id}-help`}
       aria-invalid={value !== "" && parseValue(value, entry).error !== null}
       autocomplete="off"
-      autoFocus
+      ref={field}
       value={value}
       onInput={(event) => onInput(event.currentTarget.value)}
     />

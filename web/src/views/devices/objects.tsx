@@ -39,10 +39,7 @@ function Tools({ list }: { list: ObjectList }) {
         type="button"
         class={list.onlyFavourites.value ? "button primary" : "button"}
         aria-pressed={list.onlyFavourites.value}
-        onClick={() => {
-          list.onlyFavourites.value = !list.onlyFavourites.value;
-          if (list.next.value !== null) void list.load(true);
-        }}
+        onClick={() => list.toggleOnlyFavourites()}
       >
         ★ {t.favourites}
       </button>
@@ -78,7 +75,7 @@ function Entries({ list, operator }: { list: ObjectList; operator: boolean }) {
 
 function Footer({ list }: { list: ObjectList }) {
   return (
-    <div class="row object-footer muted small">
+    <div class="row wrap object-footer muted small">
       <span>
         {list.entries.value.length} {text.devices.objects.loaded}
       </span>
@@ -91,6 +88,11 @@ function Footer({ list }: { list: ObjectList }) {
         >
           {text.devices.objects.more}
         </button>
+      )}
+      {list.notes.value.length > 0 && (
+        <span>
+          {text.devices.objects.notes} {list.notes.value.join("; ")}
+        </span>
       )}
     </div>
   );

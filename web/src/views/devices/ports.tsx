@@ -1,6 +1,5 @@
 /** Links and error counters of the ports of a device. */
 
-import { MISSING } from "../../logic/format.ts";
 import { notifyError } from "../../notices.ts";
 import { Chip } from "../../parts/common.tsx";
 import type { Port } from "../../remote.ts";
@@ -44,8 +43,8 @@ export function Ports({ connection, device, reload }: DetailProps) {
                   <PortState port={port} />
                 </td>
                 {[port.rx_errors, port.forwarded_errors, port.lost_links].map((n, at) => (
-                  <td key={at} class={n ? "number mono bad-text" : "number mono"}>
-                    {n ?? MISSING}
+                  <td key={at} class={n > 0 ? "number mono bad-text" : "number mono"}>
+                    {n}
                   </td>
                 ))}
               </tr>

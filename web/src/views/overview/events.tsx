@@ -40,7 +40,7 @@ function Entry({ event, offset }: { event: Event; offset: number }) {
           </a>
         )}
         <time class="small muted mono right">
-          {timeOfDay(event.time + offset)} · {event.number}
+          {timeOfDay(event.time + offset)} · {text.overview.cycle} {event.number}
         </time>
       </div>
       <p>{event.message}</p>

@@ -4,8 +4,11 @@ import { useSignal } from "@preact/signals";
 import type { Connection } from "../../connection.ts";
 import { notifyError } from "../../notices.ts";
 import { Chip, Panel, type Tone } from "../../parts/common.tsx";
-import type { Diagnosis } from "../../remote.ts";
+import type { Check, Diagnosis, Examination } from "../../remote.ts";
 import { text } from "../../strings.ts";
+
+const TONES: Record<Check["status"], Tone> = { FAIL: "bad", WARN: "warn", PASS: "ok", SKIP: "" };
+const ORDER: readonly Check["status"][] = ["FAIL", "WARN", "PASS"];
 
 interface Item {
   tone: Tone;
@@ -86,20 +89,11 @@ async function diagnosis(connection: Connection): Promise<Item[]> {
   return problems.map(({ what, where, advice }) => ({ tone: "bad", title: what, where, advice }));
 }
 
+/** Return the checks of `catenary doctor`, with failures first. */
 async function doctor(connection: Connection): Promise<Item[]> {
-  const result = await connection.post<unknown>("/api/doctor");
-  const findings = Array.isArray(result) ? result : Object.values(result as object).find(Array.isArray);
-  return ((findings ?? []) as Record<string, unknown>[]).map(itemOf);
-}
-
-/** Return a finding of `catenary doctor` as an item. */
-function itemOf(finding: Record<string, unknown>): Item {
-  const verdict = String(finding["verdict"] ?? finding["status"] ?? "");
-  const tone: Tone = /good|ok|pass/i.test(verdict) ? "ok" : /bad|fail/i.test(verdict) ? "bad" : "warn";
-  return {
-    tone,
-    where: String(finding["name"] ?? finding["title"] ?? verdict),
-    title: String(finding["text"] ?? finding["found"] ?? finding["message"] ?? ""),
-    advice: String(finding["advice"] ?? finding["hint"] ?? ""),
-  };
+  const { checks } = await connection.post<Examination>("/api/doctor");
+  return checks
+    .filter(({ status }) => status !== "SKIP")
+    .sort((a, b) => ORDER.indexOf(a.status) - ORDER.indexOf(b.status))
+    .map(({ id, status, found, advice }) => ({ tone: TONES[status], where: id, title: found, advice }));
 }

@@ -1,6 +1,7 @@
 /** The most important numbers of the loop. */
 
 import type { Connection } from "../../connection.ts";
+import { isPowered } from "../../logic/axis_state.ts";
 import { count, duration } from "../../logic/format.ts";
 import { LiveText } from "../../parts/common.tsx";
 import type { Device } from "../../remote.ts";
@@ -11,6 +12,7 @@ export function Summary({ connection, devices }: { connection: Connection; devic
   const axes = () => connection.status.value?.axes ?? [];
   const counters = () => connection.timing.value?.counters ?? {};
   const lateness = () => connection.timing.value?.figures["lateness"];
+  const faults = () => axes().filter(({ fault }) => fault !== "").length;
   const t = text.overview;
   return (
     <dl class="tiles live">
@@ -18,26 +20,27 @@ export function Summary({ connection, devices }: { connection: Connection; devic
       <Tile label={t.period} of={() => duration(connection.hello.value?.layout.period)} />
       <Tile label={t.lateness} of={() => duration(lateness()?.p99)} />
       <Tile label={t.worst} of={() => duration(lateness()?.max)} />
-      <Tile label={t.lost} of={() => count(counters()["lost"])} />
+      <Tile label={t.lost} of={() => count(counters()["lost"])} bad={() => !!counters()["lost"]} />
       <Tile label={t.skipped} of={() => count(counters()["late"])} />
       <Tile
         label={t.devices}
         of={() => (devices === null ? count(null) : `${operational} / ${devices.length}`)}
+        bad={() => devices !== null && operational < devices.length}
       />
       <Tile
         label={t.axes}
-        of={() => `${axes().filter(({ enabled }) => enabled).length} / ${axes().length}`}
+        of={() => `${axes().filter(isPowered).length} / ${axes().length}`}
       />
-      <Tile label={t.faults} of={() => String(axes().filter(({ fault }) => fault !== "").length)} />
+      <Tile label={t.faults} of={() => String(faults())} bad={() => faults() > 0} />
     </dl>
   );
 }
 
-function Tile({ label, of }: { label: string; of: () => string }) {
+function Tile({ label, of, bad }: { label: string; of: () => string; bad?: () => boolean }) {
   return (
     <div class="tile">
       <dt>{label}</dt>
-      <dd>
+      <dd class={bad?.() ? "bad-text" : ""}>
         <LiveText of={of} />
       </dd>
     </div>
