@@ -104,7 +104,7 @@ class Session:
         elif message["op"] == "unsubscribe":
             self.subscriptions.pop(message["id"], None)
         elif message["op"] == "poses":
-            self.poses = message["rate"] > 0
+            self.poses = message["on"]
 
     async def send(self) -> None:
         """Send the samples since the last frame 60 times per second."""

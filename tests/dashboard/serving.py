@@ -24,6 +24,7 @@ pytest.importorskip("uvicorn")
 from websockets.sync.client import ClientConnection, connect
 
 from catenary.dashboard.hub import Hub
+from catenary.dashboard.panels import make_scene
 from catenary.dashboard.requests import Requests
 from catenary.dashboard.security import Access, Role
 from catenary.dashboard.server import Options, make_access, make_server, open_socket
@@ -167,13 +168,13 @@ def decode_frame(data: bytes) -> DecodedFrame:
 
 
 @contextlib.contextmanager
-def serving(share: str, *, port: int = 0, **files: Path) -> Iterator[Page]:
+def serving(share: str, *, port: int = 0, **options: object) -> Iterator[Page]:
     """Run a server in a thread."""
     listening = open_socket("127.0.0.1", port)
-    options = Options(port=listening.getsockname()[1], **files)  # type: ignore[arg-type]
-    access = make_access(options)
-    hub = Hub(Source(share), Requests(share))
-    server = make_server(access, hub, options)
+    given = Options(port=listening.getsockname()[1], **options)  # type: ignore[arg-type]
+    access = make_access(given)
+    hub = Hub(Source(share), Requests(share), scene=make_scene(given.panels))
+    server = make_server(access, hub, given)
     thread = threading.Thread(target=server.run, kwargs={"sockets": [listening]})
     thread.start()
     try:

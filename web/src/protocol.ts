@@ -96,21 +96,10 @@ export interface StateRequest {
   state: AxisRequest;
 }
 
-/** Request the poses of the 3D scene (kind 3) at a rate [Hz]; 0 ends them. */
+/** Request the poses of the 3D scene (kind 3), or end them. */
 export interface PosesRequest {
   op: "poses";
-  rate: number;
-}
-
-/** Push a body of a simulated robot until the next push; a force of 0 ends it. */
-export interface PushRequest {
-  op: "push";
-  /** Number of the body in the scene. */
-  body: number;
-  /** In the frame of the body [m]. */
-  point: [number, number, number];
-  /** In the frame of the world [N]. */
-  force: [number, number, number];
+  on: boolean;
 }
 
 export interface Ping {
@@ -127,7 +116,6 @@ export type ClientMessage =
   | Stop
   | StateRequest
   | PosesRequest
-  | PushRequest
   | Ping;
 
 // WebSocket /ws: server to client

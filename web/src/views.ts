@@ -2,8 +2,10 @@
 
 import type { ComponentType } from "preact";
 import type { Connection } from "./connection.ts";
+import { Recordings } from "./recordings/recordings.tsx";
 import { Scope } from "./scope/scope.tsx";
 import { text } from "./strings.ts";
+import { Tune } from "./tune/tune.tsx";
 import { Axes } from "./views/axes.tsx";
 import { Devices } from "./views/devices.tsx";
 import { Overview } from "./views/overview.tsx";
@@ -39,5 +41,17 @@ export const views: View[] = [
     label: text.navigation.scope,
     icon: "M3 4h18v16H3zM6 14c2-8 4-8 6-2s4 6 6-2",
     component: Scope,
+  },
+  {
+    key: "tune",
+    label: text.navigation.tune,
+    icon: "M6 3v10M6 17v4M12 3v4M12 11v10M18 3v12M18 19v2M3.500 15h5M9.500 9h5M15.500 17h5",
+    component: Tune,
+  },
+  {
+    key: "recordings",
+    label: text.navigation.recordings,
+    icon: "M4 5h16v14H4zM9 5v14M15 5v14M4 10h5M4 14h5M15 10h5M15 14h5",
+    component: Recordings,
   },
 ];

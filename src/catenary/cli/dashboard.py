@@ -63,6 +63,20 @@ def add_parser(commands: Commands) -> None:
         "--new-links", action="store_true", help="make new links; former links become invalid"
     )
     parser.add_argument(
+        "--model", type=Path, metavar="FILE", help="MJCF or URDF file for the 3D view"
+    )
+    parser.add_argument(
+        "--joint",
+        action="append",
+        type=joint,
+        default=[],
+        metavar="AXIS=JOINT",
+        help="joint of the model for an axis (default: of the same name, or in order)",
+    )
+    parser.add_argument(
+        "--recordings", type=Path, metavar="FOLDER", help="folder of MCAP files for the page"
+    )
+    parser.add_argument(
         "--window", action="store_true", help="open the page in a window of Chromium"
     )
     parser.add_argument(
@@ -78,7 +92,15 @@ def port(text: str) -> int:
     return value
 
 
+def joint(text: str) -> tuple[str, str]:
+    axis, mark, name = text.rpartition("=")
+    if not (axis and mark and name):
+        raise argparse.ArgumentTypeError(f"{text!r}: must be AXIS=JOINT")
+    return axis, name
+
+
 def run(arguments: argparse.Namespace) -> int:
+    from catenary.dashboard.options import Panels
     from catenary.dashboard.server import Options, require_packages, run_server
     from catenary.operate import OperateProcess
 
@@ -91,6 +113,7 @@ def run(arguments: argparse.Namespace) -> int:
         viewer_only=arguments.viewer_only,
         new_links=arguments.new_links,
         uid=arguments.uid,
+        panels=Panels(arguments.model, dict(arguments.joint), arguments.recordings),
     )
     announce = Announcer(window=arguments.window)
     source = arguments.source or only_share(arguments.uid)

@@ -58,13 +58,20 @@ class Page:
     doctor: asyncio.Lock
 
 
-def make_app(access: Access, hub: Hub, routes: tuple[BaseRoute, ...] = ()) -> Guard:
+def no_routes(_: Page) -> list[BaseRoute]:
+    """Return no routes."""
+    return []
+
+
+def make_app(
+    access: Access, hub: Hub, more: Callable[[Page], list[BaseRoute]] = no_routes
+) -> Guard:
     """Return the ASGI application.
 
     Args:
         access: tokens and roles.
         hub: connection to the share; the application runs it.
-        routes: further routes.
+        more: returns further routes.
     """
     page = Page(access, hub, read_static_files(), RateLimit(2.0, 20), asyncio.Lock())
 
@@ -75,7 +82,7 @@ def make_app(access: Access, hub: Hub, routes: tuple[BaseRoute, ...] = ()) -> Gu
         yield
         task.cancel()
 
-    app = Starlette(routes=[*routes_of(page), *routes], lifespan=lifespan)
+    app = Starlette(routes=[*more(page), *routes_of(page)], lifespan=lifespan)
     app.router.redirect_slashes = False
     app.state.page = page
     return Guard(app, access)

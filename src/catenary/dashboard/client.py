@@ -17,6 +17,7 @@ from catenary.dashboard.messages import (
     Beat,
     ClientMessage,
     Ping,
+    Poses,
     Press,
     Release,
     Request,
@@ -53,6 +54,7 @@ class Client:
     def __init__(self, hub: Hub, socket: WebSocket, role: Role, refusal: str | None) -> None:
         self.role = role
         self.outbox = Outbox()
+        self.wants_poses = False
         self._hub = hub
         self._socket = socket
         self._refusal = refusal
@@ -138,6 +140,8 @@ class Client:
                 self._subscribe(message)
             case Stop():
                 self._reader().stop()
+            case Poses(on=on):
+                self.wants_poses = on
             case Beat():
                 self._enqueue(message, partial(self._motion.beat, message))
             case Release():

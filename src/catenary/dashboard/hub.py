@@ -12,6 +12,7 @@ import msgspec
 from catenary.dashboard.messages import encode_message
 from catenary.dashboard.outbox import Outbox
 from catenary.dashboard.requests import FAILURES, Requests
+from catenary.dashboard.scene_feed import SceneFeed
 from catenary.dashboard.security import Role
 from catenary.dashboard.source import Source
 from catenary.dashboard.status import AxisNotes, axis_statuses, cycle_status
@@ -20,6 +21,7 @@ from catenary.errors import CatenaryError, ShareError
 from catenary.share import Reader, SharedEvent
 
 TICK = 1 / 60  # [s]
+POSES_INTERVAL = 1 / 30  # [s]
 STATUS_INTERVAL = 0.05  # [s]
 TIMING_INTERVAL = 0.5  # [s]
 CLIENTS_MAX = 32
@@ -32,6 +34,7 @@ class Client(Protocol):
 
     role: Role
     outbox: Outbox
+    wants_poses: bool
 
     def reason_no_jog(self) -> str | None:
         """Return why the client cannot jog; None if it can."""
@@ -50,10 +53,15 @@ class Hub:
         source: connection to the share.
         requests: connection to the program of the loop.
         problem: returns the error of the program, or "".
+        scene: 3D scene; None: there is none.
     """
 
     def __init__(
-        self, source: Source, requests: Requests, problem: Callable[[], str] = str
+        self,
+        source: Source,
+        requests: Requests,
+        problem: Callable[[], str] = str,
+        scene: SceneFeed | None = None,
     ) -> None:
         self.source = source
         self.requests = requests
@@ -66,7 +74,8 @@ class Hub:
         self._fresh: list[SharedEvent] = []
         self._advising = False
         self._token = 0
-        self._status_due = self._timing_due = 0.0
+        self.scene = scene
+        self._status_due = self._timing_due = self._poses_due = 0.0
         self._tasks: set[asyncio.Task[None]] = set()
 
     async def run(self) -> None:
@@ -97,6 +106,7 @@ class Hub:
         if self.subscriptions is not None:
             self.subscriptions.deliver(reader, now)
         self._send_token(reader)
+        self._send_poses(reader, now)
         for client in list(self.clients):
             client.follow_motion()
         if now >= self._status_due - TICK / 2:
@@ -242,6 +252,15 @@ class Hub:
         )
         for client in self.clients:
             client.outbox.put_if_idle(text)
+
+    def _send_poses(self, reader: Reader, now: float) -> None:
+        wanting = [client for client in self.clients if client.wants_poses]
+        if self.scene is None or not wanting or now < self._poses_due or reader.number == 0:
+            return
+        self._poses_due = now + POSES_INTERVAL
+        data = self.scene.poses(reader)
+        for client in wanting if data else ():
+            client.outbox.put_latest(data)
 
     async def _send_timing(self) -> None:
         try:

@@ -68,13 +68,21 @@ class Request(msgspec.Struct, frozen=True, tag_field="op", tag="request"):
     axes: list[Number] | None = None
 
 
+class Poses(msgspec.Struct, frozen=True, tag_field="op", tag="poses"):
+    """Request for the poses of the 3D scene, or their end."""
+
+    on: bool
+
+
 class Ping(msgspec.Struct, frozen=True, tag_field="op", tag="ping"):
     """Request for a pong with the same `t`."""
 
     t: float
 
 
-ClientMessage: TypeAlias = Subscribe | Unsubscribe | Press | Beat | Release | Stop | Request | Ping
+ClientMessage: TypeAlias = (
+    Subscribe | Unsubscribe | Press | Beat | Release | Stop | Request | Poses | Ping
+)
 OPERATOR_ONLY = (Press, Beat, Release, Stop, Request)
 
 _decoder: msgspec.json.Decoder[ClientMessage] = msgspec.json.Decoder(ClientMessage)

@@ -50,6 +50,12 @@ class Outbox:
         self._frames += len(data)
         self._append(data)
 
+    def put_latest(self, data: bytes) -> None:
+        """Append binary data that later ones replace, unless earlier messages wait."""
+        if len(self._queue) < 4:
+            self._frames += len(data)
+            self._append(data)
+
     def put_if_idle(self, text: str) -> None:
         """Append a message that later ones replace, unless earlier messages wait."""
         if len(self._queue) < 4:

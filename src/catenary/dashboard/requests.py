@@ -25,7 +25,7 @@ READS = frozenset(
 WRITES = frozenset(
     {
         *("sdo_write", "set_state", "reset_error", "clear_counters", "set_parameters", "home"),
-        *("virtual_cable", "virtual_power"),
+        *("virtual_cable", "virtual_power", "virtual_push"),
     }
 )
 

@@ -6,10 +6,12 @@ import io
 import socket
 import ssl
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from catenary.dashboard.options import Panels
 from catenary.dashboard.security import Access, Role, is_loopback, load_key
 from catenary.errors import ConfigurationError
 from catenary.share.folder import own_folder, prepare
@@ -31,6 +33,7 @@ class Options:
     """Options of the server.
 
     `cert`, `key`: files of TLS, in PEM format. `uid`: owner of the share; None: this user or root.
+    `panels`: files for the 3D view and the recordings.
     """
 
     host: str = "127.0.0.1"
@@ -40,6 +43,7 @@ class Options:
     viewer_only: bool = False
     new_links: bool = False
     uid: int | None = None
+    panels: Panels = field(default_factory=Panels)
 
 
 def require_packages() -> None:
@@ -167,9 +171,10 @@ def make_server(access: Access, hub: Hub, options: Options) -> uvicorn.Server:
     import uvicorn
 
     from catenary.dashboard.app import make_app
+    from catenary.dashboard.panels import panel_routes
 
     settings = uvicorn.Config(
-        make_app(access, hub),
+        make_app(access, hub, partial(panel_routes, options.panels)),
         log_level="warning",
         ssl_certfile=options.cert,
         ssl_keyfile=options.key,
@@ -204,12 +209,14 @@ def run_server(
     """
     require_packages()
     from catenary.dashboard.hub import Hub
+    from catenary.dashboard.panels import make_scene
     from catenary.dashboard.requests import Requests
     from catenary.dashboard.source import Source
 
     with open_socket(options.host, options.port) as listening:
         access = make_access(replace(options, port=listening.getsockname()[1]))
-        hub = Hub(Source(share, uid=options.uid), Requests(share, options.uid), problem)
+        scene = make_scene(options.panels)
+        hub = Hub(Source(share, uid=options.uid), Requests(share, options.uid), problem, scene)
         server = make_server(access, hub, options)
         announce(access)
         server.run(sockets=[listening])

@@ -305,6 +305,25 @@ class Client:
         """
         return self.call("virtual_cable", position=position, port=port, connected=connected)  # type: ignore[no-any-return]
 
+    def virtual_push(
+        self,
+        body: str,
+        force: Sequence[float],
+        point: Sequence[float] = (0.0, 0.0, 0.0),
+        seconds: float = 0.2,
+    ) -> messages.Done:
+        """Push a body of the simulated mechanism. Another push of the body replaces it.
+
+        Args:
+            body: Name of the body in the model.
+            force: (3,) in the frame of the world [N].
+            point: (3,) point of the body on which the force acts, in its frame [m].
+            seconds: Duration [s], at most 10 s.
+        """
+        return self.call(  # type: ignore[no-any-return]
+            "virtual_push", body=body, force=list(force), point=list(point), seconds=seconds
+        )
+
     def virtual_power(self, position: int, on: bool) -> messages.Done:
         """Switch a device of a virtual segment on or off.
 

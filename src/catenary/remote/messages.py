@@ -298,8 +298,9 @@ RESULTS: dict[str, Any] = {
     "move": Done,
     "virtual_cable": Done,
     "virtual_power": Done,
+    "virtual_push": Done,
 }
-WRITES = (  # methods that change something; events name their peers
+WRITES = (  # methods that change something; events name their peers. Pushes are too frequent
     "sdo_write",
     "set_state",
     "reset_error",

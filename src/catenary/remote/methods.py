@@ -36,6 +36,7 @@ METHODS: Mapping[str, Method] = {
     "move": motion.move,
     "virtual_cable": virtual_segment.virtual_cable,
     "virtual_power": virtual_segment.virtual_power,
+    "virtual_push": virtual_segment.virtual_push,
 }
 
 

@@ -21,6 +21,14 @@ def virtual_power(program: Program, position: int, on: bool) -> messages.Done:
     return messages.Done()
 
 
+def virtual_push(
+    program: Program, body: str, force: list[float], point: list[float], seconds: float
+) -> messages.Done:
+    """Push a body of the simulated mechanism; see `Client.virtual_push`."""
+    _segment(program).push(body, force, point=point, for_=seconds)
+    return messages.Done()
+
+
 def _segment(program: Program) -> Segment:
     segment = segment_of(program.network.main.source)
     if segment is None:

@@ -12,11 +12,13 @@ from __future__ import annotations
 
 import math
 import threading
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 import msgspec
+import numpy as np
+import numpy.typing as npt
 
 from catenary.errors import ConfigurationError
 from catenary.virtual._plant import CompiledPlant
@@ -124,6 +126,7 @@ class Plant:
         self.joints = self._select_joints(joints, passive)
         self._compiled: CompiledPlant | None = None
         self._wired: list[tuple[Device, int]] = []  # motor (servo, axis) of each joint
+        self._pushes: dict[int, npt.NDArray[np.float64]] = {}  # newest of each body
         self._inertias: list[float] = []  # initial inertia at each motor shaft
         self._thread: threading.Thread | None = None
 
@@ -260,6 +263,41 @@ class Plant:
             self._wired[n] = new, axis
             if isinstance(new, Servo) and axis < new.axes and self._compiled is not None:
                 self._connect_motor(self._compiled, n, new, axis)
+
+    # -- forces --------------------------------------------------------------------------------
+
+    def push(self, body: str, force: Sequence[float], point: Sequence[float]) -> Callable[[], None]:
+        """Apply a force to a body until the returned function is called, or until another push.
+
+        Args:
+            body: name of the body in the model.
+            force: (3,) in the frame of the world [N].
+            point: (3,) in the frame of the body [m]. The lever arm is that of the present pose.
+
+        Raises:
+            ValueError: The model has no such body.
+        """
+        number = self.body_number(body)
+        data = self.data
+        at = data.xpos[number] + data.xmat[number].reshape(3, 3) @ np.asarray(point, np.float64)
+        wrench = np.array([*force, *np.cross(at - data.xipos[number], force)])
+        self._pushes[number] = wrench
+        data.xfrc_applied[number] = wrench
+
+        def end() -> None:
+            if self._pushes.get(number) is wrench:
+                data.xfrc_applied[number] = 0.0
+
+        return end
+
+    def body_number(self, name: str) -> int:
+        """Return the number of a body in the model. Raises ValueError if there is none."""
+        names = [self.model.body(n).name for n in range(self.model.nbody)]
+        if name not in names[1:]:
+            raise ValueError(
+                f"{self.path.name} has no body {name!r}; its bodies are {', '.join(names[1:])}"
+            )
+        return names.index(name)
 
     # -- time ----------------------------------------------------------------------------------
 

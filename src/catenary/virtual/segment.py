@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Literal, NamedTuple, Protocol, runtime_checkable
 
@@ -18,6 +19,8 @@ from catenary.virtual.plant import Plant
 from catenary.virtual.service import Service, ServiceThread
 from catenary.virtual.wiring import Place, Wiring
 
+SECOND = 1e9
+LONGEST_PUSH = 10.0  # [s]
 ClockKind = Literal["virtual", "monotonic"]
 # Time from the loss of light until the loop is closed [s], with enhanced link detection of the
 # ET1100 (about 15 us: datasheet, section I, chapter 6) and with an ordinary PHY.
@@ -227,6 +230,39 @@ class Segment:
         """
         self._faults.add(fault)
 
+    def push(
+        self,
+        body: str,
+        force: Sequence[float],
+        *,
+        point: Sequence[float] = (0.0, 0.0, 0.0),
+        for_: float = 0.2,
+    ) -> None:
+        """Push a body of the plant. Another push of the same body replaces it.
+
+        Args:
+            body: name of the body in the model.
+            force: (3,) in the frame of the world [N].
+            point: (3,) point of the body on which the force acts, in its frame [m].
+            for_: duration [s].
+
+        Raises:
+            ValueError: There is no plant or no such body, or a value is out of range.
+        """
+        if self.plant is None:
+            raise ValueError("the segment has no plant; use Segment(..., plant=Plant(...))")
+        _check_push(force, point, for_)
+        self.plant.body_number(body)
+        plant, agenda = self.plant, self._service.agenda
+
+        def begin() -> None:
+            agenda.after(round(for_ * SECOND), plant.push(body, force, point))
+
+        if self._core.is_virtual:
+            begin()
+        else:  # in the thread that may change devices
+            agenda.after(0, begin)
+
     @property
     def faults_done(self) -> bool:
         """True if no begin or end of a fault is pending. Active faults without end are ignored."""
@@ -298,6 +334,14 @@ def _detection_ns(given: float | str) -> int:
             f'link_loss_detection must be "enhanced", "standard" or 0 to 1 s, not {given!r}'
         )
     return round(seconds * 1e9)
+
+
+def _check_push(force: Sequence[float], point: Sequence[float], duration: float) -> None:
+    for name, values in (("force", force), ("point", point)):
+        if len(values) != 3 or not all(math.isfinite(value) for value in values):
+            raise ValueError(f"{name} must be three finite numbers, not {list(values)}")
+    if not 0 < duration <= LONGEST_PUSH:
+        raise ValueError(f"for_ must be above 0 and at most {LONGEST_PUSH:g} s, not {duration}")
 
 
 def demo_segment(*, clock: ClockKind = "virtual", ring: bool = False) -> Segment:

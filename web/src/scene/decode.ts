@@ -25,7 +25,6 @@ export interface SceneDescription {
   joints: (string | null)[];
   center: [number, number, number];
   extent: number; // [m]
-  push?: boolean; // true if bodies of the simulation can be pushed
 }
 
 export interface SceneData extends SceneDescription {

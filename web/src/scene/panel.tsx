@@ -5,12 +5,14 @@ import { useEffect, useRef, useState } from "preact/hooks";
 import type { Connection } from "../connection.ts";
 import { Panel } from "../parts/common.tsx";
 import { KIND_POSES } from "../protocol.ts";
+import { notifyError } from "../notices.ts";
+import type { Greeting } from "../remote.ts";
+import { useResource } from "../resource.ts";
 import { text } from "../strings.ts";
 import { decodePoses, decodeScene, type SceneData } from "./decode.ts";
 import type { Push, Viewer } from "./viewer.ts";
 
-const PUSH_INTERVAL = 33; // [ms]
-const RATE = 30; // [Hz]
+const PUSH_SECONDS = 0.2; // the force ends by itself when the pushes end
 
 type Loading = { scene: SceneData } | { reason: string } | null;
 
@@ -41,7 +43,8 @@ function RobotView({ connection, scene }: { connection: Connection; scene: Scene
   const viewer = useRef<Viewer | null>(null);
   const [ghost, setGhost] = useState(true);
   const [failure, setFailure] = useState("");
-  const canPush = scene.push === true && connection.role.value === "operator";
+  const program = useResource<Greeting>(connection, "hello").value.value;
+  const canPush = program?.virtual === true && connection.role.value === "operator";
   useEffect(() => {
     const created = (view: Viewer | null) => (viewer.current = view);
     return attach(connection, scene, place.current!, { canPush, created, failed: setFailure });
@@ -79,7 +82,7 @@ function attach(
   let ended = false;
   import("./viewer.ts")
     .then(({ Viewer }) => {
-      if (!ended) ends.push(...run(connection, new Viewer(element, scene), options));
+      if (!ended) ends.push(...run(connection, scene, new Viewer(element, scene), options));
     })
     .catch((error: Error) => options.failed(error.message));
   return () => {
@@ -88,29 +91,31 @@ function attach(
   };
 }
 
-function run(connection: Connection, viewer: Viewer, options: Attachment): (() => void)[] {
-  const request = () => void connection.send({ op: "poses", rate: RATE });
+function run(
+  connection: Connection, scene: SceneData, viewer: Viewer, options: Attachment,
+): (() => void)[] {
+  const request = () => void connection.send({ op: "poses", on: true });
   options.created(viewer);
-  if (options.canPush) {
-    viewer.onPush = throttled((push) => void connection.send({ op: "push", ...push }));
-  }
+  if (options.canPush) viewer.onPush = pushing(connection, scene);
   request();
   return [
     connection.onBinary(KIND_POSES, (buffer) => viewer.show(decodePoses(buffer))),
     connection.on("hello", request),
-    () => void connection.send({ op: "poses", rate: 0 }),
+    () => void connection.send({ op: "poses", on: false }),
     () => options.created(null),
     () => viewer.dispose(),
   ];
 }
 
-/** Pass at most one push in each interval; the end of a push always. */
-function throttled(send: (push: Push) => void): (push: Push) => void {
-  let last = 0;
-  return (push) => {
-    const ends = push.force.every((each) => each === 0);
-    if (!ends && performance.now() - last < PUSH_INTERVAL) return;
-    last = performance.now();
-    send(push);
+/** Push a body for a short time. A repeated push replaces it. */
+function pushing(connection: Connection, scene: SceneData): (push: Push) => void {
+  let busy = false;
+  return ({ body, point, force }) => {
+    if (busy) return;
+    busy = true;
+    connection
+      .call("virtual_push", { body: scene.bodies[body], point, force, seconds: PUSH_SECONDS })
+      .catch(notifyError)
+      .finally(() => (busy = false));
   };
 }

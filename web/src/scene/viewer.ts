@@ -27,8 +27,9 @@ export interface Push {
   force: [number, number, number]; // in the frame of the world [N]
 }
 
-const STIFFNESS = 150; // [N/m] between the pointer and the body
-const LARGEST_FORCE = 100; // [N]
+const STIFFNESS = 300; // [N/m] between the pointer and the body
+const LARGEST_FORCE = 150; // [N]
+const PUSH_INTERVAL = 50; // [ms]
 const MAX_CONTACTS = 256;
 
 /** Owns the WebGL context and the objects of one scene. */
@@ -43,7 +44,8 @@ export class Viewer {
   private readonly ghost = new Group();
   private readonly contacts: LineSegments;
   private readonly observer: ResizeObserver;
-  private held: { body: number; point: Vector3; plane: Plane } | null = null;
+  private held: { body: number; point: Vector3; plane: Plane; goal: Vector3 } | null = null;
+  private repeating: ReturnType<typeof setInterval> | undefined;
   private requested = 0;
 
   constructor(private readonly element: HTMLElement, private readonly data: SceneData) {
@@ -89,6 +91,7 @@ export class Viewer {
   }
 
   dispose(): void {
+    this.letGo();
     cancelAnimationFrame(this.requested);
     this.observer.disconnect();
     this.controls.dispose();
@@ -154,7 +157,6 @@ export class Viewer {
     for (const kind of ["pointerup", "pointercancel", "lostpointercapture"] as const) {
       canvas.addEventListener(kind, () => this.letGo());
     }
-    window.addEventListener("blur", () => this.letGo());
   }
 
   private grab(event: PointerEvent): void {
@@ -164,27 +166,30 @@ export class Viewer {
     const body = hit.object.userData.body as number;
     const normal = this.camera.getWorldDirection(new Vector3());
     const plane = new Plane().setFromNormalAndCoplanarPoint(normal, hit.point);
-    this.held = { body, point: this.actual[body]!.worldToLocal(hit.point.clone()), plane };
+    const point = this.actual[body]!.worldToLocal(hit.point.clone());
+    this.held = { body, point, plane, goal: hit.point.clone() };
+    this.repeating = setInterval(() => this.push(), PUSH_INTERVAL);
     this.controls.enabled = false;
     this.renderer.domElement.setPointerCapture(event.pointerId);
   }
 
   private drag(event: PointerEvent): void {
+    if (this.held !== null) this.ray(event).ray.intersectPlane(this.held.plane, this.held.goal);
+  }
+
+  /** Pull the held point towards the pointer. */
+  private push(): void {
     if (this.held === null) return;
-    const { body, point, plane } = this.held;
-    const goal = this.ray(event).ray.intersectPlane(plane, new Vector3());
-    if (goal === null) return;
+    const { body, point, goal } = this.held;
     const from = this.actual[body]!.localToWorld(point.clone());
-    const force = goal.sub(from).multiplyScalar(STIFFNESS).clampLength(0, LARGEST_FORCE);
+    const force = goal.clone().sub(from).multiplyScalar(STIFFNESS).clampLength(0, LARGEST_FORCE);
     this.onPush?.({ body, point: point.toArray(), force: force.toArray() });
   }
 
   private letGo(): void {
-    if (this.held === null) return;
-    const { body, point } = this.held;
+    clearInterval(this.repeating);
     this.held = null;
     this.controls.enabled = true;
-    this.onPush?.({ body, point: point.toArray(), force: [0, 0, 0] });
   }
 
   private ray(event: PointerEvent): Raycaster {

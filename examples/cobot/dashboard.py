@@ -1,0 +1,130 @@
+"""A simulated cobot on a ring, moving endlessly, for the operator's page: `make dashboard`.
+
+The drives are virtual, and a compliant controller in position mode moves them. In the page:
+
+- push a body of the robot with the mouse: the arm gives way and returns
+- pull a cable: the ring continues from both ends, and an event names the cable
+- press STOP: the arm stops and waits. Enable its axes to jog them. The arm continues its motion
+  after 10 s in which all axes are enabled and none is jogged.
+"""
+
+import argparse
+from pathlib import Path
+
+import numpy as np
+
+import catenary as cat
+from catenary import control
+from catenary.virtual import read_segment
+
+HERE = Path(__file__).parent
+PERIOD, JOINTS = 1e-3, 6  # [s]
+AXES = {  # as the data sheets of drives and gears say; limits [rad/s]
+    "names": ["base", "shoulder", "elbow", "wrist1", "wrist2", "wrist3"],
+    "counts_per_turn": 2**17,
+    "gear_ratio": [121, 121, 121, 101, 101, 101],
+    "direction": [1, 1, -1, 1, -1, 1],
+    "velocity_limit": [2.6, 2.6, 2.6, 3.1, 3.1, 3.1],
+}
+CENTER = np.array([0.0, 0.3, 0.9, 0.0, 0.6, 0.0])  # [rad]
+AMPLITUDE = np.array([0.9, 0.35, 0.5, 0.5, 0.5, 1.2])  # [rad]
+RATE = 2 * np.pi / np.array([16.0, 8.0, 8.0, 8.0, 16.0, 8.0])  # [rad/s], repeats after 16 s
+APPROACH, WAIT = 4.0, 10.0  # [s] to the start of the motion; before it continues
+# Compliance: virtual mass, damper and spring of each joint, in SI units.
+INERTIA, DAMPING, STIFFNESS = 2.0, 40.0, 120.0
+FRICTION = np.array([16.0, 16.0, 9.0, 3.5, 3.5, 3.5])  # [N·m], torques below are not a push
+GIVES_WAY = 0.5  # [rad], at most
+
+
+def path(time):
+    """Return the positions of the endless motion at `time` [s], (6,) [rad]."""
+    return CENTER + AMPLITUDE * np.sin(RATE * time)
+
+
+def smooth(share):
+    """Return a value from 0 to 1 that starts and ends without velocity and acceleration."""
+    s = min(max(share, 0.0), 1.0)
+    return s**3 * (10 - 15 * s + 6 * s**2)
+
+
+class Compliance:
+    """Deviation from the motion [rad] that yields to torques from outside."""
+
+    def __init__(self, model):
+        self.model = model
+        self.offset = np.zeros(JOINTS)
+        self.speed = np.zeros(JOINTS)
+
+    def step(self, actual):
+        """Return the deviation, (6,) [rad], from the measured position, velocity and torque."""
+        known = self.model.inverse(actual.position, actual.velocity, np.zeros(JOINTS))
+        outside = known - actual.torque
+        push = np.sign(outside) * np.maximum(abs(outside) - FRICTION, 0.0)
+        force = push - DAMPING * self.speed - STIFFNESS * self.offset
+        self.speed += PERIOD * force / INERTIA
+        self.offset = np.clip(self.offset + PERIOD * self.speed, -GIVES_WAY, GIVES_WAY)
+        return self.offset
+
+    def reset(self):
+        """Forget the deviation."""
+        self.offset[:] = self.speed[:] = 0.0
+
+
+class Motion:
+    """The endless motion, which waits while an axis is stopped or jogged."""
+
+    def __init__(self, start):
+        self.begin(start)
+        self.waiting = 0.0  # [s] until the motion continues; 0: it moves
+
+    def begin(self, start):
+        """Approach the start of the motion from `start` (6,) [rad]."""
+        self.start, self.time = start.copy(), -APPROACH
+
+    def step(self, arm, compliance):
+        """Write the targets of the arm."""
+        ready = arm.enabled.all() and not arm.jogged.any()
+        if not ready:
+            self.waiting = WAIT
+        elif self.waiting > 0:
+            self.waiting -= PERIOD
+            if self.waiting <= 0:
+                self.begin(arm.target.position)
+                compliance.reset()
+        elif self.time < 0:
+            self.time = min(self.time + PERIOD, 0.0)
+            way = path(0.0) - self.start
+            arm.target.position[:] = self.start + smooth(1 + self.time / APPROACH) * way
+        else:
+            self.time += PERIOD
+            arm.target.position[:] = path(self.time) + compliance.step(arm.actual)
+
+
+def main(name, seconds):
+    """Run the robot until `seconds` have passed; None: until Ctrl-C."""
+    model = control.Dynamics(HERE / "arm.xml", axes=JOINTS)
+    segment = read_segment(HERE / "segment.toml", clock="monotonic", ring=True)
+    stop = cat.StopPolicy(raise_faults=False, on_axis_stopped="event", lost_limit=20)
+    with (
+        cat.MainDevice(segment.first, segment.second) as bus,
+        cat.Share(name, jog=True) as share,
+    ):
+        arm = cat.Drives(bus.scan().drives, mode="csp", **AXES)
+        with cat.Loop(arm, period=PERIOD, sink=share, stop=stop) as loop:
+            compliance, motion = Compliance(model), Motion(arm.target.position)
+            print(f"ready: catenary dashboard {name} --model {HERE / 'arm.xml'}", flush=True)
+            for cycle in loop:
+                motion.step(arm, compliance)
+                if seconds is not None and cycle.time > seconds:
+                    break
+
+
+if __name__ == "__main__":
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--name", default="cobot", help="name of its share")
+    parser.add_argument("--seconds", type=float, help="duration; default: until Ctrl-C")
+    options = parser.parse_args()
+    try:
+        main(options.name, options.seconds)
+    except KeyboardInterrupt:
+        print("ended")
