@@ -19,7 +19,7 @@ expect = pytest.importorskip(
     "playwright.sync_api", reason="playwright is not installed (pip install -e '.[test]')"
 ).expect
 
-SECONDS = 60_000  # [ms] generous, because a machine may be busy
+SECONDS = 30_000  # [ms] generous, because a machine may be busy
 WIDTHS = {390: 844, 820: 1180, 1280: 800}  # width → height
 SWITCH = re.compile("^(Enable|Disable)$")
 REPORT_VIOLATIONS = """
@@ -49,7 +49,7 @@ class Operator:
 
     def _note(self, message: Any) -> None:
         if message.type == "error" and not any(each in message.text for each in EXPECTED):
-            self.problems.append(message.text)
+            self.problems.append(f"{message.text} {message.location['url']}")
 
     def open(self, view: str = "", role: str = "operator") -> Operator:
         """Open the link of a role, then a view."""
