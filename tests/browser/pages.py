@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from typing import TYPE_CHECKING, Any, Literal
 
 import pytest
@@ -15,13 +15,16 @@ if TYPE_CHECKING:
     from playwright.sync_api import Browser, BrowserContext, Locator, Page
 
 # Tests import this module: they are skipped if Playwright is absent.
-expect = pytest.importorskip(
+sync_api = pytest.importorskip(
     "playwright.sync_api", reason="playwright is not installed (pip install -e '.[test]')"
-).expect
+)
+expect, PlaywrightError = sync_api.expect, sync_api.Error
 
+PRESSES = 20
 SECONDS = 30_000  # [ms] generous, because a machine may be busy
 WIDTHS = {390: 844, 820: 1180, 1280: 800}  # width → height
-SWITCH = re.compile("^(Enable|Disable)$")
+# States of an axis that the page shows as soon as it has received the first status.
+KNOWN_STATE = re.compile("Operation enabled|Switch on disabled|Ready to switch on|Fault")
 REPORT_VIOLATIONS = """
 document.addEventListener("securitypolicyviolation", (event) =>
   console.error("CSP: " + event.violatedDirective + " " + event.blockedURI));
@@ -70,7 +73,7 @@ class Operator:
     def require_enabled(self, name: str) -> None:
         """Enable an axis unless it is enabled, and answer the question of the page."""
         card = self.axis(name)
-        expect(card.get_by_role("button", name=SWITCH)).to_be_enabled(timeout=SECONDS)
+        expect(card).to_contain_text(KNOWN_STATE, timeout=SECONDS)
         if card.get_by_role("button", name="Disable", exact=True).count() == 0:
             card.get_by_role("button", name="Enable", exact=True).click()
             dialog = self.page.get_by_role("dialog")
@@ -82,6 +85,19 @@ class Operator:
         return self.axis(name).locator(".jog-button").last
 
     def hold(self, name: str) -> None:
+        """Press the mouse on the jog button of an axis until the axis moves. Keep it pressed.
+
+        A busy machine may deliver the tokens too late: such a press is refused, and repeated.
+        """
+        for _ in range(PRESSES):
+            self.press(name)
+            expect(self.answer(name)).not_to_be_empty(timeout=SECONDS)
+            if self.answer(name).text_content() == "moving":
+                return
+            self.page.mouse.up()
+        raise AssertionError(f"{name} did not move: {self.answer(name).text_content()}")
+
+    def press(self, name: str) -> None:
         """Press the mouse on the jog button of an axis, and keep it pressed."""
         button = self.plus(name)
         expect(button).to_be_enabled(timeout=SECONDS)
@@ -123,5 +139,5 @@ def operator(
         yield (shown := Operator(context, dashboard))
         assert not shown.problems, shown.problems
     finally:
-        if browser.is_connected():
+        with suppress(PlaywrightError):  # the test has killed the browser
             context.close()

@@ -29,6 +29,7 @@ class RawClient:
             origin=origin,  # type: ignore[arg-type]
             additional_headers={"Cookie": cookies},
             max_size=None,
+            max_queue=None,  # receive all messages, also those that the test does not read
         )
 
     def send(self, **message: object) -> None:

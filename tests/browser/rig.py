@@ -49,6 +49,10 @@ class Rig:
         """Wait until a servo has a state of CiA 402. Return False if it does not reach it."""
         return comes_true(lambda: self.state(axis)["state"] == state)
 
+    def loses_power(self, axis: int = 0) -> bool:
+        """Wait until a servo leaves OPERATION ENABLED. Return False if it does not."""
+        return comes_true(lambda: self.state(axis)["state"] != "OPERATION ENABLED")
+
     def moves(self, axis: int = 0) -> bool:
         """Wait until a servo moves. Return False if it does not."""
         return comes_true(lambda: self.velocity(axis) > MOTION)

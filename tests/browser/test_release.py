@@ -82,7 +82,7 @@ def test_a_step_ends_by_itself(shared_rig: Rig) -> None:
     with shared_rig.operating() as shown:
         before = float(shared_rig.state()["position"])  # type: ignore[arg-type]
         shown.page.get_by_role("button", name="1°", exact=True).click()
-        shown.hold(AXIS)
+        shown.press(AXIS)
         expect(shown.answer(AXIS)).to_have_text("the distance was moved", timeout=SECONDS)
         assert shared_rig.stands()
         after = float(shared_rig.state()["position"])  # type: ignore[arg-type]
