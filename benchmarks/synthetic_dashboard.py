@@ -119,7 +119,6 @@ class Session:
                 await self.websocket.send_bytes(self.pose_message(now))
             last = now
 
-
     def pose_message(self, cycle: int) -> bytes:
         """Return the poses at a cycle; the targets are 0.2 s ahead."""
         actual, target = samples(self.axes, cycle, 1), samples(self.axes, cycle + 200, 1)
