@@ -48,7 +48,7 @@ class Process:
         while not text.endswith("\n"):
             left = max(until - time.monotonic(), 0.0)
             if not select.select([self.process.stdout], [], [], left)[0]:
-                raise TimeoutError(f"{self.process.args} printed nothing for {DEADLINE:g} s")
+                raise TimeoutError(f"{self.process.args!r} printed nothing for {DEADLINE:g} s")
             character = os.read(self.process.stdout.fileno(), 1).decode("latin-1")
             if not character:
                 break

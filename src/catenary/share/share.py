@@ -7,6 +7,7 @@ import threading
 import time
 from pathlib import Path
 from types import TracebackType
+from typing import Self
 
 import numpy as np
 
@@ -74,7 +75,7 @@ class Share:
         self._events: Ring | None = None
         self._reporting = threading.Lock()
 
-    def __enter__(self) -> Share:
+    def __enter__(self) -> Self:
         self._refuse_taken()
         self._entered = True
         self._pid = os.getpid()
