@@ -37,7 +37,7 @@ WORDS = st.one_of(
     st.integers(0, 2**64 - 1),
 )
 PLACES = st.one_of(
-    st.sampled_from([WHERE.closed, WHERE.holders, WHERE.places, WHERE.rings]),
+    st.sampled_from([WHERE.closed, WHERE.holders, WHERE.places, WHERE.rings, WHERE.motion]),
     st.integers(WHERE.closed // 8, WHERE.size // 8 - 1).map(lambda word: 8 * word),
 )
 WRITTEN = st.lists(st.tuples(PLACES, WORDS), min_size=1, max_size=12)
@@ -67,6 +67,23 @@ def test_the_loop_reads_whatever_is_there(
             assert set(command.axes) <= {0, 1, 2}
         for end in reader.ended():
             assert str(end)
+
+
+@given(written=WRITTEN)
+@settings(max_examples=200)
+def test_a_jog_reads_whatever_is_there(
+    shared: tuple[Desk, mmap.mmap], written: list[tuple[int, int]]
+) -> None:
+    desk, memory = shared
+    memory[WHERE.closed :] = bytes(WHERE.size - WHERE.closed)
+    with Lease(desk, LAYOUT, [0, 2], 3600.0) as lease:
+        jog, request = lease.jog(0, 0.1), lease.request("disable")
+        for at, value in written:
+            if at >= WHERE.motion:
+                memory[at : at + 8] = value.to_bytes(8, "little")
+        assert jog.status.text
+        assert all(status.text for status in request.status)
+        jog.release()
 
 
 def test_a_ring_with_the_largest_number_ends(
