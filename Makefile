@@ -3,7 +3,7 @@
 # PYTHON=/path/to/python3.12 selects another interpreter and recreates .venv.
 # `make docs` builds the documentation site into out/docs.
 # TEST="-k axis" passes options to pytest, and COBOT=--realtime to `make cobot`. `make dashboard`
-# serves the operator's page of a virtual segment, or of a target: DASHBOARD=eth0. `make rtlab` runs
+# serves the operator's page of a simulated cobot, or of a target: DASHBOARD=eth0. `make rtlab` runs
 # the benchmarks on a real-time kernel in QEMU. TABLE=quick or TABLE=pyigh,tasks selects tables, and
 # RTLAB="--out FOLDER" selects the folder of the results. TABLE=igh needs IGH=path, the path of a
 # build of IgH's master.
@@ -11,7 +11,7 @@ PYTHON ?= python3
 VENV := .venv
 TEST ?=
 COBOT ?=
-DASHBOARD ?= virtual
+DASHBOARD ?=
 TABLE ?= all
 RTLAB ?=
 IGH ?=
@@ -41,8 +41,8 @@ demo: $(VENV)/.built
 cobot: $(VENV)/.with-cobot
 	@$(VENV)/bin/python -m catenary.realtime.private_network examples/cobot/cobot.py $(COBOT)
 
-dashboard: $(VENV)/.with-dashboard
-	@$(VENV)/bin/catenary dashboard $(DASHBOARD)
+dashboard: $(VENV)/.with-dashboard $(VENV)/.with-sim
+	@$(VENV)/bin/$(if $(DASHBOARD),catenary dashboard $(DASHBOARD),python examples/cobot/dashboard.py --page)
 
 rtlab: $(VENV)/.with-test
 	@$(VENV)/bin/python -m tools.rtlab $(TABLE) $(if $(IGH),--igh $(abspath $(IGH))) $(RTLAB)

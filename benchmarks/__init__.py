@@ -86,6 +86,20 @@ def measure_share(*, drives: int, rate: int, seconds: float, file: Path | None =
     share.measure(drives=drives, rate=rate, seconds=seconds, file=file)
 
 
+def measure_remote(*, drives: int, rate: int, seconds: float, file: Path | None = None) -> None:
+    """Print the cost of 200 remote requests per second for the loop.
+
+    Args:
+        drives: Number of drives.
+        rate: Rate of the loops [Hz].
+        seconds: Run time of every variant [s].
+        file: File for the figures.
+    """
+    from benchmarks import remote_load
+
+    remote_load.measure(drives=drives, rate=rate, seconds=seconds, file=file)
+
+
 def measure_cost(*, seconds: float, file: Path | None = None) -> None:
     """Print the cost of a cycle as a + b·axes + c·bytes.
 

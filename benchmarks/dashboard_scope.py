@@ -19,10 +19,10 @@ from benchmarks.synthetic_dashboard import FIELDS, serving
 
 STATIC = Path(__file__).parents[1] / "src/catenary/dashboard/static"
 BROWSER = "/usr/bin/chromium"
-ARGUMENTS = (
-    "--no-sandbox --disable-gpu --disable-quic --no-first-run --disable-background-networking "
-    "--disable-component-update --disable-sync"
-).split()
+ARGUMENTS = [
+    *("--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run", "--disable-sync"),
+    *("--disable-background-networking", "--disable-component-update"),
+]
 MEASURE = """
 (() => {
   const frames = (window.scriptTimes = []);
@@ -56,6 +56,19 @@ def layout(axes: int, traces: int = 32, charts: int = 4, window: int = 10) -> di
         "trigger": trigger,
         "triggerOn": False,
     }
+
+
+def collect_errors(page: Any) -> list[str]:
+    """Return a list that receives the errors of the page and the violations of its policy."""
+    errors: list[str] = []
+
+    def receive(entry: Any) -> None:
+        if "Content Security" in entry.text:
+            errors.append(entry.text)
+
+    page.on("pageerror", lambda error: errors.append(str(error)))
+    page.on("console", receive)
+    return errors
 
 
 def prepare(page: Any, axes: int, window: int) -> None:
@@ -99,9 +112,7 @@ def measure(seconds: float, throttle: float, axes: int, window: int) -> dict[str
     with serving(STATIC, axes) as address, sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=BROWSER, args=ARGUMENTS)
         page = browser.new_page(viewport={"width": 1280, "height": 900})
-        errors: list[str] = []
-        page.on("pageerror", lambda error: errors.append(str(error)))
-        page.on("console", lambda entry: entry.type == "error" and errors.append(entry.text))
+        errors = collect_errors(page)
         prepare(page, axes, window)
         page.goto(f"{address}/#/scope")
         page.locator(".scope-chart").first.wait_for()

@@ -32,6 +32,7 @@ def make_parser() -> argparse.ArgumentParser:
     with_wires.add_loop(group)
     with_wires.add_storm(group)
     with_wires.add_share(group)
+    with_wires.add_remote(group)
     with_wires.add_cost(group)
     with_wires.add_scan(group)
     without_wires.add_virtual(group)

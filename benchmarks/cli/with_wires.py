@@ -64,6 +64,22 @@ def add_share(group: Commands) -> None:
     parser.set_defaults(run=run_share)
 
 
+def add_remote(group: Commands) -> None:
+    parser = add_command(
+        group,
+        "remote",
+        help="measure the cost of remote requests for the loop",
+        description="Run the loop with a share and a client that sends 200 requests per second, "
+        "and with a client that sends nothing, in turn.",
+        example="python -m benchmarks remote --seconds 5 --json remote.json",
+    )
+    add_drives(parser)
+    add_rate(parser)
+    add_seconds(parser, 5.0, "run time of every variant")
+    add_file(parser)
+    parser.set_defaults(run=run_remote)
+
+
 def add_cost(group: Commands) -> None:
     parser = add_command(
         group,
@@ -159,6 +175,20 @@ def run_share(arguments: argparse.Namespace) -> int:
 
     bench.enter_private_network()
     benchmarks.measure_share(
+        drives=arguments.drives,
+        rate=arguments.rate,
+        seconds=arguments.seconds,
+        file=arguments.json,
+    )
+    return 0
+
+
+def run_remote(arguments: argparse.Namespace) -> int:
+    import benchmarks
+    from catenary import bench
+
+    bench.enter_private_network()
+    benchmarks.measure_remote(
         drives=arguments.drives,
         rate=arguments.rate,
         seconds=arguments.seconds,

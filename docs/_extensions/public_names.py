@@ -7,7 +7,7 @@ from types import ModuleType
 from typing import TypeVar
 
 EVENTS = "catenary.bus.event_types"  # `catenary.events`
-MODULES = ("control", "drive", "esi", "realtime", "record", "share", "virtual")
+MODULES = ("control", "drive", "esi", "realtime", "record", "remote", "share", "virtual")
 PLAIN = ("errors", "events", "types", "virtual.faults")  # no `__all__`: what they define
 INTERNAL = {"catenary.events.emergency", "catenary.virtual.faults.number_of_state"}
 
@@ -25,6 +25,11 @@ RETURNED = {
     "catenary.model.finding": ("Finding",),
     "catenary.plan.stop_reason": ("StopReason",),
     "catenary.procedure.al_state": ("DeviceState",),
+    "catenary.remote.messages": (
+        *("Hello", "Device", "Port", "Axis", "Objects", "ObjectEntry", "SdoValue", "State"),
+        *("Diagnosis", "Problem", "EmergencyEntry", "Events", "EventEntry", "Timing", "Figures"),
+        *("Clocks", "ClockEntry", "Text", "LawEntry", "Parameter", "Done"),
+    ),
     "catenary.wire.al": ("AlState",),
     "catenary.wire.cia402": ("AxisState",),
 }

@@ -9,6 +9,9 @@ The drives are virtual, and a compliant controller in position mode moves them. 
 """
 
 import argparse
+import subprocess
+import sys
+from contextlib import contextmanager, nullcontext, suppress
 from pathlib import Path
 
 import numpy as np
@@ -100,11 +103,25 @@ class Motion:
             arm.target.position[:] = path(self.time) + compliance.step(arm.actual)
 
 
-def main(name, seconds):
+@contextmanager
+def page(name):
+    """Serve the page during the block. The server prints its links."""
+    command = [sys.executable, "-m", "catenary.cli", "dashboard", name]
+    server = subprocess.Popen([*command, "--model", str(HERE / "arm.xml"), "--recordings", "."])
+    try:
+        yield
+    finally:
+        server.terminate()
+        server.wait()
+
+
+def run(name, seconds):
     """Run the robot until `seconds` have passed; None: until Ctrl-C."""
     model = control.Dynamics(HERE / "arm.xml", axes=JOINTS)
     segment = read_segment(HERE / "segment.toml", clock="monotonic", ring=True)
-    stop = cat.StopPolicy(raise_faults=False, on_axis_stopped="event", lost_limit=20)
+    stop = cat.StopPolicy(
+        raise_faults=False, on_axis_stopped="event", lost_limit=20, late_limit=0.5
+    )
     with (
         cat.MainDevice(segment.first, segment.second) as bus,
         cat.Share(name, jog=True) as share,
@@ -112,7 +129,7 @@ def main(name, seconds):
         arm = cat.Drives(bus.scan().drives, mode="csp", **AXES)
         with cat.Loop(arm, period=PERIOD, sink=share, stop=stop) as loop:
             compliance, motion = Compliance(model), Motion(arm.target.position)
-            print(f"ready: catenary dashboard {name} --model {HERE / 'arm.xml'}", flush=True)
+            print(f"the arm moves; its share is {name!r}. Press Ctrl-C to end", flush=True)
             for cycle in loop:
                 motion.step(arm, compliance)
                 if seconds is not None and cycle.time > seconds:
@@ -123,8 +140,7 @@ if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--name", default="cobot", help="name of its share")
     parser.add_argument("--seconds", type=float, help="duration; default: until Ctrl-C")
+    parser.add_argument("--page", action="store_true", help="also serve the operator's page")
     options = parser.parse_args()
-    try:
-        main(options.name, options.seconds)
-    except KeyboardInterrupt:
-        print("ended")
+    with suppress(KeyboardInterrupt), page(options.name) if options.page else nullcontext():
+        run(options.name, options.seconds)

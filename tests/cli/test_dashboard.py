@@ -5,13 +5,17 @@ from __future__ import annotations
 import signal
 import subprocess
 import sys
+import time
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
+import catenary as cat
 from catenary.cli import dashboard
 from catenary.cli.failure import UsageError
 from catenary.cli.main import main, make_parser
+from tests.share.processes import comes_true
 
 
 def test_help_names_the_safety_limit(capsys: pytest.CaptureFixture[str]) -> None:
@@ -81,3 +85,24 @@ def test_a_signal_ends_the_server_with_status_0(kind: signal.Signals, tmp_path: 
         assert server.stdout.readline().startswith("operator: http://127.0.0.1:")
         server.send_signal(kind)
         assert server.wait(30) == 0
+
+
+def test_the_program_of_a_target_ends_with_a_killed_server() -> None:
+    pytest.importorskip("starlette")
+    command = [sys.executable, "-m", "catenary.cli", "dashboard", "virtual", "--port", "0"]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as server:
+        try:
+            assert server.stdout is not None
+            assert server.stdout.readline().startswith("operator: ")
+            with cat.attach(f"dashboard-{server.pid}", patience=patience()) as reader:
+                server.kill()
+                assert comes_true(lambda: reader.state == "ended")
+        finally:
+            server.kill()
+
+
+def patience() -> Iterator[None]:
+    """Yield for a minute."""
+    for _ in range(600):
+        time.sleep(0.1)
+        yield

@@ -10,7 +10,7 @@ import pytest
 
 from catenary.dashboard.options import Panels
 from catenary.record.file import RecordingFile
-from tests.dashboard.serving import serving
+from tests.dashboard.serving import running_loop, serving
 from tests.record.beside import shared_loop
 from tests.record.made import make_layout, make_rows
 from tests.share.names import own_name
@@ -54,3 +54,20 @@ def test_recordings_are_served(tmp_path: Path) -> None:
         assert (frame.status_code, frame.content[0]) == (200, 1)
         assert client.post(url, content=json.dumps({**body, "points": 0})).status_code == 400
         assert client.post(url, content="[]").status_code == 400
+
+
+def test_an_axis_at_rest_is_captured_with_the_reasons_for_missing_figures() -> None:
+    with own_name("tune") as name, running_loop(name), serving(name) as page:
+        client = page.client("viewer")
+        with page.socket() as socket:
+            socket.next("hello")
+        url = "/api/tune/capture"
+        answer = client.post(url, content=json.dumps({"axis": 0, "seconds": 0.5}))
+        assert answer.status_code == 200
+        assert answer.json()["rows"] >= 200
+        assert len(answer.json()["problems"]) in (1, 2)
+        assert client.post(url, content=json.dumps({"axis": 9})).status_code == 400
+        assert client.post(url, content='{"axis": 0, "seconds": 1e9}').status_code == 400
+        report = client.get("/api/tune/report")
+        assert report.headers["content-type"].startswith("text/html")
+        assert "<table" in report.text

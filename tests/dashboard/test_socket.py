@@ -211,3 +211,16 @@ def until(socket: Socket, state: str) -> dict[str, object]:
     while (status := socket.next("status"))["state"] != state:
         assert status["state"] in ("running", "stalled")
     return status
+
+
+def test_all_signals_of_33_axes_arrive_without_a_lost_sample(name: str) -> None:
+    fields = ("position", "velocity", "torque", "commanded_position", "target_position")
+    signals = [f"{field}[{axis}]" for field in (*fields, "statusword") for axis in range(33)]
+    with running_loop(name, 33) as _, serving(name) as page, page.socket() as socket:
+        socket.next("hello")
+        socket.send("subscribe", id=1, signals=["number", *signals], full=True, rate=30)
+        frames = [socket.frame() for _ in range(60)]
+    assert {frame.values.shape[0] for frame in frames} == {199}
+    numbers = np.concatenate([frame.values[0] for frame in frames])
+    np.testing.assert_array_equal(numbers, numbers[0] + np.arange(len(numbers)))
+    assert sum(frame.lost for frame in frames) == 0

@@ -83,3 +83,13 @@ def test_a_source_attaches_again_when_the_loop_returns(name: str) -> None:
         assert summary is not None
         assert (source.reason, len(summary.axes)) == ("", 2)
     source.close()
+
+
+def test_a_source_stops_all_axes(name: str) -> None:
+    with shared_loop(name) as shared:
+        shared.run(10)
+        source = Source(name)
+        source.stop()
+        with pytest.raises(cat.DriveError, match="an operator requested a quick stop"):
+            shared.run(200)
+        source.close()

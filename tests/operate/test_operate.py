@@ -15,6 +15,7 @@ from tests.machine.files import write_small
 from tests.share.names import own_name
 from tests.share.processes import comes_true
 
+
 @pytest.fixture
 def name() -> Iterator[str]:
     with own_name("operate") as name:

@@ -77,7 +77,8 @@ def test_only_the_writer_can_write_cycles(name: str, mode: int) -> None:
     with cat.MainDevice(Segment([Servo()])) as main:
         arm = cat.Drives(main.scan().drives, counts_per_turn=2**20, velocity_limit=100.0)
         with cat.Share(name, mode=mode) as share, cat.Loop(arm, sink=share):
-            cycles, desk = sorted(files_of(name))
+            requests, cycles, desk = sorted(files_of(name))
+            assert (requests.name, requests.stat().st_mode & 0o777) == (f"remote-{name}", mode)
             assert (cycles.name, cycles.stat().st_mode & 0o022) == (f"share-{name}", 0)
             assert (desk.name, desk.stat().st_mode & 0o777) == (f"socket-{name}", mode)
 

@@ -317,6 +317,23 @@ def test_stalled_loop_is_shown(opened: Opened) -> None:
     expect(page.get_by_text("no new cycles arrive")).to_be_visible()
 
 
+def test_bars_show_limits_that_arrive_after_the_last_status(opened: Opened) -> None:
+    page, _ = opened
+    expect(page.get_by_role("meter", name="Position").first).to_have_attribute(
+        "aria-valuemax", "2.9"
+    )
+
+
+def test_state_of_a_device_asks_first(opened: Opened) -> None:
+    page, server = opened
+    open_view(page, "devices/4")
+    page.get_by_role("button", name="SAFE-OP", exact=True).click()
+    page.get_by_role("button", name="Request SAFE-OP").click()
+    page.wait_for_timeout(SETTLE)
+    (call,) = [call for call in server.calls if call["method"] == "set_state"]
+    assert call["params"] == {"position": 4, "state": "SAFE-OP", "force": True}
+
+
 def test_viewer_cannot_command(browser: Browser) -> None:
     page = browser.new_page()
     server = FakeServer(page)

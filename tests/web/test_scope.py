@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from benchmarks.dashboard_scope import layout, lost_rows
+from benchmarks.dashboard_scope import collect_errors, layout, lost_rows
 from benchmarks.synthetic_dashboard import PERIOD, serving
 
 if TYPE_CHECKING:
@@ -33,11 +33,7 @@ def page(browser: Browser, address: str) -> Iterator[Page]:
     """Scope with its first arrangement; the test fails for an error of the page or its policy."""
     context = browser.new_context(viewport={"width": 1280, "height": 900})
     page = context.new_page()
-    errors: list[str] = []
-    page.on("pageerror", lambda error: errors.append(str(error)))
-    page.on(
-        "console", lambda entry: "Content Security" in entry.text and errors.append(entry.text)
-    )
+    errors = collect_errors(page)
     page.goto(f"{address}/#/scope")
     page.locator(".scope-chart").first.wait_for()
     yield page
@@ -59,8 +55,15 @@ def now(page: Page) -> str:
     return page.locator(".scope-table td").first.inner_text()
 
 
+def wait_for_change(page: Page, selector: str, before: str) -> None:
+    """Wait until an element has another text. The policy forbids `wait_for_function`."""
+    from playwright.sync_api import expect
+
+    expect(page.locator(selector).first).not_to_have_text(before, timeout=20_000)
+
+
 def wait_for_samples(page: Page) -> None:
-    page.wait_for_function("document.querySelector('.scope-table td').textContent !== '–'")
+    wait_for_change(page, ".scope-table td", "–")
 
 
 def test_198_signals_arrive_without_a_lost_sample(page: Page, address: str) -> None:
@@ -121,9 +124,7 @@ def test_pause_keeps_the_samples_and_run_continues(page: Page) -> None:
     page.wait_for_timeout(500)
     assert now(page) == before
     page.get_by_role("button", name="Run", exact=True).click()
-    page.wait_for_function(
-        "before => document.querySelector('.scope-table td').textContent !== before", arg=before
-    )
+    wait_for_change(page, ".scope-table td", before)
 
 
 def test_single_trigger_captures_once(page: Page) -> None:
@@ -162,9 +163,7 @@ def test_cursors_show_the_difference(page: Page) -> None:
     assert "Δ 1.67" in before
     page.locator(".scope-plot").first.focus()
     page.keyboard.press("Shift+ArrowLeft")
-    page.wait_for_function(
-        "before => document.querySelector('.scope-cursors').innerText !== before", arg=before
-    )
+    wait_for_change(page, ".scope-cursors", before)
 
 
 def test_arrangement_survives_a_reload(page: Page) -> None:

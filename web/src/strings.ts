@@ -29,6 +29,19 @@ export const text = {
     stepUp: "Hold to step +",
     stepHint:
       "The axis moves only while you hold the button with a mouse or a key. It must be enabled and free.",
+    bode: "Frequency response",
+    input: "Input",
+    output: "Output",
+    closed: "Closed loop",
+    compute: "Compute",
+    bodeHint:
+      "Uses the visible range of the scope. Record input and output there while the axis follows a sweep, for example a Chirp block. The time from the first to the last frequency should be visible.",
+    tooShort: "The visible range of the scope is too short: at least 300 cycles with both signals.",
+    gain: "Gain [dB]",
+    phase: "Phase [°]",
+    coherence: "Coherence",
+    gainMargin: "Gain margin",
+    phaseMargin: "Phase margin",
     noStep: "The command of the axis did not change.",
     figures: {
       size: "Step",
@@ -318,7 +331,8 @@ export const text = {
       status: "AL status",
     },
     state: "State",
-    stateBody: "The device leaves the cyclic exchange below OP. Its axes stop without regard to the program.",
+    stateBody:
+      "Below OP, the device has no outputs, and its axes stop. The loop may end if its program requires this device.",
     setState: "Request",
     resetError: "Acknowledge error",
     ports: "Ports and cables",

@@ -48,5 +48,5 @@ test("object keys are hexadecimal", () => {
 });
 
 function plain(text: string): string {
-  return text.replaceAll(" ", " ");
+  return text.replaceAll("\u00a0", " ");
 }

@@ -62,6 +62,18 @@ def add_parser(commands: Commands) -> None:
     parser.add_argument(
         "--new-links", action="store_true", help="make new links; former links become invalid"
     )
+    add_panels(parser)
+    parser.add_argument(
+        "--window", action="store_true", help="open the page in a window of Chromium"
+    )
+    parser.add_argument(
+        "--uid", type=number, help="user ID of the share's owner (default: yours, then root's)"
+    )
+    parser.set_defaults(run=run)
+
+
+def add_panels(parser: argparse.ArgumentParser) -> None:
+    """Add the options of the 3D view and of the recordings."""
     parser.add_argument(
         "--model", type=Path, metavar="FILE", help="MJCF or URDF file for the 3D view"
     )
@@ -76,13 +88,6 @@ def add_parser(commands: Commands) -> None:
     parser.add_argument(
         "--recordings", type=Path, metavar="FOLDER", help="folder of MCAP files for the page"
     )
-    parser.add_argument(
-        "--window", action="store_true", help="open the page in a window of Chromium"
-    )
-    parser.add_argument(
-        "--uid", type=number, help="user ID of the share's owner (default: yours, then root's)"
-    )
-    parser.set_defaults(run=run)
 
 
 def port(text: str) -> int:

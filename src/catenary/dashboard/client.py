@@ -76,7 +76,7 @@ class Client:
             self._hub.remove(self)
             for task in tasks:
                 task.cancel()
-            await asyncio.shield(asyncio.to_thread(self._motion.end_all))
+            await asyncio.shield(self._in_thread(self._motion.end_all))
 
     def send(self, text: str) -> None:
         """Queue a message."""
@@ -178,13 +178,16 @@ class Client:
         while True:
             message, work = await self._work.get()
             try:
-                await asyncio.to_thread(work)
+                await self._in_thread(work)
             except REFUSED as error:
                 if isinstance(message, Press):
                     text = getattr(error, "message", str(error))
                     self._report_jog(message.axis, message.press, "REFUSED", text)
                 else:
                     self._refuse(op_of(message), error)
+
+    def _in_thread(self, work: Callable[[], object]) -> asyncio.Future[object]:
+        return asyncio.get_running_loop().run_in_executor(self._hub.workers, work)
 
     async def _send_all(self) -> None:
         with contextlib.suppress(WebSocketDisconnect, RuntimeError):  # the browser has left

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import time
 from collections.abc import Callable, Coroutine
+from concurrent.futures import ThreadPoolExecutor
 from typing import Protocol
 
 import msgspec
@@ -25,6 +26,7 @@ POSES_INTERVAL = 1 / 30  # [s]
 STATUS_INTERVAL = 0.05  # [s]
 TIMING_INTERVAL = 0.5  # [s]
 CLIENTS_MAX = 32
+SPARE = 8  # threads for clients that are leaving
 EVENTS_KEPT = 256
 ADVICE_SECONDS = 1.0  # limit for the advice of new events
 
@@ -69,6 +71,8 @@ class Hub:
         self.clients: set[Client] = set()
         self._problem = problem
         self._reason = ""
+        # Locks of the desk must not wait for requests to devices, so motion has its own threads.
+        self.workers = ThreadPoolExecutor(CLIENTS_MAX + SPARE, "dashboard motion")
         self._notes = AxisNotes()
         self._events: list[dict[str, object]] = []
         self._fresh: list[SharedEvent] = []
@@ -93,6 +97,8 @@ class Hub:
                 await asyncio.sleep(due - time.monotonic())
         finally:
             self.source.close()
+            self.requests.close()
+            self.workers.shutdown(wait=False)
 
     def step(self, now: float) -> None:
         """Send what is due. `now` is a monotonic time [s]."""

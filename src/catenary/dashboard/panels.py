@@ -1,4 +1,4 @@
-"""Routes of the 3D view and of the recordings.
+"""Routes of the 3D view and of the recordings; catenary.dashboard.tune has those of the tuning.
 
 GET  /scene                        the scene (catenary.dashboard.scene); 204 without a model
 GET  /api/recordings               {files}
@@ -20,6 +20,7 @@ from catenary.dashboard.options import Panels
 from catenary.dashboard.recordings import Folder, Progress, Window
 from catenary.dashboard.scene_feed import SceneFeed
 from catenary.dashboard.security import Role
+from catenary.dashboard.tune import Tune
 from catenary.errors import CatenaryError
 
 BINARY = "application/octet-stream"
@@ -37,7 +38,7 @@ def panel_routes(panels: Panels, page: Page) -> list[BaseRoute]:
         panels: files to show.
         page: parts of the page.
     """
-    routes: list[BaseRoute] = [Route("/scene", protected(page, scene))]
+    routes: list[BaseRoute] = [Route("/scene", protected(page, scene)), *Tune(page).routes]
     if panels.recordings is not None:
         routes += RecordingRoutes(page, Folder(panels.recordings)).all
     return routes

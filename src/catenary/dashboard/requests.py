@@ -5,6 +5,8 @@ from __future__ import annotations
 import asyncio
 import threading
 from collections.abc import Mapping
+from concurrent.futures import ThreadPoolExecutor
+from functools import partial
 from typing import TYPE_CHECKING
 
 from catenary.dashboard.security import Role
@@ -47,6 +49,7 @@ class Requests:
         self._running = asyncio.Semaphore(CONNECTIONS)
         self._waiting = 0
         self._answers = True
+        self._pool = ThreadPoolExecutor(CONNECTIONS, "dashboard requests")
 
     def is_available(self) -> bool:
         """Return False if the last request found no service in the program."""
@@ -60,6 +63,11 @@ class Requests:
         for client in idle:
             client.close()
         self._answers = True
+
+    def close(self) -> None:
+        """Close the connections, without waiting for requests in progress."""
+        self.reset()
+        self._pool.shutdown(wait=False, cancel_futures=True)
 
     async def call(
         self, method: str, params: Mapping[str, object], *, timeout: float | None = None
@@ -83,7 +91,8 @@ class Requests:
         self._waiting += 1
         try:
             async with self._running:
-                return await asyncio.to_thread(self._call, method, params, timeout)
+                work = partial(self._call, method, params, timeout)
+                return await asyncio.get_running_loop().run_in_executor(self._pool, work)
         finally:
             self._waiting -= 1
 

@@ -25,7 +25,7 @@ def hello(program: Program) -> messages.Hello:
         share=layout.name,
         period=layout.period,
         networks=program.network.count,
-        jog=bool(getattr(layout, "jog", False)),
+        jog=layout.jog,
         virtual=segment_of(program.network.main.source) is not None,
         started=layout.opened,
         execution=session.plan.cycle.execution,

@@ -13,8 +13,8 @@ from catenary.loop.network import Network
 from catenary.loop.session import Session
 from catenary.procedure.exchange import Procedure
 from catenary.procedure.mailbox import MailboxChannel
-from catenary.share import Share
 from catenary.share.events import SharedEvent
+from catenary.share.share import Share
 from catenary.wire.cia402 import AxisState
 
 T = TypeVar("T")

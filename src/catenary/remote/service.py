@@ -99,7 +99,11 @@ class Service:
         poll = select.poll()
         for number in (self._wake, self._listener.fileno(), *(c.fileno() for c in self._clients)):
             poll.register(number, select.POLLIN)
-        ready = {number for number, _ in poll.poll(timeout * 1000)}
+        ready = dict(poll.poll(timeout * 1000))
+        for client in self._clients:
+            if ready.get(client.fileno(), 0) & select.POLLHUP:  # the client has gone
+                client.close()
+        self._clients = deque(client for client in self._clients if client.open)
         if self._listener.fileno() in ready:
             self._accept()
         for client in self._clients:
@@ -119,8 +123,7 @@ class Service:
         if len(self._clients) < CLIENTS:
             self._clients.append(client)
             return
-        busy = BusyError("the share has too many clients", retry=IDLE)
-        client.send(encode_error(0, busy))
+        client.send(encode_error(0, ShareError(f"the share already has {CLIENTS} clients")))
         client.close()
 
     def _begin(self, client: Connection, message: bytes) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from catenary import share
 from catenary.errors import ShareError
 from catenary.loop.network import Network
 from catenary.plan.sink import Incident
@@ -12,7 +11,7 @@ from catenary.remote.methods import Methods
 from catenary.remote.program import Program
 from catenary.remote.service import Service
 from catenary.remote.task import Task
-from catenary.share import folder
+from catenary.share import folder, share
 from catenary.share.process import command_of
 
 TEXT_MAX = 200  # characters of the arguments in an event
@@ -36,6 +35,8 @@ class Share(share.Share):
         mode: permissions as for chmod. 0o600: this user only. 0o640: the group can read.
             0o660: the group can read, command and send requests. Only this user can ever write to
             the cycles.
+        jog: accept jogs from clients, and their requests to enable and reset axes. They can always
+            stop and disable axes.
 
     Raises:
         ShareError: on entry, if the name belongs to a running process or another user.

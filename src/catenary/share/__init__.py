@@ -13,7 +13,6 @@ from catenary.share.lease import Lease
 from catenary.share.mutex import Mutex
 from catenary.share.process import Process
 from catenary.share.reader import Reader, attach
-from catenary.share.share import Share
 
 __all__ = [
     "AxisCommand",
@@ -26,7 +25,6 @@ __all__ = [
     "Reader",
     "Reason",
     "RequestStatus",
-    "Share",
     "ShareField",
     "ShareLayout",
     "SharedEvent",

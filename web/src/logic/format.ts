@@ -2,7 +2,7 @@
 
 export const MISSING = "–";
 const MINUS = "−";
-const NARROW_SPACE = " ";
+const SPACE = "\u00a0"; // does not break a line
 
 const TIME_UNITS: readonly [number, string][] = [
   [1, "s"],
@@ -37,13 +37,13 @@ export function quantity(value: number | null | undefined, unit: string): string
 /** Return a time [s] with three significant digits: 0.0000123 → "12.3 µs". */
 export function duration(seconds: number | null | undefined): string {
   if (seconds === null || seconds === undefined || Number.isNaN(seconds)) return MISSING;
-  if (seconds === 0) return `0${NARROW_SPACE}s`;
+  if (seconds === 0) return `0${SPACE}s`;
   const size = Math.abs(seconds);
   const found = TIME_UNITS.find(([factor]) => size >= factor * 0.9995) ?? TIME_UNITS[3];
   const [factor, unit] = found as [number, string];
   const scaled = size / factor;
   const digits = unit === "ns" ? 0 : Math.max(0, 2 - Math.floor(Math.log10(scaled * 1.0005)));
-  return `${seconds < 0 ? MINUS : ""}${scaled.toFixed(digits)}${NARROW_SPACE}${unit}`;
+  return `${seconds < 0 ? MINUS : ""}${scaled.toFixed(digits)}${SPACE}${unit}`;
 }
 
 /** Return an integer with groups of three digits. */
@@ -51,7 +51,7 @@ export function count(value: number | null | undefined): string {
   if (value === null || value === undefined) return MISSING;
   return Math.round(value)
     .toString()
-    .replace(/\B(?=(\d{3})+$)/g, NARROW_SPACE);
+    .replace(/\B(?=(\d{3})+$)/g, SPACE);
 }
 
 /** Return an integer as hexadecimal: "0x6064". */

@@ -57,5 +57,8 @@ function materialOf(shape: Shape, ghost: boolean): Material {
     opacity,
     depthWrite: opacity >= 1,
     flatShading: shape.type === "mesh",
+    polygonOffset: ghost, // hidden where it coincides with the robot
+    polygonOffsetFactor: 2,
+    polygonOffsetUnits: 2,
   });
 }

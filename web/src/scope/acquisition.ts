@@ -18,6 +18,7 @@ export class Acquisition {
   readonly paused = signal(false);
   readonly generation = signal(0); // changes with each new store or run
   private run: string | null = null;
+  private rejoined = false; // the connection was lost during this run
   private offered = new Set<string>();
   private wanted: readonly string[] = [];
   private subscribed: readonly string[] = [];
@@ -27,7 +28,8 @@ export class Acquisition {
     effect(() => {
       const hello = connection.hello.value;
       if (hello === null) return;
-      if (hello.run !== this.run) this.restart(hello.layout.period);
+      this.rejoined = hello.run === this.run;
+      if (!this.rejoined) this.restart(hello.layout.period);
       this.run = hello.run;
       this.offered = new Set(hello.layout.fields.flatMap((field) => elements(field)));
       this.resubscribe();
@@ -93,7 +95,12 @@ export class Acquisition {
   }
 
   private append(rows: Rows): void {
-    if (!this.paused.peek()) this.store.append(rows);
+    const { store } = this;
+    if (!this.paused.peek()) {
+      const missing = Math.round(((rows.time[0] ?? NaN) - store.lastTime) / store.period) - 1;
+      store.append(this.rejoined && missing > 0 ? { ...rows, lost: missing } : rows);
+    }
+    this.rejoined = false;
   }
 }
 

@@ -4,7 +4,7 @@ import uPlot from "uplot";
 import { Envelope, envelope, range } from "./decimation.ts";
 import type { RingStore } from "./store.ts";
 import { COLOURS, dash, drawCursor, drawGaps, drawLevel, drawTrace } from "./traces.ts";
-import { ValueRange, type Span } from "./view.ts";
+import { tickText, ValueRange, type Span } from "./view.ts";
 
 export interface PlotTrace {
   signal: string;
@@ -184,7 +184,7 @@ export class Plot {
   private timeAxis(): uPlot.Axis {
     const { text, grid } = this.palette;
     return {
-      stroke: text, grid: { stroke: grid, width: 1 }, ticks: { stroke: grid, width: 1, size: 4 },
+      values: tickTexts, stroke: text, grid: { stroke: grid, width: 1 }, ticks: { stroke: grid, width: 1, size: 4 },
       font: "11px system-ui, sans-serif", size: 26, gap: 3,
     };
   }
@@ -192,11 +192,16 @@ export class Plot {
   private valueAxis(unit: string, index: number): uPlot.Axis {
     const { text, grid } = this.palette;
     return {
-      space: 22, scale: scaleKey(unit), side: index === 0 ? 3 : 1, stroke: text, size: AXIS_SIZE, gap: 3,
+      values: tickTexts, space: 22, scale: scaleKey(unit), side: index === 0 ? 3 : 1, stroke: text, size: AXIS_SIZE, gap: 3,
       grid: { show: index === 0, stroke: grid, width: 1 }, ticks: { stroke: grid, width: 1, size: 4 },
       font: "11px system-ui, sans-serif", label: unit || "1", labelSize: 16, labelFont: "11px system-ui, sans-serif",
     };
   }
+}
+
+function tickTexts(_plot: uPlot, ticks: number[]): string[] {
+  const step = ticks.length > 1 ? ticks[1]! - ticks[0]! : 1;
+  return ticks.map((tick) => tickText(tick, step));
 }
 
 function scaleKey(unit: string): string {

@@ -45,11 +45,23 @@ export class ValueRange {
 
   include(low: number, high: number): void {
     if (Number.isNaN(low)) return;
-    const size = high - low || Math.max(Math.abs(high) * 0.02, 1e-9);
+    const size = high - low || Math.abs(high) * 0.02 || 1;
     const fits = low >= this.low && high <= this.high;
     if (fits && size > 0.5 * (this.high - this.low)) return;
     const centre = (low + high) / 2;
     this.low = centre - 0.58 * size;
     this.high = centre + 0.58 * size;
   }
+}
+
+/** Return the text of a tick with as many digits as the distance of the ticks requires. */
+export function tickText(value: number, step: number): string {
+  let digits = 0;
+  while (digits < 7 && !isWhole(step * 10 ** digits)) digits++;
+  if (digits === 7 || Math.abs(value) >= 1e7) return value === 0 ? "0" : value.toExponential(2).replaceAll("-", "−");
+  return (Math.abs(value) < step / 2 ? 0 : value).toFixed(digits).replace("-", "−");
+}
+
+function isWhole(value: number): boolean {
+  return Math.round(value) > 0 && Math.abs(value - Math.round(value)) < 1e-6 * value;
 }

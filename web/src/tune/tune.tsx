@@ -8,6 +8,7 @@ import type { Connection } from "../connection.ts";
 import type { AxisInfo } from "../remote.ts";
 import { useResource } from "../resource.ts";
 import { text } from "../strings.ts";
+import { BodePlot } from "./bode.tsx";
 import { Laws } from "./laws.tsx";
 import { StepResponse } from "./step.tsx";
 
@@ -31,6 +32,7 @@ export function Tune({ connection }: { connection: Connection }) {
           <StepResponse key={`${axis} ${unit}`} connection={connection} axis={axis} unit={unit} />
         </>
       )}
+      <BodePlot connection={connection} />
     </div>
   );
 }

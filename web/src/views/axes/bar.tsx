@@ -1,7 +1,7 @@
 /** Bar of a live value against its limits. */
 
-import { useSignalEffect } from "@preact/signals";
-import { useRef } from "preact/hooks";
+import { effect } from "@preact/signals";
+import { useEffect, useRef } from "preact/hooks";
 import { fixed, quantity } from "../../logic/format.ts";
 import { fraction, type Range } from "../../logic/range.ts";
 import { LiveText } from "../../parts/common.tsx";
@@ -38,7 +38,7 @@ function Track({ label, unit, read, range, target, centred }: BarProps) {
   const tick = useRef<HTMLDivElement>(null);
   const low = useRef<HTMLSpanElement>(null);
   const high = useRef<HTMLSpanElement>(null);
-  useSignalEffect(() => {
+  const draw = () => {
     const value = read();
     const goal = target?.() ?? null;
     if (track.current === null || fill.current === null) return;
@@ -48,7 +48,8 @@ function Track({ label, unit, read, range, target, centred }: BarProps) {
     describe(track.current, value, span, unit);
     write(low.current, limitText(span, span.low));
     write(high.current, limitText(span, span.high));
-  });
+  };
+  useEffect(() => effect(draw)); // after each rendering, because the limits may be new
   return (
     <div class="track-box">
     <div

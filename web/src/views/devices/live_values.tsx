@@ -4,11 +4,12 @@ import { useSignal } from "@preact/signals";
 import { useEffect } from "preact/hooks";
 import type { Connection } from "../../connection.ts";
 import { signalsOf, type DeviceSignal } from "../../logic/device_signals.ts";
-import { MISSING, quantity } from "../../logic/format.ts";
+import { hex, MISSING, quantity } from "../../logic/format.ts";
 import type { Device } from "../../remote.ts";
 import { text } from "../../strings.ts";
 
 const RATE = 10; // frames per second
+const WORD = /^(status|control)word/; // shown as hexadecimal
 const MOST = 256; // signals of a subscription
 
 type Extremes = readonly [number, number];
@@ -50,10 +51,11 @@ export function LiveValues({ connection, device }: { connection: Connection; dev
 
 function Value({ signal, extremes }: { signal: DeviceSignal; extremes: Extremes | undefined }) {
   const [low, high] = extremes ?? [NaN, NaN];
+  const isWord = WORD.test(signal.label) && !Number.isNaN(high);
   return (
     <tr>
       <td class="mono">{signal.label}</td>
-      <td class="number mono">{shown(high, signal.unit)}</td>
+      <td class="number mono">{isWord ? hex(high, 4) : shown(high, signal.unit)}</td>
       <td class="muted">{signal.unit}</td>
       <td class="number mono muted">
         {low === high || Number.isNaN(low)

@@ -19,7 +19,9 @@ export function StateControl({ connection, device, reload }: DetailProps) {
       body: text.devices.stateBody,
       action: `${text.devices.setState} ${state}`,
     };
-    if (await confirmed(question)) await run("set_state", { position: device.position, state });
+    if (await confirmed(question)) {
+      await run("set_state", { position: device.position, state, force: true });
+    }
   };
   return (
     <div class="row wrap" role="group" aria-label={text.devices.state}>
