@@ -23,13 +23,13 @@ export function Tune({ connection }: { connection: Connection }) {
   return (
     <div class="tune">
       <h1 class="hidden-text">{text.tune.title}</h1>
-      <Laws connection={connection} />
       {names.length > 0 && (
         <>
           <AxisBar connection={connection} axis={axis} names={names} choose={setChosen} />
           <AxisTests key={`${axis} ${unit}`} connection={connection} axis={axis} name={names[axis]!} unit={unit} />
         </>
       )}
+      <Laws connection={connection} />
     </div>
   );
 }
