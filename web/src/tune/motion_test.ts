@@ -43,6 +43,7 @@ export class MotionTest {
   begin(control: number, seconds: number, jog: JogRequest): void {
     this.finish();
     this.held.value = control;
+    this.jogging.forget(this.axis);
     this.record = this.start(seconds);
     this.timer = setTimeout(() => {
       this.jogging.press(this.axis, jog.velocity < 0 ? -1 : 1, jog, false);
