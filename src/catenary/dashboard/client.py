@@ -138,6 +138,7 @@ class Client:
                 self._subscribe(message)
             case Stop():
                 self._reader().stop()
+                self.send(encode_message("stopped"))
             case Poses(on=on):
                 self.wants_poses = on
             case Beat():
@@ -147,7 +148,13 @@ class Client:
             case Press():
                 self._enqueue(message, partial(self._motion.press, self._reader(), message))
             case Request():
-                self._enqueue(message, partial(self._motion.request, self._reader(), message))
+                self._request(message)
+
+    def _request(self, message: Request) -> None:
+        reader = self._reader()
+        if message.run not in (None, reader.layout.run):
+            raise RuntimeError("the loop has restarted; its axes may be others")
+        self._enqueue(message, partial(self._motion.request, reader, message))
 
     def _subscribe(self, message: Subscribe) -> None:
         reader, subscriptions = self._reader(), self._hub.subscriptions
