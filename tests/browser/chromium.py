@@ -21,6 +21,8 @@ OPTIONS = (
     "--headless=new",
     "--no-sandbox",  # Chromium refuses to run as root with its sandbox
     "--disable-gpu",
+    "--use-angle=swiftshader",  # WebGL without a GPU
+    "--enable-unsafe-swiftshader",
     "--disable-dev-shm-usage",
     "--disable-quic",
     "--no-first-run",
