@@ -31,8 +31,7 @@ def assert_released(rig: Rig, shown: Operator) -> None:
 
 def test_release_of_the_button(shared_rig: Rig) -> None:
     with shared_rig.operating() as shown:
-        shown.hold(AXIS)
-        assert shared_rig.moves()
+        assert shared_rig.jogs(shown)
         shown.page.mouse.up()
         assert_released(shared_rig, shown)
 
@@ -41,8 +40,7 @@ def test_release_of_the_button(shared_rig: Rig) -> None:
 def test_loss_of_the_pointer_or_the_page(shared_rig: Rig, cause: str) -> None:
     """The mouse button stays pressed, and the jog does not continue."""
     with shared_rig.operating() as shown:
-        shown.hold(AXIS)
-        assert shared_rig.moves()
+        assert shared_rig.jogs(shown)
         shown.plus(AXIS).evaluate(CAUSES[cause])
         assert_released(shared_rig, shown)
 
@@ -69,8 +67,7 @@ def test_loss_of_the_focus(shared_rig: Rig) -> None:
 def test_another_view(shared_rig: Rig) -> None:
     """The page leaves the view, for example by the back button, while the mouse is pressed."""
     with shared_rig.operating() as shown:
-        shown.hold(AXIS)
-        assert shared_rig.moves()
+        assert shared_rig.jogs(shown)
         shown.page.evaluate('location.hash = "#/overview"')
         assert shared_rig.stands()
         shown.page.mouse.up()
