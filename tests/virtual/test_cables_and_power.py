@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
+
 import pytest
 
 import catenary as cat
+from catenary.errors import SegmentError
 from catenary.virtual import Segment
 from catenary.virtual.devices import Coupler, Servo
 
@@ -28,8 +31,9 @@ def test_a_device_without_power_does_not_answer() -> None:
         assert len(main.scan()) == 2
         segment.switch_power(2, True)
         for _ in range(100):
-            if len(main.scan()) == 3:
-                break
+            with suppress(SegmentError):  # the device appears during this scan
+                if len(main.scan()) == 3:
+                    break
         assert len(main.subs) == 3
 
 
