@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from playwright.sync_api import Browser, Playwright
 
+from tests.browser.processes import with_parent
 from tests.share.processes import DEADLINE
 
 OPTIONS = (
@@ -40,7 +41,7 @@ class Chromium:
 
     def __init__(self, playwright: Playwright, path: str, profile: Path) -> None:
         self.process = subprocess.Popen(
-            [path, *OPTIONS, f"--user-data-dir={profile}", "about:blank"],
+            with_parent("--exec", path, *OPTIONS, f"--user-data-dir={profile}", "about:blank"),
             stdout=subprocess.DEVNULL,
             stderr=subprocess.DEVNULL,
             start_new_session=True,

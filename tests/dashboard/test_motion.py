@@ -175,6 +175,7 @@ def test_the_stop_of_an_operator_stops_the_axes(jogging: Page) -> None:
     with jogging.socket() as socket:
         start(socket)
         socket.send("stop")
+        assert socket.next("stopped")
         axis = status_until(socket, lambda axis: not axis["enabled"] and axis["stop_reason"])
         assert "operator" in str(axis["stop_reason"])
 
@@ -185,6 +186,16 @@ def test_an_operator_disables_and_enables_an_axis(jogging: Page) -> None:
         status_until(socket, lambda axis: not axis["enabled"])
         socket.send("request", axes=[0], state="enable")
         status_until(socket, lambda axis: axis["enabled"])
+
+
+def test_a_request_for_the_axes_of_an_earlier_run_is_refused(jogging: Page) -> None:
+    """The axis with this number may be another one after a restart of the loop."""
+    with jogging.socket() as socket:
+        run = socket.next("hello")["run"]
+        socket.send("request", axes=[0], state="disable", run="another")
+        assert "restarted" in str(socket.next("error")["message"])
+        socket.send("request", axes=[0], state="disable", run=run)
+        status_until(socket, lambda axis: not axis["enabled"])
 
 
 def test_a_share_without_jogs_refuses_them_with_the_reason(name: str) -> None:

@@ -71,10 +71,14 @@ class Stop(msgspec.Struct, frozen=True, tag_field="op", tag="stop"):
 
 
 class Request(msgspec.Struct, frozen=True, tag_field="op", tag="request"):
-    """Request for a state of axes; `axes` None: all."""
+    """Request for a state of axes; `axes` None: all.
+
+    `run`: run of the loop whose axes the page shows; another run refuses the request.
+    """
 
     state: StateName
     axes: list[Number] | None = None
+    run: Name | None = None
 
 
 class Poses(msgspec.Struct, frozen=True, tag_field="op", tag="poses"):

@@ -81,7 +81,12 @@ class Tune:
         if self._busy.locked():
             return refusal(429, "another capture is running", hint="wait for its end")
         async with self._busy:
-            captured, lost = await capture(reader, body.axis, body.seconds, request.is_disconnected)
+            try:
+                captured, lost = await capture(
+                    reader, body.axis, body.seconds, request.is_disconnected
+                )
+            except RuntimeError:  # the hub has closed the reader
+                return refusal(409, page.hub.source.reason)
             if await request.is_disconnected():
                 return Response(status_code=400)
             figures = await asyncio.to_thread(
