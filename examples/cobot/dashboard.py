@@ -36,7 +36,9 @@ APPROACH, WAIT = 4.0, 10.0  # [s] to the start of the motion; before it continue
 # Compliance: virtual mass, damper and spring of each joint, in SI units.
 INERTIA, DAMPING, STIFFNESS = 2.0, 40.0, 120.0
 FRICTION = np.array([16.0, 16.0, 9.0, 3.5, 3.5, 3.5])  # [N·m], torques below are not a push
-GIVES_WAY = 0.5  # [rad], at most
+SMOOTHING = 0.02  # [s], time constant of the torques from outside
+PUSH = np.array([100.0, 100.0, 60.0, 30.0, 30.0, 30.0])  # [N·m], at most
+GIVES_WAY, GIVES_WAY_SPEED = 0.5, 1.2  # [rad], [rad/s], at most
 
 
 def path(time):
@@ -55,22 +57,22 @@ class Compliance:
 
     def __init__(self, model):
         self.model = model
-        self.offset = np.zeros(JOINTS)
-        self.speed = np.zeros(JOINTS)
+        self.outside, self.offset, self.speed = np.zeros((3, JOINTS))
 
     def step(self, actual):
         """Return the deviation, (6,) [rad], from the measured position, velocity and torque."""
         known = self.model.inverse(actual.position, actual.velocity, np.zeros(JOINTS))
-        outside = known - actual.torque
-        push = np.sign(outside) * np.maximum(abs(outside) - FRICTION, 0.0)
+        self.outside += (known - actual.torque - self.outside) * PERIOD / SMOOTHING
+        push = np.sign(self.outside) * np.clip(abs(self.outside) - FRICTION, 0.0, PUSH)
         force = push - DAMPING * self.speed - STIFFNESS * self.offset
-        self.speed += PERIOD * force / INERTIA
+        speed = self.speed + PERIOD * force / INERTIA
+        self.speed = np.clip(speed, -GIVES_WAY_SPEED, GIVES_WAY_SPEED)
         self.offset = np.clip(self.offset + PERIOD * self.speed, -GIVES_WAY, GIVES_WAY)
         return self.offset
 
     def reset(self):
         """Forget the deviation."""
-        self.offset[:] = self.speed[:] = 0.0
+        self.outside, self.offset, self.speed = np.zeros((3, JOINTS))
 
 
 class Motion:
@@ -104,9 +106,9 @@ class Motion:
 
 
 @contextmanager
-def page(name):
+def page(name, port):
     """Serve the page during the block. The server prints its links."""
-    command = [sys.executable, "-m", "catenary.cli", "dashboard", name]
+    command = [sys.executable, "-m", "catenary.cli", "dashboard", name, "--port", str(port)]
     server = subprocess.Popen([*command, "--model", str(HERE / "arm.xml"), "--recordings", "."])
     try:
         yield
@@ -141,6 +143,7 @@ if __name__ == "__main__":
     parser.add_argument("--name", default="cobot", help="name of its share")
     parser.add_argument("--seconds", type=float, help="duration; default: until Ctrl-C")
     parser.add_argument("--page", action="store_true", help="also serve the operator's page")
-    options = parser.parse_args()
-    with suppress(KeyboardInterrupt), page(options.name) if options.page else nullcontext():
-        run(options.name, options.seconds)
+    parser.add_argument("--port", type=int, default=8710, help="port of the page")
+    a = parser.parse_args()
+    with suppress(KeyboardInterrupt), page(a.name, a.port) if a.page else nullcontext():
+        run(a.name, a.seconds)
