@@ -107,18 +107,18 @@ class Motion:
 
 @contextmanager
 def page(name, port):
-    """Serve the page during the block. The server prints its links."""
+    """Serve the page during the block, and yield its process. It prints the links."""
     command = [sys.executable, "-m", "catenary.cli", "dashboard", name, "--port", str(port)]
     server = subprocess.Popen([*command, "--model", str(HERE / "arm.xml"), "--recordings", "."])
     try:
-        yield
+        yield server
     finally:
         server.terminate()
         server.wait()
 
 
-def run(name, seconds):
-    """Run the robot until `seconds` have passed; None: until Ctrl-C."""
+def run(name, seconds, server):
+    """Run the robot until `seconds` have passed (None: until Ctrl-C) or `server` has ended."""
     model = control.Dynamics(HERE / "arm.xml", axes=JOINTS)
     segment = read_segment(HERE / "segment.toml", clock="monotonic", ring=True)
     stop = cat.StopPolicy(
@@ -136,6 +136,8 @@ def run(name, seconds):
                 motion.step(arm, compliance)
                 if seconds is not None and cycle.time > seconds:
                     break
+                if server and cycle.number % 1000 == 0 and server.poll() is not None:
+                    break
 
 
 if __name__ == "__main__":
@@ -145,5 +147,6 @@ if __name__ == "__main__":
     parser.add_argument("--page", action="store_true", help="also serve the operator's page")
     parser.add_argument("--port", type=int, default=8710, help="port of the page")
     a = parser.parse_args()
-    with suppress(KeyboardInterrupt), page(a.name, a.port) if a.page else nullcontext():
-        run(a.name, a.seconds)
+    serving = page(a.name, a.port) if a.page else nullcontext()
+    with suppress(KeyboardInterrupt), serving as server:
+        run(a.name, a.seconds, server)
