@@ -34,12 +34,15 @@ CENTER = np.array([0.0, 0.3, 0.9, 0.0, 0.6, 0.0])  # [rad]
 AMPLITUDE = np.array([0.9, 0.35, 0.5, 0.5, 0.5, 1.2])  # [rad]
 RATE = 2 * np.pi / np.array([16.0, 8.0, 8.0, 8.0, 16.0, 8.0])  # [rad/s], repeats after 16 s
 APPROACH, WAIT = 4.0, 10.0  # [s] to the start of the motion; before it continues
-# Compliance: virtual mass, damper and spring of each joint, in SI units.
-INERTIA, DAMPING, STIFFNESS = 2.0, 30.0, 50.0
+# Compliance: virtual mass, damper and spring of each joint, in SI units. The mass is at least that
+# of the arm: a smaller one makes the controller react to its own acceleration.
+INERTIA = np.array([8.0, 8.0, 3.0, 0.5, 0.5, 0.5])
+DAMPING = np.array([60.0, 60.0, 25.0, 6.0, 6.0, 6.0])
+STIFFNESS = np.array([50.0, 50.0, 25.0, 8.0, 8.0, 8.0])
 FRICTION = np.array([16.0, 16.0, 9.0, 3.5, 3.5, 3.5])  # [N·m], torques below are not a push
 SMOOTHING = 0.02  # [s], time constant of the torques from outside
 PUSH = np.array([100.0, 100.0, 60.0, 30.0, 30.0, 30.0])  # [N·m], at most
-GIVES_WAY, GIVES_WAY_SPEED = 0.5, 1.2  # [rad], [rad/s], at most
+GIVES_WAY, GIVES_WAY_SPEED = 0.5, 1.0  # [rad], [rad/s], at most
 
 
 def path(time):
