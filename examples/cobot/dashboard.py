@@ -132,7 +132,7 @@ def run(name, seconds, server):
         cat.MainDevice(segment.first, segment.second) as bus,
         cat.Share(name, jog=True) as share,
     ):
-        arm = cat.Drives(bus.scan().drives, mode="csp", **AXES)
+        arm = cat.Drives(bus.scan().drives, mode="csp", required=False, **AXES)
         with cat.Loop(arm, period=PERIOD, sink=share, stop=stop) as loop:
             compliance, motion, before = Compliance(model), Motion(arm.target.position), 0.0
             print(f"the arm moves; its share is {name!r}. Press Ctrl-C to end", flush=True)
