@@ -82,7 +82,7 @@ class Film:
         """Write an animated WebP."""
         first, *rest = self.frames
         options: dict[str, Any] = {"save_all": True, "append_images": rest, "duration": FRAME}
-        first.save(path, loop=0, quality=55, method=6, minimize_size=True, **options)
+        first.save(path, loop=0, quality=60, method=4, **options)
 
 
 @contextmanager
