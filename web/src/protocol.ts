@@ -106,6 +106,8 @@ export interface StateRequest {
   /** Numbers of axes; null: all. */
   axes: number[] | null;
   state: AxisRequest;
+  /** Run of the loop whose axes the page shows (`hello.run`); another run refuses the request. */
+  run?: string | null;
 }
 
 /** Request the poses of the 3D scene (kind 3), or end them. */
@@ -262,6 +264,11 @@ export interface ErrorMessage extends ErrorBody {
   about: string;
 }
 
+/** The server has written the stop word: the loop stops all axes in its next cycle. */
+export interface Stopped {
+  op: "stopped";
+}
+
 export interface Pong {
   op: "pong";
   t: number;
@@ -276,6 +283,7 @@ export type ServerMessage =
   | Timing
   | JogMessage
   | ErrorMessage
+  | Stopped
   | Pong;
 
 // Binary frames, little endian. Header of 32 bytes:

@@ -49,9 +49,9 @@ function Curve({ response, values, label, range }: CurveProps) {
   return <div ref={place} class="tune-curve" role="img" aria-label={label} />;
 }
 
-/** Label only 1, 2 and 5 times a power of ten. */
-function frequencies(_plot: uPlot, splits: number[]): (string | null)[] {
-  return splits.map((each) => (/^[125]/.test(each.toExponential()) ? `${each} Hz` : null));
+/** Label only 1, 2 and 5 times a power of ten. uPlot leaves out some places (null). */
+function frequencies(_plot: uPlot, splits: (number | null)[]): string[] {
+  return splits.map((each) => (each !== null && /^[125]/.test(each.toExponential()) ? `${each} Hz` : ""));
 }
 
 function MarginList({ loop }: { loop: FrequencyResponse }) {

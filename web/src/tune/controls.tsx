@@ -1,5 +1,7 @@
 /** Controls of a motion test: numbers, and a button that is held. */
 
+import { isOtherButton } from "../views/axes/jog_controls.tsx";
+
 interface EntryProps {
   label: string;
   value: number;
@@ -39,7 +41,8 @@ export function HoldButton({ label, held, disabled, begin, end }: HoldProps) {
         event.currentTarget.setPointerCapture(event.pointerId);
         begin();
       }}
-      onPointerUp={end} onPointerCancel={end} onLostPointerCapture={end} onBlur={end}
+      onPointerUp={end} onPointerMove={(event) => isOtherButton(event) && end()}
+      onPointerCancel={end} onLostPointerCapture={end} onBlur={end}
       onKeyDown={(event) => {
         if (!isKey(event)) return;
         event.preventDefault();

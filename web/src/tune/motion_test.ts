@@ -43,8 +43,11 @@ export class MotionTest {
   begin(control: number, seconds: number, jog: JogRequest): void {
     this.finish();
     this.held.value = control;
+    this.jogging.forget(this.axis);
     this.record = this.start(seconds);
+    const releases = this.jogging.releases; // a release in the meantime also cancels this press
     this.timer = setTimeout(() => {
+      if (this.jogging.releases !== releases) return this.end();
       this.jogging.press(this.axis, jog.velocity < 0 ? -1 : 1, jog, false);
       this.moving = this.jogging.held.peek() !== null;
       if (!this.moving) this.end();
