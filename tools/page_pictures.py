@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import argparse
 import io
-import os
 import shutil
 import signal
 import subprocess
@@ -28,11 +27,11 @@ if TYPE_CHECKING:
     from playwright.sync_api import Page
 
 ROOT = Path(__file__).resolve().parents[1]
-NAME = f"cobot{os.getpid()}"
-WIDTH, HEIGHT = 1180, 760
-SCALE = 0.72
+WIDTH, HEIGHT = 1100, 720
+SCALE = 0.76
 FRAME = 125  # [ms] of the animation
 SPEED = 2.0  # of the animation, at most
+ZOOM = -600  # pixels of the mouse wheel
 SETTLE = 4000  # [ms] until live values have filled the charts
 VIEWS = {"overview": "Overview", "axes": "Axes", "devices": "Devices", "scope": "Scope"}
 FLAGS = ["--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
@@ -86,10 +85,10 @@ class Film:
 
 
 @contextmanager
-def demo() -> Iterator[str]:
+def demo(name: str) -> Iterator[str]:
     """Run the cobot, and yield the link of an operator."""
     command = [sys.executable, str(ROOT / "examples/cobot/dashboard.py"), "--page"]
-    options = ["--name", NAME, "--port", "0"]
+    options = ["--name", name, "--port", "0"]
     program = subprocess.Popen([*command, *options], stdout=subprocess.PIPE, text=True)
     try:
         lines = list(islice(program.stdout or (), 4))  # links, a note, and that the arm moves
@@ -110,7 +109,7 @@ def grab(film: Film) -> None:
         y = box["y"] + box["height"] * (0.25 + 0.03 * (step // 10))
         film.move(x, y)
         page.mouse.down()
-        page.wait_for_timeout(200)
+        page.wait_for_timeout(150)
         if pushes:
             return
         page.mouse.up()
@@ -138,8 +137,8 @@ def pull_and_plug(film: Film) -> None:
     elbow = page.locator(".topology").get_by_role("link").nth(2)
     film.click(navigation(page, "Devices"), 3)
     film.click(elbow, 3)
-    film.click(page.get_by_role("button", name="Pull cable at port 1"), 10)
-    film.click(navigation(page, "Overview"), 14)
+    film.click(page.get_by_role("button", name="Pull cable at port 1"), 8)
+    film.click(navigation(page, "Overview"), 12)
     film.click(navigation(page, "Devices"), 2)
     film.click(elbow, 2)
     film.click(page.get_by_role("button", name="Plug cable at port 1"), 6)
@@ -166,7 +165,8 @@ def open_page(browser: Any, link: str) -> Page:
     page.set_default_timeout(60_000)
     page.goto(link)
     navigation(page, "Axes").click()
-    page.locator(".scene-view canvas").wait_for()
+    page.locator(".scene-view canvas").hover()
+    page.mouse.wheel(0, ZOOM)
     page.wait_for_timeout(SETTLE)
     return page
 
@@ -174,14 +174,16 @@ def open_page(browser: Any, link: str) -> Page:
 def main() -> None:
     parser = argparse.ArgumentParser(description="Make the pictures of the operator's page.")
     parser.add_argument("folder", type=Path)
-    folder: Path = parser.parse_args().folder
+    parser.add_argument("--name", default="cobot", help="name of the share")
+    arguments = parser.parse_args()
+    folder: Path = arguments.folder
     from playwright.sync_api import sync_playwright
 
-    with demo() as link, sync_playwright() as playwright:
+    with demo(arguments.name) as link, sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=shutil.which("chromium"), args=FLAGS)
         page = open_page(browser, link)
         film = Film(page)
-        film.shoot(16)
+        film.shoot(14)
         push(film)
         pull_and_plug(film)
         film.save(folder / "page.webp")
