@@ -468,6 +468,21 @@ def test_the_stop_word_at_the_attachment_stops_nothing() -> None:
     assert b.drives[0].state == 4
 
 
+def test_the_stop_word_is_the_reason_of_a_disabled_axis_too() -> None:
+    """The program must not enable it by itself, as it may do after another stop."""
+    b, operator = made(jog=False)
+    b.ask(REQUEST_DISABLED)
+    b.steps(5)
+    assert b.stop_reason[0] == 0
+    operator.stop()
+    assert not b.engine.next() & CYCLE_DROPPED
+    b.steps(2)
+    assert StopReason(b.stop_reason[0]) is StopReason.OPERATOR
+    b.ask(REQUEST_ENABLED)
+    b.steps(12)
+    assert (b.stop_reason[0], b.drives[0].state) == (0, 4)
+
+
 def test_a_stop_ends_a_jog() -> None:
     b, operator = made()
     operator.press(0.5)
