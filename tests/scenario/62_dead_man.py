@@ -13,7 +13,7 @@ import pytest
 import catenary as cat
 from catenary.errors import MoveError, WorkingCounterError
 from catenary.plan.stop_reason import StopReason
-from catenary.share import Jog, JogStatus, Lease, Reader, Share
+from catenary.share import Jog, JogStatus, Lease, Reader
 from tests.scenario.vertical import LAG, MS, RESOLUTION, VerticalCell, vertical_cell
 from tests.share.names import own_name
 
@@ -31,7 +31,7 @@ class Desk:
     """An operator at a share, whose loop the test iterates."""
 
     def __init__(
-        self, cell: VerticalCell, arm: cat.Drives, loop: cat.Loop, share: Share, reader: Reader
+        self, cell: VerticalCell, arm: cat.Drives, loop: cat.Loop, share: cat.Share, reader: Reader
     ) -> None:
         self.cell, self.arm, self.loop, self.share, self.reader = cell, arm, loop, share, reader
         self.lease: Lease = reader.lease(for_=3600.0)
@@ -209,6 +209,20 @@ def test_link_down_ends_the_jog() -> None:
             desk.cell.let_pass(0.5)
             assert not desk.cell.powered
             desk.cell.segment.plug()
+
+
+def test_the_watchdog_acts_if_the_process_of_the_loop_is_killed_during_a_jog() -> None:
+    """Without the process nobody judges the jog. The drive stops after its watchdog."""
+    patient = cat.StopPolicy(on_axis_stopped="event", raise_faults=False)
+    with operated(stop=patient) as desk:
+        desk.jog(300)
+        before = desk.cell.joint
+        desk.loop._opened.engine.stop()  # as after a kill: no more frames
+        desk.cell.let_pass(1.0)
+        assert not desk.cell.powered
+        assert abs(desk.cell.joint - before) < SPEED * (0.1 + DELAY) + RAMP_WAY
+        assert abs(desk.cell.velocity) < 1e-3
+        desk.loop._opened.engine.start()
 
 
 def test_the_stop_needs_no_lease_and_ends_the_jog() -> None:
