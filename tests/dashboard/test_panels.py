@@ -45,7 +45,7 @@ def test_recordings_are_served(tmp_path: Path) -> None:
     file.finish({})
     with own_name("files") as name, serving(name, panels=Panels(recordings=tmp_path)) as page:
         client = page.client()
-        assert client.get("/scene").status_code == 404
+        assert client.get("/scene").status_code == 204
         assert [f["name"] for f in client.get("/api/recordings").json()["files"]] == ["arm.mcap"]
         assert client.get("/api/recordings/arm.mcap").json()["duration"] == pytest.approx(0.299)
         assert client.get("/api/recordings/..%2Farm.mcap").status_code == 404

@@ -60,7 +60,7 @@ function ConnectionFact({ connection }: { connection: Connection }) {
 }
 
 function LoopFact({ connection }: { connection: Connection }) {
-  const open = connection.state.value === "open";
+  const open = connection.state.value === "open" && connection.fresh.value;
   const lost = connection.losing.value;
   const tone: Tone = !open ? "" : !connection.running.value ? "bad" : lost ? "warn" : "ok";
   const shown: string = !open

@@ -6,7 +6,7 @@ import { Header } from "./header.tsx";
 import { Login } from "./login.tsx";
 import { dismiss, notices, notify } from "./notices.ts";
 import { Icon } from "./parts/common.tsx";
-import { ConfirmDialog } from "./parts/confirm.tsx";
+import { cancelQuestion, ConfirmDialog } from "./parts/confirm.tsx";
 import { address, route } from "./route.ts";
 import { text } from "./strings.ts";
 import { choice, nextTheme } from "./theme.ts";
@@ -20,6 +20,11 @@ export function Shell({ connection }: { connection: Connection }) {
       connection.on("error", ({ message, hint }) => notify(message, { hint, kind: "bad" })),
     [connection],
   );
+  useEffect(
+    () => connection.state.subscribe((state) => state !== "open" && cancelQuestion()),
+    [connection],
+  );
+  useEffect(cancelQuestion, [connection.hello.value?.run]);
   if (connection.state.value === "login") return <Login connection={connection} />;
   const view = views.find(({ key }) => key === route.value[0]) ?? views[0];
   if (view === undefined) return null;
@@ -39,7 +44,8 @@ export function Shell({ connection }: { connection: Connection }) {
 }
 
 function isLive(connection: Connection): boolean {
-  return connection.state.value === "open" && connection.running.value;
+  const { state, fresh, running } = connection;
+  return state.value === "open" && fresh.value && running.value;
 }
 
 function Rail({ shown }: { shown: string }) {
@@ -75,6 +81,13 @@ function Banner({ connection }: { connection: Connection }) {
     return (
       <div class="banner bad" role="alert">
         <strong>{text.banner.lost}</strong> <span>{text.banner.lostHint}</span>
+      </div>
+    );
+  }
+  if (state === "open" && !connection.fresh.value) {
+    return (
+      <div class="banner bad" role="alert">
+        <strong>{text.banner.silent}</strong> <span>{text.banner.silentHint}</span>
       </div>
     );
   }

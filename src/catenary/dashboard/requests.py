@@ -18,9 +18,10 @@ if TYPE_CHECKING:
 FAILURES = (CatenaryError, OSError, RuntimeError, TypeError, ValueError)  # of a request
 CONNECTIONS = 6
 CALLS_MAX = 32  # that wait or run
+VIEWER_CALLS_MAX = 16  # the rest is for operators
 READS = frozenset(
     {
-        *("hello", "devices", "axes", "objects", "sdo_read", "registers", "diagnosis"),
+        *("hello", "devices", "axes", "objects", "sdo_read", "diagnosis"),
         *("emergencies", "events", "timing", "clocks", "plan", "laws"),
     }
 )
@@ -28,6 +29,7 @@ WRITES = frozenset(
     {
         *("sdo_write", "set_state", "reset_error", "clear_counters", "set_parameters", "home"),
         *("virtual_cable", "virtual_power", "virtual_push"),
+        "registers",  # reading can change a device: it empties a mailbox, or resets a latch
     }
 )
 
@@ -70,7 +72,12 @@ class Requests:
         self._pool.shutdown(wait=False, cancel_futures=True)
 
     async def call(
-        self, method: str, params: Mapping[str, object], *, timeout: float | None = None
+        self,
+        method: str,
+        params: Mapping[str, object],
+        *,
+        timeout: float | None = None,
+        limit: int = CALLS_MAX,
     ) -> object:
         """Return the result of a method of `catenary.remote.Client`.
 
@@ -78,6 +85,7 @@ class Requests:
             method: name of the method.
             params: its arguments.
             timeout: deadline [s]; None: that of the client.
+            limit: number of requests in progress from which this one is refused.
 
         Raises:
             CatenaryError: the program refused the request, or does not answer.
@@ -86,8 +94,8 @@ class Requests:
             TypeError: the arguments do not fit the method.
             ValueError: a value is not valid.
         """
-        if self._waiting >= CALLS_MAX:
-            raise BusyError
+        if self._waiting >= limit:
+            raise BusyError(limit)
         self._waiting += 1
         try:
             async with self._running:
@@ -139,8 +147,8 @@ class Requests:
 class BusyError(CatenaryError):
     """Too many requests are waiting."""
 
-    def __init__(self) -> None:
-        super().__init__(f"{CALLS_MAX} requests are already waiting", hint="try again")
+    def __init__(self, limit: int) -> None:
+        super().__init__(f"{limit} requests are already waiting", hint="try again")
 
 
 def is_allowed(method: str, role: Role) -> bool:

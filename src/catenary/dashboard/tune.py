@@ -79,7 +79,10 @@ class Tune:
         if self._busy.locked():
             return refusal(429, "another capture is running", hint="wait for its end")
         async with self._busy:
-            captured, lost = await capture(reader, body.axis, body.seconds)
+            try:
+                captured, lost = await capture(reader, body.axis, body.seconds)
+            except RuntimeError:  # the hub has closed the reader
+                return refusal(409, page.hub.source.reason)
             figures = await asyncio.to_thread(
                 make_figures, reader.layout.axes[body.axis], captured, lost
             )

@@ -9,6 +9,7 @@ import { Plot } from "../scope/plot.ts";
 import { RingStore } from "../scope/store.ts";
 import { useTheme } from "../scope/scope.tsx";
 import { text } from "../strings.ts";
+import { isOtherButton } from "../views/axes/jog_controls.tsx";
 import { Jogging, type Unit } from "../views/axes/jogging.ts";
 import { type StepFigures, stepFigures } from "./step_response.ts";
 
@@ -28,8 +29,11 @@ export function StepResponse({ connection, axis, unit }: { connection: Connectio
     record.current?.();
     record.current = recordAxis(connection, axis, (recorded) => setStore(recorded));
     const jog = { velocity: sign * velocity, distance, acceleration: null };
-    setTimeout(() => held.current && jogging.press(axis, sign, jog, false), 1000 * BEFORE);
+    const releases = jogging.releases; // a release in the meantime also cancels this press
     held.current = true;
+    setTimeout(() => {
+      if (held.current && jogging.releases === releases) jogging.press(axis, sign, jog, false);
+    }, 1000 * BEFORE);
   };
   const held = useRef(false);
   const end = () => {
@@ -70,7 +74,8 @@ function HoldButton(props: { label: string; disabled: boolean; begin: () => void
         event.currentTarget.setPointerCapture(event.pointerId);
         props.begin();
       }}
-      onPointerUp={props.end} onPointerCancel={props.end} onLostPointerCapture={props.end} onBlur={props.end}
+      onPointerUp={props.end} onPointerMove={(event) => isOtherButton(event) && props.end()}
+      onPointerCancel={props.end} onLostPointerCapture={props.end} onBlur={props.end}
       onKeyDown={(event) => {
         if (!isKey(event)) return;
         event.preventDefault();

@@ -126,7 +126,7 @@ function EnablePad({ jogging }: { jogging: Jogging }) {
   const touched = useSignal(matchMedia("(pointer: coarse)").matches);
   useEffect(() => {
     const onPointer = (event: PointerEvent) => {
-      if (event.pointerType === "touch") touched.value = true;
+      if (event.pointerType !== "mouse") touched.value = true;
     };
     window.addEventListener("pointerdown", onPointer);
     return () => window.removeEventListener("pointerdown", onPointer);
