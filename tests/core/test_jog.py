@@ -10,7 +10,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from catenary.core import AXIS_FOLLOWED, CYCLE_DROPPED, REQUEST_DISABLED, REQUEST_ENABLED
+from catenary.core import (
+    AXIS_FOLLOWED,
+    CYCLE_DROPPED,
+    REQUEST_DISABLED,
+    REQUEST_ENABLED,
+    Stream,
+)
 from catenary.plan.cycle import AxisLimits
 from catenary.plan.stop_reason import StopReason
 from catenary.share.jog import JogStatus, RequestStatus
@@ -409,6 +415,23 @@ def test_a_target_far_away_is_refused_after_a_jog_and_the_axis_holds() -> None:
     assert operator.status() is JogStatus.DONE
     assert b.drives[0].target_position == 200
     assert b.drives[0].state == 4
+
+
+def test_a_stream_that_is_far_away_after_a_jog_stops_the_axis() -> None:
+    """The other axes of a stream move on: this one must not stay behind in silence."""
+    b, operator = made(limits=AxisLimits(velocity=V, step=0.01))
+    operator.press(0.5, 0.2)
+    jogged(b, operator, 100)
+    stream = Stream(1, 8)
+    b.engine.set_stream(stream)
+    for _ in range(700):
+        operator.beat()
+        stream.write(np.zeros((1, 3)).tobytes(), b.engine.number)
+        b.engine.next()
+    assert operator.status() is JogStatus.DONE
+    assert b.drives[0].target_position == 200
+    assert StopReason(b.stop_reason[0]) is StopReason.REFUSED
+    assert b.drives[0].state != 4
 
 
 def test_a_request_of_the_application_ends_the_jog() -> None:

@@ -81,7 +81,7 @@ class Recovery:
         self._since: float | None = None  # [s] time of the last reason or enable request
         self._next_reset = 0.0
         self._resetting = False
-        self._by_operator = False  # an operator has stopped a drive, and nobody has enabled it
+        self._by_operator = False  # an operator has stopped a drive, and all are not enabled yet
 
     def step(self, cycle: CycleNow, reason: str | None = None, *, ready: bool = True) -> Phase:
         """Stop or recover the drives.

@@ -132,7 +132,7 @@ def checked(check: Callable[[], None], procedure: Procedure[T]) -> Procedure[T]:
 def in_thread(function: Callable[[Callable[[], bool]], T]) -> Work[T]:
     """Run a function that may block in a separate thread, and return its result.
 
-    The function receives another one, which returns True if nobody waits for the result any more.
+    The function receives another one, which returns True when the request has ended.
     """
     results: list[T] = []
     errors: list[BaseException] = []
