@@ -243,6 +243,20 @@ def test_link_down_ends_the_jog() -> None:
             desk.cell.segment.plug()
 
 
+def test_the_watchdog_acts_if_the_process_of_the_loop_is_killed_during_a_jog() -> None:
+    """Without the process nobody judges the jog. The drive stops after its watchdog."""
+    patient = cat.StopPolicy(on_axis_stopped="event", raise_faults=False)
+    with operated(stop=patient) as desk:
+        desk.jog(300)
+        before = desk.cell.joint
+        desk.loop._opened.engine.stop()  # as after a kill: no more frames
+        desk.cell.let_pass(1.0)
+        assert not desk.cell.powered
+        assert abs(desk.cell.joint - before) < SPEED * (0.1 + DELAY) + RAMP_WAY
+        assert abs(desk.cell.velocity) < 1e-3
+        desk.loop._opened.engine.start()
+
+
 def test_the_stop_needs_no_lease_and_ends_the_jog() -> None:
     with operated() as desk:
         jog = desk.jog(300)
