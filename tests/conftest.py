@@ -1,8 +1,9 @@
 """Fixtures of all tests: shared data, private network interfaces, tshark and the laboratory.
 
-A test that uses `shared_data`, `veth`, `tshark` or `rtlab` is marked `shared_data`, `wire`,
-`tshark` or `rtlab`. It is skipped with a reason if the resource is missing. If CI requires a marker
-(`--require MARKER`), such a skip is a failure, and at least one test with the marker must pass.
+A test that uses `shared_data`, `veth`, `tshark`, `rtlab` or `chromium` is marked `shared_data`,
+`wire`, `tshark`, `rtlab` or `browser`. It is skipped with a reason if the resource is missing. If
+CI requires a marker (`--require MARKER`), such a skip is a failure, and at least one test with the
+marker must pass.
 """
 
 from __future__ import annotations
@@ -11,6 +12,7 @@ import os
 import shutil
 import signal
 from collections.abc import Iterator
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Never
 
@@ -21,7 +23,14 @@ from catenary.realtime import private_network
 
 ROOT = Path(__file__).resolve().parent.parent
 # marker: fixture
-FIXTURE_OF = {"shared_data": "shared_data", "wire": "veth", "tshark": "tshark", "rtlab": "rtlab"}
+FIXTURE_OF = {
+    "shared_data": "shared_data",
+    "wire": "veth",
+    "tshark": "tshark",
+    "rtlab": "rtlab",
+    "browser": "chromium",
+}
+PAGE_PACKAGES = ("starlette", "uvicorn", "websockets", "segno", "httpx", "playwright")
 
 # no deadlines, because no time is asserted; the same examples each time in CI
 hypothesis.settings.register_profile(
@@ -40,7 +49,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
         default=[],
         choices=sorted(FIXTURE_OF),
         metavar="MARKER",
-        help="fail unless tests with this marker ran (shared_data, wire, tshark, rtlab)",
+        help="fail unless tests with this marker ran (shared_data, wire, tshark, rtlab, browser)",
     )
 
 
@@ -107,6 +116,19 @@ def tshark(pytestconfig: pytest.Config) -> str:
     command = shutil.which("tshark")
     if command is None:
         lacking(pytestconfig, "tshark", "tshark is not installed (package tshark)")
+    return command
+
+
+@pytest.fixture(scope="session")
+def chromium(pytestconfig: pytest.Config) -> str:
+    """Return the command of Chromium. The packages of the page and Playwright are installed."""
+    missing = [name for name in PAGE_PACKAGES if find_spec(name) is None]
+    if missing:
+        hint = "pip install -e '.[dashboard,test]'"
+        lacking(pytestconfig, "browser", f"{', '.join(missing)}: not installed ({hint})")
+    command = os.environ.get("CHROMIUM") or shutil.which("chromium")
+    if command is None:
+        lacking(pytestconfig, "browser", "Chromium is not installed (package chromium)")
     return command
 
 

@@ -6,11 +6,14 @@ wakes as often, and does the work of a client without sending anything.
 
 from __future__ import annotations
 
+import asyncio
 import contextlib
+import itertools
 import os
 import sys
 import time
 from collections.abc import Iterator, Sequence
+from typing import Any
 
 import catenary as cat
 from benchmarks.peers.with_catenary_share import START_SECONDS
@@ -21,10 +24,11 @@ from catenary.realtime.child import Child, start_python
 from catenary.remote.connection import encode_request
 
 RATE = 200.0  # requests per second
-METHODS: Sequence[tuple[str, dict[str, object]]] = (
+PENDING = 8  # the limit of one client
+METHODS: Sequence[tuple[str, dict[str, Any]]] = (
     ("devices", {}),
     ("timing", {}),
-    ("sdo_read", {"position": 1, "index": 0x1018, "subindex": 1}),
+    ("sdo_read", {"position": 2, "index": 0x1018, "subindex": 1}),
 )
 
 
@@ -64,30 +68,41 @@ def main(arguments: Sequence[str]) -> None:
     os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))
     os.sched_setaffinity(0, map(int, cpus.split(",")))
     print("ready", flush=True)
-    with contextlib.suppress(CatenaryError), connected(name) as program:
-        program.hello()
+    with contextlib.suppress(CatenaryError, ExceptionGroup):
+        asyncio.run(send_all(name, sending == "1"))
+
+
+async def send_all(name: str, sending: bool) -> None:
+    """Send requests at RATE, with at most PENDING at a time."""
+    places = asyncio.Semaphore(PENDING)
+    async with await connected(name) as program:
+        await program.call("hello")
         os.write(sys.stdout.fileno(), b"connected\n")
         due = time.monotonic()
-        for serial in range(1 << 60):
-            method, params = METHODS[serial % len(METHODS)]
-            if sending == "1":
-                program.call(method, **params)
-            else:
-                encode_request(serial, method, 1.0, params)
-            due = max(due + 1 / RATE, time.monotonic())
-            time.sleep(due - time.monotonic())
+        async with asyncio.TaskGroup() as group:
+            for serial in itertools.count():
+                method, params = METHODS[serial % len(METHODS)]
+                await places.acquire()
+                if sending:
+                    asked = group.create_task(program.call(method, **params))
+                    asked.add_done_callback(lambda _: places.release())
+                else:
+                    encode_request(serial, method, 1.0, params)
+                    places.release()
+                due = max(due + 1 / RATE, time.monotonic())
+                await asyncio.sleep(due - time.monotonic())
 
 
-def connected(name: str) -> cat.remote.Client:
+async def connected(name: str) -> cat.remote.AsyncClient:
     """Connect to the share as soon as it exists."""
     deadline = time.monotonic() + START_SECONDS
     while True:
         try:
-            return cat.connect(name)
+            return await cat.connect_async(name)
         except ShareError:
             if time.monotonic() > deadline:
                 raise
-            time.sleep(0.01)
+            await asyncio.sleep(0.01)
 
 
 if __name__ == "__main__":

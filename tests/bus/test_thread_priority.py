@@ -4,18 +4,21 @@ from __future__ import annotations
 
 import os
 import threading
+from collections.abc import Callable
 
 import pytest
 
-from catenary.bus.thread_priority import BEHIND, step_behind
+from catenary.bus.thread_priority import BEHIND, leave_real_time, step_behind
 
 
-def scheduling_of_a_thread_started_with(policy: int, priority: int) -> tuple[int, int]:
-    """Return policy and priority after `step_behind`."""
+def scheduling_of_a_thread_started_with(
+    policy: int, priority: int, change: Callable[[], None] = step_behind
+) -> tuple[int, int]:
+    """Return policy and priority after `change`."""
     found: list[tuple[int, int]] = []
 
     def inner() -> None:
-        step_behind()
+        change()
         found.append((os.sched_getscheduler(0), os.sched_getparam(0).sched_priority))
 
     def outer() -> None:
@@ -42,3 +45,8 @@ def test_a_thread_does_not_keep_the_priority_of_the_loop(policy: int) -> None:
 
 def test_a_thread_of_an_ordinary_program_keeps_its_scheduling() -> None:
     assert scheduling_of_a_thread_started_with(os.SCHED_OTHER, 0) == (os.SCHED_OTHER, 0)
+
+
+def test_a_thread_for_requests_is_an_ordinary_one() -> None:
+    found = scheduling_of_a_thread_started_with(os.SCHED_FIFO, 80, leave_real_time)
+    assert found == (os.SCHED_OTHER, 0)

@@ -94,6 +94,20 @@ def test_a_step_ends_at_its_distance(jogging: Page) -> None:
         assert axis["commanded_position"] == pytest.approx(0.1, abs=1e-6)
 
 
+def test_a_sweep_ends_by_itself(jogging: Page) -> None:
+    with jogging.socket() as socket:
+        press(socket, velocity=0.2, sweep={"start": 1.0, "end": 20.0, "duration": 0.5})
+        assert hold(socket, 1, lambda m: m["op"] == "jog" and m["status"] == "DONE")
+
+
+def test_an_invalid_sweep_is_refused_with_the_reason(jogging: Page) -> None:
+    with jogging.socket() as socket:
+        press(socket, sweep={"start": 1.0, "end": 20.0, "duration": 0.0})
+        refused = socket.next("jog")
+        assert refused["status"] == "REFUSED"
+        assert "duration=0.0" in str(refused["text"])
+
+
 def test_a_silent_browser_stops_the_axis(jogging: Page) -> None:
     with jogging.socket() as socket:
         assert socket.jog_until(start(socket), "EXPIRED")

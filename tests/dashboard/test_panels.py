@@ -45,7 +45,7 @@ def test_recordings_are_served(tmp_path: Path) -> None:
     file.finish({})
     with own_name("files") as name, serving(name, panels=Panels(recordings=tmp_path)) as page:
         client = page.client()
-        assert client.get("/scene").status_code == 404
+        assert client.get("/scene").status_code == 204
         assert [f["name"] for f in client.get("/api/recordings").json()["files"]] == ["arm.mcap"]
         assert client.get("/api/recordings/arm.mcap").json()["duration"] == pytest.approx(0.299)
         assert client.get("/api/recordings/..%2Farm.mcap").status_code == 404
@@ -70,4 +70,8 @@ def test_an_axis_at_rest_is_captured_with_the_reasons_for_missing_figures() -> N
         assert client.post(url, content='{"axis": 0, "seconds": 1e9}').status_code == 400
         report = client.get("/api/tune/report")
         assert report.headers["content-type"].startswith("text/html")
+        axis = answer.json()["axis"]
         assert "<table" in report.text
+        assert f"<td>{axis}</td>" in report.text
+        other = client.get("/api/tune/report", params={"axis": "another"})
+        assert f"<td>{axis}</td>" not in other.text

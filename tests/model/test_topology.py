@@ -148,3 +148,14 @@ def test_contradictions_are_reported(ports: list[Ports]) -> None:
     if ports and (open_ends or not all(each[0] for each in ports)):
         assert found.contradictions
     assert len(found.path()) <= 2 * len(ports)
+
+
+def test_cables_of_a_device_are_those_at_its_ports() -> None:
+    ends, through = (True, False, False, False), (True, True, False, False)
+    branches = (True, True, True, True)
+    found = make_topology([through, branches, through, ends, ends, ends])
+    for position in range(len(found)):
+        expected = [each for each in found.cables if position in (each.upper, each.lower)]
+        assert list(found.cables_of(position)) == expected
+    assert [len(found.cables_of(position)) for position in range(6)] == [2, 4, 2, 1, 1, 1]
+    assert list(found.cables_of(6)) == []

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import struct
+import threading
 
 import pytest
 
@@ -125,3 +126,34 @@ def test_a_wrong_position_does_not_leave_the_segment_locked() -> None:
     with pytest.raises(IndexError):
         segment._wires.delay_cable(99, 100)
     assert segment._core.system_time(0) >= 0  # would wait for ever on a locked mutex
+
+
+def test_a_service_in_real_time_switches_the_power(monkeypatch: pytest.MonkeyPatch) -> None:
+    segment = Segment([Coupler(), DigitalOutputs()], clock="monotonic")
+    switched = threading.Event()
+    threads: list[threading.Thread] = []
+    switch_off = segment[1].switch_off
+
+    def watched() -> None:
+        threads.append(threading.current_thread())
+        switch_off()
+        switched.set()
+
+    monkeypatch.setattr(segment[1], "switch_off", watched)
+    link = segment.open_link()
+    try:
+        segment.switch_power(1, False)
+        assert switched.wait(10.0)
+    finally:
+        link.close()
+    assert threads != [threading.current_thread()]
+
+
+def test_power_is_switched_at_once_without_a_link() -> None:
+    segment = Segment([Coupler(), DigitalOutputs()])
+    segment.switch_power(1, False)
+    main = MainDevice(segment)
+    main.let_pass(2000)  # the coupler detects the loss of the link
+    assert main.exchange(EcatCommand.BRD, 0, 0x0130, bytes(2)).working_counter == 1
+    with pytest.raises(ValueError, match="no device 2"):
+        segment.switch_power(2, True)

@@ -12,6 +12,7 @@ import type {
   ServerMessage,
   Session,
   Status,
+  Sweep,
   Timing,
 } from "./protocol.ts";
 import { KIND_DECIMATED, KIND_FULL } from "./protocol.ts";
@@ -30,6 +31,7 @@ export interface JogRequest {
   velocity: number; // signed [rad/s or m/s]
   distance: number | null; // [rad or m]; null: until release
   acceleration: number | null; // null: limit of the axis
+  sweep?: Sweep | null; // sine of changing frequency, without a distance
 }
 
 interface Subscription extends SubscribeOptions {

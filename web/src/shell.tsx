@@ -9,10 +9,7 @@ import { Icon } from "./parts/common.tsx";
 import { cancelQuestion, ConfirmDialog } from "./parts/confirm.tsx";
 import { address, route } from "./route.ts";
 import { text } from "./strings.ts";
-import { choice, nextTheme } from "./theme.ts";
 import { views } from "./views.ts";
-
-const THEME_ICON = "M12 3a9 9 0 1 0 0 18zM12 3a9 9 0 0 1 0 18";
 
 export function Shell({ connection }: { connection: Connection }) {
   useEffect(
@@ -58,10 +55,6 @@ function Rail({ shown }: { shown: string }) {
             {label}
           </a>
         ))}
-        <button type="button" class="theme" onClick={nextTheme} aria-label={text.theme.label}>
-          <Icon path={THEME_ICON} />
-          {text.theme[choice.value]}
-        </button>
       </nav>
     </div>
   );

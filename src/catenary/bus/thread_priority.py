@@ -19,3 +19,9 @@ def step_behind() -> None:
     if policy in (os.SCHED_FIFO, os.SCHED_RR):
         with contextlib.suppress(OSError):  # forbidden by a filter: the scheduling is unchanged
             os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(BEHIND))
+
+
+def leave_real_time() -> None:
+    """Run the calling thread under SCHED_OTHER: its work is never urgent for the cycle."""
+    with contextlib.suppress(OSError):  # forbidden by a filter: the scheduling is unchanged
+        os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 from catenary.dashboard.messages import Beat, Press, Release, Request
 from catenary.errors import CatenaryError
-from catenary.share import Jog, JogStatus, Lease, Reader, RequestStatus, StateRequest
+from catenary.share import Jog, JogStatus, Lease, Reader, RequestStatus, StateRequest, Sweep
 
 LEASE_SECONDS = 1.0
 REQUESTS_MAX = 64  # whose answers are awaited
@@ -63,6 +63,8 @@ class Motion:
                 self._held[message.axis] = self._begin(reader, message)
 
     def _begin(self, reader: Reader, message: Press) -> Held:
+        given = message.sweep
+        sweep = None if given is None else Sweep(given.start, given.end, given.duration)
         lease = reader.lease([message.axis], for_=LEASE_SECONDS)
         try:
             jog = lease.jog(
@@ -70,6 +72,7 @@ class Motion:
                 message.velocity,
                 distance=message.distance,
                 acceleration=message.acceleration,
+                sweep=sweep,
                 token=int(message.token),
             )
         except BaseException:

@@ -1,6 +1,6 @@
 """Routes of the 3D view and of the recordings; catenary.dashboard.tune has those of the tuning.
 
-GET  /scene                        the scene (catenary.dashboard.scene); 404 without a model
+GET  /scene                        the scene (catenary.dashboard.scene); 204 without a model
 GET  /api/recordings               {files}
 GET  /api/recordings/NAME          layout, duration and events
 POST /api/recordings/NAME/window   a binary frame, or 202 {progress}
@@ -39,16 +39,21 @@ def panel_routes(panels: Panels, page: Page) -> list[BaseRoute]:
         page: parts of the page.
     """
     routes: list[BaseRoute] = [Route("/scene", protected(page, scene)), *Tune(page).routes]
-    if panels.recordings is not None:
-        routes += RecordingRoutes(page, Folder(panels.recordings)).all
-    return routes
+    if panels.recordings is None:
+        return [*routes, Route("/api/recordings", protected(page, no_recordings))]
+    return [*routes, *RecordingRoutes(page, Folder(panels.recordings)).all]
+
+
+async def no_recordings(page: Page, request: Request, role: Role) -> Response:
+    """Return the empty list of a server without a folder of recordings."""
+    return json_response({"files": []})
 
 
 async def scene(page: Page, request: Request, role: Role) -> Response:
-    """Return the 3D scene."""
+    """Return the 3D scene; an empty response if the server has no model."""
     feed, reader = page.hub.scene, page.hub.source.reader
     if feed is None:
-        return refusal(404, "there is no model", hint="catenary dashboard NAME --model arm.xml")
+        return Response(status_code=204)  # not an error: browsers report those in their console
     if reader is None:
         return refusal(404, page.hub.source.reason)
     found = await asyncio.to_thread(feed.scene, reader)

@@ -85,7 +85,7 @@ def axis_statuses(row: np.void, layout: ShareLayout, notes: AxisNotes) -> list[d
         _axis_status(
             name,
             state=int(row["state"][k]),
-            enabled=bool(row["enabled"][k]),
+            enabled=bool(row["enabled"][k]) or bool(jogged[k]),  # a jogged axis follows no targets
             notes=notes,
             jogged=bool(jogged[k]),
             **{key: _finite(numbers[key][k]) if key in numbers else None for key in NUMBERS},

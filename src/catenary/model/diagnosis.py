@@ -91,7 +91,7 @@ def _power(seen: Observation) -> tuple[list[Finding], set[Cable]]:
     found: list[Finding] = []
     explained: set[Cable] = set()
     for position, errors in enumerate(seen.errors):
-        cables = [cable for cable in seen.topology.cables if position in (cable.upper, cable.lower)]
+        cables = seen.topology.cables_of(position)
         far = [_far_end(cable, position) for cable in cables]
         far = [end for end in far if end[0] is not None]
         lost = [end for end in far if seen.port(*end).lost_links]
@@ -176,7 +176,7 @@ def _common_device(topology: Topology, noisy: Sequence[Cable]) -> int | None:
     if len(noisy) < 2:
         return None
     for position in range(len(topology)):
-        own = {cable for cable in topology.cables if position in (cable.upper, cable.lower)}
+        own = set(topology.cables_of(position))
         if own == set(noisy):
             return position
     return None

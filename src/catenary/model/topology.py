@@ -10,8 +10,8 @@ the entry. Even then, the order of the devices does not show which ones are behi
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import NamedTuple
 
 from catenary.wire.dl import DlStatus
@@ -73,28 +73,41 @@ class Topology:
 
     In a ring, `second_end` is the (position, port) wired to the MainDevice's second interface. It
     is None if this port is not open or cannot be identified, and on a line.
+
+    `cables` holds the cables to all devices that have a place, by position.
     """
 
     ports: tuple[Ports, ...]
     places: tuple[Place, ...]
     contradictions: tuple[str, ...] = ()
     second_end: tuple[int, int] | None = None
+    cables: tuple[Cable, ...] = field(init=False, repr=False, compare=False)
+    _cables_of: Mapping[int, list[Cable]] = field(init=False, repr=False, compare=False)
 
-    def __len__(self) -> int:
-        return len(self.ports)
-
-    @property
-    def cables(self) -> tuple[Cable, ...]:
-        """Cables to all devices that have a place, by position."""
-        return tuple(
+    def __post_init__(self) -> None:
+        cables = tuple(
             Cable(place.parent, place.parent_port, position)
             for position, place in enumerate(self.places)
             if place.parent is not None or position == 0
         )
+        found: dict[int, list[Cable]] = {}
+        for cable in cables:
+            if cable.upper is not None:
+                found.setdefault(cable.upper, []).append(cable)
+            found.setdefault(cable.lower, []).append(cable)
+        object.__setattr__(self, "cables", cables)
+        object.__setattr__(self, "_cables_of", found)
+
+    def __len__(self) -> int:
+        return len(self.ports)
+
+    def cables_of(self, position: int) -> Sequence[Cable]:
+        """Return the cables of a device, ordered by the positions at their lower ends."""
+        return self._cables_of.get(position, ())
 
     def children(self, position: int) -> tuple[Cable, ...]:
         """Return the cables from a device to its children, in the order a frame passes them."""
-        return tuple(cable for cable in self.cables if cable.upper == position)
+        return tuple(cable for cable in self.cables_of(position) if cable.upper == position)
 
     def cable_at(self, position: int, port: int) -> Cable | None:
         """Return the cable at a port; None if no cable is known there.
@@ -103,7 +116,7 @@ class Topology:
             position: Position of the device.
             port: The port of the device.
         """
-        for cable in self.cables:
+        for cable in self.cables_of(position):
             if (position, port) in (cable[:2], cable[2:]):
                 return cable
         return None

@@ -52,9 +52,9 @@ class Client:
             print(arm.sdo_read(2, 0x6064).text)
 
     Requests need no lease, and run next to the loop without delaying it. Any thread may use the
-    client. Each method raises the error of the request: an error of `catenary.errors`, or
-    ValueError, TypeError or RuntimeError for a mistake of the caller. It raises ShareError if the
-    program has ended, and ResponseTimeout at the deadline.
+    client, which sends one request at a time. Each method raises the error of the request: an error
+    of `catenary.errors`, or ValueError, TypeError or RuntimeError for a mistake of the caller. It
+    raises ShareError if the program has ended, and ResponseTimeout at the deadline.
     """
 
     def __init__(self, name: str, connection: socket.socket, timeout: float) -> None:
@@ -265,9 +265,7 @@ class Client:
         """Return the laws of the loop and their parameters."""
         return self.call("laws")  # type: ignore[no-any-return]
 
-    def set_parameters(
-        self, law: str, values: Mapping[str, float | Sequence[float]]
-    ) -> messages.Done:
+    def set_parameters(self, law: str, values: Mapping[str, float]) -> messages.Done:
         """Set parameters of a running law, all together before one step.
 
         Args:

@@ -22,6 +22,7 @@ from catenary.wire.dl import DlStatus
 from catenary.wire.error_counters import ErrorCounters
 
 REGISTERS_MAX = 1024  # bytes, as in `catenary reg`
+BATCH = 16  # devices whose registers are decoded in one step of the acyclic queue
 
 
 class Reading(NamedTuple):
@@ -42,12 +43,14 @@ def read_all(stations: Sequence[Station]) -> Procedure[list[Reading]]:
 
 def devices(program: Program) -> Work[list[messages.Device]]:
     """Read the states and counters of all devices, by position."""
+    found: list[messages.Device] = []
     subs = program.network.main.subs
-    readings = yield from program.ask(read_all([sub.station for sub in subs]))
-    found = []
-    for sub, reading in zip(subs, readings, strict=True):
-        found.append(_device(program, sub, reading))
-        yield None
+    for first in range(0, len(subs), BATCH):
+        batch = subs[first : first + BATCH]
+        readings = yield from program.ask(read_all([sub.station for sub in batch]))
+        for sub, reading in zip(batch, readings, strict=True):
+            found.append(_device(program, sub, reading))
+            yield None
     return found
 
 

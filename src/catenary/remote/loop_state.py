@@ -25,7 +25,7 @@ def hello(program: Program) -> messages.Hello:
         share=layout.name,
         period=layout.period,
         networks=program.network.count,
-        jog=bool(getattr(layout, "jog", False)),
+        jog=layout.jog,
         virtual=segment_of(program.network.main.source) is not None,
         started=layout.opened,
         execution=session.plan.cycle.execution,
@@ -117,11 +117,12 @@ def plan(program: Program) -> messages.Text:
     return messages.Text(text=program.plan_text)
 
 
-def events(program: Program, after: int = 0) -> messages.Events:
+def events(program: Program, after: int = 0) -> Work[messages.Events]:
     """Return the events after serial number `after`, oldest first, with advice."""
     found, lost = program.events(after)
-    return messages.Events(
-        events=[
+    entries: list[messages.EventEntry] = []
+    for each in found:
+        entries.append(
             messages.EventEntry(
                 serial=each.serial,
                 number=each.number,
@@ -132,7 +133,6 @@ def events(program: Program, after: int = 0) -> messages.Events:
                 details=dict(each.details),
                 advice=advice_for(each),
             )
-            for each in found
-        ],
-        lost=lost,
-    )
+        )
+        yield None
+    return messages.Events(events=entries, lost=lost)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable, Generator
+from collections.abc import Callable, Generator, Iterator
 from importlib.metadata import version
 from typing import TypeAlias, TypeVar
 
@@ -27,7 +27,10 @@ class Program:
     """Access of the methods to a share and its network."""
 
     def __init__(
-        self, share: Share, network: Network, events: Callable[[int], tuple[list[SharedEvent], int]]
+        self,
+        share: Share,
+        network: Network,
+        events: Callable[[int], tuple[Iterator[SharedEvent], int]],
     ) -> None:
         self.share = share
         self.network = network

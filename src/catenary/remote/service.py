@@ -22,7 +22,7 @@ from pathlib import Path
 
 import msgspec
 
-from catenary.bus.thread_priority import step_behind
+from catenary.bus.thread_priority import leave_real_time
 from catenary.errors import BusyError, ShareError
 from catenary.remote.limits import RateLimit
 from catenary.remote.listener import Connection, Listener
@@ -73,7 +73,7 @@ class Service:
         os.close(self._wake)
 
     def _serve(self) -> None:
-        step_behind()
+        leave_real_time()
         try:
             while not self._ended.is_set():
                 if self._receive(PAUSE if self._is_busy else IDLE) or self._is_busy:

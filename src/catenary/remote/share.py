@@ -35,6 +35,8 @@ class Share(share.Share):
         mode: permissions as for chmod. 0o600: this user only. 0o640: the group can read.
             0o660: the group can read, command and send requests. Only this user can ever write to
             the cycles.
+        jog: accept jogs from clients, and their requests to enable and reset axes. They can always
+            stop and disable axes.
 
     Raises:
         ShareError: on entry, if the name belongs to a running process or another user.

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 
 import msgspec
 
@@ -67,23 +67,21 @@ def encodable(value: object) -> object:
     return value.encode(errors="replace").decode() if isinstance(value, str) else value
 
 
-def read_events(ring: Ring, after: int) -> tuple[list[SharedEvent], int]:
-    """Read the events of a ring after serial `after` that still exist, oldest first.
+def read_events(ring: Ring, after: int) -> tuple[Iterator[SharedEvent], int]:
+    """Copy the events of a ring after serial `after` that still exist, oldest first.
 
     Args:
         ring: ring of the events.
         after: serial number.
 
     Returns:
-        The events, and how many between `after` and the last one were overwritten.
-
-    Raises:
-        ShareError: an event is damaged.
+        The events, and how many between `after` and the last one were overwritten. An event is
+        decoded when the iterator reaches it, which raises ShareError if it is damaged.
     """
     rows, lost = ring.copy_after(after)
-    return [
+    return (
         decode_event(rows[at : at + EVENT_SIZE]) for at in range(0, len(rows), EVENT_SIZE)
-    ], lost
+    ), lost
 
 
 def decode_event(row: bytes | bytearray) -> SharedEvent:

@@ -5,8 +5,10 @@ from __future__ import annotations
 import os
 import threading
 import time
+from collections.abc import Iterator
 from pathlib import Path
 from types import TracebackType
+from typing import Self
 
 import numpy as np
 
@@ -74,7 +76,7 @@ class Share:
         self._events: Ring | None = None
         self._reporting = threading.Lock()
 
-    def __enter__(self) -> Share:
+    def __enter__(self) -> Self:
         self._refuse_taken()
         self._entered = True
         self._pid = os.getpid()
@@ -224,10 +226,10 @@ class Share:
         """Permissions of the share as for chmod."""
         return self._mode
 
-    def shared_events(self, after: int) -> tuple[list[SharedEvent], int]:
-        """Return the events of the open loop after serial `after`, as `Reader.events`."""
+    def shared_events(self, after: int) -> tuple[Iterator[SharedEvent], int]:
+        """Copy the events of the open loop after serial `after`: see `events.read_events`."""
         with self._reporting:
-            return ([], 0) if self._events is None else read_events(self._events, after)
+            return (iter(()), 0) if self._events is None else read_events(self._events, after)
 
     @property
     def is_inherited(self) -> bool:

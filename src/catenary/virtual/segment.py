@@ -306,15 +306,24 @@ class Segment:
     def switch_power(self, device: int, on: bool) -> None:
         """Switch a device on or off. Any thread may call it.
 
+        While a link is open, the service of the segment does it: at once in real time, and when the
+        time advances in virtual time.
+
+        Args:
+            device: Position of the device.
+            on: True to switch it on.
+
         Raises:
             ValueError: There is no such device.
         """
         if not 0 <= device < len(self._devices):
             raise ValueError(f"there is no device {device}; it has {len(self._devices)} devices")
-        if on:
-            self._devices[device].switch_on()
+        chosen = self._devices[device]
+        action = chosen.switch_on if on else chosen.switch_off
+        if self._links:
+            self._service.agenda.after(0, action)  # the service may be running the device now
         else:
-            self._devices[device].switch_off()
+            action()
 
     def _plug_first(self, devices: int) -> None:
         for number in range(len(self._devices)):

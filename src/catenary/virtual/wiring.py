@@ -116,7 +116,7 @@ class Wiring:
             ValueError: No cable belongs to the port.
         """
         for number, cable in enumerate(self.cables):
-            if (device, port) in (cable.up, cable.down):
+            if device >= 0 and (device, port) in (cable.up, cable.down):
                 return number
         raise ValueError(f"no cable belongs to port {port} of device {device}")
 

@@ -99,6 +99,13 @@ export class Jogging {
     };
   }
 
+  /** Remove the answer of an axis. */
+  forget(axis: number): void {
+    const answers = new Map(this.answers.value);
+    answers.delete(axis);
+    this.answers.value = answers;
+  }
+
   private receiveToken(token: string): void {
     this.deadman.receiveToken(token);
     this.follow();
@@ -123,12 +130,6 @@ export class Jogging {
 
   private answer(axis: number, answer: Answer): void {
     this.answers.value = new Map(this.answers.value).set(axis, answer);
-  }
-
-  private forget(axis: number): void {
-    const answers = new Map(this.answers.value);
-    answers.delete(axis);
-    this.answers.value = answers;
   }
 }
 
