@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from catenary.dashboard.hub import CLIENTS_MAX, VIEWERS_MAX, Hub
+from catenary.dashboard.hub import CLIENTS_MAX, RESERVED, Hub
 from catenary.dashboard.outbox import Outbox
 from catenary.dashboard.requests import Requests
 from catenary.dashboard.security import Role
@@ -129,7 +129,7 @@ def test_viewers_leave_room_for_operators(name: str) -> None:
     async def scenario() -> None:
         hub = Hub(Source(name), Requests(name))
         viewers = [Viewer() for _ in range(CLIENTS_MAX)]
-        assert sum(hub.add(viewer) for viewer in viewers) == VIEWERS_MAX
+        assert sum(hub.add(viewer) for viewer in viewers) == CLIENTS_MAX - RESERVED
         operator = Viewer()
         operator.role = "operator"
         assert hub.add(operator)
