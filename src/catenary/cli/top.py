@@ -17,7 +17,7 @@ def add_parser(commands: Commands) -> None:
         "(Loop(..., sink=cat.Share(NAME))), also over ssh. Press q to quit. Press s twice within "
         "2 s for a quick stop of all axes; this is not an emergency stop (ISO 13850). If the loop "
         "ends, the page waits until it returns. Needs catenary[top].",
-        example="catenary top arm\nssh robot catenary top arm",
+        example="catenary top arm\nssh -t robot catenary top arm",
     )
     parser.add_argument("share", metavar="SHARE", help="name of the loop's share")
     parser.add_argument(
