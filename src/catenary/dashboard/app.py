@@ -22,13 +22,12 @@ from catenary.dashboard.guard import Guard
 from catenary.dashboard.hub import Hub
 from catenary.dashboard.limits import RateLimit
 from catenary.dashboard.report import make_report
-from catenary.dashboard.requests import FAILURES, BusyError, error_body, is_allowed
+from catenary.dashboard.requests import FAILURES, error_body, is_allowed
 from catenary.dashboard.security import SESSION_SECONDS, Access, Role
 from catenary.dashboard.static_files import StaticFile, read_static_files
-from catenary.errors import CatenaryError
+from catenary.errors import BusyError, CatenaryError
 
 BODY_MAX = 64 << 10  # bytes
-RETRY_SECONDS = 0.2
 INDEX = "index.html"
 T = TypeVar("T")
 Handler = Callable[["Page", Request, Role], Awaitable[Response]]
@@ -195,11 +194,9 @@ async def call(page: Page, request: Request, role: Role) -> Response:
     try:
         return json_response({"result": await page.hub.requests.call(body.method, body.params)})
     except BusyError as error:
-        return json_response({"error": error_body(error), "retry": RETRY_SECONDS}, 429)
+        return json_response({"error": error_body(error), "retry": error.retry}, 429)
     except FAILURES as error:
-        retry = getattr(error, "retry", None)
-        extra = {} if retry is None else {"retry": retry}
-        return json_response({"error": error_body(error), **extra}, 400)
+        return json_response({"error": error_body(error)}, 400)
 
 
 async def doctor(page: Page, request: Request, role: Role) -> Response:

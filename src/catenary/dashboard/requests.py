@@ -10,14 +10,15 @@ from functools import partial
 from typing import TYPE_CHECKING
 
 from catenary.dashboard.security import Role
-from catenary.errors import CatenaryError, ResponseTimeout, ShareError
+from catenary.errors import BusyError, CatenaryError, ResponseTimeout, ShareError
 
 if TYPE_CHECKING:
     from catenary.remote import Client
 
 FAILURES = (CatenaryError, OSError, RuntimeError, TypeError, ValueError)  # of a request
 CONNECTIONS = 6
-CALLS_MAX = 32  # that wait or run
+CALLS_MAX = 32  # calls that wait or run
+RETRY_SECONDS = 0.2
 READS = frozenset(
     {
         *("hello", "devices", "axes", "objects", "sdo_read", "registers", "diagnosis"),
@@ -87,7 +88,7 @@ class Requests:
             ValueError: a value is not valid.
         """
         if self._waiting >= CALLS_MAX:
-            raise BusyError
+            raise BusyError(f"{CALLS_MAX} requests are already waiting", retry=RETRY_SECONDS)
         self._waiting += 1
         try:
             async with self._running:
@@ -134,13 +135,6 @@ class Requests:
                 self._idle.append(client)
                 return
         client.close()
-
-
-class BusyError(CatenaryError):
-    """Too many requests are waiting."""
-
-    def __init__(self) -> None:
-        super().__init__(f"{CALLS_MAX} requests are already waiting", hint="try again")
 
 
 def is_allowed(method: str, role: Role) -> bool:
