@@ -28,7 +28,7 @@ export const text = {
     stepDown: "Hold to step −",
     stepUp: "Hold to step +",
     stepHint:
-      "The axis moves only while you hold the button with a mouse or a key. It must be enabled and free.",
+      "The axis moves only while you hold the button with a mouse or a key. It must be enabled and at rest.",
     bode: "Frequency response",
     input: "Input",
     output: "Output",
@@ -58,10 +58,10 @@ export const text = {
     columns: { name: "File", modified: "Modified", size: "Size" },
     back: "All recordings",
     about: (start: string, length: string, axes: number) => `from ${start} · ${length} · ${axes} axes`,
-    unfinished: "not closed",
+    unfinished: "incomplete",
     lost: (rows: string) => `${rows} lost cycles`,
     all: "Show all",
-    scrub: "Begin of the visible range",
+    scrub: "Start of the visible range",
     range: (start: string, end: string) => `${start} to ${end} s`,
     reading: (percent: number) => `reading: ${percent} %`,
     time: "seconds from the first cycle",
@@ -78,7 +78,7 @@ export const text = {
   },
   scope: {
     title: "Scope",
-    empty: "No signals yet: the share has not answered.",
+    empty: "No signals: there is no share yet.",
     toolbar: "Scope controls",
     pause: "Pause",
     run: "Run",
@@ -95,7 +95,6 @@ export const text = {
     emptyChart: "Choose signals in the list to show them here.",
     absent: "not in this share",
     help: "Drag: zoom. Shift and drag: move. Wheel: zoom. Double click: run. Keys: arrows, + and −, Home, P; Shift or Shift and Alt with arrows: cursor A or B.",
-    axisLabel: (unit: string) => `in ${unit}`,
     time: (origin: string) => `seconds from ${origin} s of the cycle clock`,
     fromTrigger: "seconds from the trigger",
     stored: (signals: number, seconds: number, megabytes: number) =>
@@ -143,9 +142,7 @@ export const text = {
   },
   common: {
     cancel: "Cancel",
-    close: "Close",
     back: "Back",
-    refresh: "Refresh",
     dismiss: "Dismiss",
     messages: "Messages",
     unknown: "unknown",
@@ -161,7 +158,7 @@ export const text = {
     body: "Open the link that `catenary dashboard` printed, or enter its token.",
     token: "Token",
     submit: "Connect",
-    refused: "The server refused this token. A new start of the server makes a new token.",
+    refused: "The server refused this token. Use the newest link that `catenary dashboard` printed.",
   },
   connection: {
     connecting: "connecting",
@@ -244,7 +241,6 @@ export const text = {
     events: "Events",
     eventsNone: "No events since the start of the loop.",
     cycle: "cycle",
-    segment: "segment",
     device: "device",
     health: "Health",
     diagnose: "Diagnose the bus",
@@ -299,7 +295,7 @@ export const text = {
     enablePadHint: "Hold here with one finger, and − or + with another",
     refusals: {
       busy: "Another jog is in progress.",
-      no_token: "The loop sent no recent token, so that it would refuse the jog.",
+      no_token: "The loop has sent no recent token, so it would refuse the jog.",
       no_connection: "There is no connection to the server.",
       not_enabled: "Hold the enable field with another finger.",
     },
@@ -366,8 +362,6 @@ export const text = {
       written: "Written:",
       notes: "Incomplete dictionary:",
       range: "Range",
-      readOnly: "read only",
-      writeOnly: "write only",
       errors: {
         integer: "Enter an integer, such as 12, −3 or 0x1F.",
         number: "Enter a number.",
