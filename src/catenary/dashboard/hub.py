@@ -141,7 +141,7 @@ class Hub:
         return list(self._events)
 
     def _change(self) -> None:
-        """Tell all clients that the share has ended or returned."""
+        """Forget the previous run, and greet all clients if the share has returned."""
         reader = self.source.reader
         self._notes, self._events, self._fresh, self._token = AxisNotes(), [], [], 0
         self.subscriptions = None if reader is None else Subscriptions(reader.layout)
@@ -155,7 +155,7 @@ class Hub:
                 self._greet(client)
 
     def _send_reason(self) -> None:
-        """Send why there is no share, if the reason has changed."""
+        """Send the reason for a missing share, if it has changed."""
         reason = self._problem() or self.source.reason
         if reason != self._reason:
             self._reason = reason

@@ -13,7 +13,7 @@ from catenary.errors import CatenaryError
 from catenary.share import Jog, JogStatus, Lease, Reader, RequestStatus, StateRequest
 
 LEASE_SECONDS = 1.0
-REQUESTS_MAX = 64  # whose answers are awaited
+REQUESTS_MAX = 64  # requests without an answer
 REFUSED_FROM = RequestStatus.REFUSED_NOT_ALLOWED
 
 
