@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import shutil
 import socket
 import subprocess
@@ -23,7 +22,6 @@ from catenary.dashboard.server import (
     shown_host,
 )
 from catenary.errors import ConfigurationError
-from catenary.share import folder
 from tests.dashboard.serving import DEADLINE, serving
 
 KEY = bytes(32)
@@ -74,18 +72,6 @@ def test_an_unusable_certificate_is_refused(tmp_path: Path) -> None:
     (tmp_path / "pem").write_text("nothing")
     with pytest.raises(ConfigurationError, match="TLS cannot use"):
         make_access(Options(cert=tmp_path / "pem", key=tmp_path / "pem"))
-
-
-def test_the_key_is_not_in_the_folder_of_a_group(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(folder, "GROUP_FOLDER", tmp_path)
-    monkeypatch.setattr(folder, "USER_FOLDERS", tmp_path)
-    monkeypatch.setattr(folder, "_is_group_folder", lambda: True)
-    make_access(Options())
-    assert folder.own_folder() == tmp_path
-    assert not (tmp_path / "dashboard-key").exists()
-    assert (folder.user_folder(os.geteuid()) / "dashboard-key").exists()
 
 
 def test_a_used_port_is_refused_with_a_hint() -> None:

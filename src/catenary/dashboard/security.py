@@ -1,6 +1,6 @@
 """Access to the page: links with tokens, cookies, roles, and the checks of each request.
 
-Theory of operation. A secret key is stored in the private folder of this user, with mode 0600. The
+Theory of operation. A secret key is stored in the folder of this user's shares, with mode 0600. The
 tokens of the two roles and the signatures of cookies are derived from it. Links and cookies
 therefore stay valid when the server restarts, until the machine restarts or `renew` replaces the
 key. The token is in the fragment of the link, which browsers do not send. The page exchanges it for

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import io
-import os
 import socket
 import ssl
 from collections.abc import Callable
@@ -15,7 +14,7 @@ from typing import TYPE_CHECKING
 from catenary.dashboard.options import Panels
 from catenary.dashboard.security import Access, Role, is_loopback, load_key
 from catenary.errors import ConfigurationError
-from catenary.share.folder import prepare, user_folder
+from catenary.share.folder import own_folder, prepare
 
 if TYPE_CHECKING:
     import uvicorn
@@ -54,8 +53,7 @@ def require_packages() -> None:
     missing = [name for name in NEEDED if find_spec(name) is None]
     if missing:
         raise ConfigurationError(
-            f"the page needs packages that are not installed: {', '.join(missing)}",
-            hint="pip install 'catenary[dashboard]'",
+            f"the page needs {', '.join(missing)}", hint="pip install 'catenary[dashboard]'"
         )
 
 
@@ -70,7 +68,7 @@ def make_access(options: Options) -> Access:
         raise ConfigurationError("TLS needs --cert and --key")
     if options.cert is not None and options.key is not None:
         check_certificate(options.cert, options.key)
-    folder = user_folder(os.geteuid())  # also where a group shares /run/catenary
+    folder = own_folder()
     prepare(folder, 0o600)
     return Access(
         load_key(folder, renew=options.new_links),
