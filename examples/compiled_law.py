@@ -9,7 +9,8 @@ from typing import Any
 import catenary as cat
 
 
-@cat.law  # plain Python here, compiled on the robot
+# Plain Python here, compiled on the robot. An operator may set its parameters within the limits.
+@cat.law(parameters=[cat.Parameter("stiffness", 0, 40), cat.Parameter("damping", 0, 2)])
 def pd(actual: Any, target: Any, memory: Any, time: float, parameters: Any) -> bool:
     for i in range(actual.n):
         error = memory[i] - actual.position[i]

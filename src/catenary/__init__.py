@@ -45,7 +45,7 @@ if TYPE_CHECKING:
         WorkingCounterError,
     )
     from catenary.link.interfaces import interfaces
-    from catenary.loop import ClockOptions, Cycle, Loop, Scheduling, StopPolicy, law
+    from catenary.loop import ClockOptions, Cycle, Loop, Parameter, Scheduling, StopPolicy, law
     from catenary.machine import Machine
     from catenary.remote import connect, connect_async
     from catenary.remote.share import Share
@@ -72,6 +72,7 @@ __all__ = [
     "MainDevice",
     "MoveError",
     "Outputs",
+    "Parameter",
     "ProcessData",
     "Scheduling",
     "Segment",
@@ -127,7 +128,8 @@ _HOMES = {
     **dict.fromkeys(_ERRORS, "catenary.errors"),
     **dict.fromkeys(_DRIVE, "catenary.drive"),
     **dict.fromkeys(
-        ("ClockOptions", "Cycle", "Loop", "Scheduling", "StopPolicy", "law"), "catenary.loop"
+        ("ClockOptions", "Cycle", "Loop", "Parameter", "Scheduling", "StopPolicy", "law"),
+        "catenary.loop",
     ),
     "Machine": "catenary.machine",
     "MainDevice": "catenary.target",

@@ -15,12 +15,15 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from playwright.sync_api import Browser, Playwright
 
+from tests.browser.processes import with_parent
 from tests.share.processes import DEADLINE
 
 OPTIONS = (
     "--headless=new",
     "--no-sandbox",  # Chromium refuses to run as root with its sandbox
     "--disable-gpu",
+    "--use-angle=swiftshader",  # WebGL without a GPU
+    "--enable-unsafe-swiftshader",
     "--disable-dev-shm-usage",
     "--disable-quic",
     "--no-first-run",
@@ -38,7 +41,7 @@ class Chromium:
 
     def __init__(self, playwright: Playwright, path: str, profile: Path) -> None:
         self.process = subprocess.Popen(
-            [path, *OPTIONS, f"--user-data-dir={profile}", "about:blank"],
+            with_parent("--exec", path, *OPTIONS, f"--user-data-dir={profile}", "about:blank"),
             stdout=subprocess.DEVNULL,
             stderr=subprocess.DEVNULL,
             start_new_session=True,

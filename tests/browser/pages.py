@@ -20,7 +20,6 @@ sync_api = pytest.importorskip(
 )
 expect, PlaywrightError = sync_api.expect, sync_api.Error
 
-PRESSES = 20
 SECONDS = 30_000  # [ms] generous, because a machine may be busy
 WIDTHS = {390: 844, 820: 1180, 1280: 800}  # width → height
 # States of an axis that the page shows as soon as it has received the first status.
@@ -84,19 +83,6 @@ class Operator:
         """Return the button that jogs an axis in positive direction."""
         return self.axis(name).locator(".jog-button").last
 
-    def hold(self, name: str) -> None:
-        """Press the mouse on the jog button of an axis until the axis moves. Keep it pressed.
-
-        A busy machine may deliver the tokens too late: such a press is refused, and repeated.
-        """
-        for _ in range(PRESSES):
-            self.press(name)
-            expect(self.answer(name)).not_to_be_empty(timeout=SECONDS)
-            if self.answer(name).text_content() == "moving":
-                return
-            self.page.mouse.up()
-        raise AssertionError(f"{name} did not move: {self.answer(name).text_content()}")
-
     def press(self, name: str) -> None:
         """Press the mouse on the jog button of an axis, and keep it pressed."""
         button = self.plus(name)
@@ -104,6 +90,10 @@ class Operator:
         button.scroll_into_view_if_needed()
         button.hover()
         self.page.mouse.down()
+
+    def has_ended(self, name: str) -> bool:
+        """Return True if the last jog of an axis was refused, or has ended."""
+        return self.answer(name).text_content() not in ("", "requested", "moving")
 
     def answer(self, name: str) -> Locator:
         """Return the text with the status of the last jog of an axis."""

@@ -22,6 +22,11 @@ ROOT = Path(__file__).resolve().parents[2]
 LINK = re.compile(r"(?P<role>\w+): (?P<link>https?://\S+#\S+)")
 
 
+def with_parent(*command: str) -> list[str]:
+    """Return a command (`-m MODULE ...`, `--exec PROGRAM ...`) that ends with this process."""
+    return [sys.executable, "-m", "catenary.realtime.child", str(os.getpid()), *command]
+
+
 class Process:
     """Owner of a process with pipes, in its own session."""
 
@@ -96,7 +101,7 @@ def running(command: Sequence[str], **environment: str) -> Iterator[Process]:
 @contextlib.contextmanager
 def python(*arguments: str) -> Iterator[Process]:
     """Run this interpreter, and wait until the program has printed "ready"."""
-    with running([sys.executable, *arguments]) as process:
+    with running(with_parent(*arguments)) as process:
         line = process.line()
         assert json.loads(line or "null") == "ready", f"{arguments} did not start: {line!r}"
         yield process
@@ -137,6 +142,6 @@ class Dashboard:
 @contextlib.contextmanager
 def dashboard(source: str, *options: str, port: int = 0) -> Iterator[Dashboard]:
     """Run `catenary dashboard` on a free port."""
-    module = [sys.executable, "-m", "catenary.cli", "dashboard"]
+    module = with_parent("-m", "catenary.cli", "dashboard")
     with running([*module, source, "--port", str(port), *options]) as process:
         yield Dashboard(process)

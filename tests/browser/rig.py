@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 
 STANDSTILL, MOTION = 1e-2, 5e-2  # [rad/s]
 NAMES = ("shoulder", "elbow")
+PRESSES = 20
 
 Opener = Callable[..., AbstractContextManager["Operator"]]
 
@@ -52,6 +53,21 @@ class Rig:
     def loses_power(self, axis: int = 0) -> bool:
         """Wait until a servo leaves OPERATION ENABLED. Return False if it does not."""
         return comes_true(lambda: self.state(axis)["state"] != "OPERATION ENABLED")
+
+    def jogs(self, shown: Operator, axis: int = 0) -> bool:
+        """Hold the jog button of an axis until its servo moves. Return False if it does not.
+
+        A busy machine may deliver tokens too late. The jog is then refused or ends, and the button
+        is pressed again.
+        """
+        name = NAMES[axis]
+        for _ in range(PRESSES):
+            shown.press(name)
+            comes_true(lambda: self.velocity(axis) > MOTION or shown.has_ended(name))
+            if self.velocity(axis) > MOTION:
+                return True
+            shown.page.mouse.up()
+        return False
 
     def moves(self, axis: int = 0) -> bool:
         """Wait until a servo moves. Return False if it does not."""

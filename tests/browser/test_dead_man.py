@@ -36,8 +36,7 @@ def assert_stays(rig: Rig, position: float) -> None:
 def test_browser_stopped_and_continued(shared_rig: Rig, own_browser: Chromium) -> None:
     with operator(own_browser.browser, shared_rig.dashboard) as shown:
         shown.open("Axes").require_enabled(AXIS)
-        shown.hold(AXIS)
-        assert shared_rig.moves()
+        assert shared_rig.jogs(shown)
         own_browser.signal(signal.SIGSTOP)
         assert shared_rig.stands()
         assert shared_rig.state()["state"] == "OPERATION ENABLED"
@@ -51,21 +50,18 @@ def test_browser_stopped_and_continued(shared_rig: Rig, own_browser: Chromium) -
 def test_browser_killed(shared_rig: Rig, own_browser: Chromium) -> None:
     with operator(own_browser.browser, shared_rig.dashboard) as shown:
         shown.open("Axes").require_enabled(AXIS)
-        shown.hold(AXIS)
-        assert shared_rig.moves()
+        assert shared_rig.jogs(shown)
         own_browser.end()
         assert shared_rig.stands()
     with shared_rig.operating() as other:  # the lease of the dead browser blocks nobody
-        other.hold(AXIS)
-        assert shared_rig.moves()
+        assert shared_rig.jogs(other)
         other.page.mouse.up()
         assert shared_rig.stands()
 
 
 def test_page_frozen(shared_rig: Rig) -> None:
     with shared_rig.operating() as shown:
-        shown.hold(AXIS)
-        assert shared_rig.moves()
+        assert shared_rig.jogs(shown)
         life = shown.page.context.new_cdp_session(shown.page)
         life.send("Page.setWebLifecycleState", {"state": "frozen"})
         assert shared_rig.stands()
@@ -78,8 +74,7 @@ def test_page_frozen(shared_rig: Rig) -> None:
 
 def test_page_blocked_by_its_own_script(shared_rig: Rig) -> None:
     with shared_rig.operating() as shown:
-        shown.hold(AXIS)
-        assert shared_rig.moves()
+        assert shared_rig.jogs(shown)
         shown.page.evaluate(
             "setTimeout(() => { for (const t = Date.now(); Date.now() < t + 2000;); })"
         )
@@ -96,8 +91,7 @@ def test_clock_of_the_page_jumps(shared_rig: Rig) -> None:
         shown.page.clock.install()
         shown.open("Axes").require_enabled(AXIS)
         shown.page.clock.set_system_time("1990-01-01")
-        shown.hold(AXIS)
-        assert shared_rig.moves()
+        assert shared_rig.jogs(shown)
         shown.page.clock.fast_forward("01:00:00")
         assert shared_rig.stands()
         shown.page.mouse.up()
@@ -109,8 +103,7 @@ def test_clock_of_the_page_jumps(shared_rig: Rig) -> None:
 def test_server_stopped_and_continued(local: Rig) -> None:
     """The heartbeats of the browser wait in the server's socket. Their burst moves nothing."""
     with local.operating() as shown:
-        shown.hold(AXIS)
-        assert local.moves()
+        assert local.jogs(shown)
         local.dashboard.process.signal(signal.SIGSTOP)
         assert local.stands()
         position = local.position()
@@ -124,8 +117,7 @@ def test_server_killed_and_started_again(local: Rig) -> None:
     """The page works again without reloading. The new server does not continue the jog."""
     with local.operating() as shown, ExitStack() as stack:
         shown.page.evaluate("window.loadedOnce = true")
-        shown.hold(AXIS)
-        assert local.moves()
+        assert local.jogs(shown)
         local.dashboard.process.signal(signal.SIGKILL)
         assert local.stands()
         position = local.position()
@@ -134,8 +126,7 @@ def test_server_killed_and_started_again(local: Rig) -> None:
         expect(shown.page.get_by_role("status").first).to_have_text("connected", timeout=SECONDS)
         assert_stays(local, position)
         shown.page.mouse.up()
-        shown.hold(AXIS)
-        assert local.moves()
+        assert local.jogs(shown)
         shown.page.mouse.up()
         assert local.stands()
         assert shown.page.evaluate("window.loadedOnce")
@@ -147,13 +138,11 @@ def test_server_killed_and_started_again(local: Rig) -> None:
 def test_body_of_the_loop_stalls(local: Rig) -> None:
     """The core judges jogs: Python of the loop's program is not needed to stop."""
     with local.operating() as shown:
-        shown.hold(AXIS)
-        assert local.moves()
+        assert local.jogs(shown)
         local.loop.ask("stall")
         shown.page.mouse.up()
         assert local.stands()
-        shown.hold(AXIS)
-        assert local.moves()
+        assert local.jogs(shown)
         local.dashboard.process.signal(signal.SIGSTOP)
         assert local.stands()
         local.dashboard.process.signal(signal.SIGCONT)
@@ -166,8 +155,7 @@ def test_body_of_the_loop_stalls(local: Rig) -> None:
 def test_loop_stopped(wired: Rig) -> None:
     """The watchdog of the drive stops the axis. The page reports that no cycles arrive."""
     with wired.operating() as shown:
-        shown.hold(AXIS)
-        assert wired.moves()
+        assert wired.jogs(shown)
         wired.loop.signal(signal.SIGSTOP)
         assert wired.stands()
         assert wired.loses_power()
@@ -179,8 +167,7 @@ def test_loop_stopped(wired: Rig) -> None:
 
 def test_loop_killed(wired: Rig) -> None:
     with wired.operating() as shown:
-        shown.hold(AXIS)
-        assert wired.moves()
+        assert wired.jogs(shown)
         wired.loop.signal(signal.SIGKILL)
         assert wired.stands()
         assert wired.loses_power()
@@ -191,8 +178,7 @@ def test_loop_killed(wired: Rig) -> None:
 def test_link_down(wired: Rig) -> None:
     """The watchdog of the drive stops the axis; after the return of the link it does not move."""
     with wired.operating() as shown:
-        shown.hold(AXIS)
-        assert wired.moves()
+        assert wired.jogs(shown)
         subprocess.run(["ip", "link", "set", wired.interface, "down"], check=True)
         assert wired.stands()
         assert wired.loses_power()
@@ -249,8 +235,7 @@ def test_flood_of_messages(local: Rig) -> None:
     from websockets.exceptions import ConnectionClosed
 
     with local.operating() as shown, RawClient(local.dashboard) as hostile:
-        shown.hold(AXIS)
-        assert local.moves()
+        assert local.jogs(shown)
         message, closed = json.dumps({"op": "ping", "t": 0.0}), False
         for _ in range(10_000):
             try:
@@ -262,8 +247,7 @@ def test_flood_of_messages(local: Rig) -> None:
         assert hostile.socket.close_code == 1008
         shown.page.mouse.up()
         assert local.stands()
-        shown.hold(AXIS)
-        assert local.moves()
+        assert local.jogs(shown)
         shown.page.mouse.up()
         assert local.stands()
 
@@ -275,8 +259,7 @@ def test_two_operators(shared_rig: Rig, own_browser: Chromium) -> None:
         operator(own_browser.browser, shared_rig.dashboard) as second,
     ):
         second.open("Axes")
-        first.hold(AXIS)
-        assert shared_rig.moves()
+        assert shared_rig.jogs(first)
         second.press(AXIS)
         expect(second.answer(AXIS)).to_contain_text("lease", timeout=SECONDS)
         second.page.mouse.up()
@@ -284,7 +267,6 @@ def test_two_operators(shared_rig: Rig, own_browser: Chromium) -> None:
         assert "mov" in (first.answer(AXIS).text_content() or "")
         first.page.mouse.up()
         assert shared_rig.stands()
-        second.hold(AXIS)
-        assert shared_rig.moves()
+        assert shared_rig.jogs(second)
         second.page.mouse.up()
         assert shared_rig.stands()

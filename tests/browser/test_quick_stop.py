@@ -12,8 +12,7 @@ AXIS = NAMES[0]
 def test_escape_stops_all_axes(shared_rig: Rig) -> None:
     with shared_rig.operating() as shown:
         shown.require_enabled(NAMES[1])
-        shown.hold(AXIS)
-        assert shared_rig.moves()
+        assert shared_rig.jogs(shown)
         shown.page.keyboard.press("Escape")
         for axis in range(len(NAMES)):
             assert shared_rig.becomes("SWITCH ON DISABLED", axis)
@@ -29,8 +28,7 @@ def test_the_button_stops_without_a_lease(shared_rig: Rig, own_browser: Chromium
         operator(own_browser.browser, shared_rig.dashboard) as second,
     ):
         second.open("Overview")
-        first.hold(AXIS)
-        assert shared_rig.moves()
+        assert shared_rig.jogs(first)
         second.page.get_by_role("button", name="Quick stop of all axes").click()
         assert shared_rig.becomes("SWITCH ON DISABLED")
         assert shared_rig.stands()

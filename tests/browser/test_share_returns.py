@@ -21,8 +21,7 @@ MALICIOUS = (
 
 def test_another_layout(local: Rig) -> None:
     with local.operating() as shown, ExitStack() as stack:
-        shown.hold(NAMES[0])
-        assert local.moves()
+        assert local.jogs(shown)
         local.loop.end()
         expect(shown.page.get_by_role("alert").first).to_contain_text("share", timeout=SECONDS)
         loop = stack.enter_context(processes.machine(local.share, OTHER))
@@ -30,7 +29,7 @@ def test_another_layout(local: Rig) -> None:
         expect(shown.axis(NAMES[0])).to_have_count(0)
         assert all(abs(axis["velocity"]) < 1e-2 for axis in loop.ask("state"))  # no old jog
         shown.page.mouse.up()
-        shown.hold(OTHER[2])
+        shown.press(OTHER[2])
         expect(shown.answer(OTHER[2])).to_contain_text("moving", timeout=SECONDS)
         shown.page.mouse.up()
         expect(shown.answer(OTHER[2])).to_have_text("released", timeout=SECONDS)

@@ -7,7 +7,7 @@ import pytest
 from tests.browser.pages import SECONDS, WIDTHS, expect
 from tests.browser.rig import Rig
 
-VIEWS = ("Overview", "Axes", "Devices", "Scope")
+VIEWS = ("Overview", "Axes", "Devices", "Scope", "Tune", "Recordings")
 OVERFLOW = "document.documentElement.scrollWidth - document.documentElement.clientWidth"
 NAMELESS = """
 [...document.querySelectorAll("button, a, input, select, [role=meter]")]

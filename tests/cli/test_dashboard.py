@@ -98,6 +98,26 @@ def test_a_window_needs_chromium(monkeypatch: pytest.MonkeyPatch) -> None:
         dashboard.Announcer(window=True)
 
 
+def test_a_window_receives_the_token_in_a_private_file(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    """All users of the machine can read the arguments of a process."""
+    pytest.importorskip("starlette")
+    from catenary.dashboard.security import Access
+
+    started: list[list[str]] = []
+    monkeypatch.setattr("shutil.which", lambda name: f"/usr/bin/{name}")
+    monkeypatch.setattr("catenary.cli.dashboard.subprocess.Popen", lambda c, **_: started.append(c))
+    monkeypatch.setattr("catenary.dashboard.server.key_folder", lambda: tmp_path)
+    access = Access(bytes(32), host="127.0.0.1", port=8710)
+    for _ in range(2):  # a second server replaces the file
+        dashboard.Announcer(window=True)(access)
+    file = tmp_path / "dashboard-8710.html"
+    assert started[-1] == ["/usr/bin/chromium", f"--app=file://{file}"]
+    assert file.stat().st_mode & 0o777 == 0o600
+    assert f"#token={access.token('operator')}" in file.read_text()
+
+
 @pytest.mark.parametrize("kind", [signal.SIGINT, signal.SIGTERM])
 def test_a_signal_ends_the_server_with_status_0(kind: signal.Signals, tmp_path: Path) -> None:
     pytest.importorskip("starlette")

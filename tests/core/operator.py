@@ -69,13 +69,16 @@ class Operator:
         distance: float = math.nan,
         acceleration: float = math.nan,
         *,
+        sweep: tuple[float, float, float] = (0.0, 0.0, 0.0),
         axis: int = 0,
         token: int | None = None,
     ) -> int:
+        """Start a jog. `sweep`: start and end [Hz], duration [s]."""
         slot = self.slots[axis]
         number = int(slot["press"]) + 1
         slot["begun"] = number
         slot["velocity"], slot["distance"], slot["acceleration"] = velocity, distance, acceleration
+        slot["sweep_start"], slot["sweep_end"], slot["sweep_duration"] = sweep
         self.beat(axis=axis, token=token, press=number)
         slot["press"] = number
         return number

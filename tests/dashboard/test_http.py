@@ -99,6 +99,14 @@ def test_the_session_states_the_role(page: Page) -> None:
     assert session["reason_no_jog"] == "this link is for viewers"
 
 
+def test_the_session_renews_its_cookie_so_that_an_open_page_stays_valid(page: Page) -> None:
+    with page.client("viewer") as client:
+        cookie = client.get("/api/session").headers["set-cookie"]
+    assert cookie.startswith(f"catenary-{page.access.port}=viewer.")
+    assert "HttpOnly" in cookie
+    assert "SameSite=strict" in cookie
+
+
 @pytest.mark.parametrize("method", ["sdo_write", "set_state", "home", "virtual_cable", "close", ""])
 def test_a_viewer_can_change_nothing(page: Page, method: str) -> None:
     with page.client("viewer") as client:

@@ -103,3 +103,23 @@ def test_events_of_a_program_that_does_not_answer_are_sent_without_advice(name: 
 
     sent = [message for message in asyncio.run(scenario()) if message["op"] == "event"]
     assert [(message["serial"], message["advice"]) for message in sent] == [(7, "")]
+
+
+def test_an_unexpected_error_detaches_from_the_share_and_is_reported(
+    name: str, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    """A hub that ended would leave pages with old values that look current."""
+
+    async def scenario() -> list[dict[str, Any]]:
+        hub, client = Hub(Source(name), Requests(name)), Viewer()
+        assert hub.add(client)
+        with monkeypatch.context() as patched:
+            patched.setattr(hub, "step", lambda now: {}["missing"])
+            hub._step_or_drop(0.0)
+        hub._send_reason()
+        return await messages(client)
+
+    last = asyncio.run(scenario())[-1]
+    assert last["op"] == "gone"
+    assert "missing" in last["reason"]
+    assert "cannot show the share" in caplog.text

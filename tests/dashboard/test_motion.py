@@ -94,6 +94,20 @@ def test_a_step_ends_at_its_distance(jogging: Page) -> None:
         assert axis["commanded_position"] == pytest.approx(0.1, abs=1e-6)
 
 
+def test_a_sweep_ends_by_itself(jogging: Page) -> None:
+    with jogging.socket() as socket:
+        press(socket, velocity=0.2, sweep={"start": 1.0, "end": 20.0, "duration": 0.5})
+        assert hold(socket, 1, lambda m: m["op"] == "jog" and m["status"] == "DONE")
+
+
+def test_an_invalid_sweep_is_refused_with_the_reason(jogging: Page) -> None:
+    with jogging.socket() as socket:
+        press(socket, sweep={"start": 1.0, "end": 20.0, "duration": 0.0})
+        refused = socket.next("jog")
+        assert refused["status"] == "REFUSED"
+        assert "duration=0.0" in str(refused["text"])
+
+
 def test_a_silent_browser_stops_the_axis(jogging: Page) -> None:
     with jogging.socket() as socket:
         assert socket.jog_until(start(socket), "EXPIRED")
@@ -161,6 +175,7 @@ def test_the_stop_of_an_operator_stops_the_axes(jogging: Page) -> None:
     with jogging.socket() as socket:
         start(socket)
         socket.send("stop")
+        assert socket.next("stopped")
         axis = status_until(socket, lambda axis: not axis["enabled"] and axis["stop_reason"])
         assert "operator" in str(axis["stop_reason"])
 
@@ -171,6 +186,16 @@ def test_an_operator_disables_and_enables_an_axis(jogging: Page) -> None:
         status_until(socket, lambda axis: not axis["enabled"])
         socket.send("request", axes=[0], state="enable")
         status_until(socket, lambda axis: axis["enabled"])
+
+
+def test_a_request_for_the_axes_of_an_earlier_run_is_refused(jogging: Page) -> None:
+    """The axis with this number may be another one after a restart of the loop."""
+    with jogging.socket() as socket:
+        run = socket.next("hello")["run"]
+        socket.send("request", axes=[0], state="disable", run="another")
+        assert "restarted" in str(socket.next("error")["message"])
+        socket.send("request", axes=[0], state="disable", run=run)
+        status_until(socket, lambda axis: not axis["enabled"])
 
 
 def test_a_share_without_jogs_refuses_them_with_the_reason(name: str) -> None:

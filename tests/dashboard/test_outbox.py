@@ -55,3 +55,25 @@ def test_replaceable_messages_do_not_queue() -> None:
     for _ in range(100):
         outbox.put_if_idle("status")
     assert outbox.size < 5 * len("status")
+
+
+def test_texts_precede_the_frames_of_a_slow_client() -> None:
+    outbox = Outbox()
+    for _ in range(10):
+        outbox.put_frame(3, FRAME)
+    outbox.put_text("token")
+    outbox.put_if_idle("status")
+    assert [taken(outbox), taken(outbox)] == ["token", "status"]
+    assert isinstance(taken(outbox), bytes)
+
+
+def test_dropped_frames_are_not_sent_and_not_reported() -> None:
+    outbox = Outbox()
+    for _ in range(100):
+        outbox.put_frame(3, FRAME)
+    outbox.drop_frames()
+    assert outbox.size == 0
+    outbox.put_frame(3, FRAME)
+    data = taken(outbox)
+    assert isinstance(data, bytes)
+    assert decode_frame(data).lost == 0

@@ -70,4 +70,8 @@ def test_an_axis_at_rest_is_captured_with_the_reasons_for_missing_figures() -> N
         assert client.post(url, content='{"axis": 0, "seconds": 1e9}').status_code == 400
         report = client.get("/api/tune/report")
         assert report.headers["content-type"].startswith("text/html")
+        axis = answer.json()["axis"]
         assert "<table" in report.text
+        assert f"<td>{axis}</td>" in report.text
+        other = client.get("/api/tune/report", params={"axis": "another"})
+        assert f"<td>{axis}</td>" not in other.text

@@ -2,11 +2,21 @@
 
 from __future__ import annotations
 
+import asyncio
+import threading
 from collections.abc import Iterator
 
 import pytest
 
-from catenary.dashboard.requests import READS, WRITES, is_allowed
+from catenary.dashboard.requests import (
+    CALLS_MAX,
+    READS,
+    VIEWER_CALLS_MAX,
+    WRITES,
+    BusyError,
+    Requests,
+    is_allowed,
+)
 from catenary.remote import Client
 from tests.dashboard.serving import Page
 
@@ -40,7 +50,7 @@ def test_too_many_waiting_requests_are_refused_with_a_pause(
     called,  # type: ignore[no-untyped-def]
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr("catenary.dashboard.requests.CALLS_MAX", 0)
+    monkeypatch.setattr("catenary.dashboard.app.VIEWER_CALLS_MAX", 0)
     answer = called("hello")
     assert answer.status_code == 429
     assert answer.json()["error"]["kind"] == "BusyError"
@@ -100,3 +110,24 @@ def test_an_event_has_advice_only_if_the_program_knows_one(page: Page) -> None:
         event = socket.next("event")
     assert event["kind"] == "RemoteWrite"
     assert isinstance(event["advice"], str)
+
+
+def test_viewers_leave_room_for_the_requests_of_operators(monkeypatch: pytest.MonkeyPatch) -> None:
+    release = threading.Event()
+
+    async def scenario() -> None:
+        requests = Requests("none")
+        monkeypatch.setattr(requests, "_call", lambda *_: release.wait(30))
+        viewers = [
+            asyncio.create_task(requests.call("devices", {}, limit=VIEWER_CALLS_MAX))
+            for _ in range(VIEWER_CALLS_MAX)
+        ]
+        await asyncio.sleep(0)
+        with pytest.raises(BusyError, match=f"{VIEWER_CALLS_MAX} requests"):
+            await requests.call("devices", {}, limit=VIEWER_CALLS_MAX)
+        operator = asyncio.create_task(requests.call("set_state", {}, limit=CALLS_MAX))
+        release.set()
+        assert all(await asyncio.gather(operator, *viewers))
+        requests.close()
+
+    asyncio.run(scenario())

@@ -82,6 +82,16 @@ def test_a_used_port_is_refused_with_a_hint() -> None:
     assert "--port" in str(refused.value.hint)
 
 
+def test_the_key_is_in_the_folder_of_this_user(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    """In the folder of the group, the key of one user would lock out the others."""
+    monkeypatch.setattr("catenary.share.folder.GROUP_FOLDER", tmp_path)
+    monkeypatch.setattr("catenary.share.folder._is_group_folder", lambda: True)
+    make_access(Options())
+    assert not list(tmp_path.iterdir())
+
+
 def test_missing_packages_are_named(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("catenary.dashboard.server.NEEDED", ("no_such_package",))
     with pytest.raises(ConfigurationError, match="no_such_package") as missing:

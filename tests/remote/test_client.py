@@ -238,6 +238,26 @@ def test_parameters_of_a_law_are_set_together() -> None:
             client.set_parameters("keep", {"2": 1.0})
 
 
+def test_named_parameters_of_a_law_keep_their_limits() -> None:
+    @cat.law(parameters=[cat.Parameter("offset", -0.01, 0.01, "rad"), "gain"])
+    def keep(target, parameters):  # type: ignore[no-untyped-def]
+        target.position[0] = parameters[0] * parameters[1]
+
+    pytest.importorskip("numba")
+    with program() as own, connect(own.name) as client:
+        with pytest.raises(ValueError, match="1 given, but law keep has 2: offset, gain"):
+            own.loop.start(keep, parameters=[0.0])
+        run = own.loop.start(keep, parameters=[0.0, 1.0])
+        offset, gain = client.laws()[0].parameters.values()
+        assert (offset.minimum, offset.maximum, offset.unit) == (-0.01, 0.01, "rad")
+        assert (gain.minimum, gain.maximum, gain.unit) == (None, None, "")
+        with pytest.raises(ValueError, match="'offset': 0.5 is outside of its range -0.01 to 0.01"):
+            client.set_parameters("keep", {"gain": 2.0, "offset": 0.5})
+        assert run.parameters.tolist() == [0.0, 1.0]
+        client.set_parameters("keep", {"gain": 2.0, "offset": 0.001})
+        assert run.parameters.tolist() == [0.001, 2.0]
+
+
 def test_a_virtual_cable_is_pulled_and_plugged() -> None:
     with program(required=False) as own, connect(own.name) as client:
         with own.loop.update():

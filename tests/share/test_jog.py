@@ -9,7 +9,7 @@ import pytest
 
 import catenary as cat
 from catenary.errors import LeaseError, ShareError
-from catenary.share import JogStatus, Lease, Reader, RequestStatus
+from catenary.share import JogStatus, Lease, Reader, RequestStatus, Sweep
 from catenary.share.command_table import MOTION, SLOT
 from catenary.share.jog import JOG_TEXTS, REQUEST_TEXTS
 from catenary.virtual import Segment, Servo
@@ -57,6 +57,7 @@ def test_the_words_have_the_layout_of_the_header_file() -> None:
     assert SLOT.fields is not None
     assert MOTION.fields["token"][1] == 64  # the cache line of the core
     assert SLOT.fields["answer"][1] == 64
+    assert SLOT.fields["sweep_start"][1] == 104
 
 
 def test_a_step_moves_one_axis_by_its_distance(rig: Rig) -> None:
@@ -68,6 +69,40 @@ def test_a_step_moves_one_axis_by_its_distance(rig: Rig) -> None:
         rig.steps(1)
     assert jog.status is JogStatus.DONE
     assert rig.arm.target.position.tolist() == pytest.approx([0.0, -0.1], abs=1e-6)
+
+
+def test_a_sweep_ends_by_itself(rig: Rig) -> None:
+    jog = rig.lease.jog(1, 0.01, sweep=Sweep(start=4.0, end=20.0, duration=0.5))
+    path = []
+    while not jog.status.over:
+        jog.beat()
+        rig.steps(1)
+        path.append(rig.arm.target.position[1])
+    assert jog.status is JogStatus.DONE
+    assert len(path) == pytest.approx(500, abs=5)
+    half_wave = 0.01 / (math.pi * 4.0)
+    assert 0.3 * half_wave < max(path) < half_wave
+
+
+@pytest.mark.parametrize(
+    "values",
+    [
+        (0.0, 1.0, 1.0),
+        (1.0, -1.0, 1.0),
+        (math.nan, 1.0, 1.0),
+        (1.0, math.inf, 1.0),
+        (1.0, 1.0, 0.1),
+        (1.0, 1.0, math.nan),
+    ],
+)
+def test_invalid_sweeps_raise(values: tuple[float, float, float]) -> None:
+    with pytest.raises(ValueError, match="must be finite and at least"):
+        Sweep(*values)
+
+
+def test_a_sweep_stays_below_half_of_the_cycle_rate(rig: Rig) -> None:
+    with pytest.raises(ValueError, match="500 Hz: must be below half of the cycle rate, 500 Hz"):
+        rig.lease.jog(1, 0.1, sweep=Sweep(1.0, 500.0, 1.0))
 
 
 def test_the_block_of_a_jog_releases_it(rig: Rig) -> None:
@@ -131,10 +166,11 @@ def test_a_later_jog_replaces_the_status(rig: Rig) -> None:
         (0.1, {"acceleration": -1.0}),
         (0.1, {"token": 2**48}),
         (0.1, {"token": -1}),
+        (0.1, {"distance": 0.1, "sweep": Sweep(1.0, 2.0, 1.0)}),
     ],
 )
 def test_invalid_values_raise_before_anything_is_written(
-    rig: Rig, velocity: float, options: dict[str, float]
+    rig: Rig, velocity: float, options: dict[str, object]
 ) -> None:
     with pytest.raises(ValueError, match="must be"):
         rig.lease.jog(1, velocity, **options)  # type: ignore[arg-type]

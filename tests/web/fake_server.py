@@ -34,6 +34,7 @@ class FakeServer:
         self.calls: list[Message] = []
         self.sockets: list[WebSocketRoute] = []
         self.accepts = True
+        self.confirms = True  # quick stops
         self.role = "operator"
         self.reason_no_jog: str | None = None
         self.axes = [f"joint_{number}" for number in range(1, axes + 1)]
@@ -94,6 +95,8 @@ class FakeServer:
         self.received.append(message)
         if message["op"] == "ping":
             self.send({"op": "pong", "t": message["t"]})
+        elif message["op"] == "stop" and self.confirms:
+            self.send({"op": "stopped"})
 
     def _serve(self, route: Route) -> None:
         path = route.request.url.removeprefix(ORIGIN).partition("?")[0]

@@ -163,6 +163,52 @@ def assert_released(page: Page, server: FakeServer) -> None:
     assert len(server.of("press")) == 1
 
 
+def test_release_of_the_first_of_two_mouse_buttons_releases_the_jog(opened: Opened) -> None:
+    """While another button is down, browsers send no pointerup for the first."""
+    page, server = opened
+    hold_jog(page, server)
+    page.mouse.down(button="right")
+    page.mouse.up(button="left")
+    assert_released(page, server)
+    page.mouse.up(button="right")
+
+
+def test_another_modifier_key_releases_a_jog_by_keyboard(opened: Opened) -> None:
+    """MacOS sends no keyup for a key that goes up while Meta is down."""
+    page, server = opened
+    give_token(page, server, "t1")
+    page.get_by_role("group", name="Jog joint_1").focus()
+    page.keyboard.down("ArrowRight")
+    wait_for(page, server, "press")
+    page.keyboard.down("Meta")
+    assert_released(page, server)
+    page.keyboard.up("Meta")
+
+
+def test_mouse_over_the_button_does_not_release_a_jog_by_keyboard(opened: Opened) -> None:
+    page, server = opened
+    give_token(page, server, "t1")
+    page.get_by_role("group", name="Jog joint_1").focus()
+    page.keyboard.down("ArrowRight")
+    wait_for(page, server, "press")
+    page.get_by_role("button", name="Jog joint_1 in positive").hover()
+    server.send_token("t2")
+    wait_for(page, server, "beat")
+    assert server.of("release") == []
+    page.keyboard.up("ArrowRight")
+    wait_for(page, server, "release")
+
+
+def test_open_question_releases_the_jog(opened: Opened) -> None:
+    page, server = opened
+    hold_jog(page, server)
+    page.evaluate(
+        "[...document.querySelectorAll('button')].find(b => b.textContent == 'Enable').click()"
+    )
+    expect(page.get_by_role("dialog")).to_be_visible()
+    assert_released(page, server)
+
+
 def test_late_tokens_release_the_jog(opened: Opened) -> None:
     page, server = opened
     hold_jog(page, server)
@@ -260,6 +306,27 @@ def test_stop_button_works_with_the_keyboard(opened: Opened) -> None:
     assert len(server.of("stop")) == 1
 
 
+def test_stop_that_the_server_does_not_confirm_is_reported(opened: Opened) -> None:
+    page, server = opened
+    page.keyboard.press("Escape")
+    expect(page.get_by_role("button", name="Quick stop")).to_contain_text("sent")
+    server.confirms = False
+    page.keyboard.press("Escape")
+    expect(page.get_by_text("has not confirmed the stop")).to_be_visible()
+
+
+def test_stop_of_a_viewer_states_that_it_has_no_effect(browser: Browser) -> None:
+    page = browser.new_page()
+    server = FakeServer(page)
+    server.role = "viewer"
+    open_view(page, "overview")
+    page.keyboard.press("Escape")
+    expect(page.get_by_text("it cannot stop the axes")).to_be_visible()
+    expect(page.get_by_role("button", name="Quick stop")).to_contain_text("operators only")
+    assert server.of("stop") == []
+    page.close()
+
+
 def test_stop_without_a_connection_is_reported(opened: Opened) -> None:
     page, server = opened
     server.accepts = False
@@ -278,7 +345,28 @@ def test_enabling_asks_first(opened: Opened) -> None:
     page.get_by_role("button", name="Enable", exact=True).first.click()
     page.get_by_role("dialog").get_by_role("button", name="Enable").click()
     wait_for(page, server, "request")
-    assert server.of("request") == [{"op": "request", "axes": [4], "state": "enable"}]
+    assert server.of("request") == [
+        {"op": "request", "axes": [4], "state": "enable", "run": "run-1"}
+    ]
+
+
+def test_question_closes_when_the_share_ends(opened: Opened) -> None:
+    """The axis with the same number may be another one when the share returns."""
+    page, server = opened
+    page.get_by_role("button", name="Enable", exact=True).first.click()
+    expect(page.get_by_role("dialog")).to_be_visible()
+    server.send({"op": "gone", "reason": "the loop has ended"})
+    expect(page.get_by_role("dialog")).to_be_hidden()
+    assert server.of("request") == []
+
+
+def test_values_without_new_statuses_are_marked_as_old(opened: Opened) -> None:
+    page, server = opened
+    page.evaluate("window.testTime += 2500")
+    server.send_token("t1")  # the connection itself works
+    expect(page.get_by_text("these are old values")).to_be_visible()
+    server.send_status()
+    expect(page.get_by_text("these are old values")).to_be_hidden()
 
 
 def test_page_reconnects_and_subscribes_again_without_reload(opened: Opened) -> None:

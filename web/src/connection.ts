@@ -12,6 +12,7 @@ import type {
   ServerMessage,
   Session,
   Status,
+  Sweep,
   Timing,
 } from "./protocol.ts";
 import { KIND_DECIMATED, KIND_FULL } from "./protocol.ts";
@@ -30,6 +31,7 @@ export interface JogRequest {
   velocity: number; // signed [rad/s or m/s]
   distance: number | null; // [rad or m]; null: until release
   acceleration: number | null; // null: limit of the axis
+  sweep?: Sweep | null; // sine of changing frequency, without a distance
 }
 
 interface Subscription extends SubscribeOptions {
@@ -41,7 +43,9 @@ export const BACKOFF_FIRST = 100; // [ms]
 export const BACKOFF_LAST = 2000; // [ms]
 export const EVENTS_KEPT = 500;
 export const SILENCE = 3000; // [ms] without any message: the connection counts as lost
+export const STATUS_SILENCE = 2000; // [ms] without a status: the shown values count as old
 const PING_INTERVAL = 1000; // [ms]
+const SESSION_INTERVAL = 3_600_000; // [ms] between two renewals of the cookie
 
 /** Error that the server or the loop reported. */
 export class RemoteError extends Error {
@@ -64,6 +68,7 @@ export class Connection {
   readonly timing = signal<Timing | null>(null);
   readonly events = signal<readonly Event[]>([]); // newest first
   readonly role = computed(() => this.hello.value?.role ?? this.session.value?.role ?? null);
+  readonly fresh = signal(true); // false: no status for STATUS_SILENCE
   readonly running = computed(() => this.status.value?.state !== "stalled");
   readonly losing = computed(() => (this.status.value?.lost_in_row ?? 0) > 0);
   readonly delay = signal<number | null>(null); // round trip to the server [ms]
@@ -75,12 +80,14 @@ export class Connection {
   private nextId = 1;
   private nextPress = 1;
   private received = 0;
+  private statusTime = 0;
   private readonly subscriptions = new Map<number, Subscription>();
   private readonly callbacks = new Map<Kind, Set<(message: never) => void>>();
   private readonly binary = new Map<number, Set<(buffer: ArrayBuffer) => void>>();
 
   /** Exchange the token of the URL fragment for a cookie, then connect. */
   async start(): Promise<void> {
+    setInterval(() => void fetch("/api/session").catch(() => undefined), SESSION_INTERVAL);
     const token = new URLSearchParams(location.hash.slice(1)).get("token");
     if (token !== null) {
       history.replaceState(null, "", location.pathname + location.search);
@@ -124,7 +131,7 @@ export class Connection {
   /** Post JSON, and return the result. Throws RemoteError. */
   async post<T>(path: string, body: object = {}): Promise<T> {
     const reply = await post(path, body);
-    if (reply.status === 401) this.state.value = "login";
+    if (reply.status === 401 && this.socket === null) this.state.value = "login"; // the stop stays
     const answer = (await reply.json()) as CallAnswer<T>;
     if ("error" in answer) throw new RemoteError(answer.error);
     return answer.result;
@@ -169,7 +176,7 @@ export class Connection {
   }
 
   request(axes: number[] | null, state: AxisRequest): void {
-    this.send({ op: "request", axes, state });
+    this.send({ op: "request", axes, state, run: this.hello.value?.run ?? null });
   }
 
   send(message: ClientMessage): boolean {
@@ -201,7 +208,9 @@ export class Connection {
   private open(): void {
     const scheme = location.protocol === "https:" ? "wss" : "ws";
     const socket = new WebSocket(`${scheme}://${location.host}/ws`);
+    const former = this.socket;
     this.socket = socket;
+    former?.close();
     this.received = performance.now();
     socket.binaryType = "arraybuffer";
     socket.onmessage = (event: MessageEvent<string | ArrayBuffer>) => {
@@ -224,6 +233,8 @@ export class Connection {
       socket.close();
       return;
     }
+    const status = this.status.value;
+    this.fresh.value = status === null || performance.now() - this.statusTime < STATUS_SILENCE;
     this.send({ op: "ping", t: performance.now() });
   }
 
@@ -237,7 +248,7 @@ export class Connection {
   private receive(message: ServerMessage): void {
     if (message.op === "hello") this.receiveHello(message);
     else if (message.op === "gone") this.receiveGone(message.reason);
-    else if (message.op === "status") this.status.value = message;
+    else if (message.op === "status") this.receiveStatus(message);
     else if (message.op === "timing") this.timing.value = message;
     else if (message.op === "event") this.receiveEvent(message);
     else if (message.op === "pong") this.delay.value = performance.now() - message.t;
@@ -251,10 +262,18 @@ export class Connection {
       this.timing.value = null;
     }
     this.backoff = BACKOFF_FIRST;
+    this.statusTime = performance.now();
+    this.fresh.value = true;
     this.hello.value = message;
     this.reason.value = null;
     this.state.value = "open";
     for (const id of this.subscriptions.keys()) this.announce(id);
+  }
+
+  private receiveStatus(status: Status): void {
+    this.statusTime = performance.now();
+    this.fresh.value = true;
+    this.status.value = status;
   }
 
   private receiveGone(reason: string): void {

@@ -2,9 +2,12 @@
 
 import type { Connection, LinkState } from "./connection.ts";
 import { count, duration } from "./logic/format.ts";
-import { LiveText, type Tone } from "./parts/common.tsx";
+import { Icon, LiveText, type Tone } from "./parts/common.tsx";
 import { StopButton } from "./stop.tsx";
 import { text } from "./strings.ts";
+import { choice, nextTheme } from "./theme.ts";
+
+const THEME_ICON = "M12 3a9 9 0 1 0 0 18zM12 3a9 9 0 0 1 0 18";
 
 const TONES: Record<LinkState, Tone> = {
   connecting: "warn",
@@ -41,6 +44,7 @@ export function Header({ connection }: { connection: Connection }) {
         </div>
         <RoleFact connection={connection} />
       </dl>
+      <ThemeButton />
       <StopButton connection={connection} />
     </header>
   );
@@ -60,7 +64,7 @@ function ConnectionFact({ connection }: { connection: Connection }) {
 }
 
 function LoopFact({ connection }: { connection: Connection }) {
-  const open = connection.state.value === "open";
+  const open = connection.state.value === "open" && connection.fresh.value;
   const lost = connection.losing.value;
   const tone: Tone = !open ? "" : !connection.running.value ? "bad" : lost ? "warn" : "ok";
   const shown: string = !open
@@ -88,5 +92,14 @@ function RoleFact({ connection }: { connection: Connection }) {
       <dt>{text.header.role}</dt>
       <dd>{role === null ? text.header.unknown : text.header.roles[role]}</dd>
     </div>
+  );
+}
+
+function ThemeButton() {
+  const label = text.theme.label(text.theme[choice.value]);
+  return (
+    <button type="button" class="theme" onClick={nextTheme} aria-label={label} title={label}>
+      <Icon path={THEME_ICON} />
+    </button>
   );
 }

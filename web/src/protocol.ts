@@ -55,6 +55,16 @@ export interface Unsubscribe {
   id: number;
 }
 
+/** Sine of changing frequency; its amplitude is the velocity of the press. */
+export interface Sweep {
+  /** Frequency at the start, at least 0.001 [Hz]. */
+  start: number;
+  /** Frequency at the end, below half of the cycle rate [Hz]. */
+  end: number;
+  /** At least 0.2 [s]. */
+  duration: number;
+}
+
 export interface Press {
   op: "press";
   /** Number of the axis in `layout.axes`. */
@@ -64,6 +74,8 @@ export interface Press {
   /** Length of a step [rad or m]; null: until the release. */
   distance: number | null;
   acceleration: number | null;
+  /** null: constant velocity. A sweep needs distance null, and ends with status DONE. */
+  sweep?: Sweep | null;
   /** Newest token that the server has sent. */
   token: string;
   /** Counter of the client; the answers and the beats repeat it. */
@@ -94,6 +106,8 @@ export interface StateRequest {
   /** Numbers of axes; null: all. */
   axes: number[] | null;
   state: AxisRequest;
+  /** Run of the loop whose axes the page shows (`hello.run`); another run refuses the request. */
+  run?: string | null;
 }
 
 /** Request the poses of the 3D scene (kind 3), or end them. */
@@ -250,6 +264,11 @@ export interface ErrorMessage extends ErrorBody {
   about: string;
 }
 
+/** The server has written the stop word: the loop stops all axes in its next cycle. */
+export interface Stopped {
+  op: "stopped";
+}
+
 export interface Pong {
   op: "pong";
   t: number;
@@ -264,6 +283,7 @@ export type ServerMessage =
   | Timing
   | JogMessage
   | ErrorMessage
+  | Stopped
   | Pong;
 
 // Binary frames, little endian. Header of 32 bytes:

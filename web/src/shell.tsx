@@ -6,13 +6,10 @@ import { Header } from "./header.tsx";
 import { Login } from "./login.tsx";
 import { dismiss, notices, notify } from "./notices.ts";
 import { Icon } from "./parts/common.tsx";
-import { ConfirmDialog } from "./parts/confirm.tsx";
+import { cancelQuestion, ConfirmDialog } from "./parts/confirm.tsx";
 import { address, route } from "./route.ts";
 import { text } from "./strings.ts";
-import { choice, nextTheme } from "./theme.ts";
 import { views } from "./views.ts";
-
-const THEME_ICON = "M12 3a9 9 0 1 0 0 18zM12 3a9 9 0 0 1 0 18";
 
 export function Shell({ connection }: { connection: Connection }) {
   useEffect(
@@ -20,6 +17,11 @@ export function Shell({ connection }: { connection: Connection }) {
       connection.on("error", ({ message, hint }) => notify(message, { hint, kind: "bad" })),
     [connection],
   );
+  useEffect(
+    () => connection.state.subscribe((state) => state !== "open" && cancelQuestion()),
+    [connection],
+  );
+  useEffect(cancelQuestion, [connection.hello.value?.run]);
   if (connection.state.value === "login") return <Login connection={connection} />;
   const view = views.find(({ key }) => key === route.value[0]) ?? views[0];
   if (view === undefined) return null;
@@ -39,7 +41,8 @@ export function Shell({ connection }: { connection: Connection }) {
 }
 
 function isLive(connection: Connection): boolean {
-  return connection.state.value === "open" && connection.running.value;
+  const { state, fresh, running } = connection;
+  return state.value === "open" && fresh.value && running.value;
 }
 
 function Rail({ shown }: { shown: string }) {
@@ -52,10 +55,6 @@ function Rail({ shown }: { shown: string }) {
             {label}
           </a>
         ))}
-        <button type="button" class="theme" onClick={nextTheme} aria-label={text.theme.label}>
-          <Icon path={THEME_ICON} />
-          {text.theme[choice.value]}
-        </button>
       </nav>
     </div>
   );
@@ -75,6 +74,13 @@ function Banner({ connection }: { connection: Connection }) {
     return (
       <div class="banner bad" role="alert">
         <strong>{text.banner.lost}</strong> <span>{text.banner.lostHint}</span>
+      </div>
+    );
+  }
+  if (state === "open" && !connection.fresh.value) {
+    return (
+      <div class="banner bad" role="alert">
+        <strong>{text.banner.silent}</strong> <span>{text.banner.silentHint}</span>
       </div>
     );
   }

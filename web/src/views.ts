@@ -2,10 +2,8 @@
 
 import type { ComponentType } from "preact";
 import type { Connection } from "./connection.ts";
-import { Recordings } from "./recordings/recordings.tsx";
-import { Scope } from "./scope/scope.tsx";
+import { lazy } from "./parts/lazy.tsx";
 import { text } from "./strings.ts";
-import { Tune } from "./tune/tune.tsx";
 import { Axes } from "./views/axes.tsx";
 import { Devices } from "./views/devices.tsx";
 import { Overview } from "./views/overview.tsx";
@@ -16,6 +14,12 @@ export interface View {
   icon: string; // path of an SVG of 24 x 24
   component: ComponentType<{ connection: Connection }>;
 }
+
+const Scope = lazy(() => import("./scope/scope.tsx").then((module) => module.Scope));
+const Tune = lazy(() => import("./tune/tune.tsx").then((module) => module.Tune));
+const Recordings = lazy(() =>
+  import("./recordings/recordings.tsx").then((module) => module.Recordings),
+);
 
 export const views: View[] = [
   {

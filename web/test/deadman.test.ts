@@ -120,3 +120,11 @@ test("a press without a connection is refused", () => {
   assert.equal(deadman.press(0, JOG), "no_connection");
   assert.equal(deadman.held, null);
 });
+
+test("after a reconnection, the enabling touch must be renewed", () => {
+  const { deadman } = bench();
+  deadman.enable(true);
+  deadman.disconnect();
+  deadman.receiveToken("a");
+  assert.equal(deadman.press(0, JOG, { touch: true }), "not_enabled");
+});

@@ -1,6 +1,6 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
-import { count, duration, fixed, hex, MISSING, objectKey, quantity } from "../src/logic/format.ts";
+import { count, duration, fixed, hex, MISSING, objectKey, quantity, shortened } from "../src/logic/format.ts";
 
 test("a duration has three digits and a unit", () => {
   const cases: [number, string][] = [
@@ -45,6 +45,11 @@ test("object keys are hexadecimal", () => {
   assert.equal(objectKey(0x6064, 0), "0x6064:00");
   assert.equal(objectKey(0x1c12, 10), "0x1C12:0A");
   assert.equal(hex(2, 8), "0x00000002");
+});
+
+test("a long name keeps its begin and its end", () => {
+  assert.equal(shortened("2 Catenary virtual servo 1", 20), "2 Catenary…l servo 1");
+  assert.equal(shortened("2 Catenary virtual servo 1", 26), "2 Catenary virtual servo 1");
 });
 
 function plain(text: string): string {

@@ -174,11 +174,11 @@ class Announcer:
 
     def __call__(self, access: Access) -> None:
         """Print the links of a server, and open the window."""
-        from catenary.dashboard.server import announcement, link
+        from catenary.dashboard.server import announcement, key_folder, link_file
 
         print(announcement(access, draw=sys.stdout.isatty()), flush=True)
         if self._browser is not None:
-            page = link(access, access.roles[0])
+            page = link_file(access, key_folder()).as_uri()
             subprocess.Popen([self._browser, f"--app={page}"], start_new_session=True)
 
 

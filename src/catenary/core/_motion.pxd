@@ -1,6 +1,7 @@
 from libc.stdint cimport int64_t, uint8_t, uint32_t, uint64_t
 
 from catenary.core._native cimport cat_motion, cat_motion_slot, cat_sink
+from catenary.core._sweep cimport sweep_t
 
 cdef enum:
     TOKENS = 5                 # as many as can be fresh
@@ -16,11 +17,12 @@ cdef struct jog_t:             # of one axis
     int64_t deadline           # the jog stops later than this [ns]
     uint8_t status             # answer to that press
     uint8_t ending             # status at the end of the ramp
-    double velocity            # wished [rad/s]
+    double velocity            # wished [rad/s]; of a sweep: its amplitude
     double acceleration        # [rad/s²]
     double deceleration        # [rad/s²]
     double remaining           # [rad] in the direction of `velocity`; infinite: until release
     double speed               # velocity of the command in this cycle, signed [rad/s]
+    sweep_t sweep              # its `duration` is 0 for another jog
 
 cdef struct motion_t:
     cat_motion *words          # NULL: no other process can request motions

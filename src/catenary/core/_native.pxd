@@ -154,6 +154,9 @@ cdef extern from "motion.h" nogil:
         uint64_t request
         uint64_t answer
         uint64_t taken
+        double sweep_start
+        double sweep_end
+        double sweep_duration
 
 
 cdef extern from "sink.h" nogil:

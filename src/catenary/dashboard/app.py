@@ -22,7 +22,13 @@ from catenary.dashboard.guard import Guard
 from catenary.dashboard.hub import Hub
 from catenary.dashboard.limits import RateLimit
 from catenary.dashboard.report import make_report
-from catenary.dashboard.requests import FAILURES, error_body, is_allowed
+from catenary.dashboard.requests import (
+    CALLS_MAX,
+    FAILURES,
+    VIEWER_CALLS_MAX,
+    error_body,
+    is_allowed,
+)
 from catenary.dashboard.security import SESSION_SECONDS, Access, Role
 from catenary.dashboard.static_files import StaticFile, read_static_files
 from catenary.errors import BusyError, CatenaryError
@@ -156,32 +162,41 @@ async def log_in(page: Page, request: Request) -> Response:
         return refusal(429, "too many wrong tokens", hint="wait a few seconds")
     if cookie is None:
         return refusal(403, "the token is not valid", hint="open the link that the terminal shows")
-    response = Response(status_code=204)
+    return with_cookie(Response(status_code=204), page.access, cookie)
+
+
+def with_cookie(response: Response, access: Access, cookie: str) -> Response:
+    """Return the response, which now sets a cookie.
+
+    Args:
+        response: the response.
+        access: tokens and roles.
+        cookie: value of the cookie.
+    """
     response.set_cookie(
-        page.access.cookie_name,
+        access.cookie_name,
         cookie,
         max_age=SESSION_SECONDS,
         httponly=True,
         samesite="strict",
-        secure=page.access.tls,
+        secure=access.tls,
     )
     return response
 
 
 async def session(page: Page, request: Request, role: Role) -> Response:
-    """Return the role of the session."""
+    """Return the role of the session, and renew its cookie, so that an open page stays valid."""
     source = page.hub.source
     reason = source.reason_no_jog
     if role != "operator":
         reason = page.access.refusal or "this link is for viewers"
-    return json_response(
-        {
-            "role": role,
-            "share": source.name,
-            "reason_no_jog": reason,
-            "version": version("catenary"),
-        }
-    )
+    facts = {
+        "role": role,
+        "share": source.name,
+        "reason_no_jog": reason,
+        "version": version("catenary"),
+    }
+    return with_cookie(json_response(facts), page.access, page.access.cookie(role))
 
 
 async def call(page: Page, request: Request, role: Role) -> Response:
@@ -192,7 +207,9 @@ async def call(page: Page, request: Request, role: Role) -> Response:
     if not is_allowed(body.method, role):
         return refusal(403, f"the role {role} cannot call {body.method!r}")
     try:
-        return json_response({"result": await page.hub.requests.call(body.method, body.params)})
+        limit = CALLS_MAX if role == "operator" else VIEWER_CALLS_MAX
+        result = await page.hub.requests.call(body.method, body.params, limit=limit)
+        return json_response({"result": result})
     except BusyError as error:
         return json_response({"error": error_body(error), "retry": error.retry}, 429)
     except FAILURES as error:

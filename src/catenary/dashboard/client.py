@@ -61,7 +61,6 @@ class Client:
         self._motion = Motion()
         self._limit = RateLimit(MESSAGES_PER_SECOND, MESSAGES_AT_ONCE)
         self._work: asyncio.Queue[tuple[ClientMessage, Work]] = asyncio.Queue(WORK_MAX)
-        self._closed = False
 
     async def run(self) -> None:
         """Serve the client until it disconnects. Then release its jogs."""
@@ -72,7 +71,6 @@ class Client:
         try:
             await self._receive_all()
         finally:
-            self._closed = True
             self._hub.remove(self)
             for task in tasks:
                 task.cancel()
@@ -95,7 +93,7 @@ class Client:
             self._report_jog(change.axis, change.press, status.name, status.text)
             if status.over:
                 end = Release(change.axis, change.press)
-                self._enqueue(end, partial(self._motion.end, change.axis))
+                self._enqueue(end, partial(self._motion.end, change))
         for text in self._motion.refusals():
             self._refuse("request", RuntimeError(text))
 
@@ -140,6 +138,7 @@ class Client:
                 self._subscribe(message)
             case Stop():
                 self._reader().stop()
+                self.send(encode_message("stopped"))
             case Poses(on=on):
                 self.wants_poses = on
             case Beat():
@@ -147,13 +146,15 @@ class Client:
             case Release():
                 self._enqueue(message, partial(self._motion.release, message))
             case Press():
-                self._enqueue(message, partial(self._press, self._reader(), message))
+                self._enqueue(message, partial(self._motion.press, self._reader(), message))
             case Request():
-                self._enqueue(message, partial(self._motion.request, self._reader(), message))
+                self._request(message)
 
-    def _press(self, reader: Reader, message: Press) -> None:
-        if not self._closed:
-            self._motion.press(reader, message)
+    def _request(self, message: Request) -> None:
+        reader = self._reader()
+        if message.run not in (None, reader.layout.run):
+            raise RuntimeError("the loop has restarted; its axes may be others")
+        self._enqueue(message, partial(self._motion.request, reader, message))
 
     def _subscribe(self, message: Subscribe) -> None:
         reader, subscriptions = self._reader(), self._hub.subscriptions

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import re
 import struct
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -57,11 +57,11 @@ def find_columns(layout: ShareLayout | Layout, signals: Sequence[str]) -> list[C
 
     Raises ValueError if the layout has no such signal.
     """
-    return [_find_column(layout, signal) for signal in signals]
-
-
-def _find_column(layout: ShareLayout | Layout, signal: str) -> Column:
     shapes = {field.name: field.shape for field in layout.fields}
+    return [_find_column(layout.name, shapes, signal) for signal in signals]
+
+
+def _find_column(share: str, shapes: Mapping[str, tuple[int, ...]], signal: str) -> Column:
     if shapes.get(signal) == ():
         return signal, None
     found = SIGNAL.match(signal)
@@ -69,7 +69,7 @@ def _find_column(layout: ShareLayout | Layout, signal: str) -> Column:
     shape = shapes.get(name)
     if shape and index is not None and int(index) < shape[0]:
         return name, int(index)
-    raise ValueError(f"the share {layout.name!r} has no signal {signal!r}")
+    raise ValueError(f"the share {share!r} has no signal {signal!r}")
 
 
 def encode_full(rows: Rows, columns: Sequence[Column], lost: int, period: float) -> Frame:

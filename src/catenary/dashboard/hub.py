@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import logging
 import time
 from collections.abc import Callable, Coroutine
 from concurrent.futures import ThreadPoolExecutor
@@ -21,6 +22,7 @@ from catenary.dashboard.subscriptions import Subscriptions
 from catenary.errors import CatenaryError, ShareError
 from catenary.share import Reader, SharedEvent
 
+log = logging.getLogger(__name__)
 TICK = 1 / 60  # [s]
 POSES_INTERVAL = 1 / 30  # [s]
 STATUS_INTERVAL = 0.05  # [s]
@@ -88,17 +90,25 @@ class Hub:
             due = time.monotonic()
             while True:
                 now = time.monotonic()
-                try:
-                    self.step(now)
-                except ShareError as error:
-                    self.source.drop(error.message)
-                    self._change()
+                self._step_or_drop(now)
                 due = max(due + TICK, now)  # without catching up after a pause
                 await asyncio.sleep(due - time.monotonic())
         finally:
             self.source.close()
             self.requests.close()
             self.workers.shutdown(wait=False)
+
+    def _step_or_drop(self, now: float) -> None:
+        """Send what is due. After an error, detach from the share and tell all clients."""
+        try:
+            self.step(now)
+        except ShareError as error:
+            self.source.drop(error.message)
+            self._change()
+        except Exception as error:
+            log.exception("the server cannot show the share %r", self.source.name)
+            self.source.drop(f"the server cannot show the share: {error!r}")
+            self._change()
 
     def step(self, now: float) -> None:
         """Send what is due. `now` is a monotonic time [s]."""
@@ -151,6 +161,7 @@ class Hub:
         self._reason = ""
         for client in list(self.clients):
             client.forget_motion()
+            client.outbox.drop_frames()
             if reader is not None:
                 self._greet(client)
 

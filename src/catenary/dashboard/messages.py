@@ -31,8 +31,16 @@ class Unsubscribe(msgspec.Struct, frozen=True, tag_field="op", tag="unsubscribe"
     id: Id
 
 
+class SweepValues(msgspec.Struct, frozen=True):
+    """Sine of changing frequency: the fields of `catenary.share.Sweep`, not checked."""
+
+    start: float  # [Hz]
+    end: float  # [Hz]
+    duration: float  # [s]
+
+
 class Press(msgspec.Struct, frozen=True, tag_field="op", tag="press"):
-    """Start of a jog. Without a distance, it lasts until the release."""
+    """Start of a jog. Without a distance or a sweep, it lasts until the release."""
 
     axis: Number
     velocity: float  # signed [rad/s or m/s]
@@ -40,6 +48,7 @@ class Press(msgspec.Struct, frozen=True, tag_field="op", tag="press"):
     press: Number
     distance: float | None = None  # [rad or m]
     acceleration: float | None = None  # [rad/s² or m/s²]
+    sweep: SweepValues | None = None
 
 
 class Beat(msgspec.Struct, frozen=True, tag_field="op", tag="beat"):
@@ -62,10 +71,14 @@ class Stop(msgspec.Struct, frozen=True, tag_field="op", tag="stop"):
 
 
 class Request(msgspec.Struct, frozen=True, tag_field="op", tag="request"):
-    """Request for a state of axes; `axes` None: all."""
+    """Request for a state of axes; `axes` None: all.
+
+    `run`: run of the loop whose axes the page shows; another run refuses the request.
+    """
 
     state: StateName
     axes: list[Number] | None = None
+    run: Name | None = None
 
 
 class Poses(msgspec.Struct, frozen=True, tag_field="op", tag="poses"):

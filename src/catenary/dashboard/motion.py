@@ -1,16 +1,17 @@
 """Jogs and state requests of one client, through leases on the desk of the loop.
 
-The methods block: they lock the mutex of the desk. Call them in a worker thread, one at a time.
-Only `changes` and `refusals` do not lock.
+The methods block: they lock the mutex of the desk. Call them in a worker thread.
+Only `changes`, `refusals` and `forget` do not lock.
 """
 
 from __future__ import annotations
 
+import threading
 from dataclasses import dataclass
 
 from catenary.dashboard.messages import Beat, Press, Release, Request
 from catenary.errors import CatenaryError
-from catenary.share import Jog, JogStatus, Lease, Reader, RequestStatus, StateRequest
+from catenary.share import Jog, JogStatus, Lease, Reader, RequestStatus, StateRequest, Sweep
 
 LEASE_SECONDS = 1.0
 REQUESTS_MAX = 64  # requests without an answer
@@ -42,6 +43,8 @@ class Motion:
     def __init__(self) -> None:
         self._held: dict[int, Held] = {}
         self._requests: list[StateRequest] = []
+        self._turn = threading.Lock()
+        self._closed = False
 
     def press(self, reader: Reader, message: Press) -> None:
         """Start a jog; a former jog of the axis is released.
@@ -54,7 +57,14 @@ class Motion:
             CatenaryError: the axis is leased to another client, or the loop has ended.
             ValueError: a value is out of range.
         """
-        self.end(message.axis)
+        with self._turn:
+            if not self._closed:
+                self._end(message.axis)
+                self._held[message.axis] = self._begin(reader, message)
+
+    def _begin(self, reader: Reader, message: Press) -> Held:
+        given = message.sweep
+        sweep = None if given is None else Sweep(given.start, given.end, given.duration)
         lease = reader.lease([message.axis], for_=LEASE_SECONDS)
         try:
             jog = lease.jog(
@@ -62,12 +72,13 @@ class Motion:
                 message.velocity,
                 distance=message.distance,
                 acceleration=message.acceleration,
+                sweep=sweep,
                 token=int(message.token),
             )
         except BaseException:
             lease.release()
             raise
-        self._held[message.axis] = Held(message.press, lease, jog)
+        return Held(message.press, lease, jog)
 
     def beat(self, message: Beat) -> None:
         """Pass the token that the browser echoed. A beat of an ended jog has no effect."""
@@ -91,8 +102,14 @@ class Motion:
                 changed.append(JogChange(axis, held.press, status))
         return changed
 
-    def end(self, axis: int) -> None:
-        """Release the jog of an axis and its lease, if there is one."""
+    def end(self, change: JogChange) -> None:
+        """Release a jog and its lease. A no-op if the axis has another jog since then."""
+        with self._turn:
+            held = self._held.get(change.axis)
+            if held is not None and held.press == change.press:
+                self._end(change.axis)
+
+    def _end(self, axis: int) -> None:
         held = self._held.pop(axis, None)
         if held is not None:
             try:
@@ -101,13 +118,15 @@ class Motion:
                 held.lease.release()
 
     def end_all(self) -> list[str]:
-        """Release all jogs. Return the messages of releases that failed."""
+        """Release all jogs, and accept no more. Return the messages of releases that failed."""
         problems = []
-        for axis in list(self._held):
-            try:
-                self.end(axis)
-            except CatenaryError as error:
-                problems.append(error.message)
+        with self._turn:
+            self._closed = True
+            for axis in list(self._held):
+                try:
+                    self._end(axis)
+                except CatenaryError as error:
+                    problems.append(error.message)
         return problems
 
     def forget(self) -> None:

@@ -39,9 +39,14 @@ def panel_routes(panels: Panels, page: Page) -> list[BaseRoute]:
         page: parts of the page.
     """
     routes: list[BaseRoute] = [Route("/scene", protected(page, scene)), *Tune(page).routes]
-    if panels.recordings is not None:
-        routes += RecordingRoutes(page, Folder(panels.recordings)).all
-    return routes
+    if panels.recordings is None:
+        return [*routes, Route("/api/recordings", protected(page, no_recordings))]
+    return [*routes, *RecordingRoutes(page, Folder(panels.recordings)).all]
+
+
+async def no_recordings(page: Page, request: Request, role: Role) -> Response:
+    """Return the empty list of a server without a folder of recordings."""
+    return json_response({"files": []})
 
 
 async def scene(page: Page, request: Request, role: Role) -> Response:

@@ -18,10 +18,11 @@ if TYPE_CHECKING:
 FAILURES = (CatenaryError, OSError, RuntimeError, TypeError, ValueError)  # of a request
 CONNECTIONS = 6
 CALLS_MAX = 32  # calls that wait or run
+VIEWER_CALLS_MAX = 16  # the rest is for operators
 RETRY_SECONDS = 0.2
 READS = frozenset(
     {
-        *("hello", "devices", "axes", "objects", "sdo_read", "registers", "diagnosis"),
+        *("hello", "devices", "axes", "objects", "sdo_read", "diagnosis"),
         *("emergencies", "events", "timing", "clocks", "plan", "laws"),
     }
 )
@@ -29,6 +30,7 @@ WRITES = frozenset(
     {
         *("sdo_write", "set_state", "reset_error", "clear_counters", "set_parameters", "home"),
         *("virtual_cable", "virtual_power", "virtual_push"),
+        "registers",  # reading can change a device: it empties a mailbox, or resets a latch
     }
 )
 
@@ -71,7 +73,12 @@ class Requests:
         self._pool.shutdown(wait=False, cancel_futures=True)
 
     async def call(
-        self, method: str, params: Mapping[str, object], *, timeout: float | None = None
+        self,
+        method: str,
+        params: Mapping[str, object],
+        *,
+        timeout: float | None = None,
+        limit: int = CALLS_MAX,
     ) -> object:
         """Return the result of a method of `catenary.remote.Client`.
 
@@ -79,6 +86,7 @@ class Requests:
             method: name of the method.
             params: its arguments.
             timeout: deadline [s]; None: that of the client.
+            limit: number of requests in progress from which this one is refused.
 
         Raises:
             CatenaryError: the program refused the request, or does not answer.
@@ -87,8 +95,8 @@ class Requests:
             TypeError: the arguments do not fit the method.
             ValueError: a value is not valid.
         """
-        if self._waiting >= CALLS_MAX:
-            raise BusyError(f"{CALLS_MAX} requests are already waiting", retry=RETRY_SECONDS)
+        if self._waiting >= limit:
+            raise BusyError(f"{limit} requests are already waiting", retry=RETRY_SECONDS)
         self._waiting += 1
         try:
             async with self._running:

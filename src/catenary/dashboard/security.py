@@ -87,9 +87,13 @@ class Access:
         """Return the value of the cookie for a token; None if the token is wrong."""
         for role in self.roles:
             if hmac.compare_digest(token.encode(), self.token(role).encode()):
-                expiry = round(self._clock() + SESSION_SECONDS)
-                return f"{role}.{expiry}.{self._sign(f'cookie {role} {expiry}')}"
+                return self.cookie(role)
         return None
+
+    def cookie(self, role: Role) -> str:
+        """Return the value of a new cookie for a role."""
+        expiry = round(self._clock() + SESSION_SECONDS)
+        return f"{role}.{expiry}.{self._sign(f'cookie {role} {expiry}')}"
 
     def role_of(self, cookie: str | None) -> Role | None:
         """Return the role of a cookie; None if it is missing, forged or expired."""

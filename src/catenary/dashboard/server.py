@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import os
 import socket
 import ssl
 from collections.abc import Callable
@@ -14,7 +15,7 @@ from typing import TYPE_CHECKING
 from catenary.dashboard.options import Panels
 from catenary.dashboard.security import Access, Role, is_loopback, load_key
 from catenary.errors import ConfigurationError
-from catenary.share.folder import own_folder, prepare
+from catenary.share.folder import prepare, user_folder
 
 if TYPE_CHECKING:
     import uvicorn
@@ -25,6 +26,10 @@ PORT = 8710
 CONNECTIONS_MAX = 128
 MESSAGE_MAX = 64 << 10  # bytes of a message of a browser
 PING_SECONDS = 10.0
+REDIRECTION = (
+    '<!doctype html><meta charset="utf-8"><meta name="referrer" content="no-referrer">'
+    '<meta http-equiv="refresh" content="0; url={link}"><title>Catenary</title>'
+)
 NEEDED = ("starlette", "uvicorn", "websockets", "segno")
 
 
@@ -68,15 +73,20 @@ def make_access(options: Options) -> Access:
         raise ConfigurationError("TLS needs --cert and --key")
     if options.cert is not None and options.key is not None:
         check_certificate(options.cert, options.key)
-    folder = own_folder()
-    prepare(folder, 0o600)
     return Access(
-        load_key(folder, renew=options.new_links),
+        load_key(key_folder(), renew=options.new_links),
         host=options.host,
         port=options.port,
         tls=options.cert is not None,
         viewer_only=options.viewer_only,
     )
+
+
+def key_folder() -> Path:
+    """Return the folder of this user's key. In /run/catenary, several users would share one."""
+    folder = user_folder(os.geteuid())
+    prepare(folder, 0o600)
+    return folder
 
 
 def check_certificate(cert: Path, key: Path) -> None:
@@ -115,6 +125,23 @@ def link(access: Access, role: Role) -> str:
     """Return the link of a role. Its fragment contains the token."""
     scheme = "https" if access.tls else "http"
     return f"{scheme}://{shown_host(access.host)}:{access.port}/#token={access.token(role)}"
+
+
+def link_file(access: Access, folder: Path) -> Path:
+    """Write a private page that opens the first link, and return its path.
+
+    All users can read the arguments of a process, so a browser receives this path and no token.
+
+    Args:
+        access: tokens and roles.
+        folder: folder of the page.
+    """
+    path = folder / f"dashboard-{access.port}.html"
+    path.unlink(missing_ok=True)
+    descriptor = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, 0o600)
+    with os.fdopen(descriptor, "w") as file:
+        file.write(REDIRECTION.format(link=link(access, access.roles[0])))
+    return path
 
 
 def shown_host(host: str) -> str:

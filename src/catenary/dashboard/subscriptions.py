@@ -19,6 +19,7 @@ from catenary.dashboard.messages import Subscribe
 from catenary.share import Reader, ShareLayout
 
 GROUPS_MAX = 256
+MEMBERS_MAX, SIGNALS_MAX = 32, 1024  # of one client
 ROWS_MAX = 4096  # of a frame
 EARLY = 0.008  # [s] half a tick of the hub: the nearest tick sends a frame
 
@@ -61,10 +62,11 @@ class Subscriptions:
             newest: number of the newest cycle; a new group begins after it.
 
         Raises:
-            ValueError: a signal does not exist, or there are too many different subscriptions.
+            ValueError: a signal does not exist, or there are too many subscriptions.
         """
         columns = find_columns(self._layout, request.signals)
         self.remove(client, request.id)
+        self._check_share_of(client, len(columns))
         key = (tuple(request.signals), request.full, request.rate)
         group = self._groups.get(key)
         if group is None:
@@ -86,6 +88,19 @@ class Subscriptions:
                 del group.members[member]
             if not group.members:
                 del self._groups[key]
+
+    def _check_share_of(self, client: object, signals: int) -> None:
+        """Raise ValueError if further signals exceed the limits of a client."""
+        sizes = [
+            len(group.columns)
+            for group in self._groups.values()
+            for member in group.members
+            if member[0] is client
+        ]
+        if len(sizes) >= MEMBERS_MAX or sum(sizes) + signals > SIGNALS_MAX:
+            raise ValueError(
+                f"a client has at most {MEMBERS_MAX} subscriptions and {SIGNALS_MAX} signals"
+            )
 
     def deliver(self, reader: Reader, now: float) -> None:
         """Encode and deliver the frames that are due.

@@ -1,7 +1,7 @@
 """Tuning over HTTP: capture one axis while it moves, and return its figures.
 
     POST /api/tune/capture   {axis, seconds}: {bode, identified, problems, rows, lost}
-    GET  /api/tune/report    the figures of all captured axes as one HTML page
+    GET  /api/tune/report    the figures of all captured axes as one HTML page; ?axis=NAME: of one
 
 A capture only reads. Start the motion with a jog, in the program, or with a law.
 """
@@ -79,7 +79,10 @@ class Tune:
         if self._busy.locked():
             return refusal(429, "another capture is running", hint="wait for its end")
         async with self._busy:
-            captured, lost = await capture(reader, body.axis, body.seconds)
+            try:
+                captured, lost = await capture(reader, body.axis, body.seconds)
+            except RuntimeError:  # the hub has closed the reader
+                return refusal(409, page.hub.source.reason)
             figures = await asyncio.to_thread(
                 make_figures, reader.layout.axes[body.axis], captured, lost
             )
@@ -87,7 +90,9 @@ class Tune:
         return json_response(to_json(figures))
 
     async def _report(self, page: Page, request: Request, role: Role) -> Response:
-        return Response(make_page(list(self._figures.values())), media_type="text/html")
+        wanted = request.query_params.get("axis")
+        figures = [each for each in self._figures.values() if wanted in (None, each.axis)]
+        return Response(make_page(figures), media_type="text/html")
 
 
 async def capture(reader: Reader, axis: int, seconds: float) -> tuple[Capture, int]:

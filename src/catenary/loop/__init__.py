@@ -1,7 +1,7 @@
 """The cyclic loop: from process-data requests to `for cycle in loop`, and control laws."""
 
 from catenary.core import Cycle
-from catenary.loop.laws.law import Law, law
+from catenary.loop.laws.law import Law, Parameter, law
 from catenary.loop.laws.run import LawRun
 from catenary.loop.loop import Loop
 from catenary.loop.network import Network
@@ -15,6 +15,7 @@ __all__ = [
     "LawRun",
     "Loop",
     "Network",
+    "Parameter",
     "Scheduling",
     "StopPolicy",
     "Stream",

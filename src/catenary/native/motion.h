@@ -3,8 +3,9 @@
  *
  * Theory of operation. The header has the global words, one slot per axis has the others. Each word has
  * 8 bytes, and each side accesses it by one atomic operation. Clients write the first cache line of the
- * header and of each slot, the core writes the second one. The core trusts no word: it copies each one
- * once, checks it, and keeps all of its state in private memory.
+ * header and of each slot, and the words of a sweep. The core writes the other words of the second one.
+ * The core trusts no word: it copies each one once, checks it, and keeps all of its state in private
+ * memory.
  *
  *     stop          clients add 1; any change stops all axes. It needs no lease.
  *     stopper       pid of the last client that did so; stored before `stop`; for messages only
@@ -21,6 +22,8 @@
  *     velocity      signed [rad/s or m/s]
  *     distance      positive [rad or m]; NaN: until release
  *     acceleration  positive [rad/s² or m/s²]; NaN: that of the axis
+ *     sweep_start, sweep_end    first and last frequency of a sweep [Hz]
+ *     sweep_duration            [s]; 0: the jog is not a sweep. A sweep has no distance.
  *     request       number << 8 | requested state; a new number is a new request
  *     answer        press << 8 | status (jog_status)
  *     taken         number << 8 | status (request_status)
@@ -56,7 +59,10 @@ typedef struct cat_motion_slot {
     uint64_t request;
     uint64_t answer;
     uint64_t taken;
-    uint64_t of_core[6];
+    uint64_t of_core[3];
+    double sweep_start;
+    double sweep_end;
+    double sweep_duration;
 } cat_motion_slot;
 
 #endif

@@ -13,6 +13,7 @@ from catenary.share.lease import Lease
 from catenary.share.mutex import Mutex
 from catenary.share.process import Process
 from catenary.share.reader import Reader, attach
+from catenary.share.sweep import Sweep
 
 __all__ = [
     "AxisCommand",
@@ -29,5 +30,6 @@ __all__ = [
     "ShareLayout",
     "SharedEvent",
     "StateRequest",
+    "Sweep",
     "attach",
 ]

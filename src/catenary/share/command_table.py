@@ -79,7 +79,10 @@ SLOT = np.dtype(  # cat_motion_slot
         ("request", "<u8"),
         ("answer", "<u8"),
         ("taken", "<u8"),
-        ("of_core", "<u8", (6,)),
+        ("of_core", "<u8", (3,)),
+        ("sweep_start", "<f8"),
+        ("sweep_end", "<f8"),
+        ("sweep_duration", "<f8"),
     ]
 )
 

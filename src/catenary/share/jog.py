@@ -7,12 +7,13 @@ heartbeats echo recent tokens. This works in every execution mode, also while a 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping
 from enum import IntEnum
 from types import TracebackType
 from typing import Literal, TypeVar
 
 from catenary.share.command_table import MotionWords
+from catenary.share.sweep import Sweep
 
 STATUS_BITS = 8
 TOKEN_MASK = (1 << 48) - 1
@@ -63,7 +64,7 @@ JOG_TEXTS: dict[JogStatus, str] = {
     JogStatus.NONE: "requested",
     JogStatus.MOVING: "moving",
     JogStatus.STOPPING: "stopping",
-    JogStatus.DONE: "the distance was moved",
+    JogStatus.DONE: "the motion is complete",
     JogStatus.RELEASED: "released",
     JogStatus.EXPIRED: "stopped: no fresh heartbeat within 200 ms",
     JogStatus.AT_LIMIT: "stopped at a position limit",
@@ -109,8 +110,8 @@ REQUEST_TEXTS: dict[RequestStatus, str] = {
 class Jog:
     """Motion of one axis on request of an operator. `Lease.jog` creates it.
 
-    The axis moves until `release`, or until it has moved the distance. It stops 200 ms after the
-    issue of the token that the last heartbeat has echoed.
+    The axis moves until `release`, or until its distance or its sweep is complete. It stops
+    200 ms after the issue of the token that the last heartbeat has echoed.
 
         with cat.attach("arm") as arm, arm.lease(axes=["1 Servo"]) as command:
             with command.jog("1 Servo", 0.1) as jog:
@@ -228,37 +229,44 @@ def heartbeat_of(words: MotionWords, press: int, token: int | None) -> int:
 
 
 def checked_values(
-    velocity: float, distance: float | None, acceleration: float | None
-) -> tuple[float, float, float]:
-    """Return the values of a jog for its slot; NaN for None.
+    velocity: float, distance: float | None, acceleration: float | None, sweep: Sweep | None
+) -> dict[str, float]:
+    """Return the values of a jog for the fields of its slot.
 
     Args:
         velocity: signed velocity [rad/s or m/s].
         distance: distance [rad or m].
         acceleration: acceleration [rad/s² or m/s²].
+        sweep: sine whose amplitude is the velocity.
 
     Raises:
-        ValueError: a value is not finite, the velocity is 0, or another value is not positive.
+        ValueError: a value is not finite, the velocity is 0, another value is not positive, or a
+            sweep has a distance.
     """
     if not math.isfinite(velocity) or velocity == 0:
         raise ValueError(f"velocity={velocity}: must be finite and not 0")
     for name, value in (("distance", distance), ("acceleration", acceleration)):
         if value is not None and not 0 < value < math.inf:
             raise ValueError(f"{name}={value}: must be positive and finite")
-    return (
-        float(velocity),
-        math.nan if distance is None else float(distance),
-        math.nan if acceleration is None else float(acceleration),
-    )
+    if sweep is not None and distance is not None:
+        raise ValueError(f"distance={distance}: must be None for a sweep")
+    return {
+        "velocity": float(velocity),
+        "distance": math.nan if distance is None else float(distance),
+        "acceleration": math.nan if acceleration is None else float(acceleration),
+        "sweep_start": 0.0 if sweep is None else sweep.start,
+        "sweep_end": 0.0 if sweep is None else sweep.end,
+        "sweep_duration": 0.0 if sweep is None else sweep.duration,
+    }
 
 
-def press(words: MotionWords, axis: int, values: Sequence[float], token: int | None) -> int:
+def press(words: MotionWords, axis: int, values: Mapping[str, float], token: int | None) -> int:
     """Publish a new press, and return its number. The caller holds the mutex of the desk.
 
     Args:
         words: motion words of the desk.
         axis: number of the axis.
-        values: velocity, distance and acceleration.
+        values: values of the fields of the slot: see `checked_values`.
         token: echoed token; None: the newest token.
 
     Raises:
@@ -268,7 +276,8 @@ def press(words: MotionWords, axis: int, values: Sequence[float], token: int | N
     echoed = heartbeat_of(words, number, token)
     words.begun.store(axis, number)
     slot = words.slots[axis]
-    slot["velocity"], slot["distance"], slot["acceleration"] = values
+    for field, value in values.items():
+        slot[field] = value
     words.heartbeat.store(axis, echoed)
     words.press.store(axis, number)
     return number

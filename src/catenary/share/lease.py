@@ -24,6 +24,7 @@ from catenary.share.jog import (
 )
 from catenary.share.layout import ShareLayout
 from catenary.share.process import this_process
+from catenary.share.sweep import Sweep
 
 LOCK_TIMEOUT_NS = 2_000_000_000  # a running owner unlocks much earlier; a dead one loses the lock
 
@@ -97,6 +98,7 @@ class Lease:
         *,
         distance: float | None = None,
         acceleration: float | None = None,
+        sweep: Sweep | None = None,
         token: int | None = None,
     ) -> Jog:
         """Request a motion of one axis by the core of the loop, and renew the lease.
@@ -111,6 +113,8 @@ class Lease:
             distance: distance to move [rad or m]; None: move until release.
             acceleration: acceleration, limited to that of the axis [rad/s² or m/s²]; None: that of
                 the axis.
+            sweep: sine of changing frequency, whose amplitude is `velocity`; it has no `distance`.
+                None: constant velocity.
             token: the token that the operator's device has echoed; None: the newest token, for a
                 program on this machine.
 
@@ -122,7 +126,9 @@ class Lease:
             ValueError: the axis is not part of the lease, or a value is out of range.
         """
         [number] = self._numbers_of([axis])
-        values = checked_values(velocity, distance, acceleration)
+        values = checked_values(velocity, distance, acceleration, sweep)
+        if sweep is not None:
+            sweep.check_period(self._layout.period)
         words = self._desk.motion
         with self._renewed():
             serial = press(words, number, values, token)

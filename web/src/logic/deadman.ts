@@ -80,9 +80,10 @@ export class Deadman {
     if (this.held?.press === press && !MOVING.has(status)) this.held = null;
   }
 
-  /** The connection is lost: no later message may continue the jog. */
+  /** The connection is lost: no later message may continue the jog, and the enabling touch must be renewed. */
   disconnect(): void {
     this.held = null;
+    this.enabling = false;
     this.token = null;
     this.tokenTime = -Infinity;
   }

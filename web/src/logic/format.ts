@@ -72,3 +72,10 @@ export function timeOfDay(utc: number): string {
   const clock = parts.map((each) => String(each).padStart(2, "0")).join(":");
   return `${clock}.${String(date.getMilliseconds()).padStart(3, "0")}`;
 }
+
+/** Return a name of at most `most` characters: a longer one without its middle. */
+export function shortened(name: string, most = 44): string {
+  if (name.length <= most) return name;
+  const end = Math.floor((most - 1) / 2);
+  return `${name.slice(0, most - 1 - end)}…${name.slice(-end)}`;
+}

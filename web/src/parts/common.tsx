@@ -26,7 +26,7 @@ export function Panel(props: {
   title: string;
   actions?: ComponentChildren;
   class?: string;
-  children: ComponentChildren;
+  children?: ComponentChildren;
 }) {
   return (
     <section class={`panel ${props.class ?? ""}`} aria-label={props.title}>

@@ -1,6 +1,6 @@
 /** Questions before an action: one dialog of the page. */
 
-import { signal } from "@preact/signals";
+import { computed, signal } from "@preact/signals";
 import { useEffect, useRef } from "preact/hooks";
 import { text } from "../strings.ts";
 
@@ -16,9 +16,19 @@ interface Pending extends Question {
 
 const pending = signal<Pending | null>(null);
 
-/** Ask the user, and return true if the action was chosen. */
+/** True while a question is open. */
+export const asking = computed(() => pending.value !== null);
+
+/** Ask the user, and return true if the action was chosen. A former question counts as cancelled. */
 export function confirmed(question: Question): Promise<boolean> {
+  cancelQuestion();
   return new Promise((answer) => (pending.value = { ...question, answer }));
+}
+
+/** Close the question, because the axes and devices that it names may be others now. */
+export function cancelQuestion(): void {
+  pending.peek()?.answer(false);
+  pending.value = null;
 }
 
 export function ConfirmDialog() {
@@ -27,7 +37,7 @@ export function ConfirmDialog() {
   const question = pending.value;
   useEffect(() => {
     if (question === null) return;
-    dialog.current?.showModal();
+    if (dialog.current?.open === false) dialog.current.showModal();
     cancel.current?.focus();
   }, [question]);
   if (question === null) return null;

@@ -1,8 +1,5 @@
 /** Recordings: list, open, and move through the time. */
 
-import "../scope/scope.css";
-import "uplot/dist/uPlot.min.css";
-import "./recordings.css";
 import { useEffect, useState } from "preact/hooks";
 import { count, duration, timeOfDay } from "../logic/format.ts";
 import { Panel } from "../parts/common.tsx";

@@ -1,8 +1,8 @@
 /** Panel with the robot in 3D. The code of three.js is loaded only when the panel is open. */
 
-import "./scene.css";
 import { useEffect, useRef, useState } from "preact/hooks";
 import type { Connection } from "../connection.ts";
+import { isPhone } from "../media.ts";
 import { Panel } from "../parts/common.tsx";
 import { KIND_POSES } from "../protocol.ts";
 import { notifyError } from "../notices.ts";
@@ -29,7 +29,33 @@ export function ScenePanel({ connection }: { connection: Connection }) {
   }, [run]);
   if (loading === null) return null;
   if ("reason" in loading) return null;
-  return <RobotView connection={connection} scene={loading.scene} />;
+  return <CollapsiblePanel connection={connection} scene={loading.scene} />;
+}
+
+interface RobotProps {
+  connection: Connection;
+  scene: SceneData;
+}
+
+/** Panel that is closed on a phone until it is opened. */
+function CollapsiblePanel(props: RobotProps) {
+  const [open, setOpen] = useState(!isPhone.peek());
+  if (open) return <RobotView {...props} close={() => setOpen(false)} />;
+  return (
+    <Panel
+      title={text.scene.title}
+      actions={<ToggleButton label={text.scene.show} open={false} onClick={() => setOpen(true)} />}
+      class="scene-panel closed"
+    />
+  );
+}
+
+function ToggleButton(props: { label: string; open: boolean; onClick: () => void }) {
+  return (
+    <button type="button" class="button small" aria-expanded={props.open} onClick={props.onClick}>
+      {props.label}
+    </button>
+  );
 }
 
 async function load(signal: AbortSignal): Promise<Loading> {
@@ -38,7 +64,7 @@ async function load(signal: AbortSignal): Promise<Loading> {
   return { scene: decodeScene(await reply.arrayBuffer()) };
 }
 
-function RobotView({ connection, scene }: { connection: Connection; scene: SceneData }) {
+function RobotView({ connection, scene, close }: RobotProps & { close: () => void }) {
   const place = useRef<HTMLDivElement>(null);
   const viewer = useRef<Viewer | null>(null);
   const [ghost, setGhost] = useState(true);
@@ -57,6 +83,7 @@ function RobotView({ connection, scene }: { connection: Connection; scene: Scene
         {text.scene.ghost}
       </label>
       <button type="button" class="button small" onClick={() => viewer.current?.resetCamera()}>{text.scene.reset}</button>
+      <ToggleButton label={text.scene.hide} open onClick={close} />
     </>
   );
   return (

@@ -25,6 +25,7 @@ export function objectOf(shape: Shape, scene: SceneData, ghost: boolean): Mesh {
   object.position.fromArray(shape.position);
   object.quaternion.set(x, y, z, w);
   object.userData.body = shape.body;
+  object.userData.isPlane = shape.type === "plane";
   return object;
 }
 

@@ -2,6 +2,7 @@
 
 import {
   AmbientLight,
+  Box3,
   BufferAttribute,
   BufferGeometry,
   DirectionalLight,
@@ -19,6 +20,7 @@ import {
 } from "three";
 import { OrbitControls } from "three/examples/jsm/controls/OrbitControls.js";
 import { CONTACT_SIZE, POSE_SIZE, type Poses, type SceneData } from "./decode.ts";
+import { cornersOf, distanceFor, VIEW } from "./fit.ts";
 import { objectOf } from "./shapes.ts";
 
 export interface Push {
@@ -47,6 +49,7 @@ export class Viewer {
   private held: { body: number; point: Vector3; plane: Plane; goal: Vector3 } | null = null;
   private repeating: ReturnType<typeof setInterval> | undefined;
   private requested = 0;
+  private fitted = false;
 
   constructor(private readonly element: HTMLElement, private readonly data: SceneData) {
     this.renderer = new WebGLRenderer({ antialias: true, alpha: true });
@@ -70,6 +73,7 @@ export class Viewer {
   show(poses: Poses): void {
     place(this.actual, poses.actual);
     place(this.ghosts, poses.target);
+    this.fitOnce();
     this.showContacts(poses.contacts);
     this.request();
   }
@@ -79,12 +83,14 @@ export class Viewer {
     this.request();
   }
 
-  /** Look at the whole robot. */
+  /** Look at the whole robot in its present pose. */
   resetCamera(): void {
-    const { center, extent } = this.data;
-    const target = new Vector3(...center);
+    const corners = cornersOf(this.actual);
+    const target = new Box3().setFromPoints(corners).getCenter(new Vector3());
+    if (corners.length === 0) target.set(...this.data.center);
+    const distance = distanceFor(corners, target, this.camera) || this.data.extent * 2;
     this.camera.up.set(0, 0, 1);
-    this.camera.position.copy(target).add(new Vector3(1.1, -1.5, 0.8).multiplyScalar(extent));
+    this.camera.position.copy(target).addScaledVector(VIEW, distance);
     this.controls.target.copy(target);
     this.controls.update();
     this.request();
@@ -97,6 +103,14 @@ export class Viewer {
     this.controls.dispose();
     this.renderer.dispose();
     this.renderer.domElement.remove();
+  }
+
+  /** Fit the camera to the first poses, as soon as the size of the view is known. */
+  private fitOnce(): void {
+    if (this.fitted || this.element.clientHeight === 0) return;
+    this.fitted = true;
+    this.resize();
+    this.resetCamera();
   }
 
   private bodies(ghost: boolean, parent: Scene | Group): Group[] {

@@ -1,7 +1,5 @@
 /** Scope: any signals of the share at the full cycle rate. */
 
-import "uplot/dist/uPlot.min.css";
-import "./scope.css";
 import { useEffect, useState } from "preact/hooks";
 import type { Connection } from "../connection.ts";
 import { text } from "../strings.ts";

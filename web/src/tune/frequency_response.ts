@@ -1,5 +1,7 @@
 /** Frequency response from two recorded signals, by averaged cross spectra (Welch), and its margins. */
 
+import type { RingStore } from "../scope/store.ts";
+
 export interface FrequencyResponse {
   frequency: number[]; // [Hz]
   gain: number[]; // magnitude [dB]
@@ -41,6 +43,22 @@ export function frequencyResponse(input: Float64Array, output: Float64Array, per
     result.coherence.push((sums.real[bin]! ** 2 + sums.imaginary[bin]! ** 2) / (power * sums.yy[bin]! || 1));
   }
   return { ...result, ...bode(result.real, result.imaginary) };
+}
+
+/** Return the part of a response between two frequencies [Hz]. */
+export function within(response: FrequencyResponse, low: number, high: number): FrequencyResponse {
+  const part = (values: number[]) =>
+    values.filter((_, index) => response.frequency[index]! >= low && response.frequency[index]! <= high);
+  const [real, imaginary] = [part(response.real), part(response.imaginary)];
+  const { frequency, coherence } = response;
+  return { frequency: part(frequency), coherence: part(coherence), real, imaginary, ...bode(real, imaginary) };
+}
+
+/** Return the values of signals in the rows that contain all of them. */
+export function recorded(store: RingStore, names: readonly string[], from: number, to: number): Float64Array[] {
+  const rows = Array.from({ length: Math.max(0, to - from) }, (_, index) => from + index);
+  const kept = rows.filter((row) => names.every((name) => !Number.isNaN(store.value(name, row))));
+  return names.map((name) => Float64Array.from(kept, (row) => store.value(name, row)));
 }
 
 /** Return the open loop of a closed loop with unity feedback: T / (1 - T). */

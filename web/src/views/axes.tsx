@@ -3,6 +3,7 @@
 import { useComputed, useSignal } from "@preact/signals";
 import { useEffect, useMemo } from "preact/hooks";
 import type { Connection } from "../connection.ts";
+import { isPhone } from "../media.ts";
 import { Segmented } from "../parts/common.tsx";
 import { confirmed } from "../parts/confirm.tsx";
 import type { AxisInfo } from "../remote.ts";
@@ -28,7 +29,7 @@ export function Axes({ connection }: { connection: Connection }) {
   return (
     <>
       <Toolbar {...{ connection, jogging, noJog, units }} />
-      <ScenePanel connection={connection} />
+      {!isPhone.value && <ScenePanel connection={connection} />}
       <div class="axes-grid">
         {names.map((name, axis) => {
           const info = infos.find((each) => each.name === name);
@@ -38,6 +39,7 @@ export function Axes({ connection }: { connection: Connection }) {
           );
         })}
       </div>
+      {isPhone.value && <ScenePanel connection={connection} />}
       {noJog === null && connection.role.value === "operator" && <EnablePad jogging={jogging} />}
     </>
   );
@@ -126,7 +128,7 @@ function EnablePad({ jogging }: { jogging: Jogging }) {
   const touched = useSignal(matchMedia("(pointer: coarse)").matches);
   useEffect(() => {
     const onPointer = (event: PointerEvent) => {
-      if (event.pointerType === "touch") touched.value = true;
+      if (event.pointerType !== "mouse") touched.value = true;
     };
     window.addEventListener("pointerdown", onPointer);
     return () => window.removeEventListener("pointerdown", onPointer);

@@ -1,6 +1,7 @@
 /** Devices: topology as wired, and the page of a device. */
 
 import type { Connection } from "../connection.ts";
+import { isWide } from "../media.ts";
 import { Failure, Panel } from "../parts/common.tsx";
 import type { Device } from "../remote.ts";
 import { useResource } from "../resource.ts";
@@ -14,7 +15,8 @@ const INTERVAL = 1000; // [ms]
 export function Devices({ connection }: { connection: Connection }) {
   const devices = useResource<Device[]>(connection, "devices", {}, INTERVAL);
   const shown = devices.value.value ?? [];
-  const chosen = shown.find(({ position }) => String(position) === route.value[1]);
+  const asked = shown.find(({ position }) => String(position) === route.value[1]);
+  const chosen = asked ?? (isWide.value ? shown[0] : undefined);
   return (
     <div class={chosen === undefined ? "devices" : "devices with-detail"}>
       <Panel title={text.devices.title} class="topology">
@@ -26,9 +28,7 @@ export function Devices({ connection }: { connection: Connection }) {
           <p class="empty">{text.devices.none}</p>
         )}
       </Panel>
-      {chosen === undefined ? (
-        <p class="empty choose">{text.devices.choose}</p>
-      ) : (
+      {chosen !== undefined && (
         <div class="detail">
           <a class="button small back" href={address("devices")}>
             ‹ {text.common.back}

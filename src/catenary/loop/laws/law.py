@@ -4,8 +4,11 @@ from __future__ import annotations
 
 import functools
 import inspect
-from collections.abc import Callable
-from typing import TypeAlias
+import math
+from collections import Counter
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import TypeAlias, overload
 
 from catenary.errors import LawError
 
@@ -13,6 +16,34 @@ LawFunction: TypeAlias = Callable[..., object]  # its arguments are among ARGUME
 
 ARGUMENTS = ("actual", "target", "memory", "time", "parameters", "enabled", "dt", "ok", "n")
 """Names of the arguments that a law may have."""
+
+
+@dataclass(frozen=True, slots=True)
+class Parameter:
+    """Name of a parameter of a law, and the values that an operator may set.
+
+    Args:
+        name: Name, such as "stiffness".
+        minimum: Smallest value.
+        maximum: Largest value.
+        unit: Unit of the value, such as "N·m/rad".
+
+    Raises:
+        ValueError: The name is empty, or `minimum` is not below `maximum`.
+    """
+
+    name: str
+    minimum: float = -math.inf
+    maximum: float = math.inf
+    unit: str = ""
+
+    def __post_init__(self) -> None:
+        if not self.name:
+            raise ValueError("the name of a parameter is empty")
+        if not self.minimum < self.maximum:
+            raise ValueError(
+                f"parameter {self.name!r}: minimum {self.minimum} is not below {self.maximum}"
+            )
 
 
 class Law:
@@ -35,10 +66,11 @@ class Law:
     None. A direct call of a Law runs the function as Python, with Python's errors.
     """
 
-    def __init__(self, function: LawFunction) -> None:
+    def __init__(self, function: LawFunction, parameters: Sequence[Parameter | str] = ()) -> None:
         self.function = function
         functools.update_wrapper(self, function)
         self.arguments = arguments_of(function)
+        self.parameters = named_parameters(parameters)
 
     def __call__(self, *arguments: object, **named: object) -> object:
         return self.function(*arguments, **named)
@@ -50,16 +82,49 @@ class Law:
         return getattr(self.function, "__name__", "law")
 
 
-def law(function: LawFunction) -> Law:
+@overload
+def law(function: LawFunction) -> Law: ...
+
+
+@overload
+def law(*, parameters: Sequence[Parameter | str]) -> Callable[[LawFunction], Law]: ...
+
+
+def law(
+    function: LawFunction | None = None, *, parameters: Sequence[Parameter | str] = ()
+) -> Law | Callable[[LawFunction], Law]:
     """Make a control law from a function: see `Law`. Run it with `loop.run(pd, memory=[...])`.
+
+        @cat.law(parameters=[cat.Parameter("stiffness", 0, 40, "N·m/rad"), "damping"])
+        def pd(actual, target, memory, parameters): ...
 
     A Law is returned unchanged.
 
+    Args:
+        function: Function to use.
+        parameters: Names of the values in `parameters`, in their order. Other programs show and
+            set them by name, for example the operator's page.
+
     Raises:
         TypeError: The object is not a plain function.
+        ValueError: A name is used twice.
         LawError: An argument of the function is not one of those of `Law`.
     """
+    if function is None:
+        return functools.partial(Law, parameters=parameters)
     return function if isinstance(function, Law) else Law(function)
+
+
+def named_parameters(given: Sequence[Parameter | str]) -> tuple[Parameter, ...]:
+    """Return the parameters, with names as parameters without limits.
+
+    Raises ValueError if a name is used twice.
+    """
+    found = tuple(each if isinstance(each, Parameter) else Parameter(each) for each in given)
+    twice = [name for name, count in Counter(each.name for each in found).items() if count > 1]
+    if twice:
+        raise ValueError(f"parameters: the name {twice[0]!r} is used twice")
+    return found
 
 
 def arguments_of(function: LawFunction) -> tuple[str, ...]:

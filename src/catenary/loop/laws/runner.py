@@ -80,6 +80,11 @@ class LawRunner:
             raise ValueError(f"overruns={overruns}: must be at least 1")
         compiled = self.compile(law)
         given = numbers("parameters", parameters)
+        if law.parameters and len(given) != len(law.parameters):
+            names = ", ".join(each.name for each in law.parameters)
+            raise ValueError(
+                f"parameters: {len(given)} given, but law {law} has {len(law.parameters)}: {names}"
+            )
         native = core.Law(
             compiled.address,
             numbers("memory", memory),

@@ -2,18 +2,18 @@
 
 import { useComputed } from "@preact/signals";
 import type { Connection } from "../../connection.ts";
-import { isPowered } from "../../logic/axis_state.ts";
+import { shortened } from "../../logic/format.ts";
 import { positionRange, signedRange } from "../../logic/range.ts";
 import { notifyError } from "../../notices.ts";
-import { Chip, type Tone } from "../../parts/common.tsx";
+import { Chip } from "../../parts/common.tsx";
 import { confirmed } from "../../parts/confirm.tsx";
-import type { AxisStatus } from "../../protocol.ts";
 import type { AxisInfo } from "../../remote.ts";
 import { address } from "../../route.ts";
 import { text } from "../../strings.ts";
 import { Bar } from "./bar.tsx";
 import { JogControls } from "./jog_controls.tsx";
 import type { Jogging, Unit } from "./jogging.ts";
+import { AxisState, EnableButton, useIsPowered } from "./power.tsx";
 
 export interface CardProps {
   connection: Connection;
@@ -25,23 +25,15 @@ export interface CardProps {
   noJog: string | null; // why this session cannot jog
 }
 
-const TONES: Readonly<Record<string, Tone>> = {
-  OPERATION_ENABLED: "ok",
-  QUICK_STOP_ACTIVE: "warn",
-  FAULT_REACTION_ACTIVE: "bad",
-  FAULT: "bad",
-};
-
 export function AxisCard(props: CardProps) {
   const { connection, axis, name, info } = props;
-  const headline = `axis-${axis}`;
   return (
-    <section class="panel axis" aria-labelledby={headline}>
+    <section class="panel axis" aria-label={name}>
       <header>
-        <h2 id={headline} class="cut grow" title={name}>
-          {name}
+        <h2 class="two-lines grow" title={name}>
+          {shortened(name)}
         </h2>
-        <State connection={connection} axis={axis} />
+        <AxisState connection={connection} axis={axis} />
       </header>
       <div class="body">
         <p class="row small muted">
@@ -63,11 +55,6 @@ export function AxisCard(props: CardProps) {
       </div>
     </section>
   );
-}
-
-function State({ connection, axis }: { connection: Connection; axis: number }) {
-  const state = useComputed(() => connection.status.value?.axes[axis]?.state ?? "");
-  return <Chip tone={TONES[state.value] ?? ""}>{readable(state.value)}</Chip>;
 }
 
 function Jogged({ connection, axis }: { connection: Connection; axis: number }) {
@@ -131,22 +118,14 @@ function Trouble({ connection, axis }: { connection: Connection; axis: number })
 
 function Controls(props: CardProps) {
   const { connection, jogging, axis, noJog } = props;
-  const enabled = useComputed(() => {
-    const status = connection.status.value?.axes[axis];
-    return status !== undefined && isPowered(status);
-  });
+  const enabled = useIsPowered(connection, axis);
   const faulted = useComputed(() => (connection.status.value?.axes[axis]?.fault ?? "") !== "");
   const operator = connection.role.value === "operator";
   const answer = jogging.answers.value.get(axis);
   return (
     <>
       <div class="row wrap">
-        <EnableButton
-          {...props}
-          enabled={enabled.value}
-          faulted={faulted.value}
-          disabled={!operator}
-        />
+        <EnableButton {...props} enabled={enabled} faulted={faulted.value} disabled={!operator} />
         <button
           type="button"
           class={faulted.value ? "button small primary" : "button small"}
@@ -155,39 +134,13 @@ function Controls(props: CardProps) {
         >
           {text.axes.reset}
         </button>
-        <HomeButton {...props} disabled={!operator || !enabled.value} />
+        <HomeButton {...props} disabled={!operator || !enabled} />
       </div>
-      <JogControls {...props} disabled={!operator || noJog !== null || !enabled.value} />
+      <JogControls {...props} disabled={!operator || noJog !== null || !enabled} />
       <p class={isRefused(answer?.status) ? "answer bad-text" : "answer muted"} role="status">
         {answer?.text ?? ""}
       </p>
     </>
-  );
-}
-
-function EnableButton(props: CardProps & { enabled: boolean; faulted: boolean; disabled: boolean }) {
-  const { connection, axis, name, enabled, faulted, disabled } = props;
-  const onClick = async () => {
-    if (enabled) {
-      connection.request([axis], "disable");
-      return;
-    }
-    const question = {
-      title: `${text.axes.enable} ${name}?`,
-      body: text.axes.enableBody,
-      action: text.axes.enable,
-    };
-    if (await confirmed(question)) connection.request([axis], "enable");
-  };
-  return (
-    <button
-      type="button"
-      class={enabled || faulted ? "button small" : "button small primary"}
-      disabled={disabled}
-      onClick={() => void onClick()}
-    >
-      {enabled ? text.axes.disable : text.axes.enable}
-    </button>
   );
 }
 
@@ -214,10 +167,4 @@ function HomeButton({ connection, name, disabled }: CardProps & { disabled: bool
 
 function isRefused(status: string | undefined): boolean {
   return status !== undefined && (status.startsWith("REFUSED") || status === "EXPIRED");
-}
-
-/** Return a state as words: "OPERATION_ENABLED" → "Operation enabled". */
-export function readable(state: AxisStatus["state"]): string {
-  if (state === "") return text.common.unknown;
-  return (state[0] ?? "") + state.slice(1).toLowerCase().replaceAll("_", " ");
 }

@@ -31,7 +31,10 @@ export function JogControls(props: JogControlsProps) {
   };
   const onKeyDown = (event: KeyboardEvent) => {
     const sign = KEYS[event.key];
-    if (sign === undefined || event.altKey || event.ctrlKey || event.metaKey) return;
+    if (sign === undefined || event.altKey || event.ctrlKey || event.metaKey) {
+      jogging.release(); // with such a key held, some systems do not report that the arrow key goes up
+      return;
+    }
     event.preventDefault();
     if (!event.repeat) begin(sign, false);
   };
@@ -65,6 +68,12 @@ function Speed({ jogging, info, unit }: { jogging: Jogging; info: AxisInfo | und
   );
 }
 
+/** Return true if only another button of the mouse is still down; there is no pointerup for the first. */
+export function isOtherButton(event: PointerEvent): boolean {
+  const button = event.currentTarget as HTMLElement;
+  return (event.buttons & 1) === 0 && button.hasPointerCapture(event.pointerId);
+}
+
 interface JogButtonProps extends JogControlsProps {
   sign: 1 | -1;
   begin: (sign: 1 | -1, touch: boolean) => void;
@@ -91,6 +100,7 @@ function JogButton({ jogging, axis, name, disabled, sign, begin }: JogButtonProp
       aria-pressed={held.value}
       onPointerDown={onPointerDown}
       onPointerUp={release}
+      onPointerMove={(event) => isOtherButton(event) && release()}
       onPointerCancel={release}
       onLostPointerCapture={release}
       onContextMenu={(event) => event.preventDefault()}

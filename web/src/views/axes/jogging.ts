@@ -3,6 +3,7 @@
 import { batch, signal } from "@preact/signals";
 import type { Connection, JogRequest } from "../../connection.ts";
 import { Deadman } from "../../logic/deadman.ts";
+import { asking } from "../../parts/confirm.tsx";
 import type { JogMessage } from "../../protocol.ts";
 import type { AxisInfo } from "../../remote.ts";
 import { text } from "../../strings.ts";
@@ -27,6 +28,7 @@ export class Jogging {
   readonly held = signal<{ axis: number; sign: 1 | -1 } | null>(null);
   readonly enabling = signal(false); // the enabling touch
   readonly answers = signal<ReadonlyMap<number, Answer>>(new Map());
+  releases = 0; // counts causes of a release; a control that presses later compares it
   private readonly deadman: Deadman;
   private readonly connection: Connection;
 
@@ -37,25 +39,27 @@ export class Jogging {
 
   /** Begin to serve tokens and to watch for causes of a release. Return a function that ends both. */
   attach(): () => void {
-    const release = () => this.release();
-    const onVisibility = () => document.hidden && this.release();
-    window.addEventListener("blur", release);
-    window.addEventListener("pagehide", release);
-    document.addEventListener("freeze", release);
+    const cancel = () => this.enable(false);
+    const onVisibility = () => document.hidden && cancel();
+    window.addEventListener("blur", cancel);
+    window.addEventListener("pagehide", cancel);
+    document.addEventListener("freeze", cancel);
     document.addEventListener("visibilitychange", onVisibility);
     const ends = [
       this.connection.on("token", ({ token }) => this.receiveToken(token)),
       this.connection.on("jog", (message) => this.receiveAnswer(message)),
       this.connection.on("hello", () => this.disconnect()),
       this.connection.on("gone", () => this.disconnect()),
-      this.connection.stops.subscribe(release),
+      this.connection.stops.subscribe(cancel),
+      asking.subscribe((open) => open && cancel()),
       this.connection.state.subscribe((state) => state !== "open" && this.disconnect()),
     ];
     return () => {
       this.release();
-      window.removeEventListener("blur", release);
-      window.removeEventListener("pagehide", release);
-      document.removeEventListener("freeze", release);
+      this.disconnect(); // a press after this would have no heartbeats
+      window.removeEventListener("blur", cancel);
+      window.removeEventListener("pagehide", cancel);
+      document.removeEventListener("freeze", cancel);
       document.removeEventListener("visibilitychange", onVisibility);
       for (const end of ends) end();
     };
@@ -73,14 +77,16 @@ export class Jogging {
   }
 
   release(): void {
+    this.releases += 1;
     this.deadman.release();
     this.held.value = null;
   }
 
+  /** Set the enabling touch. Its end releases the jog. */
   enable(on: boolean): void {
     this.enabling.value = on;
     this.deadman.enable(on);
-    this.follow();
+    if (!on) this.release();
   }
 
   /** Return the jog that the controls of the page describe. */
@@ -91,6 +97,13 @@ export class Jogging {
       distance: step === "hold" ? null : STEPS[unit][step],
       acceleration: null,
     };
+  }
+
+  /** Remove the answer of an axis. */
+  forget(axis: number): void {
+    const answers = new Map(this.answers.value);
+    answers.delete(axis);
+    this.answers.value = answers;
   }
 
   private receiveToken(token: string): void {
@@ -106,7 +119,8 @@ export class Jogging {
 
   private disconnect(): void {
     this.deadman.disconnect();
-    this.follow();
+    this.enabling.value = false;
+    this.release();
   }
 
   /** Show that the jog ended, if it did. */
@@ -116,12 +130,6 @@ export class Jogging {
 
   private answer(axis: number, answer: Answer): void {
     this.answers.value = new Map(this.answers.value).set(axis, answer);
-  }
-
-  private forget(axis: number): void {
-    const answers = new Map(this.answers.value);
-    answers.delete(axis);
-    this.answers.value = answers;
   }
 }
 

@@ -2,6 +2,7 @@
 
 import { useSignal } from "@preact/signals";
 import type { Connection } from "../../connection.ts";
+import { shortened } from "../../logic/format.ts";
 import { stateTone } from "../../logic/device_state.ts";
 import { Chip, Segmented } from "../../parts/common.tsx";
 import type { Device, Greeting } from "../../remote.ts";
@@ -31,8 +32,8 @@ export function DeviceDetail(props: DetailProps) {
   return (
     <section class="panel" aria-label={device.name}>
       <header>
-        <h2 class="cut">
-          <span class="mono muted">{device.position}</span> {device.name}
+        <h2 class="two-lines" title={device.name}>
+          <span class="mono muted">{device.position}</span> {shortened(device.name)}
         </h2>
         <Chip tone={stateTone(device)}>
           {device.state === "" ? text.devices.noAnswer : device.state}

@@ -1,6 +1,6 @@
 /** Topology as wired: one row per device, and the cables as lines at its left. */
 
-import { duration } from "../../logic/format.ts";
+import { duration, shortened } from "../../logic/format.ts";
 import { portErrors, stateTone } from "../../logic/device_state.ts";
 import { layout, openLinks, type Node } from "../../logic/topology.ts";
 import { Chip } from "../../parts/common.tsx";
@@ -82,6 +82,7 @@ function Mark({ node, device }: { node: Node; device: Device | undefined }) {
 
 function Row({ device, chosen }: { device: Device; chosen: boolean }) {
   const errors = portErrors(device.ports);
+  const axes = device.axes.filter((name) => name !== device.name).join(", ");
   return (
     <li>
       <a
@@ -91,8 +92,10 @@ function Row({ device, chosen }: { device: Device; chosen: boolean }) {
       >
         <span class="mono muted">{device.position}</span>
         <span class="grow tree-name">
-          <span class="cut">{device.name}</span>
-          <span class="small muted cut">{device.axes.join(", ")}</span>
+          <span class={axes === "" ? "two-lines" : "cut"} title={device.name}>
+            {shortened(device.name)}
+          </span>
+          {axes !== "" && <span class="small muted cut">{axes}</span>}
         </span>
         {errors > 0 && (
           <Chip tone="warn">
