@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 
 from catenary.cli.arguments import number
 from catenary.cli.failure import UsageError
-from catenary.cli.parsers import Commands, add_command
+from catenary.cli.parsers import Commands, add_command, add_uid
 
 if TYPE_CHECKING:
     from catenary.dashboard.security import Access
@@ -70,9 +70,7 @@ def add_parser(commands: Commands) -> None:
     parser.add_argument(
         "--window", action="store_true", help="open the page in a window of Chromium"
     )
-    parser.add_argument(
-        "--uid", type=number, help="user ID of the share's owner (default: yours, then root's)"
-    )
+    add_uid(parser)
     parser.set_defaults(run=run)
 
 

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import argparse
 
-from catenary.cli.arguments import number
-from catenary.cli.parsers import Commands, add_command
+from catenary.cli.parsers import Commands, add_command, add_uid
 
 
 def add_parser(commands: Commands) -> None:
@@ -20,9 +19,7 @@ def add_parser(commands: Commands) -> None:
         example="catenary top arm\nssh -t robot catenary top arm",
     )
     parser.add_argument("share", metavar="SHARE", help="name of the loop's share")
-    parser.add_argument(
-        "--uid", type=number, help="user ID of the share's owner (default: yours, then root's)"
-    )
+    add_uid(parser)
     parser.set_defaults(run=run)
 
 
