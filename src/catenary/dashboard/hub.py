@@ -99,7 +99,7 @@ class Hub:
             self.workers.shutdown(wait=False)
 
     def _step_or_drop(self, now: float) -> None:
-        """Send what is due. After an error, detach from the share and tell all clients."""
+        """Send all due messages. After an error, detach from the share and notify all clients."""
         try:
             self.step(now)
         except ShareError as error:
@@ -111,7 +111,7 @@ class Hub:
             self._change()
 
     def step(self, now: float) -> None:
-        """Send what is due. `now` is a monotonic time [s]."""
+        """Send all due messages. `now` is a monotonic time [s]."""
         if self.source.step():
             self._change()
         reader = self.source.reader
