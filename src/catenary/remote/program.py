@@ -1,4 +1,4 @@
-"""The program that serves requests: its share, and the network whose data the share publishes."""
+"""The program that serves requests: its share, and the network of the share's loop."""
 
 from __future__ import annotations
 
