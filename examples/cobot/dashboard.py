@@ -133,7 +133,7 @@ def run(name, seconds, server):
         cat.Share(name, jog=True) as share,
     ):
         arm = cat.Drives(bus.scan().drives, mode="csp", required=False, **AXES)
-        with cat.Loop(arm, period=PERIOD, sink=share, stop=stop) as loop:
+        with cat.Loop(arm, period=PERIOD, watchdog=1.0, sink=share, stop=stop) as loop:
             compliance, motion, before = Compliance(model), Motion(arm.target.position), 0.0
             print(f"the arm moves; its share is {name!r}. Press Ctrl-C to end", flush=True)
             for cycle in loop:
