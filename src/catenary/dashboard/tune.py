@@ -28,6 +28,7 @@ from catenary.share import Reader
 
 SECONDS_MAX = 60.0
 READ_INTERVAL = 0.2  # [s]
+WAIT = 1.0  # [s] for the end of another capture
 FIELDS = ("position", "commanded_position", "velocity", "torque")
 COLUMNS = (
     *("axis", "inertia", "viscous friction", "Coulomb friction", "offset", "R²"),
@@ -78,21 +79,27 @@ class Tune:
             return refusal(404, page.hub.source.reason)
         if not 0 <= body.axis < len(reader.layout.axes) or not 0 < body.seconds <= SECONDS_MAX:
             return refusal(400, f"axis or seconds is out of range; at most {SECONDS_MAX:g} s")
-        if self._busy.locked():
+        try:  # a capture whose client has left ends soon
+            await asyncio.wait_for(self._busy.acquire(), WAIT)
+        except TimeoutError:
             return refusal(429, "another capture is running", hint="wait for its end")
-        async with self._busy:
-            try:
-                captured, lost = await capture(
-                    reader, body.axis, body.seconds, request.is_disconnected
-                )
-            except RuntimeError:  # the hub has closed the reader
-                return refusal(409, page.hub.source.reason)
-            if await request.is_disconnected():
-                return Response(status_code=400)
-            figures = await asyncio.to_thread(
-                make_figures, reader.layout.axes[body.axis], captured, lost
-            )
-        self._figures[figures.axis] = figures
+        try:
+            return await self._answer(page, request, reader, body)
+        finally:
+            self._busy.release()
+
+    async def _answer(
+        self, page: Page, request: Request, reader: Reader, body: CaptureRequest
+    ) -> Response:
+        try:
+            captured, lost = await capture(reader, body.axis, body.seconds, request.is_disconnected)
+        except RuntimeError:  # the hub has closed the reader
+            return refusal(409, page.hub.source.reason)
+        if await request.is_disconnected():
+            return Response(status_code=400)
+        name = reader.layout.axes[body.axis]
+        figures = await asyncio.to_thread(make_figures, name, captured, lost)
+        self._figures[name] = figures
         return json_response(to_json(figures))
 
     async def _report(self, page: Page, request: Request, role: Role) -> Response:
