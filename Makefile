@@ -3,15 +3,16 @@
 # PYTHON=/path/to/python3.12 selects another interpreter and recreates .venv.
 # `make docs` builds the documentation site into out/docs.
 # TEST="-k axis" passes options to pytest, and COBOT=--realtime to `make cobot`. `make dashboard`
-# serves the operator's page of a simulated cobot, or of a target: DASHBOARD=eth0. `make rtlab` runs
-# the benchmarks on a real-time kernel in QEMU. TABLE=quick or TABLE=pyigh,tasks selects tables, and
-# RTLAB="--out FOLDER" selects the folder of the results. TABLE=igh needs IGH=path, the path of a
-# build of IgH's master.
+# serves the operator's page of a simulated cobot, or of a target: DASHBOARD=eth0. PORT=8711 selects its
+# port. `make rtlab` runs the benchmarks on a real-time kernel in QEMU. TABLE=quick or
+# TABLE=pyigh,tasks selects tables, and RTLAB="--out FOLDER" selects the folder of the results.
+# TABLE=igh needs IGH=path, the path of a build of IgH's master.
 PYTHON ?= python3
 VENV := .venv
 TEST ?=
 COBOT ?=
 DASHBOARD ?=
+PORT ?=
 TABLE ?= all
 RTLAB ?=
 IGH ?=
@@ -42,7 +43,7 @@ cobot: $(VENV)/.with-cobot
 	@$(VENV)/bin/python -m catenary.realtime.private_network examples/cobot/cobot.py $(COBOT)
 
 dashboard: $(VENV)/.with-dashboard $(VENV)/.with-sim
-	@$(VENV)/bin/$(if $(DASHBOARD),catenary dashboard $(DASHBOARD),python examples/cobot/dashboard.py --page)
+	@$(VENV)/bin/$(if $(DASHBOARD),catenary dashboard $(DASHBOARD),python examples/cobot/dashboard.py --page)$(if $(PORT), --port $(PORT))
 
 rtlab: $(VENV)/.with-test
 	@$(VENV)/bin/python -m tools.rtlab $(TABLE) $(if $(IGH),--igh $(abspath $(IGH))) $(RTLAB)

@@ -22,6 +22,7 @@ from catenary.virtual import read_segment
 
 HERE = Path(__file__).parent
 PERIOD, JOINTS = 1e-3, 6  # [s]
+LONGEST_STEP = 0.02  # [s] of the motion, if the machine has delayed the program
 AXES = {  # as the data sheets of drives and gears say; limits [rad/s]
     "names": ["base", "shoulder", "elbow", "wrist1", "wrist2", "wrist3"],
     "counts_per_turn": 2**17,
@@ -33,10 +34,15 @@ CENTER = np.array([0.0, 0.3, 0.9, 0.0, 0.6, 0.0])  # [rad]
 AMPLITUDE = np.array([0.9, 0.35, 0.5, 0.5, 0.5, 1.2])  # [rad]
 RATE = 2 * np.pi / np.array([16.0, 8.0, 8.0, 8.0, 16.0, 8.0])  # [rad/s], repeats after 16 s
 APPROACH, WAIT = 4.0, 10.0  # [s] to the start of the motion; before it continues
-# Compliance: virtual mass, damper and spring of each joint, in SI units.
-INERTIA, DAMPING, STIFFNESS = 2.0, 40.0, 120.0
+# Compliance: virtual mass, damper and spring of each joint, in SI units. The mass is at least that
+# of the arm: a smaller one makes the controller react to its own acceleration.
+INERTIA = np.array([8.0, 8.0, 3.0, 0.5, 0.5, 0.5])
+DAMPING = np.array([60.0, 60.0, 25.0, 6.0, 6.0, 6.0])
+STIFFNESS = np.array([50.0, 50.0, 25.0, 8.0, 8.0, 8.0])
 FRICTION = np.array([16.0, 16.0, 9.0, 3.5, 3.5, 3.5])  # [N·m], torques below are not a push
-GIVES_WAY = 0.5  # [rad], at most
+SMOOTHING = 0.02  # [s], time constant of the torques from outside
+PUSH = np.array([100.0, 100.0, 60.0, 30.0, 30.0, 30.0])  # [N·m], at most
+GIVES_WAY, GIVES_WAY_SPEED = 0.5, 1.0  # [rad], [rad/s], at most
 
 
 def path(time):
@@ -55,22 +61,22 @@ class Compliance:
 
     def __init__(self, model):
         self.model = model
-        self.offset = np.zeros(JOINTS)
-        self.speed = np.zeros(JOINTS)
+        self.outside, self.offset, self.speed = np.zeros((3, JOINTS))
 
-    def step(self, actual):
-        """Return the deviation, (6,) [rad], from the measured position, velocity and torque."""
+    def step(self, actual, dt):
+        """Return the deviation, (6,) [rad], `dt` [s] later, from the measured values."""
         known = self.model.inverse(actual.position, actual.velocity, np.zeros(JOINTS))
-        outside = known - actual.torque
-        push = np.sign(outside) * np.maximum(abs(outside) - FRICTION, 0.0)
+        self.outside += (known - actual.torque - self.outside) * dt / SMOOTHING
+        push = np.sign(self.outside) * np.clip(abs(self.outside) - FRICTION, 0.0, PUSH)
         force = push - DAMPING * self.speed - STIFFNESS * self.offset
-        self.speed += PERIOD * force / INERTIA
-        self.offset = np.clip(self.offset + PERIOD * self.speed, -GIVES_WAY, GIVES_WAY)
+        speed = self.speed + dt * force / INERTIA
+        self.speed = np.clip(speed, -GIVES_WAY_SPEED, GIVES_WAY_SPEED)
+        self.offset = np.clip(self.offset + dt * self.speed, -GIVES_WAY, GIVES_WAY)
         return self.offset
 
     def reset(self):
         """Forget the deviation."""
-        self.offset[:] = self.speed[:] = 0.0
+        self.outside, self.offset, self.speed = np.zeros((3, JOINTS))
 
 
 class Motion:
@@ -84,55 +90,58 @@ class Motion:
         """Approach the start of the motion from `start` (6,) [rad]."""
         self.start, self.time = start.copy(), -APPROACH
 
-    def step(self, arm, compliance):
-        """Write the targets of the arm."""
+    def step(self, arm, compliance, dt):
+        """Write the targets of the arm, `dt` [s] after those before."""
         ready = arm.enabled.all() and not arm.jogged.any()
         if not ready:
             self.waiting = WAIT
         elif self.waiting > 0:
-            self.waiting -= PERIOD
+            self.waiting -= dt
             if self.waiting <= 0:
                 self.begin(arm.target.position)
                 compliance.reset()
         elif self.time < 0:
-            self.time = min(self.time + PERIOD, 0.0)
+            self.time = min(self.time + dt, 0.0)
             way = path(0.0) - self.start
             arm.target.position[:] = self.start + smooth(1 + self.time / APPROACH) * way
         else:
-            self.time += PERIOD
-            arm.target.position[:] = path(self.time) + compliance.step(arm.actual)
+            self.time += dt
+            arm.target.position[:] = path(self.time) + compliance.step(arm.actual, dt)
 
 
 @contextmanager
-def page(name):
-    """Serve the page during the block. The server prints its links."""
-    command = [sys.executable, "-m", "catenary.cli", "dashboard", name]
+def page(name, port):
+    """Serve the page during the block, and yield its process. It prints the links."""
+    command = [sys.executable, "-m", "catenary.cli", "dashboard", name, "--port", str(port)]
     server = subprocess.Popen([*command, "--model", str(HERE / "arm.xml"), "--recordings", "."])
     try:
-        yield
+        yield server
     finally:
         server.terminate()
         server.wait()
 
 
-def run(name, seconds):
-    """Run the robot until `seconds` have passed; None: until Ctrl-C."""
+def run(name, seconds, server):
+    """Run the robot until `seconds` have passed (None: until Ctrl-C) or `server` has ended."""
     model = control.Dynamics(HERE / "arm.xml", axes=JOINTS)
     segment = read_segment(HERE / "segment.toml", clock="monotonic", ring=True)
-    stop = cat.StopPolicy(
-        raise_faults=False, on_axis_stopped="event", lost_limit=20, late_limit=0.5
+    stop = cat.StopPolicy(  # late_limit=0: on a busy machine, the arm waits for the program
+        raise_faults=False, on_axis_stopped="event", lost_limit=20, late_limit=0
     )
     with (
         cat.MainDevice(segment.first, segment.second) as bus,
         cat.Share(name, jog=True) as share,
     ):
-        arm = cat.Drives(bus.scan().drives, mode="csp", **AXES)
-        with cat.Loop(arm, period=PERIOD, sink=share, stop=stop) as loop:
-            compliance, motion = Compliance(model), Motion(arm.target.position)
+        arm = cat.Drives(bus.scan().drives, mode="csp", required=False, **AXES)
+        with cat.Loop(arm, period=PERIOD, watchdog=1.0, sink=share, stop=stop) as loop:
+            compliance, motion, before = Compliance(model), Motion(arm.target.position), 0.0
             print(f"the arm moves; its share is {name!r}. Press Ctrl-C to end", flush=True)
             for cycle in loop:
-                motion.step(arm, compliance)
+                motion.step(arm, compliance, min(cycle.time - before, LONGEST_STEP))
+                before = cycle.time
                 if seconds is not None and cycle.time > seconds:
+                    break
+                if server and cycle.number % 1000 == 0 and server.poll() is not None:
                     break
 
 
@@ -141,6 +150,8 @@ if __name__ == "__main__":
     parser.add_argument("--name", default="cobot", help="name of its share")
     parser.add_argument("--seconds", type=float, help="duration; default: until Ctrl-C")
     parser.add_argument("--page", action="store_true", help="also serve the operator's page")
-    options = parser.parse_args()
-    with suppress(KeyboardInterrupt), page(options.name) if options.page else nullcontext():
-        run(options.name, options.seconds)
+    parser.add_argument("--port", type=int, default=8710, help="port of the page")
+    a = parser.parse_args()
+    serving = page(a.name, a.port) if a.page else nullcontext()
+    with suppress(KeyboardInterrupt), serving as server:
+        run(a.name, a.seconds, server)

@@ -5,15 +5,17 @@ while the body is stuck and while a law runs. Only a new press moves it again.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from contextlib import contextmanager
+from itertools import pairwise
 
 import pytest
 
 import catenary as cat
 from catenary.errors import MoveError, WorkingCounterError
 from catenary.plan.stop_reason import StopReason
-from catenary.share import Jog, JogStatus, Lease, Reader
+from catenary.share import Jog, JogStatus, Lease, Reader, Sweep
 from tests.scenario.vertical import LAG, MS, RESOLUTION, VerticalCell, vertical_cell
 from tests.share.names import own_name
 
@@ -110,6 +112,36 @@ def test_without_heartbeats_the_axis_stops(mode: str, execution: str) -> None:
         desk.steps(400)
         assert jog.status is JogStatus.EXPIRED
         assert 0 < desk.cell.joint - before < WAY
+        desk.assert_at_rest()
+
+
+@pytest.mark.parametrize("mode", MODES)
+def test_a_sweep_swings_the_axis_and_ends_at_rest(mode: str) -> None:
+    with operated(mode) as desk:
+        jog = desk.lease.jog(0, SPEED, sweep=Sweep(start=1.0, end=10.0, duration=2.0))
+        before, path = desk.cell.joint, []
+        for _ in range(2100):
+            desk.steps(1, jog)
+            path.append(desk.cell.joint - before)
+        steps = [b - a for a, b in pairwise(path[::20])]
+        turns = [a for a, b in pairwise(steps) if a * b < 0]  # changes of direction
+        assert jog.status is JogStatus.DONE
+        assert (
+            max(map(abs, path)) < SPEED / math.pi + RAMP_WAY
+        )  # the first half-wave is the longest
+        assert len(turns) >= 8  # of 2 · 7.8 half-waves
+        desk.assert_at_rest()
+
+
+def test_a_sweep_without_heartbeats_ends_while_the_body_is_stuck() -> None:
+    with operated() as desk:
+        jog = desk.lease.jog(0, SPEED, sweep=Sweep(start=1.0, end=10.0, duration=60.0))
+        desk.steps(300, jog)
+        before = desk.cell.joint
+        cycle = next(desk.loop)
+        trace = desk.cell.compute(cycle, 1.0)
+        assert jog.status is JogStatus.EXPIRED
+        assert abs(trace.joint - before).max() < WAY
         desk.assert_at_rest()
 
 

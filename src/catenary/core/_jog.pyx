@@ -22,7 +22,7 @@ and PV the distance is that of the commanded velocity, and the limits hold for t
 A press with a sweep follows a sine of increasing or decreasing frequency (_sweep.pxd). It ends with
 DONE after its duration. A position limit that would reduce its velocity ends it.
 
-Budget: 10 ns per axis without a jog, 60 ns with one, 110 ns with a sweep.
+Budget: 10 ns per axis without a jog, 60 ns with one, 90 ns with a sweep.
 """
 
 from libc.math cimport INFINITY, ceil, copysign, fabs, fmax, fmin, isfinite, isnan, sqrt

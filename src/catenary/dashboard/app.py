@@ -221,7 +221,12 @@ async def call(page: Page, request: Request, role: Role) -> Response:
 
 
 async def doctor(page: Page, request: Request, role: Role) -> Response:
-    """Examine this machine, and return the result as JSON."""
+    """Examine this machine, and return the result as JSON.
+
+    The examination measures latency with a real-time thread, which can delay a loop.
+    """
+    if role != "operator":
+        return refusal(403, f"the role {role} cannot examine the machine")
     if page.doctor.locked():
         return refusal(429, "the examination is already running", hint="wait for its result")
     async with page.doctor:

@@ -28,6 +28,7 @@ POSES_INTERVAL = 1 / 30  # [s]
 STATUS_INTERVAL = 0.05  # [s]
 TIMING_INTERVAL = 0.5  # [s]
 CLIENTS_MAX = 32
+RESERVED = 8  # of these clients, for operators
 SPARE = 8  # threads for clients that are leaving
 EVENTS_KEPT = 256
 ADVICE_SECONDS = 1.0  # limit for the advice of new events
@@ -134,7 +135,8 @@ class Hub:
 
     def add(self, client: Client) -> bool:
         """Add a client and send the present state. Return False if there are too many."""
-        if len(self.clients) >= CLIENTS_MAX:
+        limit = CLIENTS_MAX if client.role == "operator" else CLIENTS_MAX - RESERVED
+        if len(self.clients) >= limit:
             return False
         self.clients.add(client)
         self._greet(client)

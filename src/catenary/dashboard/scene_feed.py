@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import threading
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from catenary.dashboard.scene import Scene
@@ -25,18 +26,24 @@ class SceneFeed:
         self._model = model
         self._joints = joints
         self._run = ""
+        self._reading = threading.Lock()  # requests and poses come from several threads
         self._scene: Scene | None = None
 
     def scene(self, reader: Reader) -> Scene | None:
         """Return the scene for the axes of a share; None if the model cannot be shown."""
         layout = reader.layout
-        if layout.run != self._run:
-            self._run, self._scene, self.problem = layout.run, None, ""
-            try:
-                self._scene = Scene(self._model, layout.axes, self._joints or None)
-            except CatenaryError as error:
-                self.problem = error.message
-        return self._scene
+        with self._reading:
+            if layout.run != self._run:
+                self._read(layout.axes)
+                self._run = layout.run
+            return self._scene
+
+    def _read(self, axes: Sequence[str]) -> None:
+        self._scene, self.problem = None, ""
+        try:
+            self._scene = Scene(self._model, axes, self._joints or None)
+        except CatenaryError as error:
+            self.problem = error.message
 
     def poses(self, reader: Reader) -> bytes:
         """Return the message with the poses of the newest cycle; b"" without a scene."""

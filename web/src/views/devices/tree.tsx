@@ -28,7 +28,7 @@ export function Tree({ devices, chosen }: TreeProps) {
     <div class="tree live">
       <svg class="cables" width={width} height={rows * ROW} aria-hidden="true">
         {nodes.map((node) => (
-          <Cable key={node.position} node={node} nodes={nodes} device={byPosition.get(node.position)} />
+          <Cable key={node.position} node={node} nodes={nodes} broken={isBroken(byPosition, node.position)} />
         ))}
         {redundant.map(({ position }) => (
           <Return key={position} node={nodes.find((node) => node.position === position)} rows={rows} />
@@ -60,13 +60,20 @@ function y(row: number): number {
 }
 
 /** Cable from the parent of a device to it. */
-function Cable({ node, nodes, device }: { node: Node; nodes: Node[]; device: Device | undefined }) {
+function Cable({ node, nodes, broken }: { node: Node; nodes: Node[]; broken: boolean }) {
   const parent = node.parent === null ? undefined : nodes[node.parent];
   const from = parent === undefined ? { x: x(0), y: y(-1) } : { x: x(parent.column), y: y(parent.row) };
   const to = { x: x(node.column), y: y(node.row) };
   const turn = from.x === to.x ? "" : `V${from.y + ROW / 2}H${to.x}`;
-  const broken = device === undefined || device.lost || device.state === "";
   return <path class={broken ? "cable broken" : "cable"} d={`M${from.x} ${from.y}${turn}V${to.y}`} />;
+}
+
+/** Return whether the cable from the parent of a device carries no frames. */
+function isBroken(devices: Map<number, Device>, position: number): boolean {
+  const device = devices.get(position);
+  if (device === undefined || device.lost || device.state === "") return true;
+  const parent = device.parent === null ? undefined : devices.get(device.parent);
+  return parent?.ports.find(({ port }) => port === device.parent_port)?.link === false;
 }
 
 /** Redundant cable from the last device back to the MainDevice. */
