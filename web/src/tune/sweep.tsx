@@ -10,7 +10,7 @@ import type { Unit } from "../views/axes/jogging.ts";
 import { ScopeResponse } from "./bode.tsx";
 import { BodeCurves } from "./bode_curves.tsx";
 import { Entry, HoldButton } from "./controls.tsx";
-import { frequencyResponse, recorded, within } from "./frequency_response.ts";
+import { differences, frequencyResponse, recorded, within } from "./frequency_response.ts";
 import type { Identification } from "./identification.tsx";
 import { MotionTest } from "./motion_test.ts";
 
@@ -80,7 +80,7 @@ function Response({ store, names, sweep }: { store: RingStore; names: string[]; 
 /** Return the response between the frequencies of a sweep; null if the record is too short. */
 function responseOf(store: RingStore, names: string[], { start, end }: Sweep) {
   const [command, position] = recorded(store, names, store.begin, store.end);
-  const response = frequencyResponse(command!, position!, store.period);
+  const response = frequencyResponse(differences(command!), differences(position!), store.period);
   if (response === null) return null;
   const found = within(response, Math.min(start, end) / EDGE, Math.max(start, end) * EDGE);
   return found.frequency.length < 3 ? null : found;
