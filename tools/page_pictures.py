@@ -29,9 +29,8 @@ if TYPE_CHECKING:
 ROOT = Path(__file__).resolve().parents[1]
 WIDTH, HEIGHT = 1100, 720
 SCALE = 0.76
-FRAME = 125  # [ms] of the animation
-SPEED = 2.0  # of the animation, at most
-ZOOM = -600  # pixels of the mouse wheel
+FRAME = 105  # [ms] of the animation
+SPEED = 1.5  # of the animation, at most
 SETTLE = 4000  # [ms] until live values have filled the charts
 VIEWS = {"overview": "Overview", "axes": "Axes", "devices": "Devices", "scope": "Scope"}
 FLAGS = ["--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
@@ -165,8 +164,7 @@ def open_page(browser: Any, link: str) -> Page:
     page.set_default_timeout(60_000)
     page.goto(link)
     navigation(page, "Axes").click()
-    page.locator(".scene-view canvas").hover()
-    page.mouse.wheel(0, ZOOM)
+    page.locator(".scene-view canvas").wait_for()
     page.wait_for_timeout(SETTLE)
     return page
 
@@ -183,7 +181,7 @@ def main() -> None:
         browser = playwright.chromium.launch(executable_path=shutil.which("chromium"), args=FLAGS)
         page = open_page(browser, link)
         film = Film(page)
-        film.shoot(14)
+        film.shoot(16)
         push(film)
         pull_and_plug(film)
         film.save(folder / "page.webp")

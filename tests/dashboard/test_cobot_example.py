@@ -64,3 +64,19 @@ def test_the_arm_moves_yields_and_survives_a_cut(name: str) -> None:
         arm.stop()
         assert until(lambda: not arm.read()["enabled"].any())
         assert "an operator requested a quick stop" in messages(arm)
+        with arm.lease() as lease:
+            lease.request("enable")
+            assert until(lambda: bool(arm.read()["enabled"].all()))
+
+
+def test_the_arm_survives_a_device_without_power(name: str) -> None:
+    with cat.attach(name) as arm, cat.connect(name) as program:
+        assert arm.wait(10.0)
+        program.virtual_power(2, False)
+        assert until(lambda: "device 2 (elbow) does not answer any more" in messages(arm))
+        program.virtual_power(2, True)
+        assert until(lambda: "device 2 (elbow) answers again" in messages(arm))
+        assert until(lambda: program.devices()[2].state == "OP")
+        with arm.lease() as lease:
+            lease.request("enable")
+            assert until(lambda: bool(arm.read()["enabled"].all()))
