@@ -21,7 +21,6 @@ from tests.share.processes import comes_true
 AXIS = NAMES[0]
 SPEED = 1.0  # [rad/s]
 BURST = 100  # heartbeats
-BLOCK_SCRIPT = "setTimeout(() => { for (const t = Date.now(); Date.now() < t + 2000;); })"
 
 
 def assert_stays(rig: Rig, position: float) -> None:

@@ -70,6 +70,28 @@ def test_without_one_share_the_name_is_needed(
         dashboard.only_share(None)
 
 
+@pytest.mark.parametrize(
+    "words",
+    [["arm", "--model", "none.xml"], ["arm", "--recordings", "none"], ["none.toml"]],
+)
+def test_a_missing_file_is_refused(
+    words: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(UsageError, match=r"there is no (file|folder) none"):
+        dashboard.check_paths(make_parser().parse_args(["dashboard", *words]))
+
+
+def test_a_share_that_does_not_exist_is_noted(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr("catenary.dashboard.source.names", lambda uid: ["arm"])
+    dashboard.note_missing("arm", None)
+    assert capsys.readouterr().err == ""
+    dashboard.note_missing("amr", None)
+    assert "no share 'amr' yet; existing shares: 'arm'" in capsys.readouterr().err
+
+
 def test_a_window_needs_chromium(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("shutil.which", lambda name: None)
     with pytest.raises(UsageError, match="Chromium"):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import ctypes
 import math
 
 import numpy as np
@@ -10,25 +9,8 @@ import numpy as np
 from catenary.share.command_table import MOTION, SLOT
 from catenary.share.jog import JogStatus, RequestStatus
 from tests.core.rig import Bench
+from tests.core.sink_table import PUT, Table
 from tests.link_table import capsule_of
-
-PUT = ctypes.CFUNCTYPE(None, *[ctypes.c_void_p] * 5)
-
-
-class Table(ctypes.Structure):
-    """`cat_sink` of native/sink.h, version 2."""
-
-    _fields_ = (
-        ("version", ctypes.c_uint32),
-        ("record_size", ctypes.c_uint32),
-        ("actual_size", ctypes.c_uint32),
-        ("target_size", ctypes.c_uint32),
-        ("self", ctypes.c_void_p),
-        ("put", PUT),
-        ("motion", ctypes.c_void_p),
-        ("motion_axes", ctypes.c_uint32),
-        ("jog", ctypes.c_uint32),
-    )
 
 
 class Operator:

@@ -10,7 +10,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from catenary.core import AXIS_FOLLOWED, CYCLE_DROPPED, REQUEST_DISABLED, REQUEST_ENABLED
+from catenary.core import (
+    AXIS_FOLLOWED,
+    CYCLE_DROPPED,
+    REQUEST_DISABLED,
+    REQUEST_ENABLED,
+    Stream,
+)
 from catenary.plan.cycle import AxisLimits
 from catenary.plan.stop_reason import StopReason
 from catenary.share.jog import JogStatus, RequestStatus
@@ -411,6 +417,23 @@ def test_a_target_far_away_is_refused_after_a_jog_and_the_axis_holds() -> None:
     assert b.drives[0].state == 4
 
 
+def test_a_stream_that_is_far_away_after_a_jog_stops_the_axis() -> None:
+    """The other axes of a stream move on: this one must not stay behind in silence."""
+    b, operator = made(limits=AxisLimits(velocity=V, step=0.01))
+    operator.press(0.5, 0.2)
+    jogged(b, operator, 100)
+    stream = Stream(1, 8)
+    b.engine.set_stream(stream)
+    for _ in range(700):
+        operator.beat()
+        stream.write(np.zeros((1, 3)).tobytes(), b.engine.number)
+        b.engine.next()
+    assert operator.status() is JogStatus.DONE
+    assert b.drives[0].target_position == 200
+    assert StopReason(b.stop_reason[0]) is StopReason.REFUSED
+    assert b.drives[0].state != 4
+
+
 def test_a_request_of_the_application_ends_the_jog() -> None:
     b, operator = made()
     operator.press(0.5)
@@ -466,6 +489,21 @@ def test_the_stop_word_at_the_attachment_stops_nothing() -> None:
     b.enable()
     b.steps(5)
     assert b.drives[0].state == 4
+
+
+def test_the_stop_word_is_the_reason_of_a_disabled_axis_too() -> None:
+    """The program must not enable it by itself, as it may do after another stop."""
+    b, operator = made(jog=False)
+    b.ask(REQUEST_DISABLED)
+    b.steps(5)
+    assert b.stop_reason[0] == 0
+    operator.stop()
+    assert not b.engine.next() & CYCLE_DROPPED
+    b.steps(2)
+    assert StopReason(b.stop_reason[0]) is StopReason.OPERATOR
+    b.ask(REQUEST_ENABLED)
+    b.steps(12)
+    assert (b.stop_reason[0], b.drives[0].state) == (0, 4)
 
 
 def test_a_stop_ends_a_jog() -> None:

@@ -10,33 +10,10 @@ import pytest
 
 from catenary.core import RECORD_FIELDS
 from tests.core.rig import CSP, Bench, ScriptedDrive, axis, make_plan
+from tests.core.sink_table import PUT, Table
 from tests.link_table import capsule_of
 
 NAME = b"catenary.sink"
-PUT = ctypes.CFUNCTYPE(
-    None,
-    ctypes.c_void_p,
-    ctypes.c_uint64,
-    ctypes.c_void_p,
-    ctypes.c_void_p,
-    ctypes.c_void_p,
-)
-
-
-class Table(ctypes.Structure):
-    """`cat_sink` of native/sink.h."""
-
-    _fields_ = (
-        ("version", ctypes.c_uint32),
-        ("record_size", ctypes.c_uint32),
-        ("actual_size", ctypes.c_uint32),
-        ("target_size", ctypes.c_uint32),
-        ("self", ctypes.c_void_p),
-        ("put", PUT),
-        ("motion", ctypes.c_void_p),
-        ("motion_axes", ctypes.c_uint32),
-        ("jog", ctypes.c_uint32),
-    )
 
 
 class Sink:

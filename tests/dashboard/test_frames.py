@@ -34,6 +34,14 @@ def rows_of(values: list[float]) -> np.ndarray:
     return rows
 
 
+def test_a_field_of_two_dimensions_has_no_signals() -> None:
+    field = SimpleNamespace(name="matrix", shape=(3, 3))
+    layout = cast(ShareLayout, SimpleNamespace(name="test", fields=[field]))
+    for signal in ("matrix", "matrix[0]"):
+        with pytest.raises(ValueError, match="no signal"):
+            find_columns(layout, [signal])
+
+
 @given(st.lists(floats, min_size=1, max_size=50))
 def test_a_full_frame_has_every_sample(values: list[float]) -> None:
     columns = find_columns(LAYOUT, ["x[1]", "odd[1]"])

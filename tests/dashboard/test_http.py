@@ -115,6 +115,11 @@ def test_a_viewer_can_change_nothing(page: Page, method: str) -> None:
     assert "viewer" in answer.json()["error"]["message"]
 
 
+def test_a_viewer_cannot_load_the_machine_with_an_examination(page: Page) -> None:
+    with page.client("viewer") as client:
+        assert client.post("/api/doctor").status_code == 403
+
+
 @pytest.mark.parametrize("method", ["close", "call", "__init__", "move"])
 def test_an_operator_can_call_only_listed_methods(page: Page, method: str) -> None:
     with page.client() as client:

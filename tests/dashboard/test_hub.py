@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from catenary.dashboard.hub import Hub
+from catenary.dashboard.hub import CLIENTS_MAX, RESERVED, Hub
 from catenary.dashboard.outbox import Outbox
 from catenary.dashboard.requests import Requests
 from catenary.dashboard.security import Role
@@ -123,3 +123,15 @@ def test_an_unexpected_error_detaches_from_the_share_and_is_reported(
     assert last["op"] == "gone"
     assert "missing" in last["reason"]
     assert "cannot show the share" in caplog.text
+
+
+def test_viewers_leave_room_for_operators(name: str) -> None:
+    async def scenario() -> None:
+        hub = Hub(Source(name), Requests(name))
+        viewers = [Viewer() for _ in range(CLIENTS_MAX)]
+        assert sum(hub.add(viewer) for viewer in viewers) == CLIENTS_MAX - RESERVED
+        operator = Viewer()
+        operator.role = "operator"
+        assert hub.add(operator)
+
+    asyncio.run(scenario())

@@ -14,6 +14,7 @@ from tests.dashboard.serving import running_loop, serving
 from tests.record.beside import shared_loop
 from tests.record.made import make_layout, make_rows
 from tests.share.names import own_name
+from tests.share.processes import comes_true
 
 MODEL = """<mujoco><worldbody>
 <body><joint name="a" axis="0 0 1"/><geom size=".1" pos="1 0 0"/></body></worldbody></mujoco>"""
@@ -75,3 +76,16 @@ def test_an_axis_at_rest_is_captured_with_the_reasons_for_missing_figures() -> N
         assert f"<td>{axis}</td>" in report.text
         other = client.get("/api/tune/report", params={"axis": "another"})
         assert f"<td>{axis}</td>" not in other.text
+
+
+def test_a_capture_ends_with_its_client() -> None:
+    with own_name("tune") as name, running_loop(name), serving(name) as page:
+        client = page.client("viewer")
+        with page.socket() as socket:
+            socket.next("hello")
+        url = "/api/tune/capture"
+        with pytest.raises(httpx.ReadTimeout):
+            client.post(url, content='{"axis": 0, "seconds": 60}', timeout=0.5)
+        short = '{"axis": 0, "seconds": 0.2}'
+        assert comes_true(lambda: client.post(url, content=short).status_code == 200)
+        assert "<td>" in client.get("/api/tune/report").text

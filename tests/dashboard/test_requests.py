@@ -46,6 +46,17 @@ def test_a_viewer_reads_the_devices(called) -> None:  # type: ignore[no-untyped-
     assert answer.headers["cache-control"] == "no-store"
 
 
+def test_too_many_waiting_requests_are_refused_with_a_pause(
+    called,  # type: ignore[no-untyped-def]
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr("catenary.dashboard.app.VIEWER_CALLS_MAX", 0)
+    answer = called("hello")
+    assert answer.status_code == 429
+    assert answer.json()["error"]["kind"] == "BusyError"
+    assert answer.json()["retry"] > 0
+
+
 def test_bytes_of_an_object_are_base64(called) -> None:  # type: ignore[no-untyped-def]
     result = called("sdo_read", position=0, index=0x1000, type="UDINT").json()["result"]
     assert result["value"] & 0xFFFF == 402

@@ -164,9 +164,9 @@ def test_a_socket_of_another_site_is_refused(page: Page, origin: str | None) -> 
 
 def test_too_many_clients_are_refused(page: Page, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("catenary.dashboard.hub.CLIENTS_MAX", len(page.hub.clients) + 1)
-    with page.socket("viewer") as first:
+    with page.socket() as first:
         first.next("hello")
-        with page.socket("viewer") as second, pytest.raises(ConnectionClosed) as closed:
+        with page.socket() as second, pytest.raises(ConnectionClosed) as closed:
             second.next("hello")
     assert closed.value.rcvd is not None
     assert closed.value.rcvd.code == 1013

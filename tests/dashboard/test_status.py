@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from catenary.dashboard.limits import RateLimit
 from catenary.dashboard.status import AxisNotes
 from catenary.plan.stop_reason import StopReason
 from catenary.share import SharedEvent
@@ -41,13 +40,3 @@ def test_a_fault_has_the_text_of_the_emergency_of_its_device() -> None:
     assert notes.fault("j1") == "the drive is in fault"
     notes.devices = {"j1": 2}
     assert notes.fault("j1") == "emergency 0x8611"
-
-
-def test_a_rate_limit_allows_a_burst_and_then_its_rate() -> None:
-    now = [0.0]
-    limit = RateLimit(10.0, 5, clock=lambda: now[0])
-    assert [limit.use() for _ in range(6)] == [True] * 5 + [False]
-    now[0] += 0.2
-    assert [limit.use() for _ in range(3)] == [True, True, False]
-    now[0] += 1e6
-    assert [limit.use() for _ in range(6)] == [True] * 5 + [False]

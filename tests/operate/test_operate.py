@@ -50,6 +50,7 @@ def test_an_error_of_the_target_is_reported(name: str) -> None:
         assert comes_true(lambda: "has ended" in program.problem())
     assert "no-such-nic0" in program.problem()
     assert notes[-1].startswith("error: ")
+    assert "hint:" not in notes[-1]
 
 
 def test_a_killed_program_is_reported(name: str) -> None:

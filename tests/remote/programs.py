@@ -30,13 +30,17 @@ def small_segment() -> Segment:
 
 @contextmanager
 def program(
-    *, background: bool = True, required: bool = True, segment: Segment | None = None
+    *,
+    background: bool = True,
+    required: bool = True,
+    jog: bool = True,
+    segment: Segment | None = None,
 ) -> Iterator[Running]:
     """Open a loop in virtual time with a share of a unique name."""
     with (
         own_name("remote") as name,
         cat.MainDevice(segment or small_segment()) as main,
-        cat.Share(name) as share,
+        cat.Share(name, jog=jog) as share,
     ):
         main.scan()
         arm = cat.Drives(main.subs.drives, required=required, other_modes=["hm"], **OPTIONS)

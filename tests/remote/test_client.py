@@ -221,6 +221,26 @@ def test_a_move_needs_the_background() -> None:
         client.move(list(own.arm.names), [0.1])
 
 
+def test_a_move_needs_permission() -> None:
+    with program(jog=False) as own, connect(own.name) as client:
+        for request in (client.home, lambda names: client.move(names, [0.1])):
+            with pytest.raises(LoopError, match="does not allow motions"):
+                request(list(own.arm.names))
+        assert own.arm.actual.position[0] == pytest.approx(0.0, abs=1e-6)
+
+
+def test_a_move_does_not_begin_after_the_deadline_of_its_request() -> None:
+    with program() as own, connect(own.name) as client:
+        with own.loop.update(), pytest.raises(ResponseTimeout):
+            client.call("move", timeout=0.1, axes=list(own.arm.names), positions=[0.1])
+        wait_until(lambda: not any(t.name == "catenary remote call" for t in threading.enumerate()))
+        with own.loop.update():
+            pass
+        assert own.arm.target.position[0] == pytest.approx(0.0, abs=1e-6)
+        client.move(own.arm.names, [0.01])  # only this one moves
+        wait_until(lambda: abs(own.arm.actual.position[0] - 0.01) < 1e-3)
+
+
 def test_parameters_of_a_law_are_set_together() -> None:
     @cat.law
     def keep(target, parameters):  # type: ignore[no-untyped-def]
@@ -251,7 +271,9 @@ def test_named_parameters_of_a_law_keep_their_limits() -> None:
         offset, gain = client.laws()[0].parameters.values()
         assert (offset.minimum, offset.maximum, offset.unit) == (-0.01, 0.01, "rad")
         assert (gain.minimum, gain.maximum, gain.unit) == (None, None, "")
-        with pytest.raises(ValueError, match="'offset': 0.5 is outside of its range -0.01 to 0.01"):
+        with pytest.raises(
+            ValueError, match=r"'offset': 0\.5 is outside of its range -0\.01 to 0\.01"
+        ):
             client.set_parameters("keep", {"gain": 2.0, "offset": 0.5})
         assert run.parameters.tolist() == [0.0, 1.0]
         client.set_parameters("keep", {"gain": 2.0, "offset": 0.001})

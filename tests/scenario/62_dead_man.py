@@ -5,15 +5,17 @@ while the body is stuck and while a law runs. Only a new press moves it again.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from contextlib import contextmanager
+from itertools import pairwise
 
 import pytest
 
 import catenary as cat
 from catenary.errors import MoveError, WorkingCounterError
 from catenary.plan.stop_reason import StopReason
-from catenary.share import Jog, JogStatus, Lease, Reader, Share
+from catenary.share import Jog, JogStatus, Lease, Reader, Sweep
 from tests.scenario.vertical import LAG, MS, RESOLUTION, VerticalCell, vertical_cell
 from tests.share.names import own_name
 
@@ -31,7 +33,7 @@ class Desk:
     """An operator at a share, whose loop the test iterates."""
 
     def __init__(
-        self, cell: VerticalCell, arm: cat.Drives, loop: cat.Loop, share: Share, reader: Reader
+        self, cell: VerticalCell, arm: cat.Drives, loop: cat.Loop, share: cat.Share, reader: Reader
     ) -> None:
         self.cell, self.arm, self.loop, self.share, self.reader = cell, arm, loop, share, reader
         self.lease: Lease = reader.lease(for_=3600.0)
@@ -110,6 +112,36 @@ def test_without_heartbeats_the_axis_stops(mode: str, execution: str) -> None:
         desk.steps(400)
         assert jog.status is JogStatus.EXPIRED
         assert 0 < desk.cell.joint - before < WAY
+        desk.assert_at_rest()
+
+
+@pytest.mark.parametrize("mode", MODES)
+def test_a_sweep_swings_the_axis_and_ends_at_rest(mode: str) -> None:
+    with operated(mode) as desk:
+        jog = desk.lease.jog(0, SPEED, sweep=Sweep(start=1.0, end=10.0, duration=2.0))
+        before, path = desk.cell.joint, []
+        for _ in range(2100):
+            desk.steps(1, jog)
+            path.append(desk.cell.joint - before)
+        steps = [b - a for a, b in pairwise(path[::20])]
+        turns = [a for a, b in pairwise(steps) if a * b < 0]  # changes of direction
+        assert jog.status is JogStatus.DONE
+        assert (
+            max(map(abs, path)) < SPEED / math.pi + RAMP_WAY
+        )  # the first half-wave is the longest
+        assert len(turns) >= 8  # of 2 · 7.8 half-waves
+        desk.assert_at_rest()
+
+
+def test_a_sweep_without_heartbeats_ends_while_the_body_is_stuck() -> None:
+    with operated() as desk:
+        jog = desk.lease.jog(0, SPEED, sweep=Sweep(start=1.0, end=10.0, duration=60.0))
+        desk.steps(300, jog)
+        before = desk.cell.joint
+        cycle = next(desk.loop)
+        trace = desk.cell.compute(cycle, 1.0)
+        assert jog.status is JogStatus.EXPIRED
+        assert abs(trace.joint - before).max() < WAY
         desk.assert_at_rest()
 
 
@@ -209,6 +241,20 @@ def test_link_down_ends_the_jog() -> None:
             desk.cell.let_pass(0.5)
             assert not desk.cell.powered
             desk.cell.segment.plug()
+
+
+def test_the_watchdog_acts_if_the_process_of_the_loop_is_killed_during_a_jog() -> None:
+    """Without the process nobody judges the jog. The drive stops after its watchdog."""
+    patient = cat.StopPolicy(on_axis_stopped="event", raise_faults=False)
+    with operated(stop=patient) as desk:
+        desk.jog(300)
+        before = desk.cell.joint
+        desk.loop._opened.engine.stop()  # as after a kill: no more frames
+        desk.cell.let_pass(1.0)
+        assert not desk.cell.powered
+        assert abs(desk.cell.joint - before) < SPEED * (0.1 + DELAY) + RAMP_WAY
+        assert abs(desk.cell.velocity) < 1e-3
+        desk.loop._opened.engine.start()
 
 
 def test_the_stop_needs_no_lease_and_ends_the_jog() -> None:

@@ -16,6 +16,18 @@ from catenary.virtual import Segment, Servo
 from tests.share.names import own_name
 from tests.share.processes import started
 
+LOOP = """
+import sys
+import catenary as cat
+from catenary.virtual import Segment, Servo
+with cat.MainDevice(Segment([Servo()])) as main:
+    arm = cat.Drives(main.scan().drives, counts_per_turn=2**20, velocity_limit=1.0)
+    share = cat.Share(sys.argv[1], jog=True)
+    with share, cat.Loop(arm, sink=share) as loop:
+        for cycle in loop:
+            if cycle.number == 100:
+                print("running", flush=True)
+"""
 STOPPER = """
 import sys
 import catenary as cat
@@ -218,6 +230,43 @@ def test_a_loop_that_has_ended_cannot_be_stopped(rig: Rig) -> None:
     rig.loop.close()
     with cat.attach(rig.reader.layout.name) as late, pytest.raises(ShareError):
         late.stop()
+    assert rig.lease.axes  # this reader has opened the desk of the loop
+    with pytest.raises(ShareError, match="cannot be stopped"):
+        rig.reader.stop()
+
+
+def test_a_killed_loop_is_an_error_of_the_next_call(rig: Rig) -> None:
+    """Its last answers stay in the desk: the status alone would be "moving" for ever."""
+    with own_name("killed") as name, started(LOOP, name) as program:
+        assert program.line() == "running"
+        with cat.attach(name) as reader, reader.lease(for_=3600.0) as lease:
+            jog = lease.jog(0, 0.5)
+            program.kill()
+            for call in (jog.beat, lambda: lease.jog(0, 0.5), lambda: lease.request("enable")):
+                with pytest.raises(LeaseError, match="has died"):
+                    call()
+            with pytest.raises(ShareError, match="cannot be stopped"):
+                reader.stop()
+
+
+def test_an_application_that_enables_a_jogged_axis_does_not_disturb_the_jog(rig: Rig) -> None:
+    jog = rig.lease.jog(1, 0.5)
+    rig.steps(50)
+    for _ in range(300):
+        jog.beat()
+        if not rig.arm.enabled.all():
+            rig.arm.enable()
+        rig.steps(1)
+    assert jog.status is JogStatus.MOVING
+    assert rig.arm.jogged.tolist() == [False, True]
+    assert rig.arm.actual.position[1] > 0.1
+
+
+def test_the_start_of_a_loop_does_not_wait_for_a_jogged_axis(rig: Rig) -> None:
+    jog = rig.lease.jog(1, 0.5)
+    rig.steps(50)
+    rig.loop._opened.enable()
+    assert jog.status is JogStatus.MOVING
 
 
 def test_every_status_has_a_text() -> None:

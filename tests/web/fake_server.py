@@ -276,10 +276,6 @@ def make_device(position: int, count: int, axes: list[str]) -> Message:
     }
 
 
-def name_of(position: int) -> str:
-    return "EK1100" if position == 0 else f"servo_{position}"
-
-
 def make_clocks(count: int) -> Message:
     clocks = [
         {

@@ -350,6 +350,16 @@ def test_enabling_asks_first(opened: Opened) -> None:
     ]
 
 
+def test_question_returns_the_focus(opened: Opened) -> None:
+    page, _ = opened
+    enable = page.get_by_role("button", name="Enable", exact=True).first
+    enable.focus()
+    page.keyboard.press("Enter")
+    expect(page.get_by_role("button", name="Cancel")).to_be_focused()
+    page.keyboard.press("Enter")
+    expect(enable).to_be_focused()
+
+
 def test_question_closes_when_the_share_ends(opened: Opened) -> None:
     """The axis with the same number may be another one when the share returns."""
     page, server = opened

@@ -100,7 +100,7 @@ export class Connection {
   /** Return true if the server accepted the token. */
   async login(token: string): Promise<boolean> {
     try {
-      const reply = await post("/login", { token });
+      const reply = await post("/login", { token }, AbortSignal.timeout(SILENCE));
       if (!reply.ok) {
         this.state.value = "login";
         return false;
@@ -186,22 +186,20 @@ export class Connection {
   }
 
   private async connect(): Promise<void> {
-    let reply: Response;
+    let session: Session;
     try {
-      reply = await fetch("/api/session", { signal: AbortSignal.timeout(SILENCE) });
+      const reply = await fetch("/api/session", { signal: AbortSignal.timeout(SILENCE) });
+      if (reply.status === 401 || reply.status === 403) {
+        this.state.value = "login";
+        return;
+      }
+      if (!reply.ok) throw new Error(reply.statusText);
+      session = (await reply.json()) as Session;
     } catch {
       this.retry();
       return;
     }
-    if (reply.status === 401 || reply.status === 403) {
-      this.state.value = "login";
-      return;
-    }
-    if (!reply.ok) {
-      this.retry();
-      return;
-    }
-    this.session.value = (await reply.json()) as Session;
+    this.session.value = session;
     this.open();
   }
 
@@ -302,8 +300,9 @@ export class Connection {
   }
 }
 
-function post(path: string, body: object): Promise<Response> {
+function post(path: string, body: object, signal?: AbortSignal): Promise<Response> {
   return fetch(path, {
+    signal: signal ?? null,
     method: "POST",
     headers: { "Content-Type": "application/json" },
     body: JSON.stringify(body),

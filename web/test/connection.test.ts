@@ -96,3 +96,19 @@ test("a second login closes the former socket", async (context) => {
   assert.equal(socket.closed, true);
   assert.equal(FakeSocket.all.length, 2);
 });
+
+test("an answer that breaks off is tried again", async (context) => {
+  context.mock.timers.enable({ apis: ["setInterval", "setTimeout"] });
+  const { connection, socket } = await connected();
+  const session = answers.get("/api/session")!;
+  answers.set("/api/session", () => new Response('{"role": "oper'));
+  socket.onclose?.();
+  assert.equal(connection.state.value, "lost");
+  context.mock.timers.tick(100);
+  for (let turn = 0; turn < 20; turn++) await Promise.resolve();
+  await new Promise(setImmediate);
+  answers.set("/api/session", session);
+  context.mock.timers.tick(200);
+  await new Promise(setImmediate);
+  assert.equal(FakeSocket.all.length, 2);
+});

@@ -1,6 +1,6 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
-import { frequencyResponse, margins, openLoop } from "../src/tune/frequency_response.ts";
+import { differences, frequencyResponse, margins, openLoop, within } from "../src/tune/frequency_response.ts";
 
 const PERIOD = 0.001;
 const LENGTH = 40_000;
@@ -33,6 +33,23 @@ test("a low-pass has -3 dB and -45 degrees at its corner", () => {
   assert.ok(Math.abs(response.gain[corner]! + 3.01) < 0.1, String(response.gain[corner]));
   assert.ok(Math.abs(response.phase[corner]! + 45 + 1.8) < 2, String(response.phase[corner]));
   assert.ok(response.coherence[corner]! > 0.99);
+});
+
+test("the differences of a slow drift with a sweep have the response of the sweep", () => {
+  const input = sweep().map((value, row) => value + 1e-7 * row ** 2);
+  const response = frequencyResponse(differences(input), differences(lowPass(input, 10)), PERIOD)!;
+  for (const [frequency, gain] of [[10, -3.01], [30, -10]] as const) {
+    const index = near(response.frequency, frequency);
+    assert.ok(Math.abs(response.gain[index]! - gain) < 0.2, String(response.gain[index]));
+  }
+});
+
+test("a part of a response has only its frequencies", () => {
+  const input = sweep();
+  const part = within(frequencyResponse(input, lowPass(input, 10), PERIOD)!, 5, 20);
+  assert.ok(part.frequency[0]! >= 5 && part.frequency.at(-1)! <= 20);
+  const lengths = [part.gain, part.phase, part.coherence, part.real, part.imaginary].map((each) => each.length);
+  assert.deepEqual(new Set(lengths), new Set([part.frequency.length]));
 });
 
 test("a delay turns the phase beyond -180 degrees", () => {

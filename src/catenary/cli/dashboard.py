@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 
 from catenary.cli.arguments import number
 from catenary.cli.failure import UsageError
-from catenary.cli.parsers import Commands, add_command
+from catenary.cli.parsers import Commands, add_command, add_uid
 
 if TYPE_CHECKING:
     from catenary.dashboard.security import Access
@@ -24,7 +24,7 @@ BROWSERS = ("chromium", "chromium-browser", "google-chrome", "brave-browser", "m
 INTERFACES = Path("/sys/class/net")
 
 DESCRIPTION = """\
-Serves a page with which any browser watches and moves the machine of a running loop
+Serves a page for browsers that shows the machine of a running loop and moves its axes
 (Loop(..., sink=cat.Share(NAME, jog=True))). SHARE is the name of the share; without it, the only
 existing share is used. With a TARGET or a machine file, starts a program that operates all devices
 with conservative limits, and ends it with the server. Drives stay disabled until an operator
@@ -50,25 +50,27 @@ def add_parser(commands: Commands) -> None:
         "source",
         metavar="SHARE",
         nargs="?",
-        help="name of a share, or a target: eth0, virtual, machine.toml ...",
+        help="name of a share (default: the only one), or a target: eth0, virtual, machine.toml",
     )
     parser.add_argument(
-        "--host", default="127.0.0.1", help="address to listen on (127.0.0.1: this machine only)"
+        "--host", default="127.0.0.1", help="address to listen on (default: this machine only)"
     )
-    parser.add_argument("--port", type=port, default=8710, help="port (8710; 0: a free one)")
-    parser.add_argument("--cert", type=Path, metavar="FILE", help="certificate of TLS, PEM")
-    parser.add_argument("--key", type=Path, metavar="FILE", help="private key of TLS, PEM")
+    parser.add_argument(
+        "--port", type=port, default=8710, help="TCP port (default: 8710; 0: any free one)"
+    )
+    parser.add_argument("--cert", type=Path, metavar="FILE", help="TLS certificate (PEM)")
+    parser.add_argument(
+        "--key", type=Path, metavar="FILE", help="private key of the certificate (PEM)"
+    )
     parser.add_argument("--viewer-only", action="store_true", help="offer no operator role")
     parser.add_argument(
-        "--new-links", action="store_true", help="make new links; former links become invalid"
+        "--new-links", action="store_true", help="make new links; previous links become invalid"
     )
     add_panels(parser)
     parser.add_argument(
         "--window", action="store_true", help="open the page in a window of Chromium"
     )
-    parser.add_argument(
-        "--uid", type=number, help="user ID of the share's owner (default: yours, then root's)"
-    )
+    add_uid(parser)
     parser.set_defaults(run=run)
 
 
@@ -110,6 +112,7 @@ def run(arguments: argparse.Namespace) -> int:
     from catenary.operate import OperateProcess
 
     require_packages()
+    check_paths(arguments)
     options = Options(
         host=arguments.host,
         port=arguments.port,
@@ -124,12 +127,37 @@ def run(arguments: argparse.Namespace) -> int:
     source = arguments.source or only_share(arguments.uid)
     with interrupted_by_sigterm():
         if not is_target(source):
-            run_server(source.removeprefix("share:"), options, announce)
+            share = source.removeprefix("share:")
+            note_missing(share, arguments.uid)
+            run_server(share, options, announce)
         else:
             share = f"dashboard-{os.getpid()}"
             with OperateProcess(source, share, show) as program:
                 run_server(share, options, announce, program.problem)
     return 0
+
+
+def check_paths(arguments: argparse.Namespace) -> None:
+    """Raise UsageError for a file or folder of an option that does not exist."""
+    if arguments.model is not None and not arguments.model.is_file():
+        raise UsageError(f"--model: there is no file {arguments.model}")
+    if arguments.recordings is not None and not arguments.recordings.is_dir():
+        raise UsageError(f"--recordings: there is no folder {arguments.recordings}")
+    source = arguments.source or ""
+    if source.endswith(".toml") and ":" not in source and not Path(source).is_file():
+        raise UsageError(
+            f"there is no file {source}", hint=f"create it: catenary init TARGET -o {source}"
+        )
+
+
+def note_missing(share: str, uid: int | None) -> None:
+    """Print a note if a share does not exist, because its name may be misspelled."""
+    from catenary.dashboard.source import existing_shares
+
+    names = existing_shares(uid)
+    if share not in names:
+        existing = ", ".join(map(repr, names)) or "none"
+        show(f"note: there is no share {share!r} yet; existing shares: {existing}")
 
 
 class Announcer:

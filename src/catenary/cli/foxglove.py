@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 
 from catenary.cli.arguments import number
-from catenary.cli.parsers import Commands, add_command
+from catenary.cli.parsers import Commands, add_command, add_uid
 from catenary.cli.record import stopped_by_signals
 
 
@@ -23,9 +23,7 @@ def add_parser(commands: Commands) -> None:
     parser.add_argument("share", metavar="SHARE", help="name of the loop's share")
     parser.add_argument("--host", default="127.0.0.1", help="address (default: this machine only)")
     parser.add_argument("--port", type=number, default=8765, help="TCP port (default: 8765)")
-    parser.add_argument(
-        "--uid", type=number, help="user ID of the share's owner (default: yours, then root's)"
-    )
+    add_uid(parser)
     parser.set_defaults(run=run)
 
 

@@ -8,7 +8,7 @@ import sys
 import textwrap
 from typing import TYPE_CHECKING, TypeAlias
 
-from catenary.cli.arguments import position
+from catenary.cli.arguments import number, position
 
 if TYPE_CHECKING:
     from catenary.bus import MainDevice
@@ -58,6 +58,12 @@ def add_json(parser: argparse.ArgumentParser) -> None:
 def add_target(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "target", metavar="TARGET", help="eth0, virtual, machine.toml ... (see catenary --help)"
+    )
+
+
+def add_uid(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--uid", type=number, help="user ID of the share's owner (default: yours, then root's)"
     )
 
 

@@ -10,9 +10,9 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
-from catenary.cli.arguments import number, positive_seconds
+from catenary.cli.arguments import positive_seconds
 from catenary.cli.failure import UsageError
-from catenary.cli.parsers import Commands, add_command, add_json
+from catenary.cli.parsers import Commands, add_command, add_json, add_uid
 
 if TYPE_CHECKING:
     from catenary.record import Recorder
@@ -42,9 +42,7 @@ def add_parser(commands: Commands) -> None:
         action="store_true",
         help="record the last stored cycles of a share even if its process has died",
     )
-    parser.add_argument(
-        "--uid", type=number, help="user ID of the share's owner (default: yours, then root's)"
-    )
+    add_uid(parser)
     parser.add_argument(
         "--repair",
         action="store_true",

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import argparse
 
-from catenary.cli.arguments import number
-from catenary.cli.parsers import Commands, add_command
+from catenary.cli.parsers import Commands, add_command, add_uid
 
 
 def add_parser(commands: Commands) -> None:
@@ -17,12 +16,10 @@ def add_parser(commands: Commands) -> None:
         "(Loop(..., sink=cat.Share(NAME))), also over ssh. Press q to quit. Press s twice within "
         "2 s for a quick stop of all axes; this is not an emergency stop (ISO 13850). If the loop "
         "ends, the page waits until it returns. Needs catenary[top].",
-        example="catenary top arm\nssh robot catenary top arm",
+        example="catenary top arm\nssh -t robot catenary top arm",
     )
     parser.add_argument("share", metavar="SHARE", help="name of the loop's share")
-    parser.add_argument(
-        "--uid", type=number, help="user ID of the share's owner (default: yours, then root's)"
-    )
+    add_uid(parser)
     parser.set_defaults(run=run)
 
 

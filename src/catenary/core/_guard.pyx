@@ -153,10 +153,19 @@ cdef void guard_take_orders(axes_t *x, axis_t *a, const target_t *t, uint32_t i)
 
 
 cdef void guard_stop(axes_t *x, uint8_t reason) noexcept nogil:
-    """Stop every axis for a reason; each needs a new request afterwards."""
+    """Stop every axis for a reason; each needs a new request afterwards.
+
+    The stop of an operator is also the reason of an axis that is disabled already, so that the
+    application does not enable it as if nothing had happened.
+    """
+    cdef axis_t *a
     cdef uint32_t i
     for i in range(x.axis_count):
-        stop_axis(x, &x.axes[i], reason)
+        a = &x.axes[i]
+        stop_axis(x, a, reason)
+        if reason == STOP_OPERATOR:
+            a.stop_reason = reason
+            a.stop_cycle = x.number
 
 
 cdef uint16_t stop_command(axes_t *x, axis_t *a) noexcept nogil:

@@ -17,7 +17,7 @@ cdef struct jog_t:             # of one axis
     int64_t deadline           # the jog stops later than this [ns]
     uint8_t status             # answer to that press
     uint8_t ending             # status at the end of the ramp
-    double velocity            # wished [rad/s]; of a sweep: its amplitude
+    double velocity            # requested [rad/s]; of a sweep: its amplitude
     double acceleration        # [rad/s²]
     double deceleration        # [rad/s²]
     double remaining           # [rad] in the direction of `velocity`; infinite: until release

@@ -192,6 +192,8 @@ cdef void follow_position(axes_t *x, axis_t *a, const target_t *t, double target
         a.refused_cycles = 0
         return
     if not is_accepted(x, a, target, 1 if a.yielded else between):  # a pause after a jog has no limit
+        if t.header.streamed:
+            a.yielded = 0  # other axes move on: the late limit counts
         fall_back(x, a, False)
         return
     a.previous_velocity = a.setpoint_velocity

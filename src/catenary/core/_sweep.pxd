@@ -9,7 +9,7 @@ With w = 2π·frequency, the acceleration is at most amplitude · sqrt(w² + ben
 relative rate of change of the edge and of the amplitude, |ln(end/start)|/duration. The amplitude is
 reduced where this exceeds the acceleration. Without this, the acceleration limit would clip the sine.
 
-Budget: 50 ns per cycle.
+Budget: 25 ns per cycle.
 """
 
 from libc.math cimport M_PI, exp, expm1, fabs, fmax, fmin, fmod, isfinite, log, sin, sqrt

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import time
 from collections.abc import AsyncIterator, Awaitable, Callable
 from dataclasses import dataclass
 from importlib.metadata import version
@@ -20,22 +21,20 @@ from catenary.dashboard.client import CLOSE_POLICY, Client
 from catenary.dashboard.doctor import run_doctor
 from catenary.dashboard.guard import Guard
 from catenary.dashboard.hub import Hub
-from catenary.dashboard.limits import RateLimit
 from catenary.dashboard.report import make_report
 from catenary.dashboard.requests import (
     CALLS_MAX,
     FAILURES,
     VIEWER_CALLS_MAX,
-    BusyError,
     error_body,
     is_allowed,
 )
 from catenary.dashboard.security import SESSION_SECONDS, Access, Role
 from catenary.dashboard.static_files import StaticFile, read_static_files
-from catenary.errors import CatenaryError
+from catenary.errors import BusyError, CatenaryError
+from catenary.remote.limits import RateLimit
 
 BODY_MAX = 64 << 10  # bytes
-RETRY_SECONDS = 0.2
 INDEX = "index.html"
 T = TypeVar("T")
 Handler = Callable[["Page", Request, Role], Awaitable[Response]]
@@ -80,7 +79,7 @@ def make_app(
         hub: connection to the share; the application runs it.
         more: returns further routes.
     """
-    page = Page(access, hub, read_static_files(), RateLimit(2.0, 20), asyncio.Lock())
+    page = Page(access, hub, read_static_files(), RateLimit(2.0, 20.0), asyncio.Lock())
 
     @contextlib.asynccontextmanager
     async def lifespan(_: Starlette) -> AsyncIterator[None]:
@@ -160,7 +159,7 @@ async def log_in(page: Page, request: Request) -> Response:
     if isinstance(body, Response):
         return body
     cookie = page.access.login(body.token)
-    if cookie is None and not page.logins.use():
+    if cookie is None and page.logins.wait_for(time.monotonic()) > 0:
         return refusal(429, "too many wrong tokens", hint="wait a few seconds")
     if cookie is None:
         return refusal(403, "the token is not valid", hint="open the link that the terminal shows")
@@ -213,15 +212,18 @@ async def call(page: Page, request: Request, role: Role) -> Response:
         result = await page.hub.requests.call(body.method, body.params, limit=limit)
         return json_response({"result": result})
     except BusyError as error:
-        return json_response({"error": error_body(error), "retry": RETRY_SECONDS}, 429)
+        return json_response({"error": error_body(error), "retry": error.retry}, 429)
     except FAILURES as error:
-        retry = getattr(error, "retry", None)
-        extra = {} if retry is None else {"retry": retry}
-        return json_response({"error": error_body(error), **extra}, 400)
+        return json_response({"error": error_body(error)}, 400)
 
 
 async def doctor(page: Page, request: Request, role: Role) -> Response:
-    """Examine this machine, and return the result as JSON."""
+    """Examine this machine, and return the result as JSON.
+
+    The examination measures latency with a real-time thread, which can delay a loop.
+    """
+    if role != "operator":
+        return refusal(403, f"the role {role} cannot examine the machine")
     if page.doctor.locked():
         return refusal(429, "the examination is already running", hint="wait for its result")
     async with page.doctor:

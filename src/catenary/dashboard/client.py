@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import time
 from collections.abc import Callable
 from functools import partial
 
@@ -11,7 +12,6 @@ import msgspec
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from catenary.dashboard.hub import Hub
-from catenary.dashboard.limits import RateLimit
 from catenary.dashboard.messages import (
     OPERATOR_ONLY,
     Beat,
@@ -32,9 +32,10 @@ from catenary.dashboard.motion import Motion
 from catenary.dashboard.outbox import Outbox
 from catenary.dashboard.security import Role
 from catenary.errors import CatenaryError
+from catenary.remote.limits import RateLimit
 from catenary.share import Reader
 
-MESSAGES_PER_SECOND, MESSAGES_AT_ONCE = 400.0, 800
+MESSAGES_PER_SECOND, MESSAGES_AT_ONCE = 400.0, 800.0
 WORK_MAX = 64  # motion messages that wait for the worker
 CLOSE_POLICY, CLOSE_BUSY = 1008, 1013
 Work = Callable[[], None]
@@ -107,7 +108,7 @@ class Client:
                 received = await self._socket.receive()
                 if received["type"] == "websocket.disconnect":
                     return
-                if self.outbox.overflow or not self._limit.use():
+                if self.outbox.overflow or self._limit.wait_for(time.monotonic()) > 0:
                     await self._socket.close(CLOSE_POLICY, "too many messages")
                     return
                 self._handle(received.get("text") or received.get("bytes") or "")

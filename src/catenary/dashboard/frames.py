@@ -67,7 +67,7 @@ def _find_column(share: str, shapes: Mapping[str, tuple[int, ...]], signal: str)
     found = SIGNAL.match(signal)
     name, index = (found["name"], found["index"]) if found is not None else (signal, None)
     shape = shapes.get(name)
-    if shape and index is not None and int(index) < shape[0]:
+    if shape and index is not None and len(shape) == 1 and int(index) < shape[0]:
         return name, int(index)
     raise ValueError(f"the share {share!r} has no signal {signal!r}")
 

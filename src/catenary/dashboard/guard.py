@@ -13,7 +13,7 @@ class Guard:
     """ASGI application that checks Host and Origin, and adds the security headers.
 
     Args:
-        app: the application behind it.
+        app: the application that receives the accepted requests.
         access: tokens and allowed hosts.
     """
 
@@ -41,7 +41,7 @@ class Guard:
         await app(scope, receive, send_with_headers)
 
     def problem(self, scope: Scope) -> str:
-        """Return why a request is refused; "" if it is not."""
+        """Return the reason for a refusal; "" if the request is accepted."""
         headers = Headers(scope=scope)
         if not self._access.is_own_host(headers.get("host", "")):
             return f"this server does not have the name {headers.get('host', '')!r}"

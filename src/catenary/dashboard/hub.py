@@ -28,6 +28,7 @@ POSES_INTERVAL = 1 / 30  # [s]
 STATUS_INTERVAL = 0.05  # [s]
 TIMING_INTERVAL = 0.5  # [s]
 CLIENTS_MAX = 32
+RESERVED = 8  # of these clients, for operators
 SPARE = 8  # threads for clients that are leaving
 EVENTS_KEPT = 256
 ADVICE_SECONDS = 1.0  # limit for the advice of new events
@@ -99,7 +100,7 @@ class Hub:
             self.workers.shutdown(wait=False)
 
     def _step_or_drop(self, now: float) -> None:
-        """Send what is due. After an error, detach from the share and tell all clients."""
+        """Send all due messages. After an error, detach from the share and notify all clients."""
         try:
             self.step(now)
         except ShareError as error:
@@ -111,7 +112,7 @@ class Hub:
             self._change()
 
     def step(self, now: float) -> None:
-        """Send what is due. `now` is a monotonic time [s]."""
+        """Send all due messages. `now` is a monotonic time [s]."""
         if self.source.step():
             self._change()
         reader = self.source.reader
@@ -134,7 +135,8 @@ class Hub:
 
     def add(self, client: Client) -> bool:
         """Add a client and send the present state. Return False if there are too many."""
-        if len(self.clients) >= CLIENTS_MAX:
+        limit = CLIENTS_MAX if client.role == "operator" else CLIENTS_MAX - RESERVED
+        if len(self.clients) >= limit:
             return False
         self.clients.add(client)
         self._greet(client)
@@ -151,7 +153,7 @@ class Hub:
         return list(self._events)
 
     def _change(self) -> None:
-        """Tell all clients that the share has ended or returned."""
+        """Forget the previous run, and greet all clients if the share has returned."""
         reader = self.source.reader
         self._notes, self._events, self._fresh, self._token = AxisNotes(), [], [], 0
         self.subscriptions = None if reader is None else Subscriptions(reader.layout)
@@ -166,7 +168,7 @@ class Hub:
                 self._greet(client)
 
     def _send_reason(self) -> None:
-        """Send why there is no share, if the reason has changed."""
+        """Send the reason for a missing share, if it has changed."""
         reason = self._problem() or self.source.reason
         if reason != self._reason:
             self._reason = reason

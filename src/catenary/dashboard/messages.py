@@ -6,7 +6,7 @@ from typing import Annotated, Literal, TypeAlias
 
 import msgspec
 
-SIGNALS_MAX = 256  # of a subscription
+SIGNALS_MAX = 256  # signals of a subscription
 RATE_MAX = 60.0  # frames per second
 
 Id = Annotated[int, msgspec.Meta(ge=0, le=0xFFFF)]

@@ -14,7 +14,7 @@ from catenary.errors import CatenaryError
 from catenary.share import Jog, JogStatus, Lease, Reader, RequestStatus, StateRequest, Sweep
 
 LEASE_SECONDS = 1.0
-REQUESTS_MAX = 64  # whose answers are awaited
+REQUESTS_MAX = 64  # requests without an answer
 REFUSED_FROM = RequestStatus.REFUSED_NOT_ALLOWED
 
 

@@ -40,7 +40,7 @@ POINTS_MAX = 20_000
 SIGNALS_MAX = 64
 WINDOW_BYTES = 64 << 20  # rows of a window that is read at once
 STEP = 0.25  # [s] of work for one answer
-CACHED = 300_000  # chunks times signals whose extremes are kept, for each recording
+CACHED = 300_000  # cached extremes of each recording: chunks times signals
 BINS = 16  # intervals of a chunk in a large window
 OPEN_MAX = 4  # recordings
 

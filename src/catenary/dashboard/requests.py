@@ -10,15 +10,16 @@ from functools import partial
 from typing import TYPE_CHECKING
 
 from catenary.dashboard.security import Role
-from catenary.errors import CatenaryError, ResponseTimeout, ShareError
+from catenary.errors import BusyError, CatenaryError, ResponseTimeout, ShareError
 
 if TYPE_CHECKING:
     from catenary.remote import Client
 
 FAILURES = (CatenaryError, OSError, RuntimeError, TypeError, ValueError)  # of a request
 CONNECTIONS = 6
-CALLS_MAX = 32  # that wait or run
+CALLS_MAX = 32  # calls that wait or run
 VIEWER_CALLS_MAX = 16  # the rest is for operators
+RETRY_SECONDS = 0.2
 READS = frozenset(
     {
         *("hello", "devices", "axes", "objects", "sdo_read", "diagnosis"),
@@ -95,7 +96,7 @@ class Requests:
             ValueError: a value is not valid.
         """
         if self._waiting >= limit:
-            raise BusyError(limit)
+            raise BusyError(f"{limit} requests are already waiting", retry=RETRY_SECONDS)
         self._waiting += 1
         try:
             async with self._running:
@@ -142,13 +143,6 @@ class Requests:
                 self._idle.append(client)
                 return
         client.close()
-
-
-class BusyError(CatenaryError):
-    """Too many requests are waiting."""
-
-    def __init__(self, limit: int) -> None:
-        super().__init__(f"{limit} requests are already waiting", hint="try again")
 
 
 def is_allowed(method: str, role: Role) -> bool:

@@ -22,7 +22,7 @@ class SceneFeed:
     """
 
     def __init__(self, model: Path, joints: Mapping[str, str]) -> None:
-        self.problem = ""  # reason why there is no scene
+        self.problem = ""  # reason for a missing scene
         self._model = model
         self._joints = joints
         self._run = ""

@@ -3,7 +3,8 @@
     POST /api/tune/capture   {axis, seconds}: {bode, identified, problems, rows, lost}
     GET  /api/tune/report    the figures of all captured axes as one HTML page; ?axis=NAME: of one
 
-A capture only reads. Start the motion with a jog, in the program, or with a law.
+A capture only reads, and ends when its client disconnects. Start the motion with a jog, in the
+program, or with a law.
 """
 
 from __future__ import annotations
@@ -11,6 +12,7 @@ from __future__ import annotations
 import asyncio
 import html
 import time
+from collections.abc import Awaitable, Callable
 from dataclasses import asdict, dataclass, field
 
 import msgspec
@@ -80,9 +82,13 @@ class Tune:
             return refusal(429, "another capture is running", hint="wait for its end")
         async with self._busy:
             try:
-                captured, lost = await capture(reader, body.axis, body.seconds)
+                captured, lost = await capture(
+                    reader, body.axis, body.seconds, request.is_disconnected
+                )
             except RuntimeError:  # the hub has closed the reader
                 return refusal(409, page.hub.source.reason)
+            if await request.is_disconnected():
+                return Response(status_code=400)
             figures = await asyncio.to_thread(
                 make_figures, reader.layout.axes[body.axis], captured, lost
             )
@@ -95,17 +101,20 @@ class Tune:
         return Response(make_page(figures), media_type="text/html")
 
 
-async def capture(reader: Reader, axis: int, seconds: float) -> tuple[Capture, int]:
+async def capture(
+    reader: Reader, axis: int, seconds: float, is_ended: Callable[[], Awaitable[bool]]
+) -> tuple[Capture, int]:
     """Return the values of an axis in the next `seconds` [s], and the number of lost cycles.
 
     Args:
         reader: reader of the share.
         axis: number of the axis.
         seconds: duration [s].
+        is_ended: returns True to end the capture before.
     """
     end, number, lost = time.monotonic() + seconds, reader.number, 0
     parts = [np.empty((len(FIELDS), 0))]
-    while (left := end - time.monotonic()) > 0 and reader.alive:
+    while (left := end - time.monotonic()) > 0 and reader.alive and not await is_ended():
         await asyncio.sleep(min(READ_INTERVAL, left))
         rows, missing = reader.rows(number)
         if len(rows):

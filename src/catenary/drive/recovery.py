@@ -8,6 +8,7 @@ from typing import Protocol
 
 from catenary.drive.drives import Drives
 from catenary.errors import DriveError
+from catenary.plan.stop_reason import StopReason
 
 RESET_PERIOD = 0.1  # [s] between two changes of the reset bit, whose rising edge resets a fault
 
@@ -54,6 +55,9 @@ class Recovery:
     while the reason holds. When there has been no reason for some time, all drives are enabled
     again. `stops` lists all stops so far. `just_stopped` is True if the last step was a stop.
 
+    The stop of an operator (`catenary.share.Reader.stop`) is a reason, too. The drives are not
+    enabled again afterwards: the operator or the program must enable all of them.
+
     Args:
         drives: the drives.
         after: time without a reason, after which the drives are enabled [s].
@@ -77,6 +81,7 @@ class Recovery:
         self._since: float | None = None  # [s] time of the last reason or enable request
         self._next_reset = 0.0
         self._resetting = False
+        self._by_operator = False  # an operator has stopped a drive, and all are not enabled yet
 
     def step(self, cycle: CycleNow, reason: str | None = None, *, ready: bool = True) -> Phase:
         """Stop or recover the drives.
@@ -94,17 +99,37 @@ class Recovery:
         """
         now, self.just_stopped = cycle.time, False
         since = self._since = now if self._since is None else self._since
+        if StopReason.OPERATOR in self._drives.stopped:  # until the next request of the program
+            self._by_operator = True
+            if self.phase != Phase.STOPPED:
+                reason = reason or StopReason.OPERATOR.text
         if reason and self.phase != Phase.STOPPED:
             self._stop(cycle, reason)
         elif reason:
             self._since = now
-            self._reset(now)
-        elif self.phase == Phase.STOPPED and now > since + self._after:
-            self._drives.enable()
-            self.phase, self._since = Phase.STARTING, now
+            self._remain_stopped(now)
+        elif self.phase == Phase.STOPPED:
+            self._end_stop(now, now > since + self._after)
         elif self.phase == Phase.STARTING:
             self._start(now - since, ready)
         return self.phase
+
+    def _end_stop(self, now: float, is_over: bool) -> None:
+        """Enable the drives, or wait until they are enabled after the stop of an operator."""
+        if self._by_operator:
+            is_over = bool((self._drives.enabled | self._drives.jogged).all())
+        elif is_over:
+            self._drives.enable()
+        if is_over:
+            self._by_operator = False
+            self.phase, self._since = Phase.STARTING, now
+
+    def _remain_stopped(self, now: float) -> None:
+        """Reset faults. Stop drives that an operator has enabled."""
+        if (self._drives.enabled | self._drives.jogged).any():
+            self._drives.quick_stop()
+        else:
+            self._reset(now)
 
     def _stop(self, cycle: CycleNow, reason: str) -> None:
         self._drives.quick_stop()

@@ -20,7 +20,7 @@ class Source:
 
     def __init__(self, name: str, uid: int | None = None) -> None:
         self.name = name
-        self.reason = ""  # reason for which there is no running loop; "" while there is one
+        self.reason = ""  # reason for a missing loop; "" while one runs
         self._uid = uid
         self._connect(attach(name, uid=uid))
 

@@ -20,7 +20,7 @@ from catenary.operate.devices import make_requests
 from catenary.remote.share import Share
 from catenary.target import MainDevice, is_machine_file
 
-LOOK_SECONDS = 0.2  # between two looks at the error of the loop
+CHECK_SECONDS = 0.2  # between two checks for an error of the loop
 
 
 def main(target: str, name: str) -> int:
@@ -40,12 +40,12 @@ def main(target: str, name: str) -> int:
                 report("note", str(warning.message))
             loop.run_in_background()
             report("ready")
-            while not ended.wait(LOOK_SECONDS):
+            while not ended.wait(CHECK_SECONDS):
                 if loop.error is not None:
                     raise loop.error
     except (CatenaryError, ValueError, OSError) as error:
-        hint = getattr(error, "hint", "")
-        report("error", f"{error}; {hint}" if hint and hint not in str(error) else str(error))
+        message, hint = getattr(error, "message", str(error)), getattr(error, "hint", "")
+        report("error", f"{message}; {hint}" if hint else message)
         return 1
     return 0
 

@@ -277,14 +277,16 @@ class Client:
     def home(self, axes: Sequence[str]) -> messages.Done:
         """Start the homing of axes by name, as their `Drives` define it.
 
-        The loop must run in the background.
+        The loop must run in the background, and its share must allow motions: `Share(jog=True)`.
         """
         return self.call("home", axes=list(axes))  # type: ignore[no-any-return]
 
     def move(
         self, axes: Sequence[str], positions: Sequence[float], velocity: float | None = None
     ) -> messages.Done:
-        """Start a move of axes to positions. The loop must run in the background.
+        """Start a move of axes to positions.
+
+        The loop must run in the background, and its share must allow motions: `Share(jog=True)`.
 
         Args:
             axes: Names of the axes.

@@ -1,13 +1,18 @@
-"""Limit of the rate of requests, for all clients together."""
+"""Limits of the rates of requests and messages."""
 
 from __future__ import annotations
 
-RATE = 200.0  # requests per second
+RATE = 200.0  # requests of all clients per second
 BURST = 40.0  # requests that may arrive at once after a pause
 
 
 class RateLimit:
-    """Token bucket. The time is an argument."""
+    """Token bucket. The time is an argument.
+
+    Args:
+        rate: Requests per second.
+        burst: Requests that may arrive at once after a pause.
+    """
 
     def __init__(self, rate: float = RATE, burst: float = BURST) -> None:
         self._rate = rate

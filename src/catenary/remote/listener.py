@@ -98,7 +98,7 @@ class Connection:
         return self._socket.fileno()
 
     def receive(self) -> bytes | None:
-        """Return the next message; None if there is none, or the client has gone.
+        """Return the next message; None if there is none, or the connection is closed.
 
         A message that is too long closes the connection.
         """

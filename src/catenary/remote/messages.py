@@ -300,7 +300,7 @@ RESULTS: dict[str, Any] = {
     "virtual_power": Done,
     "virtual_push": Done,
 }
-WRITES = (  # methods that change something; events name their peers. Pushes are too frequent
+WRITES = (  # methods that publish an event RemoteWrite; pushes are too frequent
     "sdo_write",
     "set_state",
     "reset_error",

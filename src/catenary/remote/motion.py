@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager
+from functools import partial
 
 from catenary.drive import Drives
 from catenary.errors import LoopError
@@ -14,14 +15,7 @@ from catenary.remote.program import Program, Work, in_thread
 def home(program: Program, axes: list[str]) -> Work[messages.Done]:
     """Start the homing of axes; see `Client.home`."""
     drives, numbers = _drives_of(program, axes)
-    update = _update_of(program)
-
-    def start() -> None:
-        with update():
-            drives.home(numbers)
-
-    yield from in_thread(start)
-    return messages.Done()
+    return (yield from _begin(program, lambda: drives.home(numbers)))
 
 
 def move(
@@ -31,11 +25,27 @@ def move(
     if len(positions) != len(axes):
         raise ValueError(f"{len(positions)} positions for {len(axes)} axes")
     drives, numbers = _drives_of(program, axes)
+    begin = partial(drives.move_to, positions, velocity=velocity, axes=numbers)
+    return (yield from _begin(program, begin))
+
+
+def _begin(program: Program, begin: Callable[[], object]) -> Work[messages.Done]:
+    """Begin a motion in an update of the loop. Nothing moves after the deadline of the request.
+
+    Raises:
+        LoopError: The share does not allow motions, or the loop does not run in the background.
+    """
+    if not program.share.layout.jog:
+        raise LoopError(
+            "the program does not allow motions on request of other programs",
+            hint="it can allow them: cat.Share(..., jog=True)",
+        )
     update = _update_of(program)
 
-    def start() -> None:
+    def start(given_up: Callable[[], bool]) -> None:
         with update():
-            drives.move_to(positions, velocity=velocity, axes=numbers)
+            if not given_up():
+                begin()
 
     yield from in_thread(start)
     return messages.Done()

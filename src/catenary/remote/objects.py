@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from functools import partial
 from typing import Any
 
 import msgspec
@@ -21,7 +22,7 @@ from catenary.procedure.sdo_information import (
     read_object_list,
 )
 from catenary.remote import messages
-from catenary.remote.program import Program, Work
+from catenary.remote.program import Program, Work, checked
 from catenary.types import DataType, Integer, Value, by_index, by_name
 from catenary.wire.sdo_information import Access, EntryDescription, ListType, ObjectCode
 
@@ -167,8 +168,9 @@ def sdo_write(
     known = sub.description.documented_object(index, subindex)
     kind = yield from _type_of(program, sub, channel, (index, subindex), type)
     data = _encoded(value, kind)
-    _refuse_in_use(program, sub, index, subindex)
-    yield from program.ask(download(channel, index, subindex, data))
+    refuse = partial(_refuse_in_use, program, sub, index, subindex)
+    refuse()
+    yield from program.ask(checked(refuse, download(channel, index, subindex, data)))
     return _answer(data, None if kind is None else kind.decode(data), kind, known)
 
 
@@ -188,7 +190,7 @@ def _encoded(value: Any, kind: DataType[Value] | None) -> bytes:
 
 def _refuse_in_use(program: Program, sub: SubDevice, index: int, subindex: int) -> None:
     """Raise LoopError for an object that controls an enabled axis or its process data."""
-    enabled = program.enabled_axes(sub.position)
+    enabled = program.powered_axes(sub.position)
     if not enabled or not _is_in_use(sub, index, subindex):
         return
     raise LoopError(

@@ -1,4 +1,4 @@
-"""The program that serves requests: its share, and the network whose data the share publishes."""
+"""The program that serves requests: its share, and the network of the share's loop."""
 
 from __future__ import annotations
 
@@ -7,7 +7,11 @@ from collections.abc import Callable, Generator, Iterator
 from importlib.metadata import version
 from typing import TypeAlias, TypeVar
 
+import numpy as np
+
 from catenary.bus import SubDevice
+from catenary.drive.port import REQUESTED_SHIFT
+from catenary.drive.state_machine import RequestedState
 from catenary.errors import LoopError
 from catenary.loop.network import Network
 from catenary.loop.session import Session
@@ -18,6 +22,11 @@ from catenary.share.share import Share
 from catenary.wire.cia402 import AxisState
 
 T = TypeVar("T")
+POWERED = (  # states in which a drive moves or brakes its axis
+    AxisState.OPERATION_ENABLED,
+    AxisState.QUICK_STOP_ACTIVE,
+    AxisState.FAULT_REACTION_ACTIVE,
+)
 WAITING = True
 # A method yields None where it may be cut, and WAITING until something outside of it has happened.
 Work: TypeAlias = Generator[bool | None, None, T]
@@ -99,32 +108,49 @@ class Program:
             pending.cancel()
         return pending.result()
 
-    def enabled_axes(self, position: int) -> list[str]:
-        """Return the names of the axes of a device that are enabled."""
-        session = self.network.session
-        states = session.views.axis_state.tolist()
-        return [
-            axis.name
-            for axis, state in zip(session.plan.cycle.axes, states, strict=True)
-            if axis.device == position and state == AxisState.OPERATION_ENABLED
-        ]
+    def powered_axes(self, position: int) -> list[str]:
+        """Return the names of the axes of a device that have power, or are requested to be enabled.
+
+        The state is that of the newest cycle, even if the program does not iterate its loop.
+        """
+        views, newest = self.network.session.views, self.share.newest()
+        if newest is None:
+            states, flags = views.axis_state, views.axis_flags
+        else:
+            states, flags = newest["state"], newest["axis_flags"]
+        powered = np.isin(states, POWERED) | (flags >> REQUESTED_SHIFT == RequestedState.ENABLED)
+        axes = self.network.plan.cycle.axes
+        return [axes[i].name for i in np.flatnonzero(powered) if axes[i].device == position]
 
 
-def in_thread(function: Callable[[], T]) -> Work[T]:
-    """Run a function that may block in a separate thread, and return its result."""
+def checked(check: Callable[[], None], procedure: Procedure[T]) -> Procedure[T]:
+    """Run a check when a procedure begins, because its turn may come much later."""
+    check()
+    return (yield from procedure)
+
+
+def in_thread(function: Callable[[Callable[[], bool]], T]) -> Work[T]:
+    """Run a function that may block in a separate thread, and return its result.
+
+    The function receives another one, which returns True when the request has ended.
+    """
     results: list[T] = []
     errors: list[BaseException] = []
 
     def run() -> None:
         try:
-            results.append(function())
+            results.append(function(given_up.is_set))
         except BaseException as error:  # raised again in the thread of the request
             errors.append(error)
 
+    given_up = threading.Event()
     thread = threading.Thread(target=run, name="catenary remote call", daemon=True)
     thread.start()
-    while thread.is_alive():
-        yield WAITING
+    try:
+        while thread.is_alive():
+            yield WAITING
+    finally:
+        given_up.set()
     if errors:
         raise errors[0]
     return results[0]

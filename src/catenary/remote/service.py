@@ -175,7 +175,7 @@ class Service:
                 break
 
     def _drop(self, task: Task) -> None:
-        """End a request whose client has gone. A transfer in progress continues to its end."""
+        """End a request of a closed connection. A transfer in progress continues to its end."""
         task.cancel(ShareError("the client has closed its connection"))
 
     def _answer(self, task: Task, answer: list[bytes]) -> None:

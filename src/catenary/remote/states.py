@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 from catenary.bus import SubDevice
 from catenary.errors import LoopError
 from catenary.procedure.al_state import DeviceState, acknowledge, read_state, request_state
 from catenary.procedure.exchange import Procedure, after
 from catenary.procedure.station import Station
 from catenary.remote import messages
-from catenary.remote.program import Program, Work
+from catenary.remote.program import Program, Work, checked
 from catenary.wire.al import AlState, status_code
 
 RETURN_PAUSE = 0.05  # [s] between two checks of a device that the loop brings to OP
@@ -24,13 +26,14 @@ def set_state(
     if target is AlState.OP:
         program.session.watch.release(sub)
         return as_message((yield from program.ask(_until_op(sub.station))))
-    _refuse_powered(program, sub, f"the request for {target}")
+    refuse = partial(_refuse_powered, program, sub, f"the request for {target}")
+    refuse()
     if program.session.watch.requires(position) and not force:
         raise LoopError(
             f"{sub.station} is required: the loop ends with StateError if it leaves OP",
             hint="use force=True to accept this, or make its request with required=False",
         )
-    return as_message((yield from program.ask(request_state(sub.station, target))))
+    return as_message((yield from program.ask(checked(refuse, request_state(sub.station, target)))))
 
 
 def reset_error(program: Program, position: int) -> Work[messages.State]:
@@ -62,8 +65,8 @@ def _acknowledged(station: Station) -> Procedure[DeviceState]:
 
 
 def _refuse_powered(program: Program, sub: SubDevice, what: str) -> None:
-    """Raise LoopError if an axis of the device is enabled."""
-    enabled = program.enabled_axes(sub.position)
+    """Raise LoopError if an axis of the device is enabled, or still brakes."""
+    enabled = program.powered_axes(sub.position)
     if enabled:
         raise LoopError(
             f"{what} is refused: {', '.join(enabled)} of {sub.station} enabled",

@@ -130,6 +130,7 @@ class Lease:
         if sweep is not None:
             sweep.check_period(self._layout.period)
         words = self._desk.motion
+        self._check_loop()
         with self._renewed():
             serial = press(words, number, values, token)
         jog = Jog(words, number, serial, self.renew, self._layout.axes[number])
@@ -157,6 +158,7 @@ class Lease:
             raise ValueError(f"state={state!r}: must be one of {', '.join(STATES)}")
         numbers = self._numbers if axes is None else self._numbers_of(axes)
         words = self._desk.motion
+        self._check_loop()
         with self._renewed():
             if state == "quick_stop":
                 words.stopper.store(0, self._pid)
@@ -166,8 +168,10 @@ class Lease:
     def renew(self) -> None:
         """Renew the lease for its full duration.
 
-        Raises LeaseError if the lease has ended, or if the desk is locked for too long.
+        Raises LeaseError if the lease or the loop's process has ended, or if the desk is locked for
+        too long.
         """
+        self._check_loop()
         self._renew(None)
 
     def release(self) -> None:
@@ -238,13 +242,18 @@ class Lease:
         The process of the loop is checked only if commands are waiting.
         """
         waiting = self._desk.rings[self._place].newest - self._desk.taken.load(self._place)
-        if waiting and not self._layout.writer.is_alive:
-            raise LeaseError(f"the loop's process has died: {self._layout.writer}")
+        if waiting:
+            self._check_loop()
         if waiting >= COMMANDS:
             raise LeaseError(
                 f"the loop has not read the last {COMMANDS} commands",
                 hint="its body must call share.apply(drives) or share.commands()",
             )
+
+    def _check_loop(self) -> None:
+        """Raise LeaseError if the process of the loop has died: its answers stay in the desk."""
+        if not self._layout.writer.is_alive:
+            raise LeaseError(f"the loop's process has died: {self._layout.writer}")
 
     def _is_valid(self) -> bool:
         return self._desk.is_valid(self._place, self._serial)

@@ -220,11 +220,16 @@ class Reader:
         Each axis needs a new request to be enabled again. The first call opens the memory for
         commands, unless `token` or `lease` has opened it.
 
-        Raises ShareError if the loop does not accept commands from this user.
+        Raises ShareError if the loop does not accept commands from this user, or has ended.
         """
         motion = self._opened_desk().motion
         motion.stopper.store(0, os.getpid())
         motion.stop.add(0, 1)
+        if not self.alive:
+            raise ShareError(
+                f"the loop of the share {self.layout.name!r} has ended, and cannot be stopped",
+                hint="attach again, if its program has opened another loop",
+            )
 
     @property
     def token(self) -> int:

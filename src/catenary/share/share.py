@@ -137,11 +137,20 @@ class Share:
 
         They are NaN before the first cycle and after the loop has closed.
         """
-        number, row = self._cycles.copy() if self._cycles is not None else (0, b"")
-        if number == 0:
+        newest = self.newest()
+        if newest is None:
             return np.full(len(self.layout.axes), np.nan)
-        commanded: Values = np.frombuffer(row, self._dtype)[0]["commanded_position"]
+        commanded: Values = newest["commanded_position"]
         return commanded
+
+    def newest(self) -> np.void | None:
+        """Return the newest cycle, as `Reader.read`; None if there is none yet, or no loop.
+
+        Any thread may call it.
+        """
+        cycles = self._cycles
+        number, row = cycles.copy() if cycles is not None else (0, b"")
+        return np.frombuffer(row, self._dtype)[0] if number else None
 
     @property
     def layout(self) -> ShareLayout:

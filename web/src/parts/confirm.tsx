@@ -37,8 +37,12 @@ export function ConfirmDialog() {
   const question = pending.value;
   useEffect(() => {
     if (question === null) return;
+    const former = document.activeElement;
     if (dialog.current?.open === false) dialog.current.showModal();
     cancel.current?.focus();
+    return () => {
+      if (former instanceof HTMLElement) former.focus(); // for the keyboard and screen readers
+    };
   }, [question]);
   if (question === null) return null;
   const close = (yes: boolean) => {

@@ -1,4 +1,4 @@
-/** Edge trigger with pre-trigger share, as in an oscilloscope. */
+/** Edge trigger with a pre-trigger part, as in an oscilloscope. */
 
 import type { RingStore } from "./store.ts";
 

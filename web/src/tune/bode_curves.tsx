@@ -39,19 +39,23 @@ function Curve({ response, values, label, range }: CurveProps) {
       width: place.current!.clientWidth,
       height: HEIGHT,
       legend: { show: false },
-      scales: { x: { time: false, distr: 3 }, ...(range && { y: { range } }) },
+      scales: { x: { time: false, distr: 3, range: ends(response.frequency) }, ...(range && { y: { range } }) },
       series: [{}, { stroke: colour("--trace-0"), width: 1.5, points: { show: false } }],
       cursor: { drag: { x: false, y: false } },
-      axes: [{ ...axis, values: frequencies }, { ...axis, label, size: 58, labelSize: 16 }],
+      axes: [{ ...axis, values: frequencies, filter: (_plot, splits) => splits }, { ...axis, label, size: 58, labelSize: 16 }],
     }, [response.frequency, values], place.current!);
     return () => plot.destroy();
   }, [response, values, theme]);
   return <div ref={place} class="tune-curve" role="img" aria-label={label} />;
 }
 
-/** Label only 1, 2 and 5 times a power of ten. uPlot leaves out some places (null). */
-function frequencies(_plot: uPlot, splits: (number | null)[]): string[] {
-  return splits.map((each) => (each !== null && /^[125]/.test(each.toExponential()) ? `${each} Hz` : ""));
+function ends(values: number[]): [number, number] {
+  return [values[0]!, values.at(-1)!];
+}
+
+/** Label only 1, 2 and 5 times a power of ten. */
+function frequencies(_plot: uPlot, splits: number[]): string[] {
+  return splits.map((each) => (/^[125](e|\.0)/.test(each.toExponential(1)) ? `${Number(each.toPrecision(1))} Hz` : ""));
 }
 
 function MarginList({ loop }: { loop: FrequencyResponse }) {

@@ -44,7 +44,7 @@ export function HoldButton({ label, held, disabled, begin, end }: HoldProps) {
       onPointerUp={end} onPointerMove={(event) => isOtherButton(event) && end()}
       onPointerCancel={end} onLostPointerCapture={end} onBlur={end}
       onKeyDown={(event) => {
-        if (!isKey(event)) return;
+        if (!isKey(event)) return end(); // with Meta held, macOS does not report that a key goes up
         event.preventDefault();
         if (!event.repeat) begin();
       }}

@@ -54,6 +54,14 @@ export function within(response: FrequencyResponse, low: number, high: number): 
   return { frequency: part(frequency), coherence: part(coherence), real, imaginary, ...bode(real, imaginary) };
 }
 
+/**
+ * Return the differences of successive values. Those of input and output have the same response as the
+ * signals themselves, without the large power of slow motions.
+ */
+export function differences(values: Float64Array): Float64Array {
+  return values.subarray(1).map((value, index) => value - values[index]!);
+}
+
 /** Return the values of signals in the rows that contain all of them. */
 export function recorded(store: RingStore, names: readonly string[], from: number, to: number): Float64Array[] {
   const rows = Array.from({ length: Math.max(0, to - from) }, (_, index) => from + index);

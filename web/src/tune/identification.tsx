@@ -37,6 +37,7 @@ const UNITS: Record<Unit, readonly string[]> = {
 export class Identification {
   readonly busy = signal(false);
   readonly figures: Signal<Figures | null> = signal(null);
+  private aborting = new AbortController();
 
   constructor(private readonly axis: number) {}
 
@@ -44,21 +45,28 @@ export class Identification {
   async capture(seconds: number): Promise<void> {
     if (this.busy.peek()) return;
     this.busy.value = true;
+    const { signal } = (this.aborting = new AbortController());
     try {
-      this.figures.value = await requestFigures(this.axis, seconds);
+      this.figures.value = await requestFigures(this.axis, seconds, signal);
     } catch (error) {
-      notifyError(error);
+      if (!signal.aborted) notifyError(error);
     } finally {
       this.busy.value = false;
     }
   }
+
+  /** End a capture without figures. */
+  stop(): void {
+    this.aborting.abort();
+  }
 }
 
-async function requestFigures(axis: number, seconds: number): Promise<Figures> {
+async function requestFigures(axis: number, seconds: number, signal: AbortSignal): Promise<Figures> {
   const reply = await fetch("/api/tune/capture", {
     method: "POST",
     headers: { "Content-Type": "application/json" },
     body: JSON.stringify({ axis, seconds }),
+    signal,
   });
   const answer = (await reply.json()) as Figures | { error: ErrorBody };
   if ("error" in answer) throw new RemoteError(answer.error);

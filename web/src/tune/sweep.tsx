@@ -10,10 +10,12 @@ import type { Unit } from "../views/axes/jogging.ts";
 import { ScopeResponse } from "./bode.tsx";
 import { BodeCurves } from "./bode_curves.tsx";
 import { Entry, HoldButton } from "./controls.tsx";
-import { frequencyResponse, recorded, within } from "./frequency_response.ts";
+import { differences, frequencyResponse, recorded, within } from "./frequency_response.ts";
+import type { Identification } from "./identification.tsx";
 import { MotionTest } from "./motion_test.ts";
 
 const DEFAULT: Sweep = { start: 1, end: 50, duration: 10 };
+const LONGEST = 60; // [s] of a capture by the server
 const REST = 3; // [s] of the record before and after the sweep
 const EDGE = 1.1; // the response ends at this multiple of the last frequency
 
@@ -22,18 +24,23 @@ interface SweepProps {
   axis: number;
   unit: Unit;
   disabled: boolean;
-  capture: (seconds: number) => void; // a sweep begins that lasts so long
+  identification: Identification; // captures each sweep
 }
 
-export function SweepResponse({ connection, axis, unit, disabled, capture }: SweepProps) {
+export function SweepResponse({ connection, axis, unit, disabled, identification }: SweepProps) {
   const names = [`commanded_position[${axis}]`, `position[${axis}]`];
   const test = useMemo(() => new MotionTest(connection, axis, names), [connection, axis]);
   const [sweep, setSweep] = useState(DEFAULT);
   const [velocity, setVelocity] = useState(unit === "m" ? 0.05 : 0.5);
   useEffect(() => test.attach(), [test]);
+  const { held, jogging } = test;
+  const isDone = () => jogging.answers.peek().get(axis)?.status === "DONE";
+  useEffect(() => held.subscribe((control) => {
+    if (control === 0 && !isDone()) identification.stop();
+  }), [test]);
   const begin = () => {
     test.begin(1, sweep.duration + REST, { velocity, distance: null, acceleration: null, sweep });
-    capture(sweep.duration);
+    void identification.capture(Math.min(sweep.duration, LONGEST));
   };
   const entry = (key: keyof Sweep, label: string) => (
     <Entry label={label} value={sweep[key]} onChange={(value) => setSweep({ ...sweep, [key]: value })} />
@@ -47,9 +54,9 @@ export function SweepResponse({ connection, axis, unit, disabled, capture }: Swe
           {entry("end", text.tune.sweepEnd)}
           {entry("duration", text.tune.sweepDuration)}
           <Entry label={`${text.tune.velocity} [${unit}/s]`} value={velocity} onChange={setVelocity} />
-          <HoldButton label={text.tune.sweep} disabled={disabled} held={test.held.value !== 0}
+          <HoldButton label={text.tune.sweep} disabled={disabled} held={held.value !== 0}
             begin={begin} end={() => test.end()} />
-          <span role="status" class="small">{test.jogging.answers.value.get(axis)?.text}</span>
+          <span role="status" class="small">{jogging.answers.value.get(axis)?.text}</span>
         </div>
         <p class="muted small">{text.tune.sweepHint}</p>
         {store !== null && <Response key={store.timeOf(store.begin)} store={store} names={names} sweep={sweep} />}
@@ -73,7 +80,7 @@ function Response({ store, names, sweep }: { store: RingStore; names: string[]; 
 /** Return the response between the frequencies of a sweep; null if the record is too short. */
 function responseOf(store: RingStore, names: string[], { start, end }: Sweep) {
   const [command, position] = recorded(store, names, store.begin, store.end);
-  const response = frequencyResponse(command!, position!, store.period);
+  const response = frequencyResponse(differences(command!), differences(position!), store.period);
   if (response === null) return null;
   const found = within(response, Math.min(start, end) / EDGE, Math.max(start, end) * EDGE);
   return found.frequency.length < 3 ? null : found;

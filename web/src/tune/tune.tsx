@@ -1,7 +1,7 @@
 /** Tune: parameters of laws; step response, frequency response and identification of an axis. */
 
 import { useComputed } from "@preact/signals";
-import { useMemo, useState } from "preact/hooks";
+import { useEffect, useMemo, useState } from "preact/hooks";
 import type { Connection } from "../connection.ts";
 import { shortened } from "../logic/format.ts";
 import type { AxisInfo } from "../remote.ts";
@@ -80,13 +80,13 @@ interface TestsProps {
 
 function AxisTests({ connection, axis, name, unit }: TestsProps) {
   const identification = useMemo(() => new Identification(axis), [axis]);
+  useEffect(() => () => identification.stop(), [identification]);
   const enabled = useIsPowered(connection, axis);
   const disabled = !enabled || (connection.hello.value?.reason_no_jog ?? null) !== null;
   return (
     <>
       <StepResponse {...{ connection, axis, unit, disabled }} />
-      <SweepResponse {...{ connection, axis, unit, disabled }}
-        capture={(seconds) => void identification.capture(seconds)} />
+      <SweepResponse {...{ connection, axis, unit, disabled, identification }} />
       <IdentificationPanel {...{ identification, name, unit }} />
     </>
   );

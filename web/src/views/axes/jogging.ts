@@ -112,9 +112,9 @@ export class Jogging {
   }
 
   private receiveAnswer({ axis, press, status, text }: JogMessage): void {
+    this.answer(axis, { status, text });
     this.deadman.receiveStatus(press, status);
     this.follow();
-    this.answer(axis, { status, text });
   }
 
   private disconnect(): void {

@@ -44,7 +44,7 @@ export function Health({ connection }: { connection: Connection }) {
           <button
             type="button"
             class="button"
-            disabled={busy.value}
+            disabled={busy.value || connection.role.value !== "operator"}
             onClick={() => void run(() => doctor(connection))}
           >
             {text.overview.doctor}
