@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 
 import catenary as cat
+from catenary.errors import LoopError
 from catenary.operate import OperateProcess
 from tests.machine.files import write_small
 from tests.share.names import own_name
@@ -44,18 +45,21 @@ def test_it_operates_all_drives_disabled_and_allows_jogs(name: str) -> None:
     assert "1 rad/s" in notes[0]
 
 
-def test_an_error_of_the_target_is_reported(name: str) -> None:
+def test_an_error_of_the_target_is_raised(name: str) -> None:
     notes: list[str] = []
-    with OperateProcess("no-such-nic0", name, notes.append) as program:
-        assert comes_true(lambda: "has ended" in program.problem())
-    assert "no-such-nic0" in program.problem()
-    assert notes[-1].startswith("error: ")
-    assert "hint:" not in notes[-1]
+    with (
+        OperateProcess("no-such-nic0", name, notes.append) as program,
+        pytest.raises(LoopError, match="the program for no-such-nic0 has ended: ") as caught,
+    ):
+        program.wait_until_ready()
+    assert program.problem() == caught.value.message
+    assert "hint:" not in program.problem()
+    assert notes == []
 
 
 def test_a_killed_program_is_reported(name: str) -> None:
     with OperateProcess("virtual", name, str) as program:
-        assert comes_true(lambda: not program.problem())
+        program.wait_until_ready()
         os.kill(program.pid, signal.SIGKILL)
         assert comes_true(lambda: "status -9" in program.problem())
 

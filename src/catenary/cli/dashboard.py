@@ -133,6 +133,7 @@ def run(arguments: argparse.Namespace) -> int:
         else:
             share = f"dashboard-{os.getpid()}"
             with OperateProcess(source, share, show) as program:
+                program.wait_until_ready()
                 run_server(share, options, announce, program.problem)
     return 0
 

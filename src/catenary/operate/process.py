@@ -7,8 +7,10 @@ from collections.abc import Callable
 from types import TracebackType
 from typing import Self
 
+from catenary.errors import LoopError
 from catenary.realtime.child import start_python
 
+START_SECONDS = 120.0  # to scan and start a long segment
 FOREVER = 1e9  # [s]
 END_SECONDS = 15.0  # to stop the axes and close the segment
 
@@ -27,6 +29,7 @@ class OperateProcess:
         self._problem = f"the program for {target} is starting"
         self._target = target
         self._ending = False
+        self._decided = threading.Event()  # set when cycles run, or the process has ended
         self._child = start_python(["-m", "catenary.operate", target, share])
         self._thread = threading.Thread(target=self._read, name="operate reports", daemon=True)
         self._thread.start()
@@ -39,6 +42,14 @@ class OperateProcess:
     def problem(self) -> str:
         """Return why there are no cycles: the start or the error of the process; "" otherwise."""
         return self._problem
+
+    def wait_until_ready(self) -> None:
+        """Wait until cycles run.
+
+        Raises LoopError if the process has ended, or is not ready in time.
+        """
+        if not self._decided.wait(START_SECONDS) or self._problem:
+            raise LoopError(self._problem)
 
     def end(self) -> None:
         """End the process in order: axes are stopped, the segment is closed."""
@@ -64,11 +75,14 @@ class OperateProcess:
             kind, _, text = line.partition(" ")
             if kind == "ready":
                 self._problem = ""
+                self._decided.set()
             elif kind == "error":
                 self._problem = failed = f"the program for {self._target} has ended: {text}"
-            if text:
+            if text and (kind != "error" or self._decided.is_set()):
                 self._show(f"{kind}: {text}")
         if not self._ending and not failed:
             status = self._child.process.wait()
             self._problem = f"the program for {self._target} has ended with status {status}"
-            self._show(f"error: {self._problem}")
+            if self._decided.is_set():  # otherwise wait_until_ready raises it
+                self._show(f"error: {self._problem}")
+        self._decided.set()
