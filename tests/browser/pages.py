@@ -28,7 +28,7 @@ REPORT_VIOLATIONS = """
 document.addEventListener("securitypolicyviolation", (event) =>
   console.error("CSP: " + event.violatedDirective + " " + event.blockedURI));
 """
-# A connection that the server has ended is no error of the page.
+# A connection that the server has ended does not count as an error of the page.
 EXPECTED = ("net::ERR_CONNECTION_REFUSED", "WebSocket connection to")
 
 

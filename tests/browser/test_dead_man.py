@@ -52,7 +52,7 @@ def test_browser_killed(shared_rig: Rig, own_browser: Chromium) -> None:
         assert shared_rig.jogs(shown)
         own_browser.end()
         assert shared_rig.stands()
-    with shared_rig.operating() as other:  # the lease of the dead browser blocks nobody
+    with shared_rig.operating() as other:  # the lease of the dead browser has ended
         assert shared_rig.jogs(other)
         other.page.mouse.up()
         assert shared_rig.stands()

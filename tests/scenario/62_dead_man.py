@@ -244,7 +244,7 @@ def test_link_down_ends_the_jog() -> None:
 
 
 def test_the_watchdog_acts_if_the_process_of_the_loop_is_killed_during_a_jog() -> None:
-    """Without the process nobody judges the jog. The drive stops after its watchdog."""
+    """Without the process, the watchdog of the drive stops the axis."""
     patient = cat.StopPolicy(on_axis_stopped="event", raise_faults=False)
     with operated(stop=patient) as desk:
         desk.jog(300)
