@@ -15,7 +15,11 @@ import sys
 import catenary as cat
 with cat.MainDevice(cat.Segment([cat.virtual.Servo()])) as main:
     arm = cat.Drives(main.scan().drives, counts_per_turn=2**20, velocity_limit=100.0)
-    with cat.Share("arm", mode=int(sys.argv[1], 8)) as share, cat.Loop(arm, sink=share) as loop:
+    stop = cat.StopPolicy(on_axis_stopped="event")  # operators may stop axes
+    with (
+        cat.Share("arm", mode=int(sys.argv[1], 8)) as share,
+        cat.Loop(arm, sink=share, stop=stop) as loop,
+    ):
         next(loop)
         print("running", flush=True)
         while not sys.stdin.closed:
