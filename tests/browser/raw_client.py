@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import time
 from types import TracebackType
 from typing import Any, Self
 from urllib.parse import urlsplit
@@ -24,7 +25,7 @@ class RawClient:
         reply = httpx.post(f"{origin}/login", json={"token": token}, headers={"Origin": origin})
         reply.raise_for_status()
         cookies = "; ".join(f"{name}={value}" for name, value in reply.cookies.items())
-        self.socket = connect(
+        self._connecting = connect(
             f"ws://{link.netloc}/ws",
             origin=origin,  # type: ignore[arg-type]
             additional_headers={"Cookie": cookies},
@@ -44,12 +45,33 @@ class RawClient:
 
     def until(self, op: str, **values: object) -> dict[str, Any]:
         """Return the next message of a kind with these values."""
-        while True:
+        end, others = time.monotonic() + DEADLINE, []
+        while time.monotonic() < end:
             message = self.receive()
             if message["op"] == op and values.items() <= message.items():
                 return message
+            if message["op"] in (op, "error"):
+                others.append(message)
+        raise AssertionError(f"no message {op!r} with {values}, but {others[-5:]}")
+
+    def press(self, velocity: float) -> tuple[int, str]:
+        """Begin a jog of axis 0. Return the number of its press and the token that it used.
+
+        On a busy machine, a token can be too old when it arrives: then press again.
+        """
+        for number in range(1, 20):
+            token: str = self.until("token")["token"]
+            self.send(
+                op="press", axis=0, velocity=velocity, distance=None, token=token, press=number
+            )
+            status = self.until("jog", press=number)["status"]
+            if status not in ("REFUSED_STALE", "REFUSED_MOVING"):
+                assert status == "MOVING"
+                return number, token
+        raise AssertionError("each press was refused")
 
     def __enter__(self) -> Self:
+        self.socket = self._connecting.__enter__()
         return self
 
     def __exit__(
@@ -58,4 +80,4 @@ class RawClient:
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
-        self.socket.close()
+        self._connecting.__exit__(kind, error, trace)

@@ -63,8 +63,11 @@ def test_page_frozen(shared_rig: Rig) -> None:
         assert shared_rig.jogs(shown)
         life = shown.page.context.new_cdp_session(shown.page)
         life.send("Page.setWebLifecycleState", {"state": "frozen"})
+        life.send("Debugger.enable")  # Chromium freezes no visible page, so this stops its scripts
+        life.send("Debugger.pause")
         assert shared_rig.stands()
         position = shared_rig.position()
+        life.send("Debugger.resume")
         life.send("Page.setWebLifecycleState", {"state": "active"})
         expect(shown.plus(AXIS)).to_have_attribute("aria-pressed", "false", timeout=SECONDS)
         assert_stays(shared_rig, position)
@@ -193,14 +196,13 @@ def test_link_down(wired: Rig) -> None:
 def test_burst_of_old_heartbeats(shared_rig: Rig) -> None:
     with shared_rig.operating(), RawClient(shared_rig.dashboard) as client:
         tokens = [client.until("token")["token"] for _ in range(3)]
-        client.send(op="press", axis=0, velocity=SPEED, distance=None, token=tokens[-1], press=1)
-        assert shared_rig.moves()
-        client.until("jog", status="EXPIRED")
+        press, _ = client.press(SPEED)
+        client.until("jog", press=press, status="EXPIRED")
         assert shared_rig.stands()
         position = shared_rig.position()
         for number in range(BURST):
-            client.send(op="beat", axis=0, press=1, token=tokens[number % 3])
-        client.send(op="beat", axis=0, press=1, token=client.until("token")["token"])
+            client.send(op="beat", axis=0, press=press, token=tokens[number % 3])
+        client.send(op="beat", axis=0, press=press, token=client.until("token")["token"])
         client.send(op="ping", t=1.0)
         client.until("pong")
         assert_stays(shared_rig, position)
@@ -220,12 +222,11 @@ def test_press_with_an_old_token(shared_rig: Rig) -> None:
 def test_invented_tokens(shared_rig: Rig) -> None:
     """Heartbeats with numbers that the core has not issued do not extend a jog."""
     with shared_rig.operating(), RawClient(shared_rig.dashboard) as client:
-        token = client.until("token")["token"]
-        client.send(op="press", axis=0, velocity=SPEED, distance=None, token=token, press=1)
+        press, token = client.press(SPEED)
         for offset in range(1, BURST):
             guess = str((int(token) + offset) % (1 << 48))
-            client.send(op="beat", axis=0, press=1, token=guess)
-        client.until("jog", status="EXPIRED")
+            client.send(op="beat", axis=0, press=press, token=guess)
+        client.until("jog", press=press, status="EXPIRED")
         assert shared_rig.stands()
 
 
