@@ -64,6 +64,7 @@ def test_loss_of_the_pointer_or_the_page(shared_rig: Rig, cause: str) -> None:
 
         def end() -> None:
             shown.plus(AXIS).evaluate(CAUSES[cause])
+            shown.page.mouse.move(1, 1)  # Chromium reports a lost capture with the next event
 
         assert_releases(shared_rig, shown, begin, end)
 
@@ -103,7 +104,7 @@ def test_a_step_ends_by_itself(shared_rig: Rig) -> None:
         before = float(shared_rig.state()["position"])  # type: ignore[arg-type]
         shown.page.get_by_role("button", name="1°", exact=True).click()
         shown.press(AXIS)
-        expect(shown.answer(AXIS)).to_have_text("the distance was moved", timeout=SECONDS)
+        expect(shown.answer(AXIS)).to_have_text("the motion is complete", timeout=SECONDS)
         assert shared_rig.stands()
         after = float(shared_rig.state()["position"])  # type: ignore[arg-type]
         assert after - before == pytest.approx(radians(1), abs=1e-3)
