@@ -227,7 +227,7 @@ class Client:
 
     # Diagnosis
 
-    def diagnosis(self) -> messages.Diagnosis:
+    def diagnosis(self) -> messages.DiagnosisResult:
         """Read the error counters and states of all devices, and locate faults."""
         return self.call("diagnosis")  # type: ignore[no-any-return]
 

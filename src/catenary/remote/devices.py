@@ -131,7 +131,7 @@ def clear_counters(program: Program) -> Work[messages.Done]:
     return messages.Done()
 
 
-def diagnosis(program: Program) -> Work[messages.Diagnosis]:
+def diagnosis(program: Program) -> Work[messages.DiagnosisResult]:
     """Read the error counters and states of all devices, and locate faults."""
     main = program.session.main
     ring = ring_of(main.link) is not None
@@ -146,7 +146,7 @@ def diagnosis(program: Program) -> Work[messages.Diagnosis]:
         )
         for each in found.findings
     ]
-    return messages.Diagnosis(problems=problems, text=str(found))
+    return messages.DiagnosisResult(problems=problems, text=str(found))
 
 
 def emergencies(program: Program, position: int) -> list[messages.EmergencyEntry]:

@@ -173,7 +173,7 @@ class Problem(msgspec.Struct, frozen=True, kw_only=True):
     devices: list[int] = []
 
 
-class Diagnosis(msgspec.Struct, frozen=True, kw_only=True):
+class DiagnosisResult(msgspec.Struct, frozen=True, kw_only=True):
     """Result of a diagnosis."""
 
     problems: list[Problem]
@@ -285,7 +285,7 @@ RESULTS: dict[str, Any] = {
     "set_state": State,
     "reset_error": State,
     "registers": bytes,
-    "diagnosis": Diagnosis,
+    "diagnosis": DiagnosisResult,
     "emergencies": list[EmergencyEntry],
     "events": Events,
     "clear_counters": Done,
