@@ -27,7 +27,15 @@ RETURNED = {
     "catenary.procedure.al_state": ("DeviceState",),
     "catenary.remote.messages": (
         *("Hello", "Device", "Port", "Axis", "Objects", "ObjectEntry", "SdoValue", "State"),
-        *("Diagnosis", "Problem", "EmergencyEntry", "Events", "EventEntry", "Timing", "Figures"),
+        *(
+            "DiagnosisResult",
+            "Problem",
+            "EmergencyEntry",
+            "Events",
+            "EventEntry",
+            "Timing",
+            "Figures",
+        ),
         *("Clocks", "ClockEntry", "Text", "LawEntry", "Parameter", "Done"),
     ),
     "catenary.wire.al": ("AlState",),
