@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from tests.browser.chromium import Chromium
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="module")
 def playwright(chromium: str) -> Iterator[Playwright]:
     from playwright.sync_api import sync_playwright
 
@@ -24,7 +24,7 @@ def playwright(chromium: str) -> Iterator[Playwright]:
         yield started
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="module")
 def browser(playwright: Playwright, chromium: str) -> Iterator[Browser]:
     """Browser of all tests that do not stop or kill it."""
     from tests.browser.chromium import started
@@ -42,7 +42,7 @@ def own_browser(playwright: Playwright, chromium: str) -> Iterator[Chromium]:
         yield running
 
 
-@pytest.fixture(scope="package")
+@pytest.fixture(scope="module")
 def shared_rig(browser: Browser) -> Iterator[Rig]:
     """Machine of all tests that leave it and its page intact."""
     with ExitStack() as stack:

@@ -107,7 +107,7 @@ def test_a_window_receives_the_token_in_a_private_file(
 
     started: list[list[str]] = []
     monkeypatch.setattr("shutil.which", lambda name: f"/usr/bin/{name}")
-    monkeypatch.setattr("catenary.cli.dashboard.subprocess.Popen", lambda c, **_: started.append(c))
+    monkeypatch.setattr("subprocess.Popen", lambda c, **_: started.append(c))
     monkeypatch.setattr("catenary.dashboard.server.key_folder", lambda: tmp_path)
     access = Access(bytes(32), host="127.0.0.1", port=8710)
     for _ in range(2):  # a second server replaces the file

@@ -6,7 +6,6 @@ import argparse
 import os
 import shutil
 import signal
-import subprocess
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -177,6 +176,8 @@ class Announcer:
 
         print(announcement(access, draw=sys.stdout.isatty()), flush=True)
         if self._browser is not None:
+            import subprocess  # only --window needs it
+
             page = link_file(access, key_folder()).as_uri()
             subprocess.Popen([self._browser, f"--app={page}"], start_new_session=True)
 

@@ -17,8 +17,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 import msgspec
-import numpy as np
-import numpy.typing as npt
 
 from catenary.errors import ConfigurationError
 from catenary.virtual._plant import CompiledPlant
@@ -29,6 +27,8 @@ from catenary.virtual.mujoco_model import read_model
 
 if TYPE_CHECKING:
     import mujoco
+    import numpy as np
+    import numpy.typing as npt
 
 # Equal to the internal cycle of the servos. A shorter step has no effect on their torques. A longer
 # step adds dead time to their velocity loops (80 Hz).
@@ -277,6 +277,8 @@ class Plant:
         Raises:
             ValueError: The model has no such body.
         """
+        import numpy as np  # only plants need NumPy, which MuJoCo installs
+
         number = self.body_number(body)
         data = self.data
         at = data.xpos[number] + data.xmat[number].reshape(3, 3) @ np.asarray(point, np.float64)
