@@ -72,6 +72,8 @@ def first_paint(rig: Rig) -> float:
 
 def keyboard_stops(rig: Rig, presses: int) -> list[float]:
     """Return the times from Escape to the quick stop at the servo [s]."""
+    from tests.browser.pages import SECONDS, expect
+
     found = []
     with rig.operating() as shown:
         for _ in range(presses):
@@ -84,6 +86,7 @@ def keyboard_stops(rig: Rig, presses: int) -> list[float]:
             found.append(round(float(rig.servos.line()) - start, 5))
             if not rig.becomes("SWITCH ON DISABLED"):
                 raise RuntimeError("the servo did not stop")
+            expect(shown.plus("shoulder")).to_be_disabled(timeout=SECONDS)  # the page shows it
     return found
 
 

@@ -1,10 +1,10 @@
 """Remote service: one thread that answers the requests of all clients of a share.
 
-Theory of operation. The thread runs in passes. A pass receives at most one message, from the
-clients in turn, and continues the requests for at most SLICE. After it, the thread sleeps for
-PAUSE, so that it never holds the interpreter for long. Therefore at most 1 / PAUSE messages are
-received per second. Further ones stay in the sockets of their senders, which then block. Requests
-beyond the rate limit receive BusyError with the time after which to repeat them.
+Theory of operation. The thread runs in passes. A pass receives at most one message of each client,
+and continues the requests. Both end after SLICE. Then the thread sleeps for PAUSE, so that it
+disturbs few cycles of a loop on its processor. Further messages stay in the sockets of their
+senders, which then block. Requests beyond the rate limit receive BusyError with the time after
+which to repeat them.
 
 A request that waits for a device stays pending, and does not delay the others. Each has a deadline.
 Clients that do not read, or send messages that are too long, lose their connection.
@@ -31,7 +31,7 @@ from catenary.remote.methods import Methods
 from catenary.remote.task import Task, encode_error
 
 SLICE = 200e-6  # [s] of work in one pass
-PAUSE = 0.002  # [s] between two passes
+PAUSE = 0.005  # [s] between two passes
 IDLE = 0.5  # [s] between two passes without messages and requests
 CLIENTS = 32
 PENDING = 32  # requests of all clients
@@ -76,7 +76,7 @@ class Service:
         leave_real_time()
         try:
             while not self._ended.is_set():
-                if self._receive(PAUSE if self._is_busy else IDLE) or self._is_busy:
+                if self._receive(0.0 if self._is_busy else IDLE) or self._is_busy:
                     self._continue()
                     self._ended.wait(PAUSE)
         finally:
@@ -94,7 +94,11 @@ class Service:
         self._listener.close()
 
     def _receive(self, timeout: float) -> bool:
-        """Receive at most one message, or accept one client. Return False if there is none."""
+        """Receive messages for at most SLICE, and accept a client. Return False if there are none.
+
+        Args:
+            timeout: Time to wait for the first message [s].
+        """
         self._clients = deque(client for client in self._clients if client.open)
         poll = select.poll()
         for number in (self._wake, self._listener.fileno(), *(c.fileno() for c in self._clients)):
@@ -106,13 +110,14 @@ class Service:
         self._clients = deque(client for client in self._clients if client.open)
         if self._listener.fileno() in ready:
             self._accept()
-        for client in self._clients:
-            if client.fileno() in ready:
-                self._clients.remove(client)  # its next turn comes after the others
-                self._clients.append(client)
-                message = client.receive()
-                if message is not None:
-                    self._begin(client, message)
+        until = time.perf_counter() + SLICE
+        for client in [client for client in self._clients if client.fileno() in ready]:
+            self._clients.remove(client)  # its next turn comes after the others
+            self._clients.append(client)
+            message = client.receive()
+            if message is not None:
+                self._begin(client, message)
+            if time.perf_counter() >= until:
                 break
         return bool(ready)
 
