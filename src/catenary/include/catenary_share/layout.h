@@ -23,19 +23,19 @@ typedef struct cat_share_head {
 
 static int cat_is(const char *key, const char *name) { return strcmp(key, name) == 0; }
 
-/* Decode a NumPy type such as "<f8" or "|u1". */
+/* Decode a NumPy type such as "<f8", "|u1" or "u1". Big-endian numbers are refused. */
 static void cat_decode_dtype(cat_json *j, catenary_field *field) {
     const char *dtype = cat_json_string(j);
     char *end = NULL;
     unsigned long size = 0;
-    if (strlen(dtype) > 2 && strchr("<|=", dtype[0]) && strchr("biuf", dtype[1])) {
-        size = strtoul(dtype + 2, &end, 10);
-    }
+    if (*dtype && strchr("<|=", *dtype)) dtype++;
+    if (cat_is(dtype, "?")) dtype = "b1";
+    if (*dtype && strchr("biuf", *dtype)) size = strtoul(dtype + 1, &end, 10);
     if (size < 1 || size > CAT_NUMBER_SIZE_MAX || *end) {
         cat_json_fail(j);
         return;
     }
-    field->kind = dtype[1];
+    field->kind = *dtype;
     field->size = (uint32_t)size;
 }
 

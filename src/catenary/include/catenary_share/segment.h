@@ -173,7 +173,7 @@ int catenary_read(const catenary_share *share, void *row, size_t size, uint64_t 
 int catenary_read_cycle(const catenary_share *share, uint64_t number, void *row, size_t size, catenary_error *error) {
     int code = cat_check_row(share, row, size, error);
     if (code) return code;
-    if (number && ring_copy(&share->cycles, number, (uint8_t *)row)) return 0;
+    if (number && number <= catenary_newest(share) && ring_copy(&share->cycles, number, (uint8_t *)row)) return 0;
     return cat_fail(error, CATENARY_E_OVERWRITTEN, "the share '%s' does not store cycle %llu", share->name,
                     (unsigned long long)number);
 }
