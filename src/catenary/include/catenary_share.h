@@ -76,8 +76,8 @@ typedef struct catenary_lease catenary_lease;
 
 /* ---- open and close */
 
-/* Open the share `name` of the user `uid` (CATENARY_OWN_UID: this user or root). Name only a user
- * whom you trust: the owner of a share can crash its readers. Return 0 or a code. */
+/* Open the share `name` of the user `uid` (CATENARY_OWN_UID: this user or root). Pass only user ids that
+ * you trust: the owner of a share can crash its readers. Return 0 or a code. */
 int catenary_open(catenary_share **share, const char *name, int64_t uid, int flags, catenary_error *error);
 
 /* Unmap a share and free it. Release its leases first. */
