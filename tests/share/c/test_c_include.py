@@ -42,7 +42,9 @@ def test_header_can_contain_the_implementation(tmp_path: Path, language: tuple[s
 
 
 def test_wheel_contains_all_files_that_the_header_includes() -> None:
-    pathspec = pytest.importorskip("pathspec", reason="pathspec reads the patterns as the build does")
+    pathspec = pytest.importorskip(
+        "pathspec", reason="pathspec reads the patterns as the build does"
+    )
     settings = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["scikit-build"]
     excluded = pathspec.GitIgnoreSpec.from_lines(settings["wheel"]["exclude"])
     source = ROOT / "src" / "catenary"
