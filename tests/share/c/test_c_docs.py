@@ -46,7 +46,7 @@ def test_move_arm_moves_the_first_axis(name: str, tmp_path: Path) -> None:
     with cell_of(name) as cell:
         program = Program.of([str(program_of(tmp_path, "move_arm.c")), name])
         start = cell.arm.target.position[0]
-        assert comes_true(lambda: bool(cell.cycles()))
+        assert comes_true(lambda: bool(cell.cycles(20)))
         assert program.process.wait(60.0) == 0
         program.close()
         assert cell.arm.target.position[0] - start == pytest.approx(0.01, abs=2e-5)
