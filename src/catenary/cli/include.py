@@ -14,7 +14,7 @@ def add_parser(commands: Commands) -> None:
         help="print the folder of the C header catenary_share.h",
         description="Prints the folder of catenary_share.h and catenary_share.c. With these files, "
         "a program in C, C++ or C# reads a share and commands its axes:\n"
-        "  cc program.c $(catenary include)/catenary_share.c -I$(catenary include) -o program",
+        "  cc -pthread program.c $(catenary include)/catenary_share.c -I$(catenary include)",
         example="catenary include",
     )
     parser.set_defaults(run=run)

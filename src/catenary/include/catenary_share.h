@@ -2,9 +2,9 @@
  *
  * Compile catenary_share.c with your program:
  *
- *     cc program.c $(catenary include)/catenary_share.c -I$(catenary include) -o program
+ *     cc -pthread program.c $(catenary include)/catenary_share.c -I$(catenary include) -o program
  *
- * Alternatively, define _GNU_SOURCE and CATENARY_SHARE_IMPLEMENTATION in exactly one source file,
+ * Alternatively, define CATENARY_SHARE_IMPLEMENTATION (in C also _GNU_SOURCE) in exactly one source file,
  * before its first #include, and include this header there. C11 or C++17, Linux, GCC or Clang.
  *
  * A share is shared memory that a loop writes in every cycle. Readers map it read-only. They can
@@ -45,8 +45,12 @@ enum catenary_code {
     CATENARY_E_NO_COMMANDS = -16,     /* the share does not accept commands */
     CATENARY_E_SYSTEM = -17,          /* a system call has failed */
     CATENARY_E_INTERRUPTED = -18,     /* a signal has interrupted the wait */
-    CATENARY_E_MEMORY = -19           /* out of memory */
+    CATENARY_E_MEMORY = -19,          /* out of memory */
+    CATENARY_E_REFUSED = -20          /* the core has refused a requested state */
 };
+
+/* Requested states of axes. */
+enum catenary_request { CATENARY_DISABLE = 0, CATENARY_ENABLE = 1, CATENARY_QUICK_STOP = 2, CATENARY_RESET = 3 };
 
 enum catenary_state { CATENARY_RUNNING = 1, CATENARY_ENDED = 2, CATENARY_DEAD = 3 };
 
@@ -141,6 +145,15 @@ int catenary_lease_send(catenary_lease *lease, const double *position, const dou
 
 /* Renew the lease for its full duration. Return 0 or a code. */
 int catenary_lease_renew(catenary_lease *lease, catenary_error *error);
+
+/* Request a state (enum catenary_request) of all axes of the lease, and renew the lease. CATENARY_RESET is
+ * disabled with a fault reset. CATENARY_ENABLE and CATENARY_RESET are refused unless the share was opened
+ * with `jog=True`. A later request of the program replaces it. Return 0 or a code. */
+int catenary_lease_request(catenary_lease *lease, int state, catenary_error *error);
+
+/* Answer to the last request: 1 if the core has taken it for all axes, 0 while an answer is missing, or
+ * CATENARY_E_REFUSED. The field "enabled" shows whether an axis is enabled. */
+int catenary_lease_request_status(const catenary_lease *lease, catenary_error *error);
 
 /* Release the axes and free the lease. The axes then hold their commanded position. In a forked child,
  * only free the memory. Return 0 or a code. */

@@ -26,6 +26,8 @@ import numpy as np
 ARGUMENT, NOT_FOUND, NOT_TRUSTED, DAMAGED, VERSION = -1, -2, -4, -5, -6
 DEAD, ENDED, EMPTY, OVERWRITTEN, LEASED = -7, -8, -9, -10, -11
 LEASE_ENDED, NOT_READ, LOCKED, FULL, NO_COMMANDS = -12, -13, -14, -15, -16
+REFUSED = -20
+DISABLE, ENABLE, QUICK_STOP, RESET = 0, 1, 2, 3
 RUNNING, STATE_ENDED, STATE_DEAD = 1, 2, 3
 STALE = 1
 OWN_UID = -1
@@ -91,6 +93,8 @@ SIGNATURES: dict[str, tuple[Any, tuple[Any, ...]]] = {
     ),
     "lease_send": (c_int, (c_void_p, *[POINTER(c_double)] * 3, POINTER(ErrorText))),
     "lease_renew": (c_int, (c_void_p, POINTER(ErrorText))),
+    "lease_request": (c_int, (c_void_p, c_int, POINTER(ErrorText))),
+    "lease_request_status": (c_int, (c_void_p, POINTER(ErrorText))),
     "lease_release": (c_int, (c_void_p, POINTER(ErrorText))),
     "stop": (c_int, (c_void_p, POINTER(ErrorText))),
 }
@@ -185,6 +189,12 @@ class CLease:
 
     def renew(self) -> None:
         self.library.checked("lease_renew", self.handle)
+
+    def request(self, state: int) -> None:
+        self.library.checked("lease_request", self.handle, state)
+
+    def request_status(self) -> int:
+        return self.library.checked("lease_request_status", self.handle)
 
     def release(self) -> None:
         self.library.checked("lease_release", self.handle)

@@ -15,6 +15,7 @@ struct catenary_lease {
     int64_t duration_ns;
     int64_t pid;                      /* a forked child does not own the lease */
     cat_desk_row *row;
+    uint64_t *requests;               /* the last request of each axis; 0: none */
 };
 
 static const char *cat_reason_text(uint64_t reason) {
@@ -154,6 +155,7 @@ static void cat_free_lease(catenary_lease *lease) {
     if (!lease) return;
     free(lease->axes);
     free(lease->row);
+    free(lease->requests);
     free(lease);
 }
 
@@ -167,7 +169,8 @@ static catenary_lease *cat_make_lease(catenary_share *share, const uint32_t *axe
     lease->duration_ns = (int64_t)(duration * 1e9);
     lease->axes = (uint32_t *)calloc(lease->count, sizeof *lease->axes);
     lease->row = (cat_desk_row *)calloc(1, cat_desk_row_size(share->axis_count));
-    if (!lease->axes || !lease->row) {
+    lease->requests = (uint64_t *)calloc(lease->count, sizeof *lease->requests);
+    if (!lease->axes || !lease->row || !lease->requests) {
         cat_free_lease(lease);
         return NULL;
     }
@@ -281,6 +284,63 @@ int catenary_lease_send(catenary_lease *lease, const double *position, const dou
     code = cat_write_row(lease, error);
     cat_unlock(lease->share);
     return code;
+}
+
+static cat_motion_slot *cat_slot(const catenary_lease *lease, uint32_t k) {
+    return (cat_motion_slot *)(cat_desk_motion(lease->share) + 1) + lease->axes[k];
+}
+
+/* Publish a requested state of all axes. The caller holds the mutex. */
+static void cat_put_requests(catenary_lease *lease, uint64_t state) {
+    uint32_t k;
+    if (state == CATENARY_QUICK_STOP) {
+        cat_store_release64(&cat_desk_motion(lease->share)->stopper, (uint64_t)getpid());
+    }
+    for (k = 0; k < lease->count; k++) {
+        uint64_t number = (cat_load_acquire64(&cat_slot(lease, k)->request) >> CAT_MOTION_STATUS_BITS) + 1;
+        lease->requests[k] = number << CAT_MOTION_STATUS_BITS;
+        cat_store_release64(&cat_slot(lease, k)->request, lease->requests[k] | state);
+    }
+}
+
+int catenary_lease_request(catenary_lease *lease, int state, catenary_error *error) {
+    int code;
+    if (state < CATENARY_DISABLE || state > CATENARY_RESET) {
+        return cat_fail(error, CATENARY_E_ARGUMENT, "%d is not a state of enum catenary_request", state);
+    }
+    code = cat_check_running(lease->share, error);
+    if (!code) code = cat_lock(lease->share, error);
+    if (code) return code;
+    code = cat_renew(lease, error);
+    if (!code) cat_put_requests(lease, (uint64_t)state);
+    cat_unlock(lease->share);
+    return code;
+}
+
+static const char *cat_request_text(uint64_t status) {
+    switch (status) {                 /* RequestStatus of share/jog.py */
+    case 16: return "the program does not allow it; it must open cat.Share(..., jog=True)";
+    case 18: return "the program must enable an axis in this mode";
+    case 22: return "the device does not answer";
+    case 23: return "the program starts, ends or waits";
+    default: return "the requested state is not valid";
+    }
+}
+
+int catenary_lease_request_status(const catenary_lease *lease, catenary_error *error) {
+    int is_complete = 1;
+    uint32_t k;
+    for (k = 0; k < lease->count; k++) {
+        uint64_t answer = cat_load_acquire64(&cat_slot(lease, k)->taken);
+        uint64_t status = answer & ((1u << CAT_MOTION_STATUS_BITS) - 1);
+        int is_answered = lease->requests[k] && answer - status == lease->requests[k] && status;
+        if (is_answered && status != 1) {
+            return cat_fail(error, CATENARY_E_REFUSED, "axis '%s' refuses the request: %s",
+                            lease->share->axes[lease->axes[k]], cat_request_text(status));
+        }
+        is_complete &= is_answered;
+    }
+    return is_complete;
 }
 
 int catenary_lease_release(catenary_lease *lease, catenary_error *error) {

@@ -54,11 +54,15 @@ struct catenary_share {
 __attribute__((format(printf, 3, 4)))
 static int cat_fail(catenary_error *error, int code, const char *format, ...) {
     va_list values;
+    char *c;
     if (!error) return code;
     error->code = code;
     va_start(values, format);
     vsnprintf(error->text, sizeof error->text, format, values);
     va_end(values);
+    for (c = error->text; *c; c++) {  /* names of processes can contain control characters */
+        if ((unsigned char)*c < 0x20 || *c == 0x7f) *c = '?';
+    }
     return code;
 }
 
