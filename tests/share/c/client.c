@@ -1,6 +1,7 @@
 /* Programs for the tests of catenary_share.h: C11 and C++17.
  *
  *     client open NAME ...         open each share; print the code and the text
+ *     client command NAME          open a share and send a command; print both codes
  *     client hold NAME AXIS        move an axis forward until the process is killed
  *     client follow NAME           read until no more cycles come; print the code
  */
@@ -53,6 +54,22 @@ static int hold(const char *name, uint32_t axis) {
     return report(code, &error);
 }
 
+static int command(const char *name) {
+    catenary_share *share;
+    catenary_lease *lease;
+    catenary_error error;
+    const uint32_t axis = 0;
+    const double position = 0.0;
+    int code = catenary_open(&share, name, CATENARY_OWN_UID, 0, &error);
+    if (report(code, &error)) return 0;
+    code = catenary_lease_take(share, &axis, 1, 600.0, &lease, &error);
+    if (!code) code = catenary_lease_send(lease, &position, NULL, NULL, &error);
+    report(code, &error);
+    catenary_lease_release(lease, NULL);
+    catenary_close(share);
+    return 0;
+}
+
 static int follow(const char *name) {
     catenary_share *share;
     catenary_error error;
@@ -68,6 +85,7 @@ static int follow(const char *name) {
 
 int main(int count, char **words) {
     if (count > 2 && strcmp(words[1], "open") == 0) return open_all(count - 2, words + 2);
+    if (count == 3 && strcmp(words[1], "command") == 0) return command(words[2]);
     if (count == 4 && strcmp(words[1], "hold") == 0) return hold(words[2], (uint32_t)atoi(words[3]));
     if (count == 3 && strcmp(words[1], "follow") == 0) return follow(words[2]);
     return 2;
