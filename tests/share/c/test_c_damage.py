@@ -169,6 +169,13 @@ def test_invalid_names_are_refused(library: Library, name: str) -> None:
     assert caught.value.code == ARGUMENT
 
 
+@pytest.mark.parametrize("uid", [-2, 2**32])
+def test_invalid_user_ids_are_refused(library: Library, name: str, uid: int) -> None:
+    with pytest.raises(CError, match="is not a user id") as caught:
+        library.attach(name, uid=uid)
+    assert caught.value.code == ARGUMENT
+
+
 def test_missing_share_is_not_found(library: Library, name: str) -> None:
     with pytest.raises(CError, match="there is no share") as caught:
         library.attach(name)

@@ -77,6 +77,9 @@ int catenary_open(catenary_share **share, const char *name, int64_t uid, int fla
         return cat_fail(error, CATENARY_E_ARGUMENT, "invalid name: use 1 to 64 letters, digits, '.', '_' or '-', and "
                         "begin with a letter or digit");
     }
+    if (uid < CATENARY_OWN_UID || uid > UINT32_MAX) {
+        return cat_fail(error, CATENARY_E_ARGUMENT, "%lld is not a user id", (long long)uid);
+    }
     *share = (catenary_share *)calloc(1, sizeof **share);
     if (!*share) return cat_fail(error, CATENARY_E_MEMORY, "out of memory");
     code = cat_open_share(*share, name, uid, flags, error);
