@@ -53,6 +53,7 @@ class Reports:
 
     def __init__(self) -> None:
         self.counts: Counter[str] = Counter()
+        self.notes: list[str] = []  # permanent restrictions, which are not incidents
         self.texts: deque[str] = deque(maxlen=REPORTS)
         self._unread: deque[str] = deque(maxlen=REPORTS)
 
@@ -84,6 +85,7 @@ def bridge_status(name: str, reports: Reports, incompatible: Sequence[str]) -> D
     """
     texts = [*incompatible, *reports.texts]
     values = {**reports.counts, "QoS mismatches": len(incompatible)}
+    values |= {f"note {number}": text for number, text in enumerate(reports.notes, 1)}
     values |= {f"report {number}": text for number, text in enumerate(texts, 1)}
     level = WARN if texts else OK
     return status(level, f"{name}: bridge", texts[-1] if texts else "no incidents", values)
@@ -214,3 +216,13 @@ def sensor_status(share: str, reason: str) -> DiagnosticStatus:
         reason: why its newest sample is not published; "" if it is.
     """
     return status(ERROR if reason else OK, f"{share}: sensor", reason or "valid", {})
+
+
+def devices_unknown(share: str, reason: str) -> DiagnosticStatus:
+    """Return the status of devices that the program does not report.
+
+    Args:
+        share: name of the share.
+        reason: why it does not.
+    """
+    return status(STALE, f"{share}: devices", reason, {})

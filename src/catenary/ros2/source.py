@@ -27,7 +27,7 @@ class Source:
     def __init__(self, name: str, uid: int | None = None) -> None:
         self.name = name
         self.reason = "not attached yet"  # why there are no cycles; "" while they come
-        self._uid = uid
+        self.uid = uid
         self._reader: Reader | None = None
         self._retry_at = 0.0
         self._number = 0
@@ -69,7 +69,7 @@ class Source:
             return
         self._retry_at = now + RETRY
         try:
-            self._reader = attach(self.name, uid=self._uid)
+            self._reader = attach(self.name, uid=self.uid)
         except ShareError as error:
             self.reason = error.message
             return
