@@ -1,1 +1,1 @@
-"""ROS 2: topics and services of a running loop. It attaches through `share` and `remote`."""
+"""Bridge between a running machine and a ROS 2 graph."""

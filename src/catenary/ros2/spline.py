@@ -5,6 +5,7 @@ from __future__ import annotations
 from bisect import bisect_right
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from math import comb
 from typing import NamedTuple
 
@@ -148,7 +149,7 @@ def spline(start: Motion, waypoints: Sequence[Waypoint], begin: float) -> Spline
     )
     points = [begins, first, *waypoints[1:]]
     pieces = [piece(points[0], points[1])]
-    pieces += [piece(a, b) for a, b in zip(waypoints[:-1], waypoints[1:], strict=True)]
+    pieces += [piece(a, b) for a, b in pairwise(waypoints)]
     return Spline([point.time for point in points], pieces)
 
 
