@@ -319,6 +319,21 @@ MESSAGE_TYPES = (
         "RIHS01_5a8a36efb05fb25070fa0fb3810290c0e6cd4862b54a8fb975a1ee8dc55a333e",
     ),
 )
+# Packages of the messages that occur only inside of other messages
+PACKAGE_OF_PART: dict[type[Struct], str] = {
+    Time: "builtin_interfaces",
+    Duration: "builtin_interfaces",
+    Header: "std_msgs",
+    MultiArrayDimension: "std_msgs",
+    MultiArrayLayout: "std_msgs",
+    Vector3: "geometry_msgs",
+    Point: "geometry_msgs",
+    Quaternion: "geometry_msgs",
+    Pose: "geometry_msgs",
+    JointTrajectoryPoint: "trajectory_msgs",
+    KeyValue: "diagnostic_msgs",
+    DiagnosticStatus: "diagnostic_msgs",
+}
 BY_STRUCT = {kind.struct: kind for kind in MESSAGE_TYPES}
 BY_NAME = {kind.name: kind for kind in MESSAGE_TYPES}
 
@@ -333,3 +348,10 @@ def message_type(message: type[Struct]) -> MessageType:
         return BY_STRUCT[message]
     except KeyError:
         raise TypeError(f"{message!r} is not a message of catenary.ros2.messages") from None
+
+
+def dds_name(message: type[Struct]) -> str:
+    """Return the DDS name of a message or part: `sensor_msgs::msg::dds_::JointState_`."""
+    kind = BY_STRUCT.get(message)
+    package = kind.name.partition("/")[0] if kind else PACKAGE_OF_PART[message]
+    return f"{package}::msg::dds_::{message.__name__}_"
