@@ -14,13 +14,13 @@ from functools import partial
 from types import TracebackType
 from typing import Any, Self
 
-import numpy as np
+from msgspec import Struct
 
 from catenary.errors import CatenaryError
 from catenary.ros2 import messages
 from catenary.ros2.backend import COMMAND, Backend, NotAvailable
 from catenary.ros2.commands import REFUSED, Commands
-from catenary.ros2.config import Config
+from catenary.ros2.config import Config, Forward, Point, Trajectory
 from catenary.ros2.diagnostics import Reports
 from catenary.ros2.followers import make_followers
 from catenary.ros2.publishing import Publishing
@@ -63,6 +63,7 @@ class Bridge:
         self._commands: Commands | None = None
         self._run = ""
         self._send_at = 0.0
+        self._follow_run()
         self._subscribe()
         self._offer_services()
 
@@ -77,12 +78,21 @@ class Bridge:
     ) -> None:
         self.close()
 
-    def run(self, stop: threading.Event | None = None) -> None:
-        """Publish and accept commands until `stop` is set. A loop that has ended is awaited."""
+    def run(
+        self, stop: threading.Event | None = None, show: Callable[[str], None] | None = None
+    ) -> None:
+        """Publish and accept commands until `stop` is set. A loop that has ended is awaited.
+
+        Args:
+            stop: ends the bridge.
+            show: receives each report, such as a refused command, as text.
+        """
         stop = stop or threading.Event()
         while not stop.is_set():
             self._backend.spin_once(self._time_left())
             self.step()
+            for text in self.reports.unread():
+                (show or ignore)(text)
 
     def step(self) -> None:
         """Read the share, send the set-points and publish what is due."""
@@ -139,12 +149,12 @@ class Bridge:
         commands = self._config.commands
         if not commands.on:
             return
-        topics = [
+        offers: list[tuple[str, Trajectory | Forward | Point, type[Struct]]] = [
             ("trajectory", commands.trajectory, messages.JointTrajectory),
             ("forward", commands.forward, messages.Float64MultiArray),
             ("point", commands.point, messages.JointTrajectoryPoint),
         ]
-        for name, topic, kind in topics:
+        for name, topic, kind in offers:
             if topic.on:
                 self._backend.subscription(topic.topic, kind, COMMAND, self._offer(name))
         if commands.pose is not None:
@@ -186,3 +196,7 @@ class Bridge:
         if self._commands is not None and self._commands.active:
             due = min(due, self._send_at)
         return min(max(due - time.monotonic(), 0.0), IDLE)
+
+
+def ignore(_: str) -> None:
+    """Do nothing with a report, which is also part of the diagnostics."""

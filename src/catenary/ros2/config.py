@@ -25,8 +25,12 @@ Seconds: TypeAlias = Annotated[float, Meta(gt=0.0, le=3600.0)]
 Tolerance: TypeAlias = Annotated[float, Meta(ge=0.0)]
 Text: TypeAlias = Annotated[str, Meta(min_length=1)]
 Name: TypeAlias = Annotated[str, Meta(pattern=r"^[A-Za-z_][A-Za-z0-9_]*$")]
-Topic: TypeAlias = Annotated[str, Meta(pattern=r"^/?[A-Za-z_][A-Za-z0-9_]*(/[A-Za-z_][A-Za-z0-9_]*)*$")]
-Namespace: TypeAlias = Annotated[str, Meta(pattern=r"^(/?[A-Za-z_][A-Za-z0-9_]*(/[A-Za-z_][A-Za-z0-9_]*)*)?$")]
+Topic: TypeAlias = Annotated[
+    str, Meta(pattern=r"^/?[A-Za-z_][A-Za-z0-9_]*(/[A-Za-z_][A-Za-z0-9_]*)*$")
+]
+Namespace: TypeAlias = Annotated[
+    str, Meta(pattern=r"^(/?[A-Za-z_][A-Za-z0-9_]*(/[A-Za-z_][A-Za-z0-9_]*)*)?$")
+]
 Vector: TypeAlias = tuple[Text, Text, Text]
 Quantity: TypeAlias = Literal["position", "velocity", "torque"]
 Profile: TypeAlias = Literal["", "rdda"]
@@ -36,7 +40,7 @@ class Table(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
     """Table of the file. Unknown keys are errors."""
 
 
-class JointStates(Table):
+class JointStates(Table, frozen=True):
     """[joint_states]: sensor_msgs/JointState with the actual values of all axes."""
 
     on: bool = True
@@ -46,7 +50,7 @@ class JointStates(Table):
     effort: Text = "torque"  # field of the share with one number per axis
 
 
-class Diagnostics(Table):
+class Diagnostics(Table, frozen=True):
     """[diagnostics]: diagnostic_msgs/DiagnosticArray. The topic is global by convention."""
 
     on: bool = True
@@ -54,7 +58,7 @@ class Diagnostics(Table):
     rate: Rate = 1.0
 
 
-class Clock(Table):
+class Clock(Table, frozen=True):
     """[clock]: rosgraph_msgs/Clock, published only for a loop in virtual time."""
 
     on: bool = True
@@ -62,7 +66,7 @@ class Clock(Table):
     rate: Rate = 100.0
 
 
-class Wrench(Table):
+class Wrench(Table, frozen=True):
     """[[wrench]]: geometry_msgs/WrenchStamped from a sensor's share. Fields: [N], [N·m]."""
 
     share: Text
@@ -74,7 +78,7 @@ class Wrench(Table):
     max_age: Seconds = 0.1  # an older sample is not published
 
 
-class Imu(Table):
+class Imu(Table, frozen=True):
     """[[imu]]: sensor_msgs/Imu from a sensor's share. Fields: [rad/s], [m/s²], quaternion."""
 
     share: Text
@@ -87,7 +91,7 @@ class Imu(Table):
     max_age: Seconds = 0.1  # an older sample is not published
 
 
-class ProcessData(Table):
+class ProcessData(Table, frozen=True):
     """[[process_data]]: a field of the share as a standard message.
 
     `field` is a name such as "pressure", or one element such as "input_bytes[3]".
@@ -99,7 +103,7 @@ class ProcessData(Table):
     rate: Rate = 10.0
 
 
-class Trajectory(Table):
+class Trajectory(Table, frozen=True):
     """[commands.trajectory]: trajectory_msgs/JointTrajectory. A tolerance of 0 is not checked."""
 
     on: bool = True
@@ -109,7 +113,7 @@ class Trajectory(Table):
     goal_time: Tolerance = 0.0  # [s] after the end to reach the goal; 0: no limit
 
 
-class Forward(Table):
+class Forward(Table, frozen=True):
     """[commands.forward]: std_msgs/Float64MultiArray, one set-point per axis."""
 
     on: bool = False
@@ -118,7 +122,7 @@ class Forward(Table):
     timeout: Seconds = 0.1
 
 
-class Point(Table):
+class Point(Table, frozen=True):
     """[commands.point]: trajectory_msgs/JointTrajectoryPoint as a stream of set-points."""
 
     on: bool = False
@@ -126,7 +130,7 @@ class Point(Table):
     timeout: Seconds = 0.1
 
 
-class Pose(Table):
+class Pose(Table, frozen=True):
     """[commands.pose]: geometry_msgs/PoseStamped for a body of an MJCF model."""
 
     model: Text  # path of the MJCF file, relative to the configuration
@@ -138,7 +142,7 @@ class Pose(Table):
     timeout: Seconds = 0.5
 
 
-class Commands(Table):
+class Commands(Table, frozen=True):
     """[commands]: commands that the bridge accepts."""
 
     on: bool = True
@@ -151,7 +155,7 @@ class Commands(Table):
     pose: Pose | None = None
 
 
-class LawParameters(Table):
+class LawParameters(Table, frozen=True):
     """[[parameters]]: std_msgs/Float64MultiArray that sets parameters of the running law."""
 
     law: Text
@@ -159,14 +163,14 @@ class LawParameters(Table):
     names: Annotated[tuple[Text, ...], Meta(min_length=1)]
 
 
-class Services(Table):
+class Services(Table, frozen=True):
     """[services]: enable, stop, home and reset as std_srvs/Trigger. They need rclpy."""
 
     on: bool = True
     timeout: Seconds = 2.0
 
 
-class Config(Table):
+class Config(Table, frozen=True):
     """Whole configuration of a bridge."""
 
     node: Name = "catenary"

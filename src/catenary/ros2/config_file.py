@@ -36,7 +36,9 @@ def read_config(path: str | Path) -> Config:
     return make_config(content, where, text)
 
 
-def make_config(content: dict[str, Any], path: Path, text: str = "") -> Config:
+def make_config(
+    content: dict[str, Any], path: Path = Path("configuration"), text: str = ""
+) -> Config:
     """Convert the content of a file.
 
     Args:
@@ -49,10 +51,11 @@ def make_config(content: dict[str, Any], path: Path, text: str = "") -> Config:
     """
     profile = content.get("profile", "")
     defaults = PROFILES.get(profile, {}) if isinstance(profile, str) else {}
+    whole = merged(defaults, content)
     try:
-        config = msgspec.convert(merged(defaults, content), Config)
+        config = msgspec.convert(whole, Config)
     except msgspec.ValidationError as error:
-        raise _located(str(error), path, text) from None
+        raise _located(str(error), path, text, whole) from None
     return _with_model(config, path.parent)
 
 
@@ -80,7 +83,7 @@ def _with_model(config: Config, folder: Path) -> Config:
     return msgspec.structs.replace(config, commands=commands)
 
 
-def _located(message: str, path: Path, text: str) -> ConfigurationError:
+def _located(message: str, path: Path, text: str, content: Any) -> ConfigurationError:
     found = _PLACE.fullmatch(message)
     assert found is not None  # the pattern matches any text
     keys = tuple(
@@ -92,10 +95,19 @@ def _located(message: str, path: Path, text: str) -> ConfigurationError:
     if unknown is not None:
         what, hint = f'unknown key "{unknown[1]}"', _known_keys(keys, unknown[1])
         keys = (*keys, unknown[1])
+    elif "matching regex" in what:
+        what = f"{_value_at(content, keys)!r} is not a valid name"
+        hint = "use letters, digits and '_', in a topic or namespace separated by '/'"
     name = _dotted(keys)
     line = f":{line_of(key_lines(text), keys)}" if text else ""
     where = f"{path}{line}: {name}: " if name else f"{path}{line}: "
     return ConfigurationError(f"{where}{what[0].lower()}{what[1:]}", hint=hint)
+
+
+def _value_at(content: Any, keys: KeyPath) -> object:
+    for key in keys:
+        content = content[key]
+    return content
 
 
 def _dotted(keys: KeyPath) -> str:

@@ -84,7 +84,7 @@ def bridge_status(name: str, reports: Reports, incompatible: Sequence[str]) -> D
         incompatible: QoS mismatches.
     """
     texts = [*incompatible, *reports.texts]
-    values = {**reports.counts, "QoS mismatches": len(incompatible)}
+    values: dict[str, object] = {**reports.counts, "QoS mismatches": len(incompatible)}
     values |= {f"note {number}": text for number, text in enumerate(reports.notes, 1)}
     values |= {f"report {number}": text for number, text in enumerate(texts, 1)}
     level = WARN if texts else OK
@@ -195,7 +195,9 @@ def _cables(share: str, device: Device) -> DiagnosticStatus:
             f"{port.forwarded_errors} forwarded, {port.lost_links} lost links"
         )
     text = f"{errors} receive errors and lost links" if errors else "no errors"
-    return status(WARN if errors else OK, f"{share}: cables of device {device.position}", text, values)
+    return status(
+        WARN if errors else OK, f"{share}: cables of device {device.position}", text, values
+    )
 
 
 def missing_status(share: str, reason: str) -> DiagnosticStatus:

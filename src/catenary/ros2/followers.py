@@ -13,8 +13,9 @@ from catenary.remote.messages import Axis
 from catenary.ros2.commands import CommandError, Follower, SetPoints, State, Values
 from catenary.ros2.config import Config, Quantity
 from catenary.ros2.config import Trajectory as TrajectoryConfig
+from catenary.ros2.goal import AxisStates, Goal, Status
 from catenary.ros2.limits import AxisLimits, Tolerances
-from catenary.ros2.trajectory import AxisStates, Goal, Status, TrajectoryFollower
+from catenary.ros2.trajectory import TrajectoryFollower
 
 SETTLED = 1e-6  # [rad] between the last set-point and the commanded position
 SETTLE_TIME = 1.0  # [s] at most, after the end of a trajectory
@@ -87,9 +88,7 @@ class TrajectoryCommand:
 
     quantity: Quantity = "position"
 
-    def __init__(
-        self, joints: Sequence[str], limits: AxisLimits, config: TrajectoryConfig
-    ) -> None:
+    def __init__(self, joints: Sequence[str], limits: AxisLimits, config: TrajectoryConfig) -> None:
         tolerances = Tolerances.of(
             len(joints),
             path=config.path_tolerance or math.inf,
@@ -221,4 +220,3 @@ def range_of(quantity: Quantity, axes: Sequence[Axis]) -> tuple[Values, Values]:
     )
     high = np.minimum(limit, FINITE)
     return -high, high
-

@@ -94,9 +94,7 @@ def wrench(config: Wrench, reader: Reader, row: np.void) -> messages.WrenchStamp
     check_sample(reader, row, config.max_age)
     return messages.WrenchStamped(
         header=make_header(stamp_ns(reader, row), config.frame),
-        wrench=messages.Wrench(
-            force=vector(row, config.force), torque=vector(row, config.torque)
-        ),
+        wrench=messages.Wrench(force=vector(row, config.force), torque=vector(row, config.torque)),
     )
 
 
