@@ -13,7 +13,6 @@ from catenary.control.parts import PerAxis, checked
 from catenary.ros2.spline import Row
 from catenary.ros2.waypoints import Code, TrajectoryError
 
-
 REST = 1e-9  # [rad/s]; a lower speed counts as rest
 
 
@@ -109,8 +108,10 @@ class Tolerances:
 class ToleranceLike(Protocol):
     """`control_msgs/JointTolerance`; only the position is used."""
 
-    name: str
-    position: float
+    @property
+    def name(self) -> str: ...
+    @property
+    def position(self) -> float: ...
 
 
 def overridden(

@@ -40,8 +40,10 @@ class TrajectoryError(CatenaryError):
 class TimeLike(Protocol):
     """`builtin_interfaces/Time` or `Duration`, of Catenary or of rclpy."""
 
-    sec: int
-    nanosec: int
+    @property
+    def sec(self) -> int: ...
+    @property
+    def nanosec(self) -> int: ...
 
 
 class PointLike(Protocol):
