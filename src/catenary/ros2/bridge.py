@@ -136,7 +136,7 @@ class Bridge:
         axes = self._config.commands.axes or reader.layout.axes
         try:
             limits = self._requests.axes()
-            followers = make_followers(self._config, axes, limits)
+            followers = make_followers(self._config, axes, limits, self.reports)
         except CatenaryError as error:
             self._commands = None
             self.reports.add(REFUSED, f"no commands are possible: {error.message}")

@@ -3,28 +3,29 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
-from typing import Any
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from catenary.errors import ConfigurationError
 from catenary.remote.messages import Axis
-from catenary.ros2.commands import CommandError, Follower, SetPoints, State, Values
+from catenary.ros2.commands import HELD, CommandError, Follower, SetPoints, State, Values
 from catenary.ros2.config import Config, Quantity
 from catenary.ros2.config import Trajectory as TrajectoryConfig
+from catenary.ros2.diagnostics import Reports
+from catenary.ros2.forward import ForwardCommand
 from catenary.ros2.goal import AxisStates, Goal, Status
 from catenary.ros2.limits import AxisLimits, Tolerances
 from catenary.ros2.trajectory import TrajectoryFollower
 
+UNLIMITED = 1e9  # [rad/s, rad/s²]; finite, because infinity times 0 s is not a number
 SETTLED = 1e-6  # [rad] between the last set-point and the commanded position
 SETTLE_TIME = 1.0  # [s] at most, after the end of a trajectory
-FINITE = float(np.finfo(np.float64).max)  # a bound that refuses infinity
-UNITS: Mapping[Quantity, str] = {"position": "rad", "velocity": "rad/s", "torque": "N·m"}
 
 
 def make_followers(
-    config: Config, axes: Sequence[str], known: Sequence[Axis]
+    config: Config, axes: Sequence[str], known: Sequence[Axis], reports: Reports
 ) -> dict[str, Follower]:
     """Return a follower for each command topic.
 
@@ -32,9 +33,10 @@ def make_followers(
         config: configuration of the bridge.
         axes: names of the commanded axes.
         known: axes of the loop with their limits.
+        reports: receives the time-outs of streams.
 
     Raises:
-        ConfigurationError: The loop lacks an axis.
+        ConfigurationError: The loop lacks an axis, or an axis lacks a limit.
     """
     by_name = {axis.name: axis for axis in known}
     missing = [name for name in axes if name not in by_name]
@@ -45,21 +47,34 @@ def make_followers(
     chosen = [by_name[name] for name in axes]
     joints = [config.joints.get(name, name) for name in axes]
     commands = config.commands
-    forward, point = commands.forward, commands.point
-    return {
-        "trajectory": TrajectoryCommand(joints, limits_of(chosen), commands.trajectory),
-        "forward": StreamCommand(forward.quantity, forward.timeout, chosen, lambda m: m.data),
-        "point": StreamCommand("position", point.timeout, chosen, lambda m: m.positions),
+    forward, timeout, limits = commands.forward, commands.point.timeout, limits_of(chosen)
+    made: dict[str, Follower] = {
+        "trajectory": TrajectoryCommand(joints, limits, commands.trajectory),
+        "point": StreamCommand(
+            ForwardCommand(joints, limits, "position", timeout), lambda m: m.positions, reports
+        ),
     }
+    if forward.on:
+        torque = torque_limit_of(chosen)
+        if forward.quantity == "torque" and torque is None:
+            raise ConfigurationError(
+                "commands.forward: torques need a torque limit of each axis",
+                hint="pass torque_limit= to Drives",
+            )
+        command = ForwardCommand(
+            joints, limits, forward.quantity, forward.timeout, torque_limit=torque
+        )
+        made["forward"] = StreamCommand(command, lambda m: m.data, reports)
+    return made
 
 
 def limits_of(axes: Sequence[Axis]) -> AxisLimits:
-    """Return the limits of axes; missing limits are infinite."""
+    """Return the limits of axes. Missing limits are without effect."""
     return AxisLimits.of(
         len(axes),
-        velocity=row(axes, lambda axis: axis.velocity_limit, math.inf),
-        acceleration=row(axes, lambda axis: axis.acceleration, math.inf),
-        deceleration=row(axes, lambda axis: axis.deceleration, math.inf),
+        velocity=row(axes, lambda axis: axis.velocity_limit, UNLIMITED),
+        acceleration=row(axes, lambda axis: axis.acceleration, UNLIMITED),
+        deceleration=row(axes, lambda axis: axis.deceleration, UNLIMITED),
         position_min=row(axes, lambda axis: axis.position_min, -math.inf),
         position_max=row(axes, lambda axis: axis.position_max, math.inf),
     )
@@ -136,87 +151,48 @@ def axis_states(state: State) -> AxisStates:
     return AxisStates(state.position, state.velocity, state.commanded)
 
 
+class Numbers(NamedTuple):
+    """Numbers of a message, as `ForwardCommand` reads them."""
+
+    data: Sequence[float]
+
+
 class StreamCommand:
     """Follower of a stream of set-points, which must continue.
 
-    A position set-point moves to the received one with the velocity limit at most, so that a step
-    in the stream does not stop the axes.
-
     Args:
-        quantity: quantity of the set-points.
-        timeout: longest time between two messages [s].
-        axes: commanded axes.
+        command: executes the set-points.
         extract: returns the numbers of a message.
+        reports: receives the time-outs.
     """
 
     def __init__(
         self,
-        quantity: Quantity,
-        timeout: float,
-        axes: Sequence[Axis],
+        command: ForwardCommand,
         extract: Callable[[Any], Sequence[float]],
+        reports: Reports,
     ) -> None:
-        self.quantity = quantity
-        self._timeout = timeout
-        self._names = [axis.name for axis in axes]
-        self._extract = extract
-        self._velocity = row(axes, lambda axis: axis.velocity_limit, math.inf)
-        self._low, self._high = range_of(quantity, axes)
-        self._target: Values | None = None
-        self._set_point: Values | None = None
-        self._received = self._sampled = 0.0
+        self.quantity = command.quantity
+        self._command, self._extract, self._reports = command, extract, reports
 
     def accept(self, message: Any, now: float, state: State) -> None:
-        """Take new set-points. Raises CommandError for a wrong number, NaN or a limit."""
-        given = np.array(self._extract(message), np.float64)
-        if given.shape != (len(self._names),):
-            raise CommandError(f"{given.size} numbers for {len(self._names)} axes")
-        for name, value, low, high in zip(self._names, given, self._low, self._high, strict=True):
-            if not low <= value <= high:  # also for NaN
-                unit = UNITS[self.quantity]
-                raise CommandError(
-                    f"{self.quantity} {value:.6g} {unit} of {name!r} is outside {low:g} to {high:g}"
-                )
-        if self._set_point is None:
-            self._set_point, self._sampled = state.commanded, now
-        self._target, self._received = given, now
+        """Take new set-points; see `ForwardCommand.accept`."""
+        self._command.accept(Numbers(self._extract(message)), now, axis_states(state))
 
     def sample(self, now: float, state: State) -> SetPoints | None:
-        """Return the set-points. Raises CommandError after the time-out."""
-        if self._target is None or self._set_point is None:
-            return None
-        if now - self._received > self._timeout:
-            raise CommandError(f"no message for {self._timeout:g} s")
-        if self.quantity != "position":
-            return {self.quantity: self._target}
-        elapsed = max(now - self._sampled, 0.0)
-        step = self._velocity * elapsed if elapsed else np.zeros_like(self._velocity)
-        self._set_point = self._set_point + np.clip(self._target - self._set_point, -step, step)
-        self._sampled = max(now, self._sampled)
-        return {"position": self._set_point}
+        """Return the set-points; None after the time-out, when the axes have stopped."""
+        before = self._command.timeouts
+        found = self._command.sample(now, axis_states(state))
+        if self._command.timeouts > before:
+            self._reports.add(HELD, "the stream of set-points has ended: no message in time")
+        return None if found is None else {self.quantity: found}
 
     def cancel(self) -> None:
         """Forget the stream."""
-        self._target = self._set_point = None
+        self._command.stop()
 
 
-def range_of(quantity: Quantity, axes: Sequence[Axis]) -> tuple[Values, Values]:
-    """Return the smallest and the largest set-points of axes.
-
-    Args:
-        quantity: quantity of the set-points.
-        axes: the axes.
-    """
-    if quantity == "position":
-        low = row(axes, lambda axis: axis.position_min, -math.inf)
-        high = row(axes, lambda axis: axis.position_max, math.inf)
-        return np.maximum(low, -FINITE), np.minimum(high, FINITE)
-    limit = row(
-        axes,
-        (lambda axis: axis.velocity_limit)
-        if quantity == "velocity"
-        else (lambda axis: axis.torque_limit),
-        FINITE,
-    )
-    high = np.minimum(limit, FINITE)
-    return -high, high
+def torque_limit_of(axes: Sequence[Axis]) -> float | None:
+    """Return the smallest torque limit of axes; None if an axis has no limit."""
+    limits = [axis.torque_limit for axis in axes]
+    return None if None in limits else min(each for each in limits if each is not None)
