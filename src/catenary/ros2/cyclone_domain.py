@@ -142,4 +142,5 @@ def mismatched_policy(endpoint: Entity, *, writer: bool) -> int:
 
 
 def _call(function: str, *arguments: Any) -> int:
-    return int(getattr(DDS._dll_handle, function)(*arguments))
+    result = getattr(DDS._dll_handle, function)(*arguments)
+    return 0 if result is None else int(result)

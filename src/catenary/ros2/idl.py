@@ -6,12 +6,14 @@ from collections.abc import Sequence
 from functools import cache
 from typing import Any, get_args, get_origin, get_type_hints
 
-from cyclonedds.idl import IdlStruct, make_idl_struct, types
+from cyclonedds.idl import IdlStruct, make_idl_struct
+from cyclonedds.idl import types as idl_types
 from msgspec import Struct
 
 from catenary.ros2 import discovery
 from catenary.ros2.messages import dds_name
 
+types: Any = idl_types  # its annotations do not know that `sequence` and `array` are generic
 PRIMITIVES: dict[str, Any] = {
     "bool": bool,
     "byte": types.uint8,
