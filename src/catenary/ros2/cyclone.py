@@ -28,8 +28,8 @@ from msgspec import Struct
 
 from catenary.errors import CatenaryError, DecodeError
 from catenary.ros2 import cdr, cyclone_domain, discovery, names
-from catenary.ros2.backend import STATE, Message, NotAvailable, Qos, ServiceCallback, ServiceKind
 from catenary.ros2.idl import idl_type
+from catenary.ros2.interface import STATE, Message, NotAvailable, Qos, ServiceCallback, ServiceKind
 
 ANY = SampleState.Any | ViewState.Any | InstanceState.Any
 TAKEN_AT_ONCE = 64  # messages of one subscription that one call of `spin_once` handles
