@@ -314,6 +314,11 @@ MESSAGE_TYPES = (
         "RIHS01_179b33eba59d676f6d967ac71fe35e7ca2f64b2f3928f4a018cec115e213796e",
     ),
     MessageType(
+        "trajectory_msgs/msg/JointTrajectoryPoint",
+        JointTrajectoryPoint,
+        "RIHS01_de8907036d8bd45aac6f30cc9044a3d4a329c42cbf719aff7d95a584cfa532d7",
+    ),
+    MessageType(
         "diagnostic_msgs/msg/DiagnosticArray",
         DiagnosticArray,
         "RIHS01_5a8a36efb05fb25070fa0fb3810290c0e6cd4862b54a8fb975a1ee8dc55a333e",
@@ -330,7 +335,6 @@ PACKAGE_OF_PART: dict[type[Struct], str] = {
     Point: "geometry_msgs",
     Quaternion: "geometry_msgs",
     Pose: "geometry_msgs",
-    JointTrajectoryPoint: "trajectory_msgs",
     KeyValue: "diagnostic_msgs",
     DiagnosticStatus: "diagnostic_msgs",
 }
