@@ -216,7 +216,7 @@ class RclpyBackend:
     def _reporter(self, text: str) -> Callable[[Any], None]:
         def report(event: Any) -> None:
             self._ran = True
-            policy = event.last_policy_kind.name.lower()
+            policy = event.last_policy_kind.name.lower().removeprefix("rmw_qos_policy_")
             self._reports[f"{text}: {policy}"] = None
 
         return report

@@ -100,7 +100,7 @@ class Peer:
         )
 
     def mismatch(self, event: Any) -> None:
-        self.mismatches.append(event.last_policy_kind.name.lower())
+        self.mismatches.append(event.last_policy_kind.name.lower().removeprefix("rmw_qos_policy_"))
 
     def publish(self, topic: str, type: str, fields: dict[str, Any]) -> None:
         self.publishers[topic].publish(fill(interface(type)(), fields))
