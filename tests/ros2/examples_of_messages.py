@@ -53,7 +53,7 @@ EXAMPLES = (
             JointTrajectoryPoint((1.0, 2.0, 3.0), (0.0, 0.0, 0.0), time_from_start=Duration(1, 1)),
         ),
     ),
-    JointTrajectoryPoint((1.0, 2.0), (3.0, 4.0), (), (5.0,), Duration(-1, 1)),
+    JointTrajectoryPoint((1.0,), (0.5,), (), (2.0,), Duration(1, 5)),
     DiagnosticArray(
         HEADER,
         (

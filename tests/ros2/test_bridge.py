@@ -196,9 +196,7 @@ def test_set_points_are_forwarded_until_their_time_out() -> None:
         np.testing.assert_allclose(running.arm.target.position, goal)
         running.step(30)
         assert not running.bridge._commands.active
-        assert running.last_report == (
-            "the stream of set-points has ended: no message in time"
-        )
+        assert running.last_report == ("the stream of set-points has ended: no message in time")
 
 
 def test_a_step_in_a_stream_of_positions_is_limited_in_velocity() -> None:
@@ -335,9 +333,7 @@ def test_the_profile_rdda_streams_positions_and_publishes_efforts() -> None:
 
 def test_a_backend_without_services_is_noted() -> None:
     with rig(services=False) as running:
-        assert running.bridge.reports.notes == [
-            "services need rclpy; this backend has topics only"
-        ]
+        assert running.bridge.reports.notes == ["services need rclpy; this backend has topics only"]
 
 
 def test_commands_for_unknown_axes_are_reported() -> None:

@@ -19,7 +19,9 @@ PATIENT = Services(timeout=60.0)
 
 
 @contextmanager
-def bridged(*, jog: bool = True, **options: object) -> Iterator[tuple[Running, MemoryBackend, Bridge]]:
+def bridged(
+    *, jog: bool = True, **options: object
+) -> Iterator[tuple[Running, MemoryBackend, Bridge]]:
     policy = cat.StopPolicy(on_axis_stopped="event")
     with program(jog=jog, stop=policy) as running:
         backend = MemoryBackend()

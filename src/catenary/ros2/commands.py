@@ -17,6 +17,7 @@ import numpy.typing as npt
 from catenary.errors import CatenaryError
 from catenary.ros2.config import Quantity
 from catenary.ros2.diagnostics import Reports
+from catenary.ros2.forward import CommandError
 from catenary.share import Lease, Reader
 from catenary.wire.cia402 import Mode
 
@@ -28,10 +29,6 @@ MODES: Mapping[Quantity, tuple[Mode, ...]] = {
     "torque": (Mode.CST,),
 }
 REFUSED, HELD, LOST = "refused commands", "motions held", "leases lost"
-
-
-class CommandError(CatenaryError):
-    """A command that is refused, or a motion that must end. The message is the reason."""
 
 
 class State:
@@ -192,7 +189,7 @@ class Commands:
         try:
             state.check(follower.quantity)
             found = follower.sample(now, state)
-        except CommandError as error:
+        except CatenaryError as error:
             self.stop(error.message)
             return
         if found is None:

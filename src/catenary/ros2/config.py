@@ -134,7 +134,8 @@ class Pose(Table, frozen=True):
     """[commands.pose]: geometry_msgs/PoseStamped for a body of an MJCF model."""
 
     model: Text  # path of the MJCF file, relative to the configuration
-    site: Text  # name of the site that moves to the pose
+    site: Text  # name of the site or body that moves to the pose
+    joints: tuple[Text, ...] | None = None  # of the model, by axis; None: all
     topic: Topic = "target_pose"
     frame: str = "base_link"
     linear_speed: Annotated[float, Meta(gt=0.0)] = 0.1  # [m/s]

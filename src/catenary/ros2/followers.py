@@ -10,13 +10,16 @@ import numpy as np
 
 from catenary.errors import ConfigurationError
 from catenary.remote.messages import Axis
-from catenary.ros2.commands import HELD, CommandError, Follower, SetPoints, State, Values
+from catenary.ros2.commands import HELD, Follower, SetPoints, State, Values
 from catenary.ros2.config import Config, Quantity
+from catenary.ros2.config import Pose as PoseConfig
 from catenary.ros2.config import Trajectory as TrajectoryConfig
 from catenary.ros2.diagnostics import Reports
-from catenary.ros2.forward import ForwardCommand
+from catenary.ros2.forward import CommandError, ForwardCommand
 from catenary.ros2.goal import AxisStates, Goal, Status
+from catenary.ros2.kinematics import Kinematics
 from catenary.ros2.limits import AxisLimits, Tolerances
+from catenary.ros2.pose import PoseCommand, PoseOptions
 from catenary.ros2.trajectory import TrajectoryFollower
 
 UNLIMITED = 1e9  # [rad/s, rad/s²]; finite, because infinity times 0 s is not a number
@@ -65,7 +68,30 @@ def make_followers(
             joints, limits, forward.quantity, forward.timeout, torque_limit=torque
         )
         made["forward"] = StreamCommand(command, lambda m: m.data, reports)
+    if commands.pose is not None:
+        made["pose"] = make_pose(commands.pose, len(axes), limits)
     return made
+
+
+def make_pose(config: PoseConfig, axes: int, limits: AxisLimits) -> Follower:
+    """Return the follower of poses.
+
+    Args:
+        config: model, site and speeds.
+        axes: number of commanded axes.
+        limits: limits of the axes.
+
+    Raises:
+        ConfigurationError: MuJoCo is missing, or the model does not fit.
+    """
+    kinematics = Kinematics(config.model, config.site, joints=config.joints, axes=axes)
+    options = PoseOptions(
+        linear_speed=config.linear_speed,
+        angular_speed=config.angular_speed,
+        timeout=config.timeout,
+        frame=config.frame,
+    )
+    return PoseFollower(PoseCommand(kinematics, limits, options))
 
 
 def limits_of(axes: Sequence[Axis]) -> AxisLimits:
@@ -189,6 +215,32 @@ class StreamCommand:
 
     def cancel(self) -> None:
         """Forget the stream."""
+        self._command.stop()
+
+
+class PoseFollower:
+    """Follower of geometry_msgs/PoseStamped.
+
+    Args:
+        command: executes the poses.
+    """
+
+    quantity: Quantity = "position"
+
+    def __init__(self, command: PoseCommand) -> None:
+        self._command = command
+
+    def accept(self, message: Any, now: float, state: State) -> None:
+        """Move to a pose; see `PoseCommand.accept`."""
+        self._command.accept(message, now, axis_states(state))
+
+    def sample(self, now: float, state: State) -> SetPoints | None:
+        """Return the positions of the joints [rad]; None at the end of the motion."""
+        found = self._command.sample(now, axis_states(state))
+        return None if found is None else {"position": found}
+
+    def cancel(self) -> None:
+        """Forget the pose."""
         self._command.stop()
 
 
