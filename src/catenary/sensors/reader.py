@@ -188,7 +188,7 @@ def open_sensor(name: str, uid: int | None) -> Reader:
     """
     reader = attach_share(name, uid=uid)
     names = {field.name for field in reader.layout.fields}
-    if not OWN <= names:
+    if not names >= OWN:
         reader.close()
         raise ShareError(
             f"the share {name!r} does not belong to a sensor",
