@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from catenary.sensors.publisher import SensorShare
-    from catenary.sensors.reader import Reading, SensorReader, attach
     from catenary.sensors.rdt import Rdt
+    from catenary.sensors.reader import Reading, SensorReader, attach
     from catenary.sensors.runner import Options, Task, run
     from catenary.sensors.sensor import Channel, Connection, Counters, Sample, Sensor, Source
     from catenary.sensors.udp import Udp
