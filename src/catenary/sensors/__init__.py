@@ -10,6 +10,12 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from catenary.sensors.analog import analog_wrench
+    from catenary.sensors.calibration import Calibration
+    from catenary.sensors.ethercat import EtherCat, Field, LoopSource
+    from catenary.sensors.frame import Frame
+    from catenary.sensors.low_pass import LowPass
+    from catenary.sensors.processing import Calibrate, Filter, Processed, Step, Transform
     from catenary.sensors.publisher import SensorShare
     from catenary.sensors.rdt import Rdt
     from catenary.sensors.reader import Reading, SensorReader, attach
@@ -17,29 +23,20 @@ if TYPE_CHECKING:
     from catenary.sensors.sensor import Channel, Connection, Counters, Sample, Sensor, Source
     from catenary.sensors.udp import Udp
 
-__all__ = [
-    "Channel",
-    "Connection",
-    "Counters",
-    "Options",
-    "Rdt",
-    "Reading",
-    "Sample",
-    "Sensor",
-    "SensorReader",
-    "SensorShare",
-    "Source",
-    "Task",
-    "Udp",
-    "attach",
-    "run",
-]
-
 _MODULES = {
+    "Calibrate": "processing",
+    "Calibration": "calibration",
     "Channel": "sensor",
     "Connection": "sensor",
     "Counters": "sensor",
+    "EtherCat": "ethercat",
+    "Field": "ethercat",
+    "Filter": "processing",
+    "Frame": "frame",
+    "LoopSource": "ethercat",
+    "LowPass": "low_pass",
     "Options": "runner",
+    "Processed": "processing",
     "Rdt": "rdt",
     "Reading": "reader",
     "Sample": "sensor",
@@ -47,11 +44,44 @@ _MODULES = {
     "SensorReader": "reader",
     "SensorShare": "publisher",
     "Source": "sensor",
+    "Step": "processing",
     "Task": "runner",
+    "Transform": "processing",
     "Udp": "udp",
+    "analog_wrench": "analog",
     "attach": "reader",
     "run": "runner",
 }
+
+__all__ = [
+    "Calibrate",
+    "Calibration",
+    "Channel",
+    "Connection",
+    "Counters",
+    "EtherCat",
+    "Field",
+    "Filter",
+    "Frame",
+    "LoopSource",
+    "LowPass",
+    "Options",
+    "Processed",
+    "Rdt",
+    "Reading",
+    "Sample",
+    "Sensor",
+    "SensorReader",
+    "SensorShare",
+    "Source",
+    "Step",
+    "Task",
+    "Transform",
+    "Udp",
+    "analog_wrench",
+    "attach",
+    "run",
+]
 
 
 def __getattr__(name: str) -> object:
