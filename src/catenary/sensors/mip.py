@@ -25,6 +25,7 @@ from catenary.sensors.mip_fields import (
     make_channel,
 )
 from catenary.sensors.mip_packet import Packet, PacketSearch
+from catenary.sensors.missing_values import missing_values
 from catenary.sensors.sensor import Channel, Clock, Counters, Sample, Value
 
 DECIMATION_MAX = 0xFFFF
@@ -113,7 +114,7 @@ class Mip:
             return self._sample(packet)
         if packet.descriptor_set in (commands.BASE, commands.THREE_DM):
             refusal = self._refusal(packet)
-            return Sample(None, self._no_values(), False, refusal) if refusal else None
+            return Sample(None, missing_values(self.channels), False, refusal) if refusal else None
         return None
 
     def _sample(self, packet: Packet) -> Sample | None:
@@ -139,11 +140,6 @@ class Mip:
             each.name: found[each.name] if each.shape else found[each.name][0]
             for each in self.channels
         }
-
-    def _no_values(self) -> dict[str, Value]:
-        return self._values(
-            {name: (math.nan,) * FIELDS[name].length for name in self._names.values()}
-        )
 
     def _refusal(self, packet: Packet) -> str:
         """Return why the device does not send as requested; empty if it does."""
