@@ -22,6 +22,7 @@ import select
 import struct
 import time
 from collections.abc import Mapping, Sequence
+from datetime import timedelta
 from types import TracebackType
 from typing import Any, Literal, Self
 
@@ -132,8 +133,6 @@ class GpioLines:
             ConfigurationError: gpiod is not installed.
             OSError: The chip does not exist, or a line is in use or cannot detect edges.
         """
-        from datetime import timedelta
-
         library = require("gpiod", "gpiod")
         settings = library.LineSettings(
             edge_detection=library.line.Edge.BOTH,
