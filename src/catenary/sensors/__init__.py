@@ -11,33 +11,46 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from catenary.sensors.publisher import SensorShare
+    from catenary.sensors.rdt import Rdt
     from catenary.sensors.reader import Reading, SensorReader, attach
+    from catenary.sensors.runner import Options, Task, run
     from catenary.sensors.sensor import Channel, Connection, Counters, Sample, Sensor, Source
+    from catenary.sensors.udp import Udp
 
 __all__ = [
     "Channel",
     "Connection",
     "Counters",
+    "Options",
+    "Rdt",
     "Reading",
     "Sample",
     "Sensor",
     "SensorReader",
     "SensorShare",
     "Source",
+    "Task",
+    "Udp",
     "attach",
+    "run",
 ]
 
 _MODULES = {
     "Channel": "sensor",
     "Connection": "sensor",
     "Counters": "sensor",
+    "Options": "runner",
+    "Rdt": "rdt",
     "Reading": "reader",
     "Sample": "sensor",
     "Sensor": "sensor",
     "SensorReader": "reader",
     "SensorShare": "publisher",
     "Source": "sensor",
+    "Task": "runner",
+    "Udp": "udp",
     "attach": "reader",
+    "run": "runner",
 }
 
 

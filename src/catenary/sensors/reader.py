@@ -18,6 +18,7 @@ from catenary.share import attach as attach_share
 
 PERIODS = 3.0  # default of `max_age`, in periods of the sensor
 ATTACH_INTERVAL_NS = 500_000_000  # between two attempts to attach again
+ENDINGS = {"running": "returned", "ended": "ended", "dead": "died"}
 OWN = {name for name, *_ in (*CYCLE_FIELDS, *SENSOR_FIELDS)}
 
 
@@ -159,7 +160,7 @@ class SensorReader:
 
     def _end(self) -> str:
         """Try to attach again to a share whose writer has ended. Return the reason of the end."""
-        reason = f"the program of the sensor has {self._reader.state}"
+        reason = f"the program of the sensor has {ENDINGS[self._reader.state]}"
         now = time.monotonic_ns()
         if now < self._next_attach_ns:
             return reason
@@ -188,7 +189,7 @@ def open_sensor(name: str, uid: int | None) -> Reader:
     """
     reader = attach_share(name, uid=uid)
     names = {field.name for field in reader.layout.fields}
-    if not OWN <= names:
+    if not names >= OWN:
         reader.close()
         raise ShareError(
             f"the share {name!r} does not belong to a sensor",
