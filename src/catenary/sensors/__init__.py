@@ -12,29 +12,44 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from catenary.sensors.analog import analog_wrench
     from catenary.sensors.calibration import Calibration
+    from catenary.sensors.can import Can, CanBus, CanMessage, Signal
+    from catenary.sensors.can_dbc import DbcMessage, dbc_message
     from catenary.sensors.ethercat import EtherCat, Field, LoopSource
     from catenary.sensors.frame import Frame
+    from catenary.sensors.gpio import GpioEdges, GpioLines, GpioOutput
     from catenary.sensors.low_pass import LowPass
+    from catenary.sensors.mip import Mip
     from catenary.sensors.processing import Calibrate, Filter, Processed, Step, Transform
     from catenary.sensors.publisher import SensorShare
     from catenary.sensors.rdt import Rdt
     from catenary.sensors.reader import Reading, SensorReader, attach
     from catenary.sensors.runner import Options, Task, run
     from catenary.sensors.sensor import Channel, Connection, Counters, Sample, Sensor, Source
+    from catenary.sensors.serial_port import SerialPort
+    from catenary.sensors.text import Column, Text, TimeColumn
     from catenary.sensors.udp import Udp
 
 _MODULES = {
     "Calibrate": "processing",
     "Calibration": "calibration",
+    "Can": "can",
+    "CanBus": "can",
+    "CanMessage": "can",
     "Channel": "sensor",
+    "Column": "text",
     "Connection": "sensor",
     "Counters": "sensor",
+    "DbcMessage": "can_dbc",
     "EtherCat": "ethercat",
     "Field": "ethercat",
     "Filter": "processing",
     "Frame": "frame",
+    "GpioEdges": "gpio",
+    "GpioLines": "gpio",
+    "GpioOutput": "gpio",
     "LoopSource": "ethercat",
     "LowPass": "low_pass",
+    "Mip": "mip",
     "Options": "runner",
     "Processed": "processing",
     "Rdt": "rdt",
@@ -43,28 +58,42 @@ _MODULES = {
     "Sensor": "sensor",
     "SensorReader": "reader",
     "SensorShare": "publisher",
+    "SerialPort": "serial_port",
+    "Signal": "can",
     "Source": "sensor",
     "Step": "processing",
     "Task": "runner",
+    "Text": "text",
+    "TimeColumn": "text",
     "Transform": "processing",
     "Udp": "udp",
     "analog_wrench": "analog",
     "attach": "reader",
+    "dbc_message": "can_dbc",
     "run": "runner",
 }
 
 __all__ = [
     "Calibrate",
     "Calibration",
+    "Can",
+    "CanBus",
+    "CanMessage",
     "Channel",
+    "Column",
     "Connection",
     "Counters",
+    "DbcMessage",
     "EtherCat",
     "Field",
     "Filter",
     "Frame",
+    "GpioEdges",
+    "GpioLines",
+    "GpioOutput",
     "LoopSource",
     "LowPass",
+    "Mip",
     "Options",
     "Processed",
     "Rdt",
@@ -73,13 +102,18 @@ __all__ = [
     "Sensor",
     "SensorReader",
     "SensorShare",
+    "SerialPort",
+    "Signal",
     "Source",
     "Step",
     "Task",
+    "Text",
+    "TimeColumn",
     "Transform",
     "Udp",
     "analog_wrench",
     "attach",
+    "dbc_message",
     "run",
 ]
 
