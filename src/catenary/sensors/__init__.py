@@ -1,7 +1,7 @@
 """Sensors beside the axes: samples with time, rate, age and validity, in a share of their own.
 
-with sensors.attach("arm.wrist") as wrist:        # in the loop's program, or any other
-    now = wrist.read()                            # now.valid, now.age, now["force"]
+with sensors.attach("arm.wrist") as wrist:    # in the loop's program, or any other
+    now = wrist.read()                        # now.valid, now.age, now["force"]
 """
 
 from __future__ import annotations
@@ -13,7 +13,8 @@ if TYPE_CHECKING:
     from catenary.sensors.analog import analog_wrench
     from catenary.sensors.calibration import Calibration
     from catenary.sensors.can import Can, CanBus, CanMessage, Signal
-    from catenary.sensors.can_dbc import DbcMessage, dbc_message
+    from catenary.sensors.can_dbc import dbc_message
+    from catenary.sensors.can_frame import CanFrame
     from catenary.sensors.ethercat import EtherCat, Field, LoopSource
     from catenary.sensors.frame import Frame
     from catenary.sensors.gpio import GpioEdges, GpioLines, GpioOutput
@@ -34,12 +35,12 @@ _MODULES = {
     "Calibration": "calibration",
     "Can": "can",
     "CanBus": "can",
+    "CanFrame": "can_frame",
     "CanMessage": "can",
     "Channel": "sensor",
     "Column": "text",
     "Connection": "sensor",
     "Counters": "sensor",
-    "DbcMessage": "can_dbc",
     "EtherCat": "ethercat",
     "Field": "ethercat",
     "Filter": "processing",
@@ -78,12 +79,12 @@ __all__ = [
     "Calibration",
     "Can",
     "CanBus",
+    "CanFrame",
     "CanMessage",
     "Channel",
     "Column",
     "Connection",
     "Counters",
-    "DbcMessage",
     "EtherCat",
     "Field",
     "Filter",
