@@ -1,7 +1,9 @@
 """Sensors beside the axes: samples with time, rate, age and validity, in a share of their own.
 
-with sensors.attach("arm.wrist") as wrist:    # in the loop's program, or any other
-    now = wrist.read()                        # now.valid, now.age, now["force"]
+Submodules contain the decoders and sources of devices.
+
+    with sensors.attach("arm.wrist") as wrist:  # in the loop's program, or any other
+        now = wrist.read()                      # now.valid, now.age, now["force"]
 """
 
 from __future__ import annotations
