@@ -2,6 +2,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+import msgspec
 import numpy as np
 import pytest
 
@@ -51,6 +52,7 @@ def cycles(rig: Rig, count: int) -> None:
 def test_analogue_inputs_become_a_wrench_in_the_time_of_the_cycle(rig):
     matrix = np.diag([100.0, 100.0, 200.0, 1.0, 2.0, 3.0])
     source = LoopSource(rig.name)
+    source.layout = msgspec.structs.replace(source.layout, clock="monotonic")  # as on a wire
     fields = [Field(name, scale=VOLT) for name in rig.values]
     sensor = analog_wrench(source, fields, Calibration(matrix))
     for channel, volts in enumerate((1.0, -2.0, 0.5, 0.1, 0.2, 0.3)):
@@ -121,6 +123,22 @@ def test_a_cycle_without_an_answer_is_invalid(rig):
     (sample,) = sensor.feed(row.tobytes(), 0)
     assert (sample.valid, sample.reason) == (False, "the device did not answer in this cycle")
     assert first.feed(row.tobytes(), 0)[0].valid
+
+
+def test_in_virtual_time_the_reception_counts():
+    segment = Segment([Coupler(), ForceSensor()], clock="virtual")
+    with own_name("arm") as name, cat.MainDevice(segment) as main:
+        sensor = ProcessData(main.scan()[1])
+        with cat.Share(name) as share, cat.Loop(sensor, sink=share) as loop:
+            next(loop)
+            source = LoopSource(name)
+            force = EtherCat(source, {Channel("force", "N"): [Field("input_bytes", 0, "<f4")]})
+            connection = source.open()
+            next(loop)
+            samples = force.feed(*connection.read(1.0))
+            connection.close()
+    assert [sample.time_ns for sample in samples] == [None] * len(samples)
+    assert samples
 
 
 def test_the_end_of_the_loop_ends_the_connection(rig):

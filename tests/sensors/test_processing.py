@@ -5,7 +5,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from catenary.sensors import Calibration, Channel, Frame, Sample
-from catenary.sensors.processing import Calibrate, Filter, Processed, Transform
+from catenary.sensors.processing import Bias, Calibrate, Filter, Processed, Transform
 from tests.sensors.scripted import Lines, line
 
 MS = 1_000_000
@@ -35,6 +35,12 @@ def test_a_calibrated_sensor_has_force_and_torque():
     assert sample.values["force"].tolist() == [1, 2, 3]
     assert sample.values["torque"].tolist() == [4, 5, 6]
     assert sample.values["status"] == 0.0
+
+
+def test_a_bias_is_subtracted():
+    sensor = Processed(Gauges(), [Bias({"raw": [1, 2, 3, 4, 5, 6]})])
+    (sample,) = sensor.feed(raw(1, 1, 1, 1, 1, 1), 0)
+    assert sample.values["raw"].tolist() == [0, -1, -2, -3, -4, -5]
 
 
 def test_a_saturated_gauge_is_invalid():
@@ -71,6 +77,8 @@ def test_steps_apply_in_their_order():
     [
         (Calibrate("none", Calibration(np.eye(6))), "unknown channel 'none'"),
         (Calibrate("raw", Calibration(np.eye(3))), "the channels need"),
+        (Bias({"raw": [1.0]}), "the bias of 'raw'"),
+        (Bias({"raw": [float("nan")] * 6}), "the bias of 'raw'"),
         (Filter(["none"], 10.0, 500.0), "unknown channel 'none'"),
         (Transform(Frame()), "unknown channel 'force'"),
         (Transform(Frame(), vectors=["raw"], wrench=None), r"shape \(3,\)"),

@@ -24,7 +24,12 @@ def box():
 def test_the_box_starts_and_stops_with_the_requests_of_the_manual():
     assert Rdt(500.0).start() == (bytes.fromhex("1234 0002 00000000"),)
     assert Rdt(500.0).stop() == (bytes.fromhex("1234 0000 00000000"),)
-    assert Rdt(500.0, set_bias=True).start()[0] == bytes.fromhex("1234 0042 00000000")
+
+
+def test_the_bias_is_set_only_at_the_first_start():
+    box = Rdt(500.0, set_bias=True)
+    assert box.start()[0] == bytes.fromhex("1234 0042 00000000")
+    assert box.start() == (bytes.fromhex("1234 0002 00000000"),)  # the sensor may be loaded now
 
 
 def test_counts_become_newton_and_newton_metre():

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from catenary.sensors.gpio import GpioEdges, GpioLines, GpioOutput
     from catenary.sensors.low_pass import LowPass
     from catenary.sensors.mip import Mip
-    from catenary.sensors.processing import Calibrate, Filter, Processed, Step, Transform
+    from catenary.sensors.processing import Bias, Calibrate, Filter, Processed, Step, Transform
     from catenary.sensors.publisher import SensorShare
     from catenary.sensors.rdt import Rdt
     from catenary.sensors.reader import Reading, SensorReader, attach
@@ -33,6 +33,7 @@ if TYPE_CHECKING:
     from catenary.sensors.udp import Udp
 
 _MODULES = {
+    "Bias": "processing",
     "Calibrate": "processing",
     "Calibration": "calibration",
     "Can": "can",
@@ -77,6 +78,7 @@ _MODULES = {
 }
 
 __all__ = [
+    "Bias",
     "Calibrate",
     "Calibration",
     "Can",

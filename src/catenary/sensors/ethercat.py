@@ -106,7 +106,8 @@ class EtherCat:
         loop = LoopSource("arm")
         ft = EtherCat(loop, {Channel("force", "N", (3,)): ["Fx", "Fy", "Fz"]})
 
-    A sample is invalid if a device of the loop did not answer in its cycle.
+    A sample is invalid if a device of the loop did not answer in its cycle. Its time is that of
+    the cycle start; in virtual time, the time of reception counts.
 
     Args:
         loop: source with the share of the loop.
@@ -138,7 +139,8 @@ class EtherCat:
             check_fields(channel, fields, self._dtype)
         self.channels: Sequence[Channel] = tuple(channels)
         self.rate = 1.0 / (loop.layout.period * every)
-        self.clock: Clock = "monotonic" if loop.layout.clock == "monotonic" else "device"
+        self.clock: Clock = "monotonic"
+        self._is_virtual = loop.layout.clock == "virtual"
         self.counters = Counters()
         self._every, self._unit = every, unit
         self._number = 0  # of the last cycle
@@ -176,7 +178,8 @@ class EtherCat:
             numbers = [number_of(row, field) for field in fields]
             values[channel.name] = numbers if channel.shape else numbers[0]
         reason = self._objection(row)
-        return Sample(int(row["scheduled_ns"]), values, not reason, reason)
+        time_ns = None if self._is_virtual else int(row["scheduled_ns"])
+        return Sample(time_ns, values, not reason, reason)
 
     def _objection(self, row: np.void) -> str:
         """Return why the values of a row must not be used; empty if they may be used."""

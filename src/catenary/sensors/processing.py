@@ -154,6 +154,33 @@ class Calibrate:
         """Do nothing: the step has no state."""
 
 
+class Bias:
+    """Step that subtracts constants, such as the values of a sensor without load.
+
+    Args:
+        values: value of each channel that is subtracted, by name.
+    """
+
+    def __init__(self, values: Values) -> None:
+        self._values = {name: np.array(value, np.float64) for name, value in values.items()}
+
+    def channels(self, channels: Sequence[Channel]) -> Sequence[Channel]:
+        """Return the channels. Raises ValueError if one is missing or has another shape."""
+        for name, value in self._values.items():
+            shape = channel_of(channels, name).shape
+            if value.shape != shape or not np.isfinite(value).all():
+                raise ValueError(f"the bias of {name!r} must be finite, with the shape {shape}")
+        return channels
+
+    def apply(self, values: Values) -> tuple[Values, str]:
+        """Subtract the constants."""
+        less = {name: np.asarray(values[name]) - bias for name, bias in self._values.items()}
+        return {**values, **less}, ""
+
+    def reset(self) -> None:
+        """Do nothing: the step has no state."""
+
+
 class Filter:
     """Step that filters channels by a low-pass filter.
 

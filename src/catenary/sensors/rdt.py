@@ -35,7 +35,8 @@ class Rdt:
         counts_per_torque: counts per newton metre.
         sequence_rate: rate at which the F/T sequence counts [Hz], which then gives the times of
             the samples; None: the time of reception counts.
-        set_bias: True: the box sets its software bias when it starts. The sensor must be unloaded.
+        set_bias: True: the box sets its software bias at the first start of this decoder. The
+            sensor must be unloaded. A box that restarts loses its bias, which `Bias` does not.
 
     Raises:
         ValueError: a number is not positive.
@@ -71,6 +72,7 @@ class Rdt:
         self._sequence.restart()
         self._ticks = self._last_tick = 0
         bias = (request(SET_BIAS),) if self._set_bias else ()
+        self._set_bias = False  # after a lost connection, the sensor may be loaded
         return (*bias, request(START))
 
     def stop(self) -> Sequence[bytes]:
