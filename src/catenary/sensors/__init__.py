@@ -1,7 +1,7 @@
 """Sensors beside the axes: samples with time, rate, age and validity, in a share of their own.
 
-with sensors.attach("arm.wrist") as wrist:        # in the loop's program, or any other
-    now = wrist.read()                            # now.valid, now.age, now["force"]
+with sensors.attach("arm.wrist") as wrist:    # in the loop's program, or any other
+    now = wrist.read()                        # now.valid, now.age, now["force"]
 """
 
 from __future__ import annotations
@@ -10,11 +10,17 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from catenary.sensors.analog import analog_wrench
+    from catenary.sensors.calibration import Calibration
     from catenary.sensors.can import Can, CanBus, CanMessage, Signal
     from catenary.sensors.can_dbc import dbc_message
     from catenary.sensors.can_frame import CanFrame
+    from catenary.sensors.ethercat import EtherCat, Field, LoopSource
+    from catenary.sensors.frame import Frame
     from catenary.sensors.gpio import GpioEdges, GpioLines, GpioOutput
+    from catenary.sensors.low_pass import LowPass
     from catenary.sensors.mip import Mip
+    from catenary.sensors.processing import Calibrate, Filter, Processed, Step, Transform
     from catenary.sensors.publisher import SensorShare
     from catenary.sensors.rdt import Rdt
     from catenary.sensors.reader import Reading, SensorReader, attach
@@ -24,39 +30,9 @@ if TYPE_CHECKING:
     from catenary.sensors.text import Column, Text, TimeColumn
     from catenary.sensors.udp import Udp
 
-__all__ = [
-    "Can",
-    "CanBus",
-    "CanFrame",
-    "CanMessage",
-    "Channel",
-    "Column",
-    "Connection",
-    "Counters",
-    "GpioEdges",
-    "GpioLines",
-    "GpioOutput",
-    "Mip",
-    "Options",
-    "Rdt",
-    "Reading",
-    "Sample",
-    "Sensor",
-    "SensorReader",
-    "SensorShare",
-    "SerialPort",
-    "Signal",
-    "Source",
-    "Task",
-    "Text",
-    "TimeColumn",
-    "Udp",
-    "attach",
-    "dbc_message",
-    "run",
-]
-
 _MODULES = {
+    "Calibrate": "processing",
+    "Calibration": "calibration",
     "Can": "can",
     "CanBus": "can",
     "CanFrame": "can_frame",
@@ -65,11 +41,18 @@ _MODULES = {
     "Column": "text",
     "Connection": "sensor",
     "Counters": "sensor",
+    "EtherCat": "ethercat",
+    "Field": "ethercat",
+    "Filter": "processing",
+    "Frame": "frame",
     "GpioEdges": "gpio",
     "GpioLines": "gpio",
     "GpioOutput": "gpio",
+    "LoopSource": "ethercat",
+    "LowPass": "low_pass",
     "Mip": "mip",
     "Options": "runner",
+    "Processed": "processing",
     "Rdt": "rdt",
     "Reading": "reader",
     "Sample": "sensor",
@@ -79,14 +62,61 @@ _MODULES = {
     "SerialPort": "serial_port",
     "Signal": "can",
     "Source": "sensor",
+    "Step": "processing",
     "Task": "runner",
     "Text": "text",
     "TimeColumn": "text",
+    "Transform": "processing",
     "Udp": "udp",
+    "analog_wrench": "analog",
     "attach": "reader",
     "dbc_message": "can_dbc",
     "run": "runner",
 }
+
+__all__ = [
+    "Calibrate",
+    "Calibration",
+    "Can",
+    "CanBus",
+    "CanFrame",
+    "CanMessage",
+    "Channel",
+    "Column",
+    "Connection",
+    "Counters",
+    "EtherCat",
+    "Field",
+    "Filter",
+    "Frame",
+    "GpioEdges",
+    "GpioLines",
+    "GpioOutput",
+    "LoopSource",
+    "LowPass",
+    "Mip",
+    "Options",
+    "Processed",
+    "Rdt",
+    "Reading",
+    "Sample",
+    "Sensor",
+    "SensorReader",
+    "SensorShare",
+    "SerialPort",
+    "Signal",
+    "Source",
+    "Step",
+    "Task",
+    "Text",
+    "TimeColumn",
+    "Transform",
+    "Udp",
+    "analog_wrench",
+    "attach",
+    "dbc_message",
+    "run",
+]
 
 
 def __getattr__(name: str) -> object:
