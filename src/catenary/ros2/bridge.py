@@ -30,6 +30,7 @@ from catenary.ros2.source import Source, stamp_ns
 from catenary.share import attach
 
 IDLE = 0.05  # [s] longest wait
+SHOW_INTERVAL = 1.0  # [s] between the texts for the user
 
 
 class Bridge:
@@ -62,7 +63,8 @@ class Bridge:
         self._publishing = Publishing(config, backend, self._source, self._requests, self.reports)
         self._commands: Commands | None = None
         self._run = ""
-        self._send_at = 0.0
+        self._send_at = self._show_at = 0.0
+        self._shown = ""  # last shown report
         self._follow_run()
         self._subscribe()
         self._offer_services()
@@ -91,8 +93,16 @@ class Bridge:
         while not stop.is_set():
             self._backend.spin_once(self._time_left())
             self.step()
-            for text in self.reports.unread():
-                (show or ignore)(text)
+            if show is not None and time.monotonic() >= self._show_at:
+                self._show(show)
+
+    def _show(self, show: Callable[[str], None]) -> None:
+        """Show the new reports. A flood of refused commands must not become a flood of texts."""
+        self._show_at = time.monotonic() + SHOW_INTERVAL
+        for text in dict.fromkeys(self.reports.unread()):
+            if text != self._shown:
+                show(text)
+                self._shown = text
 
     def step(self) -> None:
         """Read the share, send the set-points and publish what is due."""
@@ -196,7 +206,3 @@ class Bridge:
         if self._commands is not None and self._commands.active:
             due = min(due, self._send_at)
         return min(max(due - time.monotonic(), 0.0), IDLE)
-
-
-def ignore(_: str) -> None:
-    """Do nothing with a report, which is also part of the diagnostics."""

@@ -173,13 +173,13 @@ class Commands:
         follower = self._followers[topic]
         try:
             state.check(follower.quantity)
+            follower.accept(message, now, state)
             if self._lease is None:
                 self._lease = reader.lease(self.axes, for_=self._duration)
-            follower.accept(message, now, state)
         except CatenaryError as error:
             self._reports.add(REFUSED, f"{topic}: {error.message}")
             if self._active is None:
-                self._drop()
+                follower.cancel()
             return
         if self._active is not follower and self._active is not None:
             self._active.cancel()

@@ -137,3 +137,20 @@ def test_the_axes_hold_when_the_bridge_is_killed(graph: Graph) -> None:
         assert found.ended == ["DIED"]
         eventually(lambda: abs(found.arm.actual.velocity).max() < 1e-3)
         assert found.arm.actual.position[0] < start + 19.0
+
+
+def test_a_flood_of_bad_commands_moves_nothing_and_does_not_stop_the_topics(graph: Graph) -> None:
+    with machine() as found, bridge(found.name, graph.environment), graph.peer() as peer:
+        eventually(lambda: bool(found.arm.enabled.all()))
+        start = found.arm.target.position.copy()
+        topic = "/left/joint_trajectory"
+        peer.ask("subscribe", topic="/left/joint_states", type=STATES, qos=RELIABLE)
+        peer.ask("advertise", topic=topic, type=TRAJECTORY, qos=RELIABLE)
+        eventually(lambda: peer.ask("matched", topic=topic))
+        fields = {"joint_names": ["none"], "points": [{"positions": [1.0]}]}
+        for _ in range(2000):
+            peer.ask("publish", topic=topic, type=TRAJECTORY, fields=fields)
+        before = len(peer.ask("messages", topic="/left/joint_states"))
+        eventually(lambda: len(peer.ask("messages", topic="/left/joint_states")) > before)
+        assert (found.arm.target.position == start).all()
+        assert found.ended == []  # a refused command takes no lease
