@@ -19,6 +19,7 @@ from tests.ros2.examples_of_messages import EXAMPLES
 from tests.ros2.judge.process import (
     BEST_EFFORT,
     RELIABLE,
+    SOURCES,
     Graph,
     NodeProcess,
     connect,
@@ -253,3 +254,17 @@ def test_a_stopped_subscription_does_not_stop_the_publisher(
     finally:
         os.kill(peer.process.pid, signal.SIGCONT)
     eventually(lambda: last in peer.ask("messages", topic="/a"))
+
+
+def test_a_missing_package_of_messages_is_named(ros2: Path) -> None:
+    program = "from catenary.ros2.rclpy_backend import ros_class; ros_class('no_msgs/msg/State')"
+    done = subprocess.run(
+        [str(ros2), "-c", program],
+        env={**os.environ, "PYTHONPATH": str(SOURCES)},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 1
+    assert "the ROS 2 package no_msgs is not installed" in done.stderr
+    assert "apt-get install ros-$ROS_DISTRO-no-msgs" in done.stderr
