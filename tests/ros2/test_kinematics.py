@@ -16,6 +16,23 @@ ARM = ROOT / "examples" / "cobot" / "arm.xml"
 BENT = np.array([0.1, 0.5, 0.8, 0.2, 0.4, 0.1])
 
 
+PLANAR = """
+<mujoco>
+  <worldbody>
+    <body>
+      <joint name="a" axis="0 0 1"/>
+      <geom type="capsule" fromto="0 0 0 0.4 0 0" size="0.02" mass="1"/>
+      <body pos="0.4 0 0">
+        <joint name="b" axis="0 0 1"/>
+        <geom type="capsule" fromto="0 0 0 0.3 0 0" size="0.02" mass="1"/>
+        <site name="tip" pos="0.3 0 0"/>
+      </body>
+    </body>
+  </worldbody>
+</mujoco>
+"""
+
+
 @pytest.fixture(scope="module")
 def arm() -> Kinematics:
     return Kinematics(ARM, "tool", axes=6)
@@ -76,6 +93,16 @@ def test_a_pose_out_of_reach_has_no_solution(arm: Kinematics) -> None:
 def test_a_straight_arm_is_singular(arm: Kinematics) -> None:
     assert condition(arm.jacobian(np.zeros(6))) > 1e6
     assert condition(arm.jacobian(np.array([0.1, 0.5, 1.2, 0.2, 1.2, 0.1]))) < 30
+
+
+def test_an_arm_of_two_axes_reaches_the_poses_in_its_plane(tmp_path: Path) -> None:
+    planar = tmp_path / "planar.xml"
+    planar.write_text(PLANAR)
+    two = Kinematics(planar, "tip")
+    assert condition(two.jacobian(np.array([0.3, 1.2]))) < 30
+    target = two.pose(np.array([0.4, 1.0]))
+    found = two.solve(target, np.array([0.3, 1.2]))
+    assert found == pytest.approx([0.4, 1.0], abs=1e-4)
 
 
 def test_a_body_can_be_named_instead_of_a_site() -> None:
