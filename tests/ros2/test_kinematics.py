@@ -10,27 +10,11 @@ from scipy.spatial.transform import Rotation
 
 from catenary.errors import ConfigurationError
 from catenary.ros2.kinematics import Kinematics, Pose, condition, reached
+from tests.ros2.planar import PLANAR
 
 ROOT = Path(__file__).resolve().parents[2]
 ARM = ROOT / "examples" / "cobot" / "arm.xml"
 BENT = np.array([0.1, 0.5, 0.8, 0.2, 0.4, 0.1])
-
-
-PLANAR = """
-<mujoco>
-  <worldbody>
-    <body>
-      <joint name="a" axis="0 0 1"/>
-      <geom type="capsule" fromto="0 0 0 0.4 0 0" size="0.02" mass="1"/>
-      <body pos="0.4 0 0">
-        <joint name="b" axis="0 0 1"/>
-        <geom type="capsule" fromto="0 0 0 0.3 0 0" size="0.02" mass="1"/>
-        <site name="tip" pos="0.3 0 0"/>
-      </body>
-    </body>
-  </worldbody>
-</mujoco>
-"""
 
 
 @pytest.fixture(scope="module")
