@@ -151,12 +151,10 @@ def test_edges_of_the_simulator(simulator: Simulator) -> None:
     connection = GpioLines(simulator.chip, edges.lines).open()
     try:
         before_ns = time.monotonic_ns()
+        samples = []
         for line, up in ((2, True), (5, True), (2, False)):
             simulator.pull(line, up)
-        samples = []
-        while len(samples) < 3:
-            data, received_ns = connection.read(5.0)
-            assert data
+            data, received_ns = connection.read(5.0)  # lines have no order of their interrupts
             samples += edges.feed(data, received_ns)
     finally:
         connection.close()

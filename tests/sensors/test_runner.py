@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pytest
 
@@ -107,6 +109,15 @@ def test_a_silent_device_is_started_again():
     assert result.valid == [1, 0, 1]
 
 
+@pytest.mark.parametrize("silence", [10.0, math.inf])
+def test_a_device_that_sends_only_changes_stays_connected(silence):
+    script = Script([*regular(1), (5000, b""), (4000, b""), (2, line(9002, 1.0))])
+    decoder = Lines()
+    result = Result(script, decoder, Options(silence=silence))
+    assert decoder.starts == 1
+    assert result.valid == [1, 1]
+
+
 def test_a_task_raises_the_error_of_its_thread():
     decoder = Lines()
     decoder.channels = ()  # the samples do not match the share
@@ -122,7 +133,14 @@ def test_a_task_raises_the_error_of_its_thread():
 
 
 @pytest.mark.parametrize(
-    "limits", [{"silence": 0.0}, {"reopen": -1.0}, {"latency": -1e-3}, {"pause_max": 0.01}]
+    "limits",
+    [
+        {"silence": 0.0},
+        {"silence": math.nan},
+        {"reopen": -1.0},
+        {"latency": -1e-3},
+        {"pause_max": 0.01},
+    ],
 )
 def test_a_limit_out_of_range_is_refused(limits):
     with pytest.raises(ValueError, match="must"):

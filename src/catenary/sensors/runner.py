@@ -16,10 +16,11 @@ from typing import Self
 
 from catenary.sensors.clock_map import ClockMap
 from catenary.sensors.publisher import SensorShare
-from catenary.sensors.sensor import Connection, Sample, Sensor, Source
+from catenary.sensors.sensor import Connection, DataSource, Sample, Sensor
 
 POLL = 0.1  # [s] longest wait, so that a stop request is seen
 SILENCE_PERIODS, SILENCE_MIN = 10.0, 0.02  # default of `Options.silence`
+FOREVER = 1e9  # [s]
 NS = 1_000_000_000
 DEVICE_TIME = "the time of the device went back or jumped"
 NO_DATA = "no data"
@@ -32,8 +33,8 @@ class Options:
 
     Args:
         silence: time without a sample that makes the sensor invalid; None: ten periods, at least
-            20 ms.
-        reopen: time without a sample after which the source is opened again.
+            20 ms; inf for a device that sends only changes.
+        reopen: time without a sample after which the source is opened again, at least `silence`.
         pause: pause before the first attempt to open the source again.
         pause_max: longest pause between two attempts.
         latency: known delay from the measurement to the reception; it is subtracted from times
@@ -51,10 +52,11 @@ class Options:
     latency: float = 0.0
 
     def __post_init__(self) -> None:
-        for name in ("silence", "reopen", "pause", "pause_max"):
-            value = getattr(self, name)
-            if value is not None and not 0 < value < math.inf:
-                raise ValueError(f"{name}={value} s: must be positive and finite")
+        if self.silence is not None and not self.silence > 0:
+            raise ValueError(f"silence={self.silence} s: must be positive")
+        for name in ("reopen", "pause", "pause_max"):
+            if not 0 < getattr(self, name) < math.inf:
+                raise ValueError(f"{name}={getattr(self, name)} s: must be positive and finite")
         if not 0 <= self.latency < math.inf:
             raise ValueError(f"latency={self.latency} s: must not be negative")
         if self.pause_max < self.pause:
@@ -63,7 +65,7 @@ class Options:
 
 def run(
     sensor: Sensor,
-    source: Source,
+    source: DataSource,
     share: SensorShare,
     *,
     stop: threading.Event | None = None,
@@ -89,13 +91,13 @@ class Runner:
     """Owner of the connection to a sensor, one at a time."""
 
     def __init__(
-        self, sensor: Sensor, source: Source, share: SensorShare, options: Options
+        self, sensor: Sensor, source: DataSource, share: SensorShare, options: Options
     ) -> None:
         self._sensor, self._source, self._share = sensor, source, share
         self._options = options
         silence = max(SILENCE_PERIODS / sensor.rate, SILENCE_MIN)
-        self._silence_ns = round((options.silence or silence) * NS)
-        self._reopen_ns = round(options.reopen * NS)
+        self._silence_ns = round(min(options.silence or silence, FOREVER) * NS)
+        self._reopen_ns = max(round(options.reopen * NS), self._silence_ns)
         self._latency_ns = round(options.latency * NS)
         self._clock = ClockMap()
         self._pause = options.pause
@@ -199,7 +201,7 @@ class Task:
     def __init__(
         self,
         sensor: Sensor,
-        source: Source,
+        source: DataSource,
         share: SensorShare,
         *,
         options: Options | None = None,
