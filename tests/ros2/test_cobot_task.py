@@ -5,7 +5,6 @@ from __future__ import annotations
 import importlib.util
 import sys
 import xml.etree.ElementTree as ElementTree
-from collections.abc import Iterator
 from pathlib import Path
 from types import ModuleType, SimpleNamespace
 
@@ -26,14 +25,14 @@ CYCLE = np.zeros(
 
 
 @pytest.fixture
-def cobot(monkeypatch: pytest.MonkeyPatch) -> Iterator[ModuleType]:
+def cobot(monkeypatch: pytest.MonkeyPatch) -> ModuleType:
     spec = importlib.util.spec_from_file_location("cobot_example", FOLDER / "cobot.py")
     assert spec is not None
     assert spec.loader is not None
     module = importlib.util.module_from_spec(spec)
     monkeypatch.setattr(sys, "path", list(sys.path))
     spec.loader.exec_module(module)
-    yield module
+    return module
 
 
 def test_a_cycle_becomes_a_joint_state(cobot: ModuleType, monkeypatch: pytest.MonkeyPatch) -> None:

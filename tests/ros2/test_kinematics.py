@@ -10,6 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from catenary.errors import ConfigurationError
 from catenary.ros2.kinematics import Kinematics, Pose, condition, reached
+from tests.ros2.planar import PLANAR
 
 ROOT = Path(__file__).resolve().parents[2]
 ARM = ROOT / "examples" / "cobot" / "arm.xml"
@@ -76,6 +77,16 @@ def test_a_pose_out_of_reach_has_no_solution(arm: Kinematics) -> None:
 def test_a_straight_arm_is_singular(arm: Kinematics) -> None:
     assert condition(arm.jacobian(np.zeros(6))) > 1e6
     assert condition(arm.jacobian(np.array([0.1, 0.5, 1.2, 0.2, 1.2, 0.1]))) < 30
+
+
+def test_an_arm_of_two_axes_reaches_the_poses_in_its_plane(tmp_path: Path) -> None:
+    planar = tmp_path / "planar.xml"
+    planar.write_text(PLANAR)
+    two = Kinematics(planar, "tip")
+    assert condition(two.jacobian(np.array([0.3, 1.2]))) < 30
+    target = two.pose(np.array([0.4, 1.0]))
+    found = two.solve(target, np.array([0.3, 1.2]))
+    assert found == pytest.approx([0.4, 1.0], abs=1e-4)
 
 
 def test_a_body_can_be_named_instead_of_a_site() -> None:

@@ -163,6 +163,9 @@ def damped(jacobian: Row, twist: Row, damping: float) -> Row:
 
 
 def condition(jacobian: Row) -> float:
-    """Return the ratio of the largest to the smallest singular value of a Jacobian (6, n)."""
+    """Return the ratio of the largest to the smallest singular value of a Jacobian (6, n).
+
+    An arm with n < 6 axes has n singular values.
+    """
     values = np.linalg.svd(jacobian, compute_uv=False)
-    return float("inf") if len(values) < 6 or values[-1] == 0 else float(values[0] / values[-1])
+    return float("inf") if values[-1] == 0 else float(values[0] / values[-1])
