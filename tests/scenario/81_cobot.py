@@ -40,6 +40,7 @@ def run(folder: Path, *options: str) -> str:
         text=True,
         timeout=300,
         check=False,
+        env={**os.environ, "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"},
     )
     assert done.returncode == 0, done.stderr
     return done.stdout
@@ -67,7 +68,7 @@ def test_all_deadlines_are_met(out: Path) -> None:
         "dynamics",
         "main control",
         "trajectory",
-        "monitor",
+        "ros2",
         "log",
         "stop",
     ]

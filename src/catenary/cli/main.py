@@ -24,6 +24,7 @@ from catenary.cli import (
     realtime,
     record,
     reg,
+    ros2,
     scan,
     sdo,
     sii,
@@ -40,7 +41,7 @@ COMMANDS = (
     *(scan, state, graph, diag, sdo, reg, alias, sii, esi),
     *(init, check),
     *(demo, dashboard, top, doctor, bench, virtual, realtime, record, plot, foxglove),
-    include,
+    *(ros2, include),
 )
 EPILOG = """\
 TARGET is one of
