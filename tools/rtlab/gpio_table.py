@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import contextlib
 import ctypes
+import gc
 import json
 import os
 import sys
@@ -65,6 +66,8 @@ def measure(chip: str, lines: Path) -> tuple[GpioEdges, dict[str, list[int]]]:
     found: dict[str, list[int]] = {"edge to running": [], "edge to output": []}
     connection = GpioLines(chip, edges.lines).open()
     with GpioOutput(chip, OUTPUT) as output:
+        gc.collect()
+        gc.disable()  # as real-time programs do: a collection takes 2.6 ms here
         os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(PRIORITY))
         if (child := os.fork()) == 0:
             make_edges(lines / f"sim_gpio{INPUT}" / "pull")
