@@ -12,13 +12,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from catenary.errors import ConfigurationError, DecodeError
-from catenary.sensors.can import Can, CanBus, CanMessage, Signal
+from catenary.sensors.can import Can, CanBus, CanMessage, CanSignal
 from catenary.sensors.can_dbc import dbc_message
 from catenary.sensors.can_frame import CanFrame, decode_frame, encode_frame
 from catenary.sensors.sensor import Channel
 
-FORCE = CanMessage(0x1A0, "<hhh", [Signal(Channel("force", "N", (3,)), 0.01)])
-TORQUE = CanMessage(0x1A1, "<hhhx", [Signal(Channel("torque", "N·m", (3,)), 0.001, 1.0)])
+FORCE = CanMessage(0x1A0, "<hhh", [CanSignal(Channel("force", "N", (3,)), 0.01)])
+TORQUE = CanMessage(0x1A1, "<hhhx", [CanSignal(Channel("torque", "N·m", (3,)), 0.001, 1.0)])
 PERIOD_NS = 2_000_000
 
 
@@ -105,9 +105,9 @@ def test_any_bytes_are_a_frame_or_an_error(data: bytes) -> None:
 @pytest.mark.parametrize(
     "make",
     [
-        lambda: CanMessage(0x1A0, "<hh", [Signal(Channel("force", "N", (3,)))]),
-        lambda: CanMessage(0x1A0, "<3s", [Signal(Channel("force", "N"))]),
-        lambda: CanMessage(0x800, "<h", [Signal(Channel("force", "N"))]),
+        lambda: CanMessage(0x1A0, "<hh", [CanSignal(Channel("force", "N", (3,)))]),
+        lambda: CanMessage(0x1A0, "<3s", [CanSignal(Channel("force", "N"))]),
+        lambda: CanMessage(0x800, "<h", [CanSignal(Channel("force", "N"))]),
         lambda: Can([FORCE, FORCE], rate=1.0),
         lambda: Can([], rate=1.0),
         lambda: Can([FORCE], rate=0.0),

@@ -72,6 +72,12 @@ def test_a_bad_sample_is_invalid_and_reported(share, values, time_ns, reason):
     assert rows["scheduled_ns"][1] >= rows["scheduled_ns"][0]
 
 
+def test_a_wrong_time_in_the_future_does_not_spoil_the_next_samples(share):
+    share.publish(GOOD, START + 10_000 * MS, received_ns=START + 50 * MS)
+    share.publish(GOOD, START + 2 * MS, received_ns=START + 52 * MS)
+    assert rows_and_reasons(share)[0]["valid"].tolist() == [0, 1]
+
+
 def test_a_reason_that_lasts_is_reported_once(share):
     for k in range(100):
         share.publish(GOOD, START + k * MS, valid=False, reason="overload")

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from catenary.sensors.analog import analog_wrench
     from catenary.sensors.calibration import Calibration
-    from catenary.sensors.can import Can, CanBus, CanMessage, Signal
+    from catenary.sensors.can import Can, CanBus, CanMessage, CanSignal
     from catenary.sensors.can_dbc import dbc_message
     from catenary.sensors.can_frame import CanFrame
     from catenary.sensors.ethercat import EtherCat, Field, LoopSource
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from catenary.sensors.rdt import Rdt
     from catenary.sensors.reader import Reading, SensorReader, attach
     from catenary.sensors.runner import Options, Task, run
-    from catenary.sensors.sensor import Channel, Connection, Counters, Sample, Sensor, Source
+    from catenary.sensors.sensor import Channel, Connection, Counters, DataSource, Sample, Sensor
     from catenary.sensors.serial_port import SerialPort
     from catenary.sensors.text import Column, Text, TimeColumn
     from catenary.sensors.udp import Udp
@@ -40,10 +40,12 @@ _MODULES = {
     "CanBus": "can",
     "CanFrame": "can_frame",
     "CanMessage": "can",
+    "CanSignal": "can",
     "Channel": "sensor",
     "Column": "text",
     "Connection": "sensor",
     "Counters": "sensor",
+    "DataSource": "sensor",
     "EtherCat": "ethercat",
     "Field": "ethercat",
     "Filter": "processing",
@@ -63,8 +65,6 @@ _MODULES = {
     "SensorReader": "reader",
     "SensorShare": "publisher",
     "SerialPort": "serial_port",
-    "Signal": "can",
-    "Source": "sensor",
     "Step": "processing",
     "Task": "runner",
     "Text": "text",
@@ -85,10 +85,12 @@ __all__ = [
     "CanBus",
     "CanFrame",
     "CanMessage",
+    "CanSignal",
     "Channel",
     "Column",
     "Connection",
     "Counters",
+    "DataSource",
     "EtherCat",
     "Field",
     "Filter",
@@ -108,8 +110,6 @@ __all__ = [
     "SensorReader",
     "SensorShare",
     "SerialPort",
-    "Signal",
-    "Source",
     "Step",
     "Task",
     "Text",

@@ -1,7 +1,7 @@
 """Sensors on a CAN bus, through python-can.
 
-    force = CanMessage(0x1A0, "<hhh", [Signal(Channel("force", "N", (3,)), 0.01)])
-    torque = CanMessage(0x1A1, "<hhh", [Signal(Channel("torque", "N·m", (3,)), 0.001)])
+    force = CanMessage(0x1A0, "<hhh", [CanSignal(Channel("force", "N", (3,)), 0.01)])
+    torque = CanMessage(0x1A1, "<hhh", [CanSignal(Channel("torque", "N·m", (3,)), 0.001)])
     sensor, source = Can([force, torque], rate=500.0), CanBus("can0", ids=[0x1A0, 0x1A1])
 
 A message is described by a format of `struct`, or by a DBC file (`dbc_message`, which needs
@@ -47,7 +47,7 @@ class Message(Protocol):
 
 
 @dataclass(frozen=True, slots=True)
-class Signal:
+class CanSignal:
     """Consecutive numbers of a message that become one channel.
 
     Args:
@@ -77,7 +77,7 @@ class CanMessage:
 
     identifier: int
     layout: str
-    signals: Sequence[Signal]
+    signals: Sequence[CanSignal]
     extended: bool = False
 
     def __post_init__(self) -> None:

@@ -19,6 +19,7 @@ from catenary.share.share import Share
 HISTORY = 2.0  # [s]
 RATE_SAMPLES = 64  # largest number of samples for the measured rate
 EVENT_PAUSE_NS = 1_000_000_000  # the same reason is not reported again earlier
+INVALID_DATA = "the sensor reports invalid data"
 NOT_FINITE = "a value is not finite"
 TIME_BACK = "the time of the samples went back"
 FUTURE = "the time of a sample is in the future"
@@ -107,13 +108,17 @@ class SensorShare:
         """
         received = time.monotonic_ns() if received_ns is None else received_ns
         row = self._row_of(values)
-        found = reason if not valid else self._objection(row, time_ns, received)
-        self._last_ns = max(self._last_ns, min(time_ns, received))
-        if not found and valid:
-            self._write(row, time_ns, received)
+        wrong_time = self._wrong_time(time_ns, received)
+        if not wrong_time:
+            self._last_ns = time_ns
+        at = received if wrong_time else time_ns
+        found = wrong_time or self._wrong_value(row)
+        if not valid:
+            found = reason or INVALID_DATA
+        if found:
+            self._write_invalid(row, at, received, found)
         else:
-            at = received if found in (TIME_BACK, FUTURE) else time_ns
-            self._write_invalid(row, at, received, found or "the sensor reports invalid data")
+            self._write(row, at, received)
 
     def invalidate(self, reason: str, now_ns: int | None = None) -> None:
         """Publish a sample without values: readers get NaN, and 0 for whole numbers.
@@ -154,12 +159,14 @@ class SensorShare:
             row[channel.name] = value
         return row
 
-    def _objection(self, row: np.void, time_ns: int, received_ns: int) -> str:
-        """Return why a sample is invalid; empty if it is valid."""
+    def _wrong_time(self, time_ns: int, received_ns: int) -> str:
+        """Return why a time is wrong; empty if it is right."""
         if time_ns < self._last_ns:
             return TIME_BACK
-        if time_ns > received_ns:
-            return FUTURE
+        return FUTURE if time_ns > received_ns else ""
+
+    def _wrong_value(self, row: np.void) -> str:
+        """Return why the values of a row are wrong; empty if they are right."""
         finite = all(np.isfinite(row[channel.name]).all() for channel in self.channels)
         return "" if finite else NOT_FINITE
 

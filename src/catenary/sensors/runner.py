@@ -16,7 +16,7 @@ from typing import Self
 
 from catenary.sensors.clock_map import ClockMap
 from catenary.sensors.publisher import SensorShare
-from catenary.sensors.sensor import Connection, Sample, Sensor, Source
+from catenary.sensors.sensor import Connection, DataSource, Sample, Sensor
 
 POLL = 0.1  # [s] longest wait, so that a stop request is seen
 SILENCE_PERIODS, SILENCE_MIN = 10.0, 0.02  # default of `Options.silence`
@@ -65,7 +65,7 @@ class Options:
 
 def run(
     sensor: Sensor,
-    source: Source,
+    source: DataSource,
     share: SensorShare,
     *,
     stop: threading.Event | None = None,
@@ -91,7 +91,7 @@ class Runner:
     """Owner of the connection to a sensor, one at a time."""
 
     def __init__(
-        self, sensor: Sensor, source: Source, share: SensorShare, options: Options
+        self, sensor: Sensor, source: DataSource, share: SensorShare, options: Options
     ) -> None:
         self._sensor, self._source, self._share = sensor, source, share
         self._options = options
@@ -201,7 +201,7 @@ class Task:
     def __init__(
         self,
         sensor: Sensor,
-        source: Source,
+        source: DataSource,
         share: SensorShare,
         *,
         options: Options | None = None,

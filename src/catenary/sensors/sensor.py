@@ -124,7 +124,7 @@ class Connection(Protocol):
         """Close the connection. A second call does nothing."""
 
 
-class Source(Protocol):
+class DataSource(Protocol):
     """Place from which the data of a device comes: a serial port, a UDP address, a CAN bus."""
 
     @property
