@@ -130,6 +130,7 @@ def measure(seconds: float) -> dict[str, object]:
     duration = (rows["scheduled_ns"][-1] - rows["scheduled_ns"][0]) * 1e-9
     return {
         "machine": machine(),
+        "load_average": os.getloadavg()[0],  # of all programs, over the last minute
         "seconds": seconds,
         "loop": {"rate_hz": 1 / PERIOD, "drives": DRIVES, "cycles": len(ages), **lost},
         "samples_sent": sent,

@@ -63,4 +63,4 @@ def test_the_makefile_passes_the_folder() -> None:
         text=True,
         check=False,
     )
-    assert "tools.rtlab gpio --gpio /opt/gpio" in done.stdout
+    assert "--gpio /opt/gpio" in done.stdout
