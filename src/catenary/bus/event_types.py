@@ -153,6 +153,17 @@ class ClockLocked(Event):
 
 
 @dataclass(frozen=True, slots=True)
+class ExternalClockChanged(Event):
+    """Change of the external clock that the cycle starts follow, or a jump of its time.
+
+    `sub` is None.
+    """
+
+    state: Literal["seeking", "locked", "lost"]
+    phase_error: float  # last lateness of a cycle start in the time of the clock [s]
+
+
+@dataclass(frozen=True, slots=True)
 class AxisStopped(Event):
     """Stop of an axis by the core, without a request from the application."""
 

@@ -90,6 +90,7 @@ from catenary.core._law cimport (
 from catenary.core._native cimport (
     cat_add32,
     cat_load_acquire_pointer,
+    cat_load_relaxed64,
     cat_or32,
     cat_pointer_claim,
     cat_pointer_is_offered,
@@ -268,6 +269,7 @@ cdef void collect(cycle_t *c, actual_t *actual, int64_t deadline) noexcept nogil
     c.outstanding = 0
     axes_read(c.axes, actual, c.number, c.scheduled)
     follow_clock(c)
+    follow_steering(c)
     judge(c)
 
 
@@ -277,6 +279,22 @@ cdef inline void follow_clock(cycle_t *c) noexcept nogil:
         c.next += clock_close(c.clock)
         if c.clock.changes != c.clock.acknowledged:
             c.flags |= CLOCKS
+
+
+cdef inline void follow_steering(cycle_t *c) noexcept nogil:
+    """Adjust the next cycle start as Python requests, which follows an external clock. A reference
+    clock that follows the MainDevice keeps its phase: its epoch moves by the same time.
+    """
+    cdef int64_t steering = <int64_t>cat_load_relaxed64(&c.steering)
+    cdef int64_t shift
+    if steering == 0:
+        return
+    c.steering_rest += steering
+    shift = c.steering_rest >> STEERING_BITS
+    c.steering_rest -= shift * STEERING_ONE
+    c.next += shift
+    if c.clock != NULL:
+        c.clock.epoch -= shift
 
 
 cdef inline void judge(cycle_t *c) noexcept nogil:
