@@ -14,7 +14,7 @@ segment. `message` describes the event as text. The other fields are for program
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 from catenary.model.device import Identity
 from catenary.model.finding import Finding

@@ -19,6 +19,7 @@ from catenary.cli import (
     foxglove,
     graph,
     init,
+    merge,
     plot,
     realtime,
     record,
@@ -38,7 +39,7 @@ DESCRIPTION = "Real-time EtherCAT for Python."
 COMMANDS = (
     *(scan, state, graph, diag, sdo, reg, alias, sii, esi),
     *(init, check),
-    *(demo, dashboard, top, doctor, bench, virtual, realtime, record, plot, foxglove),
+    *(demo, dashboard, top, doctor, bench, virtual, realtime, record, merge, plot, foxglove),
 )
 EPILOG = """\
 TARGET is one of

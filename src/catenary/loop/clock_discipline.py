@@ -5,8 +5,8 @@ keeps a system clock: https://manpages.ubuntu.com/manpages/noble/man8/phc2sys.8.
 phc2sys, it never steps. A step of the cycle starts would appear as a jump of the set-points.
 Every error is corrected by longer or shorter periods, within a limit of the rate.
 
-The gains are those of a critically damped loop, as in `plan.clocks`. The integral part is the rate of
-the external clock. While the clock is lost, the periods keep this rate.
+The gains are those of a critically damped loop, as in `plan.clocks`. The integral part is the rate
+of the external clock. While the clock is lost, the periods keep this rate.
 """
 
 from __future__ import annotations
@@ -98,24 +98,24 @@ class Discipline:
                 self.state, self._good = "lost", 0
             return self.drift
         self.error_ns = self._phase_error(sample)
-        elapsed = min((now_ns - self._accepted_ns) * 1e-9, LOST_AFTER)
+        elapsed = min((now_ns - self._accepted_ns) * 1e-9, 2 * self._options.interval)
         self._accepted_ns = now_ns
         self._judge()
         return self._correct(self.error_ns * 1e-9, elapsed)
 
     def _accept(self, sample: ClockSample) -> bool:
         """Return True for a sample that continues the previous ones, or that confirms a jump."""
-        if self._last is None or _agree(self._last, sample):
+        repeats = self._candidate is not None and _agree(self._candidate, sample)
+        if not repeats and (self._last is None or _agree(self._last, sample)):
             self._candidate = None
-        elif not self._confirms_jump(sample):
+        elif not self._confirms_jump(sample, repeats):
             self.ignored += 1
             return False
         self._last = sample
         return True
 
-    def _confirms_jump(self, sample: ClockSample) -> bool:
-        agrees = self._candidate is not None and _agree(self._candidate, sample)
-        self._agreeing = self._agreeing + 1 if agrees else 1
+    def _confirms_jump(self, sample: ClockSample, repeats: bool) -> bool:
+        self._agreeing = self._agreeing + 1 if repeats else 1
         self._candidate = sample
         if self._agreeing < JUMP_SAMPLES:
             return False

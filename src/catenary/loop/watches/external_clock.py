@@ -78,12 +78,9 @@ class ExternalClockWatch:
 
     def run(self) -> Procedure[None]:
         """Read the clock periodically until cancelled."""
-        try:
-            while True:
-                self.look()
-                yield after(self._options.interval)
-        finally:
-            self.close()
+        while True:
+            self.look()
+            yield after(self._options.interval)
 
     def look(self) -> None:
         """Read the clock, set the rate of the periods, and put events for changes."""
