@@ -29,7 +29,7 @@ def test_the_summary_comes_last(tmp_path):
     assert bad[-2] == "--apply can change 12 settings; the changes last until the next reboot."
     watched = replace(machines.controller(tmp_path / "b"), watched=3.0, sent=0)
     good = as_text(examine(watched, latency(30e-6))).splitlines()
-    assert good[-3] == "29 checks: 29 passed, 0 warnings, 0 failed, 0 unknown"
+    assert good[-3] == "30 checks: 30 passed, 0 warnings, 0 failed, 0 unknown"
     assert good[-2] == "This machine is ready for a real-time loop: no check failed or warned."
     unmeasured = as_text(examine(machines.controller(tmp_path / "c"))).splitlines()
     assert unmeasured[-2].endswith("the wake-up latency was not measured.")
