@@ -1,9 +1,9 @@
 """Fixtures of all tests: shared data, private network interfaces, tshark and the laboratory.
 
-A test that uses `shared_data`, `veth`, `tshark`, `rtlab` or `chromium` is marked `shared_data`,
-`wire`, `tshark`, `rtlab` or `browser`. It is skipped with a reason if the resource is missing. If
-CI requires a marker (`--require MARKER`), such a skip is a failure, and at least one test with the
-marker must pass.
+A test that uses `shared_data`, `veth`, `tshark`, `rtlab`, `chromium` or `ros2` is marked
+`shared_data`, `wire`, `tshark`, `rtlab`, `browser` or `ros2`. It is skipped with a reason if the
+resource is missing. If CI requires a marker (`--require MARKER`), such a skip is a failure, and at
+least one test with the marker must pass.
 """
 
 from __future__ import annotations
@@ -29,6 +29,7 @@ FIXTURE_OF = {
     "tshark": "tshark",
     "rtlab": "rtlab",
     "browser": "chromium",
+    "ros2": "ros2",
 }
 PAGE_PACKAGES = ("starlette", "uvicorn", "websockets", "segno", "httpx", "playwright")
 
@@ -49,7 +50,8 @@ def pytest_addoption(parser: pytest.Parser) -> None:
         default=[],
         choices=sorted(FIXTURE_OF),
         metavar="MARKER",
-        help="fail unless tests with this marker ran (shared_data, wire, tshark, rtlab, browser)",
+        help="fail unless tests with this marker ran "
+        "(shared_data, wire, tshark, rtlab, browser, ros2)",
     )
 
 
@@ -130,6 +132,16 @@ def chromium(pytestconfig: pytest.Config) -> str:
     if command is None:
         lacking(pytestconfig, "browser", "Chromium is not installed (package chromium)")
     return command
+
+
+@pytest.fixture(scope="session", params=["jazzy", "kilted"])
+def ros2(request: pytest.FixtureRequest, pytestconfig: pytest.Config) -> Path:
+    """Return the Python of an environment with rclpy, for each distribution."""
+    cache = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "catenary"
+    folder = Path(os.environ.get("CATENARY_ROS2") or cache) / f"ros2-{request.param}"
+    if not (folder / "requirements").is_file():
+        lacking(pytestconfig, "ros2", f"no rclpy in {folder} (`tools/ros2_environments` makes it)")
+    return folder / "bin" / "python"
 
 
 @pytest.fixture

@@ -69,7 +69,7 @@ PYIGH_CHI_SQUARED = {"PyIgH": 48.94, "PySOEM": 55.75}  # 29 degrees, critical 49
 
 # PyIgH, section 2: six tasks of a six-axis cobot under cyclic torque control, 5 min, PREEMPT_RT
 
-# "stop" is its sporadic error task, "monitor" its ROS 2 node.
+# "stop" is its sporadic error task, "ros2" its ROS 2 node.
 COBOT: Mapping[str, TaskTimes] = {
     "dynamics": TaskTimes(
         (1.0, 1.041, 0.959, 0.007),
@@ -86,7 +86,7 @@ COBOT: Mapping[str, TaskTimes] = {
         (2.064, 32.46, 1.171, 1.216),
         (24.338, 455.232, 4.732, 46.769),
     ),
-    "monitor": TaskTimes(
+    "ros2": TaskTimes(
         (10.0, 10.116, 9.883, 0.026),
         (97.859, 198.234, 6.309, 19.451),
         (326.594, 836.576, 9.272, 82.731),

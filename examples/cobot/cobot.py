@@ -10,6 +10,7 @@ presses it.
 
 import argparse
 import sys
+from contextlib import closing, contextmanager
 from pathlib import Path
 
 import numpy as np
@@ -19,6 +20,7 @@ import catenary as cat
 from catenary import control, realtime, record
 from catenary.demo.terminal import on_enter
 from catenary.demo.wire import program_target
+from catenary.ros2 import backend, messages
 from catenary.virtual import read_segment
 
 sys.path.append(str(Path(__file__).resolve().parents[2]))  # the repository has `benchmarks`
@@ -27,6 +29,7 @@ from benchmarks.cobot import Measured, Outcome, report
 HERE = Path(__file__).parent
 PERIOD, JOINTS = 1e-3, 6  # [s]
 GOALS, KEY_AT = [np.full(JOINTS, goal) for goal in (np.pi / 2, 0, np.pi / 2, 0)], 3.8  # [s]
+JOINT_NAMES = ("base", "shoulder", "elbow", "wrist1", "wrist2", "wrist3")  # of arm.xml
 AXES = {  # as the data sheets of drives and gears say; limits [rad/s]
     "counts_per_turn": 2**17,
     "gear_ratio": [121, 121, 121, 101, 101, 101],
@@ -77,19 +80,43 @@ def trajectory(task, cost, state, phase, rows, done, goals):
         done.write(number)  # also a sign of life
 
 
-def monitor(task, cost, name, key, key_at):
-    """Print the operator's view; on virtual drives also press the key."""
+def ros2(task, cost, name, key, key_at):
+    """Publish the joint states for ROS 2, and print them. On virtual drives, press the key."""
     seen = 0
-    with cat.attach(name, patience=task) as arm:
+    with cat.attach(name, patience=task) as arm, joint_states(arm.layout) as publish:
         for job in task:
+            publish(row := arm.read())
             if job.number % 100 == 0:
-                print(f"{job.time:5.1f} s  joints {np.degrees(arm.read()['position']).round(1)}")
+                print(f"{job.time:5.1f} s  joints {np.degrees(row['position']).round(1)}")
             for event in arm.events(after=seen)[0]:
                 print(f"{job.time:5.1f} s  {event.message}")
                 seen = event.serial
             if key_at and abs(job.time - key_at) < task.period / 2:
                 key.set()
             task.spend(cost)
+
+
+@contextmanager
+def joint_states(layout):
+    """Yield a function that publishes a cycle on /cobot/joint_states; without ROS 2 it ignores it.
+
+    The node needs `pip install 'catenary[ros2]'` or an environment with rclpy.
+    """
+    try:
+        node = backend.open_backend("cobot", namespace="cobot")
+    except cat.errors.ConfigurationError as error:
+        print(f"ROS 2: no joint states are published: {error}")
+        yield lambda row: None
+        return
+    publisher = node.publisher("joint_states", messages.JointState)
+
+    def publish(row):
+        stamp = messages.Time.from_ns(int(row["scheduled_ns"]) + layout.utc_offset_ns)
+        rows = [row[name].tolist() for name in ("position", "velocity", "torque")]
+        publisher.publish(messages.JointState(messages.Header(stamp), JOINT_NAMES, *rows))
+
+    with closing(node):
+        yield publish
 
 
 def log(task, cost, name, path):
@@ -178,7 +205,7 @@ def run(
     tasks = realtime.Tasks(
         task(dynamics, 40e-6, state, torque, model, gravity, period=1e-3, priority=95),
         task(trajectory, 25e-6, state, phase, rows, done, goals, period=2e-3, priority=85),
-        task(monitor, 300e-6, name, key, key_at, period=10e-3, priority=80),
+        task(ros2, 300e-6, name, key, key_at, period=10e-3, priority=80),
         task(log, 5e-3, name, path, period=0.1, priority=75, on_failure="continue"),
         task(stop, 10e-6, hit, period=0.01, priority=99, trigger=key),
         clock=realtime.VirtualClock() if virtual else None,

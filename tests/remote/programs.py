@@ -35,6 +35,7 @@ def program(
     required: bool = True,
     jog: bool = True,
     segment: Segment | None = None,
+    stop: cat.StopPolicy | None = None,
 ) -> Iterator[Running]:
     """Open a loop in virtual time with a share of a unique name."""
     with (
@@ -44,7 +45,7 @@ def program(
     ):
         main.scan()
         arm = cat.Drives(main.subs.drives, required=required, other_modes=["hm"], **OPTIONS)
-        with cat.Loop(arm, period=1e-3, sink=share) as loop:
+        with cat.Loop(arm, period=1e-3, sink=share, stop=stop or cat.StopPolicy()) as loop:
             if background:
                 loop.run_in_background()
             yield Running(name, loop, arm, main)

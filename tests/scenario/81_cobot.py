@@ -67,7 +67,7 @@ def test_all_deadlines_are_met(out: Path) -> None:
         "dynamics",
         "main control",
         "trajectory",
-        "monitor",
+        "ros2",
         "log",
         "stop",
     ]

@@ -24,6 +24,7 @@ from catenary.cli import (
     realtime,
     record,
     reg,
+    ros2,
     scan,
     sdo,
     sii,
@@ -39,7 +40,8 @@ DESCRIPTION = "Real-time EtherCAT for Python."
 COMMANDS = (
     *(scan, state, graph, diag, sdo, reg, alias, sii, esi),
     *(init, check),
-    *(demo, dashboard, top, doctor, bench, virtual, realtime, record, merge, plot, foxglove),
+    *(demo, dashboard, top, doctor, bench, virtual, realtime),
+    *(record, merge, plot, foxglove, ros2),
 )
 EPILOG = """\
 TARGET is one of

@@ -1,0 +1,1 @@
+"""Bridge between a running machine and a ROS 2 graph."""

@@ -1,0 +1,113 @@
+"""Services of the bridge, and parameters of laws, with a loop in the background."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+import pytest
+
+import catenary as cat
+from catenary.ros2 import messages
+from catenary.ros2.bridge import Bridge
+from catenary.ros2.config import Config, LawParameters, Services
+from tests.record.beside import until
+from tests.remote.programs import Running, program
+from tests.ros2.memory_backend import MemoryBackend
+
+PATIENT = Services(timeout=60.0)
+
+
+@contextmanager
+def bridged(
+    *, jog: bool = True, **options: object
+) -> Iterator[tuple[Running, MemoryBackend, Bridge]]:
+    policy = cat.StopPolicy(on_axis_stopped="event")
+    with program(jog=jog, stop=policy) as running:
+        backend = MemoryBackend()
+        config = Config(services=PATIENT, **options)
+        with Bridge(running.name, backend, config) as bridge:
+            bridge.step()
+            yield running, backend, bridge
+
+
+def answer(backend: MemoryBackend, service: str) -> tuple[bool, str]:
+    return backend.services[service](None)
+
+
+def test_stop_disables_and_enable_enables_again() -> None:
+    with bridged() as (running, backend, _):
+        assert until(lambda: bool(running.arm.enabled.all()))
+        done, text = answer(backend, "stop")
+        assert done, text
+        assert until(lambda: not running.arm.enabled.any())
+        done, text = answer(backend, "enable")
+        assert done, text
+        assert until(lambda: bool(running.arm.enabled.all()))
+
+
+def test_reset_leaves_the_axes_disabled() -> None:
+    with bridged() as (running, backend, _):
+        assert until(lambda: bool(running.arm.enabled.all()))
+        done, text = answer(backend, "reset")
+        assert done, text
+        assert until(lambda: not running.arm.enabled.any())
+
+
+def test_a_refusal_has_its_reason() -> None:
+    with bridged(jog=False) as (_, backend, _bridge):
+        assert answer(backend, "enable") == (
+            False,
+            "enable: refused: the program does not allow it",
+        )
+
+
+def test_home_starts_the_homing() -> None:
+    with bridged() as (running, backend, _):
+        assert until(lambda: bool(running.arm.enabled.all()))
+        done, text = answer(backend, "home")
+        assert done, text
+        assert f"homing of {running.arm.names[0]} has started" in text
+
+
+def test_a_service_without_a_loop_fails() -> None:
+    with bridged() as (running, backend, bridge):
+        running.loop.close()
+        bridge.step()
+        bridge._source._news_at = 0.0  # lets 1 s without a cycle pass
+        bridge.step()
+        done, text = answer(backend, "stop")
+        assert not done
+        assert "the loop has ended" in text
+
+
+@pytest.mark.parametrize(
+    ("data", "reason"),
+    [
+        ([1.0, 2.0], "needs 1 finite numbers"),
+        ([float("nan")], "needs 1 finite numbers"),
+        ([1.0], "the law 'impedance' does not run"),
+    ],
+)
+def test_parameters_that_cannot_be_set_are_reported(data: list[float], reason: str) -> None:
+    parameters = (LawParameters(law="impedance", topic="stiffness", names=("stiffness",)),)
+    with bridged(parameters=parameters) as (_, backend, bridge):
+        backend.deliver("stiffness", messages.Float64MultiArray(data=data))
+        backend.spin_once(0.0)
+        assert until(lambda: bool(bridge.reports.texts))
+        assert reason in bridge.reports.texts[-1]
+
+
+def test_parameters_of_a_running_law_are_set() -> None:
+    pytest.importorskip("numba")
+
+    @cat.law(parameters=["stiffness", "damping"])
+    def impedance(target, parameters):  # type: ignore[no-untyped-def]
+        target.position[0] = 0.0 * parameters[0]
+
+    parameters = (LawParameters(law="impedance", topic="stiffness", names=("stiffness",)),)
+    with bridged(parameters=parameters) as (running, backend, _):
+        run = running.loop.start(impedance, parameters=[1.0, 2.0])
+        backend.deliver("stiffness", messages.Float64MultiArray(data=[7.0]))
+        backend.spin_once(0.0)
+        assert until(lambda: run.parameters.tolist() == [7.0, 2.0])
