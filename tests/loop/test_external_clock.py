@@ -119,6 +119,15 @@ def test_a_loop_without_an_external_clock(cell: Cell) -> None:
         _ = loop.external
 
 
+@pytest.mark.parametrize("rate", [1.1e-3, -1.1e-3, math.nan])
+def test_an_impossible_rate(cell: Cell, rate: float) -> None:
+    with (
+        cat.Loop(cell.drives(), period=PERIOD) as loop,
+        pytest.raises(ValueError, match="steer"),
+    ):
+        loop.networks[0].session.engine.steer(rate)
+
+
 @pytest.mark.parametrize(
     ("options", "error", "text"),
     [

@@ -14,7 +14,8 @@ start. Its first step follows the collect of the cycle in which it was requested
 are sent in the cycle after its last step. Requests of the application during a law apply one cycle
 later, except for stops, requested states that remove power, and control bits (`axes_apply_late`).
 
-In virtual time all modes run in the caller's thread. Cycle starts are origin + k·period. A cycle
+In virtual time all modes run in the caller's thread. Cycle starts are origin + k·period. The
+reference clock, or a rate that Python sets (`steering`), lengthens or shortens periods. A cycle
 that begins late is sent if its frames can return before the next cycle start (`turnaround`). With a
 law, they must return before the law's reserve begins. Otherwise the cycle is skipped and counted.
 Cycles are never sent in bursts to catch up. Inline, a body that ends after the next cycle start

@@ -60,7 +60,7 @@ class ExternalClock:
                 f"source={self.source!r}: must be a path, a clock name or a clock with time_ns()"
             )
         if isinstance(self.source, str):
-            _require_name(self.source)
+            require_name("source", self.source)
         if not math.isfinite(self.phase):
             raise ValueError(f"phase={self.phase} s: must be finite")
         if not 0 < self.rate_limit <= 1e-3:
@@ -162,7 +162,13 @@ def read_sample(
     return None if best is None else ClockSample(*best, cycle_start_ns())
 
 
-def _require_name(source: str) -> None:
+def require_name(option: str, source: str) -> None:
+    """Raise ValueError unless a text is the path of a clock or the name of a kernel's clock.
+
+    Args:
+        option: Name of the option for the error message.
+        source: Path or name.
+    """
     if source not in KERNEL_CLOCKS and not source.startswith("/"):
         names = ", ".join(f'"{name}"' for name in KERNEL_CLOCKS)
-        raise ValueError(f'source={source!r}: must be a path such as "/dev/ptp0", or {names}')
+        raise ValueError(f'{option}={source!r}: must be a path such as "/dev/ptp0", or {names}')

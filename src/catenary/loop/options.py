@@ -8,7 +8,7 @@ from numbers import Integral
 from typing import Literal
 
 from catenary.bus import SubDevice
-from catenary.loop.external_clock import ExternalClock
+from catenary.loop.external_clock import ExternalClock, require_name
 from catenary.plan.clocks import BURST
 from catenary.plan.cycle import FollowedClock, ReceiveMode
 from catenary.plan.options import (
@@ -184,6 +184,8 @@ class ClockOptions:
         return ExternalClock(self.external) if isinstance(self.external, str) else self.external
 
     def _check_external(self) -> None:
+        if isinstance(self.external, str):
+            require_name("external", self.external)
         external = self.external_clock
         if external is None:
             return
