@@ -53,7 +53,7 @@ class ExternalClockWatch:
 
     @property
     def state(self) -> ExternalState:
-        """ "seeking" while the phase is corrected, then "locked"; "lost" without the clock."""
+        """State: "seeking" while the phase is corrected, then "locked"; "lost" without the clock."""
         return self._discipline.state
 
     @property
