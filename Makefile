@@ -7,6 +7,7 @@
 # port. `make rtlab` runs the benchmarks on a real-time kernel in QEMU. TABLE=quick or
 # TABLE=pyigh,tasks selects tables, and RTLAB="--out FOLDER" selects the folder of the results.
 # TABLE=igh needs IGH=path, the path of a build of IgH's master.
+# TABLE=gpio needs GPIO=path, a folder with configfs.ko and gpio-sim.ko for the guest's kernel.
 PYTHON ?= python3
 VENV := .venv
 TEST ?=
@@ -16,6 +17,7 @@ PORT ?=
 TABLE ?= all
 RTLAB ?=
 IGH ?=
+GPIO ?=
 SOURCES := CMakeLists.txt pyproject.toml \
            $(shell find src -name '*.pyx' -o -name '*.pxd' -o -name '*.pxi' -o -name '*.h')
 CHECKED := src tests tools examples benchmarks docs
@@ -46,7 +48,7 @@ dashboard: $(VENV)/.with-dashboard $(VENV)/.with-sim
 	@$(VENV)/bin/$(if $(DASHBOARD),catenary dashboard $(DASHBOARD),python examples/cobot/dashboard.py --page)$(if $(PORT), --port $(PORT))
 
 rtlab: $(VENV)/.with-test
-	@$(VENV)/bin/python -m tools.rtlab $(TABLE) $(if $(IGH),--igh $(abspath $(IGH))) $(RTLAB)
+	@$(VENV)/bin/python -m tools.rtlab $(TABLE) $(if $(IGH),--igh $(abspath $(IGH))) $(if $(GPIO),--gpio $(abspath $(GPIO))) $(RTLAB)
 
 test: $(VENV)/.with-test
 	@$(VENV)/bin/python -m catenary.realtime.private_network -m pytest $(TEST)

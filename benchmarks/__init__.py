@@ -164,6 +164,18 @@ def measure_law(*, axes: int, file: Path | None = None) -> None:
     law_call.measure(axes=axes, file=file)
 
 
+def measure_ros2(*, axes: int, file: Path | None = None) -> None:
+    """Print the time to encode and to publish one JointState.
+
+    Args:
+        axes: Number of joints of the message.
+        file: File for the figures.
+    """
+    from benchmarks import ros2_publish
+
+    ros2_publish.measure(axes=axes, file=file)
+
+
 def measure_soak(
     *,
     minutes: float,

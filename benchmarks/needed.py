@@ -6,7 +6,7 @@ from importlib.util import find_spec
 
 from catenary.errors import CatenaryError
 
-EXTRAS = {"pysoem": "peers", "numba": "law"}
+EXTRAS = {"pysoem": "peers", "numba": "law", "cyclonedds": "ros2"}
 
 
 class PackageError(CatenaryError):

@@ -38,6 +38,7 @@ def make_parser() -> argparse.ArgumentParser:
     without_wires.add_virtual(group)
     without_wires.add_tasks(group)
     without_wires.add_law(group)
+    without_wires.add_ros2(group)
     without_wires.add_soak(group)
     without_wires.add_clocks(group)
     with_wires.add_networks(group)

@@ -54,6 +54,26 @@ def add_law(group: Commands) -> None:
     parser.set_defaults(run=run_law)
 
 
+def add_ros2(group: Commands) -> None:
+    parser = add_command(
+        group,
+        "ros2",
+        help="measure the time to publish a message to ROS 2",
+        description="Publish JointState messages to a process that subscribes, without a ROS "
+        "installation (needs cyclonedds).",
+        example="python -m benchmarks ros2 --axes 7",
+    )
+    parser.add_argument(
+        "--axes",
+        type=positive_number,
+        default=7,
+        metavar="N",
+        help="joints of the message (default: 7)",
+    )
+    add_file(parser)
+    parser.set_defaults(run=run_ros2)
+
+
 def add_tasks(group: Commands) -> None:
     parser = add_command(
         group,
@@ -193,6 +213,13 @@ def run_law(arguments: argparse.Namespace) -> int:
     import benchmarks
 
     benchmarks.measure_law(axes=arguments.axes, file=arguments.json)
+    return 0
+
+
+def run_ros2(arguments: argparse.Namespace) -> int:
+    import benchmarks
+
+    benchmarks.measure_ros2(axes=arguments.axes, file=arguments.json)
     return 0
 
 

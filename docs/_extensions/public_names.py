@@ -7,7 +7,10 @@ from types import ModuleType
 from typing import TypeVar
 
 EVENTS = "catenary.bus.event_types"  # `catenary.events`
-MODULES = ("control", "drive", "esi", "realtime", "record", "remote", "share", "virtual")
+MODULES = (
+    *("control", "drive", "esi", "realtime", "record", "remote", "sensors", "share"),
+    "virtual",
+)
 PLAIN = ("errors", "events", "types", "virtual.faults")  # no `__all__`: what they define
 INTERNAL = {"catenary.events.emergency", "catenary.virtual.faults.number_of_state"}
 

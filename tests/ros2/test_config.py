@@ -70,6 +70,10 @@ def test_tables_and_lists_are_read(tmp_path: Path) -> None:
             "[[imu]]\nshare = 'a'\n[[imu]]\nshare = 'b'\nrate = 'fast'",
             "ros2.toml:5: imu[1].rate: expected `float`, got `str`",
         ),
+        (
+            "[[wrench]]\nshare = 'w'\nforce = ['x', 'y']",
+            "ros2.toml:3: wrench[0].force: expected `array` of length >= 3",
+        ),
         ("[[wrench]]\ntopic = 'w'", "wrench[0]: object missing required field `share`"),
         ("[joint_states]\ntopic = 'a b'", "joint_states.topic: 'a b' is not a valid name"),
         ("namespace = '1x'", "ros2.toml:1: namespace: '1x' is not a valid name"),

@@ -124,3 +124,11 @@ def test_a_stop_ends_the_command() -> None:
     it.accept(array(1.0, 0.0), 10.0, state())
     it.stop()
     assert it.sample(10.01, state()) is None
+
+
+@pytest.mark.parametrize("quantity", ["position", "velocity"])
+def test_unknown_limits_are_infinite(quantity: Quantity) -> None:
+    it = forward(quantity, velocity=math.inf, deceleration=math.inf, position_max=0.0)
+    it.accept(array(-0.5, -1.0), 10.0, state())
+    assert np.isfinite(it.sample(10.0, state())).all()
+    assert it.sample(10.01, state()) == pytest.approx([-0.5, -1.0])

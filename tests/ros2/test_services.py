@@ -11,6 +11,9 @@ import catenary as cat
 from catenary.ros2 import messages
 from catenary.ros2.bridge import Bridge
 from catenary.ros2.config import Config, LawParameters, Services
+from catenary.virtual import Segment
+from catenary.virtual.devices import Coupler, Servo
+from catenary.wire.cia402 import AxisState, state_of
 from tests.record.beside import until
 from tests.remote.programs import Running, program
 from tests.ros2.memory_backend import MemoryBackend
@@ -20,10 +23,10 @@ PATIENT = Services(timeout=60.0)
 
 @contextmanager
 def bridged(
-    *, jog: bool = True, **options: object
+    *, jog: bool = True, segment: Segment | None = None, **options: object
 ) -> Iterator[tuple[Running, MemoryBackend, Bridge]]:
-    policy = cat.StopPolicy(on_axis_stopped="event")
-    with program(jog=jog, stop=policy) as running:
+    policy = cat.StopPolicy(on_axis_stopped="event", raise_faults=False)
+    with program(jog=jog, stop=policy, segment=segment) as running:
         backend = MemoryBackend()
         config = Config(services=PATIENT, **options)
         with Bridge(running.name, backend, config) as bridge:
@@ -46,12 +49,23 @@ def test_stop_disables_and_enable_enables_again() -> None:
         assert until(lambda: bool(running.arm.enabled.all()))
 
 
-def test_reset_leaves_the_axes_disabled() -> None:
-    with bridged() as (running, backend, _):
+def test_reset_clears_a_fault() -> None:
+    servo = Servo()
+    with (
+        bridged(segment=Segment([Coupler(), servo])) as (running, backend, _),
+        cat.attach(running.name) as reader,
+    ):
+
+        def state() -> AxisState | None:
+            return state_of(int(reader.read()["statusword"][0]))
+
         assert until(lambda: bool(running.arm.enabled.all()))
+        servo.inject_fault(0x7500)
+        assert until(lambda: state() is AxisState.FAULT)
+        servo.inject_fault(0)  # removes the cause
         done, text = answer(backend, "reset")
         assert done, text
-        assert until(lambda: not running.arm.enabled.any())
+        assert until(lambda: state() is not AxisState.FAULT)
 
 
 def test_a_refusal_has_its_reason() -> None:

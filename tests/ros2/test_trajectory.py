@@ -312,6 +312,16 @@ def test_a_time_that_goes_back_repeats_the_last_set_points() -> None:
     assert position == pytest.approx(axes.commanded)
 
 
+def test_after_the_end_the_last_point_is_held_although_the_axes_lag() -> None:
+    axes = Axes(follower())
+    axes.accept(smooth(1.0, 0.5, -0.5))
+    axes.run(1.0)
+    behind = AxisStates(axes.commanded, axes.velocity, axes.commanded - 0.01)
+    for k in range(1, 4):
+        position, _ = axes.it.sample(axes.now + k * STEP, behind)
+        assert position == pytest.approx([0.5, -0.5])
+
+
 def test_abort_forgets_the_motion() -> None:
     axes = Axes(follower())
     goal = axes.accept(smooth(1.0, 1.0, 0))

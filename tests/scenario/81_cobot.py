@@ -40,6 +40,7 @@ def run(folder: Path, *options: str) -> str:
         text=True,
         timeout=300,
         check=False,
+        env={**os.environ, "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"},
     )
     assert done.returncode == 0, done.stderr
     return done.stdout

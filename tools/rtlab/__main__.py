@@ -21,7 +21,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from catenary.errors import CatenaryError
-from tools.rtlab import compare, igh, image, kernel, machine, record, tables
+from tools.rtlab import compare, gpio, igh, image, kernel, machine, record, tables
 from tools.rtlab.archive import Entry
 from tools.rtlab.errors import LabError
 
@@ -77,6 +77,9 @@ def parse(arguments: Sequence[str]) -> argparse.Namespace:
     parser.add_argument(
         "--igh", type=Path, metavar="FOLDER", help="a build of the IgH master, for its table"
     )
+    parser.add_argument(
+        "--gpio", type=Path, metavar="FOLDER", help="modules of a GPIO simulator, for its table"
+    )
     parser.add_argument("--minutes", type=float, help="time limit of a table (default: its own)")
     return parser.parse_args(arguments)
 
@@ -92,7 +95,7 @@ def run(arguments: argparse.Namespace) -> None:
     for folder in (cache(), WORK, arguments.out):
         folder.mkdir(parents=True, exist_ok=True)
     system = kernel.provide(cache())
-    built = built_igh(arguments.igh, system, chosen)
+    built = additions(arguments, system, chosen)
     if not chosen:
         return
     root = image.provide(system, REPOSITORY, WORK, built)
@@ -104,18 +107,20 @@ def run(arguments: argparse.Namespace) -> None:
         print(f"wrote {file}", flush=True)
 
 
-def built_igh(
-    folder: Path | None, system: kernel.Kernel, chosen: dict[str, tables.Table]
+def additions(
+    arguments: argparse.Namespace, system: kernel.Kernel, chosen: dict[str, tables.Table]
 ) -> list[Entry]:
-    """Return the files of an IgH master for the guest, or skip its table with a message."""
-    if "igh" not in chosen:
-        return []
-    try:
-        return igh.provide(folder, system)
-    except igh.NotThere as reason:
-        print(f"rtlab: igh: skipped: {reason}", flush=True)
-        del chosen["igh"]
-        return []
+    """Return the files that some tables need in the guest, or skip a table with a message."""
+    entries = []
+    for name, provide in (("igh", igh.provide), ("gpio", gpio.provide)):
+        if name not in chosen:
+            continue
+        try:
+            entries += provide(getattr(arguments, name), system)
+        except igh.NotThere as reason:
+            print(f"rtlab: {name}: skipped: {reason}", flush=True)
+            del chosen[name]
+    return entries
 
 
 def run_table(

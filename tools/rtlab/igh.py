@@ -7,7 +7,7 @@ kernel, and give the folder.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from tools.rtlab import archive
@@ -38,11 +38,24 @@ def provide(folder: Path | None, kernel: Kernel) -> list[Entry]:
     return [*found, archive.text(f"{FOLDER}/{TABLE}", program.read_text())]
 
 
-def modules(folder: Path, kernel: Kernel) -> Iterator[Entry]:
-    for name in MODULES:
+def modules(
+    folder: Path, kernel: Kernel, names: Sequence[str] = MODULES, target: str = FOLDER
+) -> Iterator[Entry]:
+    """Yield built modules.
+
+    Args:
+        folder: folder of the build.
+        kernel: kernel of the guest.
+        names: names of the modules.
+        target: folder in the guest.
+
+    Raises:
+        NotThere: A module is missing or was built for another kernel.
+    """
+    for name in names:
         file = newest(folder, f"{name}.ko") or newest(folder, f"{name}.ko.xz")
         if file is None:
-            raise NotThere(f"no {name}.ko in {folder}: build IgH's modules for {kernel.release}")
+            raise NotThere(f"no {name}.ko in {folder}: build it for Linux {kernel.release}")
         content = read_module(file)
         built_for = release_of(content)
         if built_for != kernel.release:
@@ -50,7 +63,7 @@ def modules(folder: Path, kernel: Kernel) -> Iterator[Entry]:
                 f"{file} was built for Linux {built_for or '(unknown)'}, the guest runs "
                 f"{kernel.release}: build it with linux-headers-{kernel.release}"
             )
-        yield Entry(f"{FOLDER}/{name}.ko", 0o100644, data=content)
+        yield Entry(f"{target}/{name}.ko", 0o100644, data=content)
 
 
 def library(folder: Path) -> Entry:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from tools.rtlab import igh
+from tools.rtlab import gpio, igh
 from tools.rtlab.errors import LabError
 
 RESULT = "FILE"  # placeholder for the path of the result
@@ -93,6 +93,12 @@ TABLES: Mapping[str, Table] = {
         60,
         "loops over the IgH kernel master at 1 and 4 kHz; IGH=path: a build of it",
         program=f"{igh.FOLDER}/{igh.TABLE}",
+    ),
+    "gpio": Table(
+        "",
+        15,
+        "reaction to an edge of the kernel's GPIO simulator; GPIO=path: its modules",
+        program=f"{gpio.FOLDER}/{gpio.TABLE}",
     ),
 }
 

@@ -154,7 +154,9 @@ def _field_codec(hint: Any) -> Codec:
 
 
 def _align(buffer: bytearray, size: int) -> None:
-    buffer += PADDING[(len(HEADER) - len(buffer)) % size]
+    excess = (len(buffer) - len(HEADER)) % size
+    if excess:
+        buffer += PADDING[size - excess]
 
 
 def _encode_count(buffer: bytearray, count: int) -> None:

@@ -31,7 +31,11 @@ Topic: TypeAlias = Annotated[
 Namespace: TypeAlias = Annotated[
     str, Meta(pattern=r"^(/?[A-Za-z_][A-Za-z0-9_]*(/[A-Za-z_][A-Za-z0-9_]*)*)?$")
 ]
-Vector: TypeAlias = tuple[Text, Text, Text]
+Three: TypeAlias = Annotated[tuple[Text, ...], Meta(min_length=3, max_length=3)]
+Four: TypeAlias = Annotated[tuple[Text, ...], Meta(min_length=4, max_length=4)]
+# A field of three numbers, or three fields. msgspec 0.22 crashes on the union of a constrained text
+# and tuple[Text, Text, Text].
+Vector: TypeAlias = Text | Three
 Quantity: TypeAlias = Literal["position", "velocity", "torque"]
 Profile: TypeAlias = Literal["", "rdda"]
 
@@ -72,8 +76,8 @@ class Wrench(Table, frozen=True):
     share: Text
     topic: Topic = "wrench"
     frame: str = "tool0"
-    force: Vector = ("fx", "fy", "fz")
-    torque: Vector = ("tx", "ty", "tz")
+    force: Vector = "force"
+    torque: Vector = "torque"
     rate: Rate = 100.0
     max_age: Seconds = 0.1  # an older sample is not published
 
@@ -84,9 +88,9 @@ class Imu(Table, frozen=True):
     share: Text
     topic: Topic = "imu/data"
     frame: str = "imu_link"
-    angular_velocity: Vector = ("wx", "wy", "wz")
-    linear_acceleration: Vector = ("ax", "ay", "az")
-    orientation: tuple[Text, Text, Text, Text] | None = None  # x, y, z, w; None: unknown
+    angular_velocity: Vector = "angular_velocity"
+    linear_acceleration: Vector = "acceleration"
+    orientation: Four | None = None  # x, y, z, w; None: unknown
     rate: Rate = 100.0
     max_age: Seconds = 0.1  # an older sample is not published
 

@@ -26,10 +26,10 @@ from cyclonedds.topic import Topic
 from cyclonedds.util import duration
 from msgspec import Struct
 
-from catenary.errors import DecodeError
+from catenary.errors import CatenaryError, DecodeError
 from catenary.ros2 import cdr, cyclone_domain, discovery, names
-from catenary.ros2.backend import STATE, Message, NotAvailable, Qos, ServiceCallback, ServiceKind
 from catenary.ros2.idl import idl_type
+from catenary.ros2.interface import STATE, Message, NotAvailable, Qos, ServiceCallback, ServiceKind
 
 ANY = SampleState.Any | ViewState.Any | InstanceState.Any
 TAKEN_AT_ONCE = 64  # messages of one subscription that one call of `spin_once` handles
@@ -72,6 +72,7 @@ class CyclonePublisher:
     def __init__(self, topic: str, writer: DataWriter[Any]) -> None:
         self.topic = topic
         self.writer = writer
+        self.dropped = 0
         self._reference = writer._ref
 
     @property
@@ -80,12 +81,18 @@ class CyclonePublisher:
         return cyclone_domain.matched_subscriptions(self.writer)
 
     def publish(self, message: Struct) -> None:
-        """Send a message."""
+        """Send a message. It is dropped and counted if a slow subscription blocks the writer.
+
+        Raises:
+            CatenaryError: Cyclone DDS refused the message.
+        """
         data = cdr.encode(message)
         # Cyclone DDS takes multiples of four bytes.
         result = ddspy_write(self._reference, data + bytes(-len(data) % 4))
-        if result < 0:
-            raise DDSException(result, f"Occurred while publishing {self.topic}")
+        if result == DDSException.DDS_RETCODE_TIMEOUT:
+            self.dropped += 1
+        elif result < 0:
+            raise CatenaryError(f"cannot publish {self.topic}: {DDSException(result)}")
 
 
 class CycloneSubscription:
@@ -111,7 +118,7 @@ class CycloneSubscription:
         """Call the callback for the received messages, oldest first."""
         samples = ddspy_take(self.reader._ref, ANY, TAKEN_AT_ONCE)
         if isinstance(samples, int):
-            raise DDSException(samples, f"Occurred while reading {self.topic}")
+            raise CatenaryError(f"cannot read {self.topic}: {DDSException(samples)}")
         for data, info in samples:
             if info.valid_data:
                 self._decode(data)
@@ -157,7 +164,7 @@ class CycloneBackend:
 
     @property
     def incompatible(self) -> list[str]:
-        """QoS mismatches and undecodable messages seen until now."""
+        """QoS mismatches, blocked publishers and undecodable messages seen until now."""
         self._mismatches.update(dict.fromkeys(self._new_mismatches()))
         return list(self._mismatches)
 
@@ -254,6 +261,8 @@ class CycloneBackend:
             policy = cyclone_domain.mismatched_policy(publisher.writer, writer=True)
             if policy:
                 yield f"{publisher.topic}: a subscription requests more: {_policy(policy)}"
+            if publisher.dropped:
+                yield f"{publisher.topic}: dropped messages because a subscription is slow"
         for subscription in self._subscriptions:
             policy = cyclone_domain.mismatched_policy(subscription.reader, writer=False)
             if policy:

@@ -9,6 +9,7 @@ from __future__ import annotations
 import ctypes
 from collections.abc import Mapping
 from typing import Any
+from xml.sax.saxutils import quoteattr
 
 from cyclonedds.core import DDSException, Entity
 from cyclonedds.domain import DomainParticipant
@@ -67,7 +68,7 @@ def configuration(environment: Mapping[str, str]) -> str:
 
 
 def _peer(address: str) -> str:
-    return f'<Peer Address="{address}"/>'
+    return f"<Peer Address={quoteattr(address)}/>"
 
 
 def _discovery_range(environment: Mapping[str, str]) -> str:

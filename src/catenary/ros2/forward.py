@@ -144,7 +144,7 @@ class ForwardCommand:
         if self.quantity == "position":
             return self._position(sent, step)
         wanted = np.zeros_like(sent) if self._wanted is None else self._wanted
-        change = self._limits.deceleration * step
+        change = self._limits.deceleration * step if step else np.zeros_like(sent)
         speed = sent + np.clip(wanted - sent, -change, change)
         speed = self._within(speed, state.commanded_position)
         return speed if self._wanted is not None or speed.any() else None
@@ -152,14 +152,27 @@ class ForwardCommand:
     def _position(self, sent: Row, step: float) -> Row | None:
         if self._wanted is None:
             return None
-        change = self._limits.velocity * step
+        change = self._limits.velocity * step if step else np.zeros_like(sent)
         moved: Row = sent + np.clip(self._wanted - sent, -change, change)
         return moved
 
     def _within(self, speed: Row, position: Row) -> Row:
         """Return velocities that can still stop before the position limits: v² <= 2 a d."""
         limits = self._limits
-        up = np.sqrt(2 * limits.deceleration * np.maximum(limits.position_max - position, 0.0))
-        down = np.sqrt(2 * limits.deceleration * np.maximum(position - limits.position_min, 0.0))
+        up = braking_speed(limits.deceleration, limits.position_max - position)
+        down = braking_speed(limits.deceleration, position - limits.position_min)
         slow: Row = np.clip(speed, -down, up)
         return slow
+
+
+def braking_speed(deceleration: Row, room: Row) -> Row:
+    """Return the speeds (n,) [rad/s] from which axes can stop; 0 without room.
+
+    Args:
+        deceleration: decelerations (n,) [rad/s²]; may be infinite.
+        room: distances to the limits (n,) [rad]; may be negative or infinite.
+    """
+    speed = np.zeros_like(room)
+    free = room > 0
+    speed[free] = np.sqrt(2 * deceleration[free] * room[free])
+    return speed

@@ -22,7 +22,7 @@ from rclpy.signals import SignalHandlerOptions
 
 from catenary.errors import ConfigurationError, DecodeError
 from catenary.ros2 import cdr, names
-from catenary.ros2.backend import STATE, Message, Qos, ServiceCallback, ServiceKind
+from catenary.ros2.interface import STATE, Message, Qos, ServiceCallback, ServiceKind
 from catenary.ros2.messages import message_type
 
 TAKEN_AT_ONCE = 64  # callbacks that one call of `spin_once` runs at most

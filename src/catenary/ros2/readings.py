@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from catenary.ros2 import messages
-from catenary.ros2.config import Imu, JointStates, ProcessData, Wrench
+from catenary.ros2.config import Imu, JointStates, ProcessData, Vector, Wrench
 from catenary.ros2.source import stamp_ns, value_of
 from catenary.share import Reader, ShareLayout
 
@@ -149,8 +149,22 @@ def numbers(row: np.void, fields: Sequence[str]) -> list[float]:
     return values
 
 
-def vector(row: np.void, fields: Sequence[str]) -> messages.Vector3:
-    """Return three fields as a vector; the arguments and errors are those of `numbers`."""
+def vector(row: np.void, fields: Vector) -> messages.Vector3:
+    """Return a field of three numbers, or three fields, as a vector.
+
+    Args:
+        row: a cycle.
+        fields: name of one field, or of three.
+
+    Raises:
+        InvalidReading: A value is not finite.
+        ValueError: A field does not exist or has another shape.
+    """
+    if isinstance(fields, str):
+        size = np.size(value_of(row, fields))
+        if size != 3:
+            raise ValueError(f"{fields!r} has {size} numbers instead of 3")
+        fields = (f"{fields}[0]", f"{fields}[1]", f"{fields}[2]")
     x, y, z = numbers(row, fields)
     return messages.Vector3(x=x, y=y, z=z)
 

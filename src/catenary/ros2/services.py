@@ -51,7 +51,7 @@ class Services:
         return self._request("enable")
 
     def reset(self) -> str:
-        """Reset the faults of the commanded axes, which stay disabled."""
+        """Reset the faults of the commanded axes."""
         return self._request("reset")
 
     def stop(self) -> str:

@@ -57,7 +57,9 @@ class FollowerOptions:
 class TrajectoryFollower:
     """Owns the motion of some axes: the current trajectory, and one that starts later.
 
-    All times `now` are seconds on the clock of the header stamps.
+    All times `now` are seconds on the clock of the header stamps. A motion continues from the
+    set-points before it. Call `abort` when the axes do not receive these set-points any more: the
+    next motion then starts from their commanded positions.
 
     Args:
         joints: names of the axes.
@@ -166,15 +168,15 @@ class TrajectoryFollower:
         self._plan = self._later = self._held = None
 
     def _wake(self, now: float, state: AxisStates) -> None:
-        """Set the time. Axes at rest start from where they are commanded."""
-        active, self._now = self.active, max(now, self._now)
-        if not active:
+        """Set the time. The first motion starts from where the axes are commanded."""
+        self._now = max(now, self._now)
+        if self._plan is None and self._held is None:
             commanded = np.array(state.commanded_position, dtype=np.float64)
             if not np.isfinite(commanded).all():
                 raise TrajectoryError(
                     Code.INVALID_GOAL, f"the commanded positions are {commanded.tolist()}"
                 )
-            self._plan, self._held = None, commanded
+            self._held = commanded
 
     def _planned(self, time: float) -> Motion:
         if self._plan:

@@ -205,6 +205,19 @@ class Share:
         self._events = Ring(segment.memory, events.offset, events.count, events.size, writable=True)
         return cycles.capsule
 
+    def append(self, row: bytes) -> None:
+        """Append a row to a share that no loop writes, such as the share of a sensor.
+
+        Only one thread may call this.
+
+        Raises:
+            RuntimeError: the share is not open.
+            ValueError: the row is too long.
+        """
+        if self._cycles is None:
+            raise RuntimeError(f"the share {self.name!r} is not open")
+        self._cycles.write(row)
+
     def report(self, incident: Incident) -> None:
         """Append an event; a no-op if no loop is open. Called by the loop from any thread."""
         with self._reporting:

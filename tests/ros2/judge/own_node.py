@@ -37,6 +37,11 @@ class OwnNode:
     def publish(self, topic: str, type: str, fields: dict[str, Any]) -> None:
         self.publishers[topic].publish(msgspec.convert(fields, BY_NAME[type].struct))
 
+    def flood(self, topic: str, type: str, fields: dict[str, Any], count: int) -> None:
+        message = msgspec.convert(fields, BY_NAME[type].struct)
+        for _ in range(count):
+            self.publishers[topic].publish(message)
+
     def matched(self, topic: str) -> int:
         return int(self.publishers[topic].matched)
 
@@ -67,6 +72,7 @@ def main() -> None:
         node.subscribe,
         node.advertise,
         node.publish,
+        node.flood,
         node.matched,
         node.messages,
         node.incompatible,

@@ -15,7 +15,7 @@ from rclpy.duration import Duration
 from rclpy.event_handler import PublisherEventCallbacks, SubscriptionEventCallbacks
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
-from rclpy.qos import QoSProfile
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 
 RELIABILITY = {"reliable": 1, "best_effort": 2}  # rmw_qos_reliability_policy_t
 DURABILITY = {"transient_local": 1, "volatile": 2}
@@ -27,8 +27,6 @@ def interface(name: str) -> Any:
 
 
 def profile(reliability: str, durability: str, depth: int, deadline: float | None) -> QoSProfile:
-    from rclpy.qos import DurabilityPolicy, ReliabilityPolicy
-
     options = {} if deadline is None else {"deadline": Duration(seconds=deadline)}
     return QoSProfile(
         depth=depth,
@@ -105,6 +103,11 @@ class Peer:
     def publish(self, topic: str, type: str, fields: dict[str, Any]) -> None:
         self.publishers[topic].publish(fill(interface(type)(), fields))
 
+    def flood(self, topic: str, type: str, fields: dict[str, Any], count: int) -> None:
+        message = fill(interface(type)(), fields)
+        for _ in range(count):
+            self.publishers[topic].publish(message)
+
     def matched(self, topic: str) -> int:
         return int(self.publishers[topic].get_subscription_count())
 
@@ -140,6 +143,7 @@ def main() -> None:
         peer.subscribe,
         peer.advertise,
         peer.publish,
+        peer.flood,
         peer.matched,
         peer.messages,
         peer.incompatible,

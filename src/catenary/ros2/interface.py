@@ -1,0 +1,117 @@
+"""Interface of a node in a ROS 2 graph, and quality of service."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Literal, Protocol, TypeVar
+
+from msgspec import Struct
+
+from catenary.errors import CatenaryError
+
+Reliability = Literal["reliable", "best_effort"]
+Durability = Literal["volatile", "transient_local"]
+ServiceKind = Literal["trigger", "set_bool"]
+# The request is None for a trigger. The response is the fields `success` and `message`.
+ServiceCallback = Callable[[bool | None], tuple[bool, str]]
+Message = TypeVar("Message", bound=Struct)
+
+
+class NotAvailable(CatenaryError):
+    """This backend does not offer the requested function."""
+
+
+@dataclass(frozen=True, slots=True)
+class Qos:
+    """Quality of service of a topic. The history is always `keep_last(depth)`.
+
+    A subscription that asks for more than the publisher offers receives nothing:
+    `Backend.incompatible` reports it.
+    """
+
+    reliability: Reliability = "reliable"
+    durability: Durability = "volatile"
+    depth: int = 10
+    deadline: float | None = None  # [s]
+
+    def __post_init__(self) -> None:
+        """Check the numbers."""
+        if self.depth < 1:
+            raise ValueError(f"depth must be at least 1, not {self.depth}")
+        if self.deadline is not None and not self.deadline > 0:
+            raise ValueError(f"deadline must be positive, not {self.deadline} s")
+
+
+SENSOR = Qos("best_effort", "volatile", 5)  # rmw_qos_profile_sensor_data
+STATE = Qos("reliable", "volatile", 10)  # rmw_qos_profile_default
+COMMAND = Qos("reliable", "volatile", 1)  # an old command is obsolete
+CLOCK = Qos("best_effort", "volatile", 1)  # rclcpp::ClockQoS
+
+
+class Publisher(Protocol):
+    """Publisher of one topic."""
+
+    @property
+    def matched(self) -> int:
+        """Number of subscriptions that receive the messages."""
+
+    def publish(self, message: Struct) -> None:
+        """Send a message. The call does not wait for the subscribers."""
+
+
+class Backend(Protocol):
+    """Node of a ROS 2 graph. All calls belong to one thread."""
+
+    name: Literal["cyclone", "rclpy"]
+
+    @property
+    def incompatible(self) -> list[str]:
+        """QoS mismatches with other nodes seen until now, one text for each topic and policy."""
+
+    def publisher(self, topic: str, message: type[Struct], qos: Qos = STATE) -> Publisher:
+        """Create a publisher.
+
+        Args:
+            topic: name; relative names are in the namespace of the node.
+            message: class of `catenary.ros2.messages`.
+            qos: offered quality of service.
+        """
+
+    def subscription(
+        self,
+        topic: str,
+        message: type[Message],
+        qos: Qos,
+        callback: Callable[[Message], None],
+    ) -> None:
+        """Create a subscription.
+
+        Args:
+            topic: name; relative names are in the namespace of the node.
+            message: class of `catenary.ros2.messages`.
+            qos: requested quality of service.
+            callback: receives each message, called by `spin_once`.
+        """
+
+    def service(self, name: str, kind: ServiceKind, callback: ServiceCallback) -> None:
+        """Create a service of std_srvs.
+
+        Args:
+            name: name; relative names are in the namespace of the node.
+            kind: `trigger` or `set_bool`.
+            callback: receives the request and returns the response, called by `spin_once`.
+
+        Raises:
+            NotAvailable: The backend has no services.
+        """
+
+    def spin_once(self, timeout: float) -> None:
+        """Run the callbacks of all received messages and requests in this thread.
+
+        Args:
+            timeout: longest time to wait for the first of them [s]; 0 does not wait.
+        """
+
+    def close(self) -> None:
+        """Leave the graph. A second call has no effect."""
