@@ -53,7 +53,7 @@ class ExternalClockWatch:
 
     @property
     def state(self) -> ExternalState:
-        """State: "seeking" while the phase is corrected, then "locked"; "lost" without the clock."""
+        """State: "seeking" until the phase is corrected, then "locked"; "lost" without clock."""
         return self._discipline.state
 
     @property
