@@ -24,6 +24,7 @@ RETURNED = {
     "catenary.log": ("Log",),
     "catenary.loop": ("Law", "LawRun", "Network", "Stream"),
     "catenary.loop.timing": ("Timing",),
+    "catenary.loop.watches.external_clock": ("ExternalClockWatch",),
     "catenary.model.device": ("Identity",),
     "catenary.model.finding": ("Finding",),
     "catenary.plan.stop_reason": ("StopReason",),

@@ -46,7 +46,16 @@ if TYPE_CHECKING:
         WorkingCounterError,
     )
     from catenary.link.interfaces import interfaces
-    from catenary.loop import ClockOptions, Cycle, Loop, Parameter, Scheduling, StopPolicy, law
+    from catenary.loop import (
+        ClockOptions,
+        Cycle,
+        ExternalClock,
+        Loop,
+        Parameter,
+        Scheduling,
+        StopPolicy,
+        law,
+    )
     from catenary.machine import Machine
     from catenary.remote import connect, connect_async
     from catenary.remote.share import Share
@@ -64,6 +73,7 @@ __all__ = [
     "DistributedClock",
     "DriveError",
     "Drives",
+    "ExternalClock",
     "Inputs",
     "LawError",
     "LinkError",
@@ -131,7 +141,16 @@ _HOMES = {
     **dict.fromkeys(_ERRORS, "catenary.errors"),
     **dict.fromkeys(_DRIVE, "catenary.drive"),
     **dict.fromkeys(
-        ("ClockOptions", "Cycle", "Loop", "Parameter", "Scheduling", "StopPolicy", "law"),
+        (
+            "ClockOptions",
+            "Cycle",
+            "ExternalClock",
+            "Loop",
+            "Parameter",
+            "Scheduling",
+            "StopPolicy",
+            "law",
+        ),
         "catenary.loop",
     ),
     "Machine": "catenary.machine",

@@ -12,7 +12,7 @@ import catenary as cat
 
 TEXT = (Path(__file__).resolve().parents[2] / "docs/reference/options.md").read_text()
 HEADED = [cat.Loop, cat.Drives, cat.ProcessData, cat.DistributedClock, cat.StartUp, cat.MainDevice]
-GROUPS = [cat.StopPolicy, cat.Scheduling, cat.ClockOptions]
+GROUPS = [cat.StopPolicy, cat.Scheduling, cat.ClockOptions, cat.ExternalClock]
 POSITIONAL = {"requests", "subs", "sub"}
 
 

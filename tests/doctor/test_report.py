@@ -22,14 +22,14 @@ def test_each_check_has_a_line_and_advice(tmp_path):
 
 def test_the_summary_comes_last(tmp_path):
     bad = as_text(examine(machines.laptop(tmp_path / "a"))).splitlines()
-    assert bad[-5] == "29 checks: 7 passed, 16 warnings, 4 failed, 2 unknown"
+    assert bad[-5] == "30 checks: 8 passed, 16 warnings, 4 failed, 2 unknown"
     assert bad[-4].startswith(
         "This machine is not ready for a real-time loop. Fix first: kernel-preem"
     )
     assert bad[-2] == "--apply can change 12 settings; the changes last until the next reboot."
     watched = replace(machines.controller(tmp_path / "b"), watched=3.0, sent=0)
     good = as_text(examine(watched, latency(30e-6))).splitlines()
-    assert good[-3] == "29 checks: 29 passed, 0 warnings, 0 failed, 0 unknown"
+    assert good[-3] == "30 checks: 30 passed, 0 warnings, 0 failed, 0 unknown"
     assert good[-2] == "This machine is ready for a real-time loop: no check failed or warned."
     unmeasured = as_text(examine(machines.controller(tmp_path / "c"))).splitlines()
     assert unmeasured[-2].endswith("the wake-up latency was not measured.")
@@ -84,6 +84,8 @@ def test_ids_are_the_headings_of_the_manual(tmp_path):
     manual = (ROOT / "docs" / "how_to" / "doctor.md").read_text()
     ids = {check.id for check in examine(machines.controller(tmp_path / "a")).checks}
     ids |= {check.id for check in examine(machines.make(tmp_path / "b", {})).checks}
+    with_ptp = machines.make(tmp_path / "c", {"/proc/9/comm": "ptp4l"})
+    ids |= {check.id for check in examine(with_ptp).checks}
     headings = {
         line.removeprefix("### ") for line in manual.splitlines() if line.startswith("### ")
     }

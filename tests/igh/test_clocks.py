@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 import catenary as cat
+from catenary.errors import ConfigurationError
 from catenary.igh import Master
 from catenary.plan.options import PlanOptions
 from catenary.plan.planner import make_plan
@@ -49,6 +50,12 @@ def test_the_reference_follows_the_machine(main: cat.MainDevice, double: Double)
     asked = next(call for call in calls if call.startswith("sync_reference_clock"))
     assert asked.startswith("sync_reference_clock_to ") is ("1.6.1" in double.path.name)
     assert calls.index(asked) < calls.index("sync_slave_clocks") < calls.index("queue 0")
+
+
+def test_an_external_clock_is_refused(main: cat.MainDevice) -> None:
+    loop = clocked_loop(main, external="CLOCK_TAI")
+    with pytest.raises(ConfigurationError, match="external= is not possible"), loop:
+        pass
 
 
 @pytest.mark.parametrize("ppm", [40, -40])

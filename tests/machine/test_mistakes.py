@@ -374,6 +374,13 @@ MISTAKES: dict[str, tuple[str, ...]] = {
         "clocks.lead",
         '"master" is not one of "reference", "main"',
     ),
+    "external clock without a path": (
+        'lead = "reference"',
+        'lead = "main"\nexternal = "ptp0"',
+        "clocks.external",
+        "must be a path such as",
+        "external",
+    ),
     "another format": (
         "catenary-machine/1",
         "catenary-machine/2",

@@ -14,7 +14,7 @@ segment. `message` describes the event as text. The other fields are for program
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 from catenary.model.device import Identity
 from catenary.model.finding import Finding
@@ -150,6 +150,17 @@ class ClockLocked(Event):
 
     difference: float  # largest difference from the reference clock [s]
     bound: float  # [s]
+
+
+@dataclass(frozen=True, slots=True)
+class ExternalClockChanged(Event):
+    """Change of the external clock that the cycle starts follow, or a jump of its time.
+
+    `sub` is None.
+    """
+
+    state: Literal["seeking", "locked", "lost"]
+    phase_error: float  # last lateness of a cycle start in the time of the clock [s]
 
 
 @dataclass(frozen=True, slots=True)

@@ -20,6 +20,7 @@ from catenary.cli import (
     graph,
     include,
     init,
+    merge,
     plot,
     realtime,
     record,
@@ -40,8 +41,8 @@ DESCRIPTION = "Real-time EtherCAT for Python."
 COMMANDS = (
     *(scan, state, graph, diag, sdo, reg, alias, sii, esi),
     *(init, check),
-    *(demo, dashboard, top, doctor, bench, virtual, realtime, record, plot, foxglove),
-    *(ros2, include),
+    *(demo, dashboard, top, doctor, bench, virtual, realtime),
+    *(record, merge, plot, foxglove, ros2, include),
 )
 EPILOG = """\
 TARGET is one of

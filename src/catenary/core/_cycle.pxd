@@ -29,6 +29,10 @@ cdef enum:  # phases
     PHASES = 11
 
 cdef enum:
+    STEERING_BITS = 20
+    STEERING_ONE = 1 << STEERING_BITS
+
+cdef enum:
     LOG_MARGIN = 24            # safety distance to the writer while the log is copied
 
 cdef struct record_t:
@@ -74,6 +78,8 @@ cdef struct cycle_t:
     uint32_t lost_limit
     int64_t origin             # the first cycle start
     int64_t next               # next cycle start
+    uint64_t steering          # int64: change of each period, set by Python [ns / STEERING_ONE]
+    int64_t steering_rest      # fraction of the change below one nanosecond
     int64_t scheduled          # cycle start of this cycle
     int64_t wake
     int64_t interval           # time since the last wake-up [ns]; -1: none

@@ -14,7 +14,8 @@ start. Its first step follows the collect of the cycle in which it was requested
 are sent in the cycle after its last step. Requests of the application during a law apply one cycle
 later, except for stops, requested states that remove power, and control bits (`axes_apply_late`).
 
-In virtual time all modes run in the caller's thread. Cycle starts are origin + k·period. A cycle
+In virtual time all modes run in the caller's thread. Cycle starts are origin + k·period. The
+reference clock, or a rate that Python sets (`steering`), lengthens or shortens periods. A cycle
 that begins late is sent if its frames can return before the next cycle start (`turnaround`). With a
 law, they must return before the law's reserve begins. Otherwise the cycle is skipped and counted.
 Cycles are never sent in bursts to catch up. Inline, a body that ends after the next cycle start
@@ -90,6 +91,7 @@ from catenary.core._law cimport (
 from catenary.core._native cimport (
     cat_add32,
     cat_load_acquire_pointer,
+    cat_load_relaxed64,
     cat_or32,
     cat_pointer_claim,
     cat_pointer_is_offered,
@@ -268,6 +270,7 @@ cdef void collect(cycle_t *c, actual_t *actual, int64_t deadline) noexcept nogil
     c.outstanding = 0
     axes_read(c.axes, actual, c.number, c.scheduled)
     follow_clock(c)
+    follow_steering(c)
     judge(c)
 
 
@@ -277,6 +280,22 @@ cdef inline void follow_clock(cycle_t *c) noexcept nogil:
         c.next += clock_close(c.clock)
         if c.clock.changes != c.clock.acknowledged:
             c.flags |= CLOCKS
+
+
+cdef inline void follow_steering(cycle_t *c) noexcept nogil:
+    """Adjust the next cycle start as Python requests, which follows an external clock. A reference
+    clock that follows the MainDevice keeps its phase: its epoch moves by the same time.
+    """
+    cdef int64_t steering = <int64_t>cat_load_relaxed64(&c.steering)
+    cdef int64_t shift
+    if steering == 0:
+        return
+    c.steering_rest += steering
+    shift = c.steering_rest >> STEERING_BITS
+    c.steering_rest -= shift * STEERING_ONE
+    c.next += shift
+    if c.clock != NULL:
+        c.clock.epoch -= shift
 
 
 cdef inline void judge(cycle_t *c) noexcept nogil:

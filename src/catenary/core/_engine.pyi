@@ -176,6 +176,22 @@ class Engine:
         """Return the link's time [ns]."""
 
     @property
+    def scheduled_ns(self) -> int:
+        """Cycle start of the newest cycle [ns], on the link's clock. Any thread may read it."""
+
+    def steer(self, rate: float) -> None:
+        """Lengthen every period by this relative rate until the next call. Any thread may call it.
+
+        A reference clock that follows the MainDevice keeps its phase against the cycle starts.
+
+        Args:
+            rate: Relative change of the period, at most 1e-3 in magnitude; positive: longer.
+
+        Raises:
+            ValueError: The rate is out of range.
+        """
+
+    @property
     def zero_ns(self) -> int:
         """Cycle start of the first iteration [ns], on the link's clock: the zero of `Cycle.time`.
 

@@ -27,6 +27,7 @@ from catenary.core._clocks cimport Clock
 from catenary.core._cycle cimport (
     INLINE,
     INTERPRETER,
+    STEERING_ONE,
     cycle_await_acyclic,
     cycle_inputs,
     cycle_law_reserve,
@@ -85,6 +86,7 @@ from catenary.core._native cimport (
     cat_pointer_offer,
     cat_sink,
     cat_store_release32,
+    cat_store_release64,
 )
 from catenary.core._motion cimport motion_attach
 from catenary.core._stream cimport Stream
@@ -97,6 +99,8 @@ from catenary.core._thread cimport (
     thread_schedule,
     thread_start,
 )
+
+cdef double STEERING_LIMIT = 1e-3  # as RATE_LIMIT in plan/clocks.py
 
 cdef enum:
     SIGNALS_NS = 10_000_000    # longest run of native cycles between two calls of signal handlers
@@ -241,6 +245,16 @@ cdef class Engine:
 
     def now(self):
         return self.now_ns()
+
+    @property
+    def scheduled_ns(self):
+        return <int64_t>cat_load_relaxed64(<uint64_t *>&self.e.cycle.scheduled)
+
+    def steer(self, double rate):
+        if not -STEERING_LIMIT <= rate <= STEERING_LIMIT:
+            raise ValueError(f"steer: rate {rate}, must be within {STEERING_LIMIT:g}")
+        cat_store_release64(&self.e.cycle.steering,
+                            <uint64_t><int64_t>(rate * self.e.cycle.period * STEERING_ONE))
 
     @property
     def buffers(self):

@@ -16,12 +16,14 @@ class ClockState:
     """Adjustment of the clock.
 
     slew_ppm: current rate deviation of CLOCK_MONOTONIC from the crystal; positive if fast.
-    offset: remaining time to slew [s]. resolution: resolution of timers [s].
+    offset: remaining time to slew [s]. resolution: resolution of timers [s]. tai_offset: CLOCK_TAI
+    minus UTC [s]; 0 if no program has set it.
     """
 
     slew_ppm: float
     offset: float
     resolution: float
+    tai_offset: int = 0
 
 
 class Timex(ctypes.Structure):
@@ -53,4 +55,5 @@ def read_clock_state() -> ClockState | None:
         slew_ppm=(timex.tick - NOMINAL_TICK_US) * 100.0 + timex.freq / FREQUENCY_UNIT,
         offset=timex.offset * unit,
         resolution=time.clock_getres(time.CLOCK_MONOTONIC),
+        tai_offset=round(time.clock_gettime(time.CLOCK_TAI) - time.time()),
     )

@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from catenary.doctor import clocks, interrupts, kernel, network, permissions, processors
+from catenary.doctor import clocks, interrupts, kernel, network, permissions, processors, ptp
 from catenary.doctor.card import Card
 from catenary.doctor.change import Change
 from catenary.doctor.check import Check, skipped
@@ -15,12 +15,13 @@ from catenary.doctor.clock_state import read_clock_state
 from catenary.doctor.ethtool import read_card
 from catenary.doctor.latency import Latency, judge, measure
 from catenary.doctor.machine import Machine
+from catenary.doctor.ptp_state import read_ptp_state
 from catenary.errors import LinkError
 
 GROUPS: tuple[tuple[str, Sequence[Callable[[Machine], Check]]], ...] = (
     ("kernel", kernel.CHECKS),
     ("processors", processors.CHECKS),
-    ("clocks", clocks.CHECKS),
+    ("clocks", (*clocks.CHECKS, ptp.daemons)),
     ("permissions", permissions.CHECKS),
 )
 CARD_CHECKS = (*network.CHECKS, *interrupts.CHECKS)
@@ -64,6 +65,8 @@ def examine(machine: Machine, latency: Latency | None = None) -> Examination:
         latency: Latency measured on it; None if it was not measured.
     """
     groups = [(title, tuple(check(machine) for check in checks)) for title, checks in GROUPS]
+    if ptp.uses_ptp(machine):
+        groups.append(("time of several machines", tuple(check(machine) for check in ptp.CHECKS)))
     card = machine.card
     if card is None:
         groups.append(("network card", (no_card(machine),)))
@@ -119,6 +122,7 @@ def this_machine(
         root=Path("/"),
         card=card,
         clock=read_clock_state(),
+        ptp=read_ptp_state(),
         wanted_cpu=cpu,
         period=period,
         priority=priority,

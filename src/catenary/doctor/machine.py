@@ -12,6 +12,7 @@ from pathlib import Path
 
 from catenary.doctor.card import Card
 from catenary.doctor.clock_state import ClockState
+from catenary.doctor.ptp_state import PtpState
 from catenary.realtime.system.preparation import SET_CAPABILITIES
 
 INITIAL_USER_NAMESPACE = (0, 0, 2**32 - 1)  # /proc/self/uid_map, user_namespaces(7)
@@ -24,6 +25,7 @@ class Machine:
 
     card: settings of the network card; None if no card was given.
     clock: adjustment of the kernel's clock; None if the kernel does not report it.
+    ptp: state of ptp4l; None if it does not answer.
     wanted_cpu: CPU of the loop; None if the user gave none.
     period: period of the loop [s]. priority: SCHED_FIFO priority of its thread.
     watched: time for which the sent frames of the card were counted [s].
@@ -33,6 +35,7 @@ class Machine:
     root: Path = Path("/")
     card: Card | None = None
     clock: ClockState | None = None
+    ptp: PtpState | None = None
     wanted_cpu: int | None = None
     period: float = 1e-3
     priority: int = 80
@@ -104,6 +107,15 @@ class Machine:
         """Names of the running programs that this process can see."""
         names = (self.text(path) for path in self.matching("/proc/[0-9]*/comm"))
         return frozenset(name for name in names if name)
+
+    @cached_property
+    def commands(self) -> dict[str, list[tuple[str, ...]]]:
+        """Arguments of the visible processes, by the name of the program."""
+        found: dict[str, list[tuple[str, ...]]] = {}
+        for path in self.matching("/proc/[0-9]*/cmdline"):
+            program, *words = (self.text(path) or "").split("\0")
+            found.setdefault(program.rpartition("/")[2], []).append(tuple(words))
+        return found
 
     def frames_sent(self) -> int | None:
         """Return the number of frames that the card has sent: /proc/net/dev, proc(5)."""

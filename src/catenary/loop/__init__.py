@@ -1,6 +1,7 @@
 """The cyclic loop: from process-data requests to `for cycle in loop`, and control laws."""
 
 from catenary.core import Cycle
+from catenary.loop.external_clock import ExternalClock
 from catenary.loop.laws.law import Law, Parameter, law
 from catenary.loop.laws.run import LawRun
 from catenary.loop.loop import Loop
@@ -11,6 +12,7 @@ from catenary.loop.stream import Stream
 __all__ = [
     "ClockOptions",
     "Cycle",
+    "ExternalClock",
     "Law",
     "LawRun",
     "Loop",

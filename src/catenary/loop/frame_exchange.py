@@ -87,8 +87,10 @@ class FrameExchange:
         )
         for sub in session.main.subs:
             sub.state = AlState.OP
-        watches = (self.watch, self.errors, self.frames)
-        return [session.service.runner.submit(watch.run()) for watch in watches]
+        watches = [self.watch.run(), self.errors.run(), self.frames.run()]
+        if session.external is not None:
+            watches.append(session.external.run())
+        return [session.service.runner.submit(watch) for watch in watches]
 
     def query_silence(self, suspects: Sequence[int]) -> Evidence:
         """Query all devices, and find the place where the silence begins."""

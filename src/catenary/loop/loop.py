@@ -37,6 +37,7 @@ from catenary.loop.session import Session, take_down
 from catenary.loop.signals import SignalGuard
 from catenary.loop.stream import Stream
 from catenary.loop.timing import Timing
+from catenary.loop.watches.external_clock import ExternalClockWatch
 from catenary.plan.cycle import ExecutionMode
 from catenary.plan.planner import Plan
 from catenary.plan.sink import Sink
@@ -432,6 +433,15 @@ class Loop:
             RuntimeError: No request has `dc=`.
         """
         return self._networks[0].clocks
+
+    @property
+    def external(self) -> ExternalClockWatch:
+        """External clock that the cycle starts follow; `print` shows its state.
+
+        Raises:
+            RuntimeError: The loop has no external clock.
+        """
+        return self._networks[0].external
 
     @property
     def scheduling(self) -> str:

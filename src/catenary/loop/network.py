@@ -15,7 +15,9 @@ from catenary.core import (
     CYCLE_STOPPED,
     CYCLE_WORKING_COUNTER,
 )
+from catenary.errors import ConfigurationError
 from catenary.log import Log
+from catenary.loop.clock_discipline import DisciplineOptions
 from catenary.loop.clocks import Clocks
 from catenary.loop.devices import LoopRequest
 from catenary.loop.external_cycle import CarriedExchange, carried
@@ -25,6 +27,7 @@ from catenary.loop.options import ClockOptions, Scheduling, StopPolicy, check_gr
 from catenary.loop.session import Session
 from catenary.loop.stream import Stream
 from catenary.loop.timing import Timing
+from catenary.loop.watches.external_clock import ExternalClockWatch
 from catenary.plan.cycle import ExecutionMode, ReceiveMode
 from catenary.plan.options import PlanOptions, period_in_ns
 from catenary.plan.planner import Plan, make_plan
@@ -100,7 +103,7 @@ class Settings:
             log_axes=self.log_axes,
             cpu=cpu,
             priority=self.priority,
-            clock=self.clocks.lead or "reference",
+            clock=self.clocks.followed,
             reference=None if reference is None else reference.position,
             margin=self.clocks.margin,
             burst=self.clocks.burst,
@@ -154,6 +157,20 @@ class Network:
         return clocks
 
     @property
+    def external(self) -> ExternalClockWatch:
+        """External clock that the cycle starts follow; `print` shows its state.
+
+        Raises:
+            RuntimeError: The loop has no external clock.
+        """
+        watch = self.session.external
+        if watch is None:
+            raise RuntimeError(
+                'no external clock in this loop: use ClockOptions(external="/dev/ptp0")'
+            )
+        return watch
+
+    @property
     def scheduling(self) -> str:
         """Scheduling and locked memory that the cycle thread obtained, as text."""
         return self.session.engine.scheduling
@@ -202,12 +219,44 @@ class Network:
         session.switch_interval = self._settings.scheduling.switch_interval
         for law in self._settings.laws:
             session.laws.compile(law)
+        session.external = self._make_external(session)
         self.current_session = session
         if self._sink is not None:
             session.publish(self._sink)
         if isinstance(self._sink, ServingSink):
             self._sink.serve(self)
         return session
+
+    def _make_external(self, session: Session) -> ExternalClockWatch | None:
+        """Return the watch of the external clock; None without one.
+
+        Raises:
+            ClockError: The clock cannot be opened.
+            ConfigurationError: Another master makes the frames.
+        """
+        clock = self._settings.clocks.external_clock
+        if clock is None:
+            return None
+        if self.main.carrier is not None:
+            raise ConfigurationError(
+                "external= is not possible: an external master makes the frames",
+                hint="omit the option, or open the network interface directly",
+            )
+        engine, cycle = session.engine, session.plan.cycle
+        options = DisciplineOptions(
+            period_ns=cycle.period_ns,
+            phase_ns=round(clock.phase * 1e9) + (cycle.clock.phase_ns if cycle.clock else 0),
+            rate_limit=clock.rate_limit,
+            bound_ns=round(clock.within * 1e9),
+        )
+        return ExternalClockWatch(
+            clock,
+            options,
+            now_ns=engine.now,
+            cycle_start_ns=lambda: engine.scheduled_ns,
+            steer=engine.steer,
+            put=self.main.events.put,
+        )
 
     def _make_plan(self) -> Plan:
         """Update the mappings from the devices, and return the plan of the requests."""

@@ -265,13 +265,15 @@ def clocks_of_several(options: ClockOptions) -> ClockOptions:
     """Return the checked options: the clocks of several networks follow the MainDevice.
 
     Raises:
-        ValueError: `lead` is "reference".
+        ValueError: `lead` is "reference", or there is an external clock.
     """
     if options.lead == "reference":
         raise ValueError(
             'several networks need lead="main": every reference clock would require its own cycle '
             "starts, but the networks share one schedule"
         )
+    if options.external is not None:
+        raise ValueError("external= works on one network: make a separate Loop for each network")
     return replace(options, lead="main")
 
 

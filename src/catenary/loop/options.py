@@ -8,6 +8,7 @@ from numbers import Integral
 from typing import Literal
 
 from catenary.bus import SubDevice
+from catenary.loop.external_clock import ExternalClock, require_name
 from catenary.plan.clocks import BURST
 from catenary.plan.cycle import FollowedClock, ReceiveMode
 from catenary.plan.options import (
@@ -149,16 +150,19 @@ class ClockOptions:
         margin: Latest time of the frames after the cycle start [s]. None: 20 % of the period when
             threaded, 50 % when inline.
         burst: Number of frames that synchronise the clocks before the cycle begins.
+        external: Clock outside of the segment that the cycle starts follow, such as "/dev/ptp0".
+            Distributed clocks then follow the MainDevice. It does not need `dc=`.
 
     Raises:
         ValueError: An option is impossible.
-        TypeError: `reference` is not a SubDevice.
+        TypeError: `reference` is not a SubDevice, or `external` is not a clock.
     """
 
     lead: FollowedClock | None = None
     reference: SubDevice | None = None
     margin: float | None = None
     burst: int = BURST
+    external: ExternalClock | str | None = None
 
     def __post_init__(self) -> None:
         one_of("lead", self.lead, (None, "reference", "main"))
@@ -167,6 +171,30 @@ class ClockOptions:
         if self.margin is not None and not 0 <= self.margin < math.inf:
             raise ValueError(f"margin={self.margin} s: must be 0 or a positive time")
         check_count("burst", self.burst, 0)
+        self._check_external()
+
+    @property
+    def followed(self) -> FollowedClock:
+        """Clock that gives the time of distributed clocks."""
+        return self.lead or ("reference" if self.external is None else "main")
+
+    @property
+    def external_clock(self) -> ExternalClock | None:
+        """External clock with its options; None without one."""
+        return ExternalClock(self.external) if isinstance(self.external, str) else self.external
+
+    def _check_external(self) -> None:
+        if isinstance(self.external, str):
+            require_name("external", self.external)
+        external = self.external_clock
+        if external is None:
+            return
+        if not isinstance(external, ExternalClock):
+            raise TypeError(f"external={external!r}: must be a path or a cat.ExternalClock(...)")
+        if self.lead == "reference":
+            raise ValueError(
+                'external= needs lead="main": the cycle starts cannot follow two clocks'
+            )
 
 
 def check_count(name: str, value: int, least: int) -> None:

@@ -36,6 +36,7 @@ from catenary.loop.publishing import Publisher
 from catenary.loop.safe_outputs import confirm_safe, make_safe
 from catenary.loop.signals import SignalGuard
 from catenary.loop.timing import Timing
+from catenary.loop.watches.external_clock import ExternalClockWatch
 from catenary.plan.planner import Plan
 from catenary.plan.request import ProcessDataRequest, Views
 from catenary.plan.sink import Sink
@@ -77,6 +78,7 @@ class Session:
         self.exchange.attend()
         self.watch = self.exchange.watch
         self.switch_interval: float | None = None  # [s] of the interpreter; used by an inline loop
+        self.external: ExternalClockWatch | None = None
         self._attached = ExitStack()
         self._opened = self._left = False
         self._abandon = abandon  # leaves the loop if the MainDevice is closed first
@@ -163,6 +165,8 @@ class Session:
         inline = self.plan.cycle.execution == "inline" and self.engine.scheduling != "virtual time"
         if inline and self.switch_interval is not None:
             self._attached.enter_context(switch_interval(self.switch_interval))
+        if self.external is not None:
+            self._attached.callback(self.external.close)
         engine = self.engine
         self.main.events.begin_loop(lambda: engine.zero_ns)
         self.engine.start(origin_ns)

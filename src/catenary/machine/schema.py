@@ -82,6 +82,7 @@ class ClocksTable(Table, frozen=True, kw_only=True):
     reference: Optional[Annotated[str, Meta(description="name of a device")]] = UNSET
     margin: Optional[Time] = UNSET
     burst: Optional[int] = UNSET
+    external: Optional[Annotated[str, Meta(description="PTP clock, such as /dev/ptp0")]] = UNSET
 
 
 class LoopTable(Table, frozen=True, kw_only=True):

@@ -90,7 +90,7 @@ class Channel:
 
 def topic(layout: Layout, name: str) -> str:
     """Return the topic of a channel of the layout, such as "/arm/cycle" for "cycle"."""
-    return f"/{_ros_name(layout.name)}/{name}"
+    return f"/{ros_name(layout.name)}/{name}"
 
 
 def is_event(topic: str) -> bool:
@@ -178,13 +178,13 @@ def _cycle_channel(layout: Layout, rest: list[Field], *, has_instants: bool) -> 
     lines: list[tuple[str, str, int | None, str]] = []
     for field in rest:
         if has_instants and (field.dtype, field.shape, field.unit) == ("<i8", (), "ns"):
-            name = _unused(_ros_name(field.name.removesuffix("_ns")), {**fields, **instants})
+            name = _unused(ros_name(field.name.removesuffix("_ns")), {**fields, **instants})
             message.field(f"{name}.sec", "<i4")
             message.field(f"{name}.nanosec", "<u4")
             instants[name] = field.name
             lines.append((name, "builtin_interfaces/Time", None, "of the loop's clock"))
             continue
-        name = _unused(_ros_name(field.name), {**fields, **instants})
+        name = _unused(ros_name(field.name), {**fields, **instants})
         length = prod(field.shape) if field.shape else None
         message.field(name, field.dtype, field.shape)
         fields[name] = field.name
@@ -211,7 +211,7 @@ def _comment(field: Field) -> str:
     return ", ".join(filter(None, (unit, axes)))
 
 
-def _ros_name(name: str) -> str:
+def ros_name(name: str) -> str:
     """Return a valid ROS name.
 
     It begins with a letter, and contains lower-case letters, digits and single underscores.
