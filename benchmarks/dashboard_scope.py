@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks.synthetic_dashboard import FIELDS, serving
+from catenary.bench.report import machine
 
 STATIC = Path(__file__).parents[1] / "src/catenary/dashboard/static"
 BROWSER = "/usr/bin/chromium"
@@ -156,7 +157,7 @@ def main() -> None:
     parser.add_argument("--out", type=Path, help="file for the figures (JSON)")
     options = parser.parse_args()
     figures = measure(options.seconds, options.throttle, options.axes, options.window)
-    text = json.dumps(figures, indent=2, ensure_ascii=False)
+    text = json.dumps({"machine": machine(), **figures}, indent=2, ensure_ascii=False)
     print(text)
     if options.out is not None:
         options.out.write_text(text + "\n")

@@ -18,6 +18,7 @@ from catenary.cli import (
     esi,
     foxglove,
     graph,
+    include,
     init,
     plot,
     realtime,
@@ -39,6 +40,7 @@ COMMANDS = (
     *(scan, state, graph, diag, sdo, reg, alias, sii, esi),
     *(init, check),
     *(demo, dashboard, top, doctor, bench, virtual, realtime, record, plot, foxglove),
+    include,
 )
 EPILOG = """\
 TARGET is one of

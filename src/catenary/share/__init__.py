@@ -7,6 +7,7 @@ with cat.attach("arm") as arm: ...                                          # an
 from catenary.share.command_table import Reason
 from catenary.share.commands import AxisCommand, LeaseEnd
 from catenary.share.events import SharedEvent
+from catenary.share.include import include_folder
 from catenary.share.jog import Jog, JogStatus, RequestStatus, StateRequest
 from catenary.share.layout import ShareField, ShareLayout
 from catenary.share.lease import Lease
@@ -32,4 +33,5 @@ __all__ = [
     "StateRequest",
     "Sweep",
     "attach",
+    "include_folder",
 ]

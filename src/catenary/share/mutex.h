@@ -22,7 +22,7 @@ typedef struct share_mutex {
 #define MUTEX_VERSION 1u
 
 /* Initialise a mutex, before other processes map it. Return 0 or -errno. */
-static int mutex_init(share_mutex *m) {
+static inline int mutex_init(share_mutex *m) {
     pthread_mutexattr_t attributes;
     int rc = pthread_mutexattr_init(&attributes);
     if (!rc) rc = pthread_mutexattr_setpshared(&attributes, PTHREAD_PROCESS_SHARED);
@@ -36,14 +36,14 @@ static int mutex_init(share_mutex *m) {
     return -rc;
 }
 
-static int mutex_is_ours(const share_mutex *m) {
+static inline int mutex_is_ours(const share_mutex *m) {
     return memcmp(m->magic, MUTEX_MAGIC, sizeof m->magic) == 0 && m->version == MUTEX_VERSION
         && m->size == sizeof(pthread_mutex_t);
 }
 
 /* Wait at most `timeout` [ns]. Return 0 if acquired, 1 if acquired from an owner that died,
  * -ETIMEDOUT, -EDEADLK (this thread already holds it) or another -errno (the mutex is damaged). */
-static int mutex_lock(share_mutex *m, int64_t timeout) {
+static inline int mutex_lock(share_mutex *m, int64_t timeout) {
     struct timespec until;
     int rc = pthread_mutex_trylock(&m->mutex);
     if (rc == EBUSY && timeout > 0) {
@@ -58,6 +58,6 @@ static int mutex_lock(share_mutex *m, int64_t timeout) {
     return rc ? -rc : 1;
 }
 
-static int mutex_unlock(share_mutex *m) { return -pthread_mutex_unlock(&m->mutex); }
+static inline int mutex_unlock(share_mutex *m) { return -pthread_mutex_unlock(&m->mutex); }
 
 #endif

@@ -16,8 +16,8 @@
 #include <stdint.h>
 #include <string.h>
 
-#include "atomics.h"
-#include "futex.h"
+#include "../native/atomics.h"
+#include "../native/futex.h"
 
 enum { RING_WOKEN_BY_READER = 2, RING_TRIES = 1000 };
 
