@@ -1,7 +1,8 @@
 """`python -m benchmarks.sensors`: an inertial sensor at 500 Hz next to a loop at 1 kHz.
 
 Three processes: a simulated device at a pseudo terminal, the program of the sensor, and a loop with
-a virtual segment in real time. The body of the loop reads the sensor in every cycle.
+a virtual segment in real time. The body of the loop reads the sensor in every cycle. With
+`--priority 60`, all three have this SCHED_FIFO priority, as with `chrt -f 60`.
 
 The times to reception contain the lateness of the simulated device. The smallest delay counts as 0,
 because the clock of the device is mapped by it.
@@ -132,6 +133,7 @@ def measure(seconds: float) -> dict[str, object]:
         "machine": machine(),
         "load_average": os.getloadavg()[0],  # of all programs, over the last minute
         "seconds": seconds,
+        "priority": os.sched_getparam(0).sched_priority,  # 0: ordinary scheduling
         "loop": {"rate_hz": 1 / PERIOD, "drives": DRIVES, "cycles": len(ages), **lost},
         "samples_sent": sent,
         "rate_hz": round((len(rows) - 1) / duration, 3),
@@ -197,12 +199,15 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--seconds", type=float, default=20.0)
     parser.add_argument("--json", type=Path)
+    parser.add_argument("--priority", type=int, default=0, help="SCHED_FIFO; 0: ordinary")
     parser.add_argument("--role", choices=["device", "sensor"], help=argparse.SUPPRESS)
     parser.add_argument("--argument", default="", help=argparse.SUPPRESS)
     given = parser.parse_args(arguments)
     if given.role:
         {"device": device, "sensor": sensor}[given.role](given.argument)
         return
+    if given.priority:
+        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(given.priority))
     text = json.dumps(measure(given.seconds), indent=2, ensure_ascii=False)
     print(text)
     if given.json is not None:
