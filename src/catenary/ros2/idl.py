@@ -30,7 +30,8 @@ def idl_type(message: type[Struct]) -> type[IdlStruct]:
     """Return the type of Cyclone DDS for a class of messages."""
     hints = get_type_hints(message, include_extras=True)
     fields = {name: _field_type(hints[name]) for name in message.__struct_fields__}
-    return make_idl_struct(message.__name__ + "_", _type_name(message), fields)
+    made: type[IdlStruct] = make_idl_struct(message.__name__ + "_", _type_name(message), fields)
+    return made
 
 
 def _type_name(message: type[Struct]) -> str:
