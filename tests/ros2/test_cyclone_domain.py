@@ -27,6 +27,10 @@ def test_type_information_of_fast_dds_is_ignored() -> None:
     assert domain_of({}).findtext("Compatibility/IgnoreTypeInformation") == "1.15"
 
 
+def test_key_hashes_are_sent() -> None:
+    assert domain_of({}).findtext("Internal/GenerateKeyhash") == "true"
+
+
 def test_subnet_is_the_default() -> None:
     assert configuration({}) == configuration({"ROS_AUTOMATIC_DISCOVERY_RANGE": "SUBNET"})
     domain = domain_of({})

@@ -23,6 +23,8 @@ from catenary.ros2.discovery import PARTICIPANT_USER_DATA
 # not readable for Cyclone DDS, so matching uses the names of the types
 # (eclipse-cyclonedds/cyclonedds pull request 2333).
 COMPATIBILITY = "<Compatibility><IgnoreTypeInformation>1.15</IgnoreTypeInformation></Compatibility>"
+# Fast DDS recognises the end of a node or endpoint by its key hash, else only after 10 s.
+INTERNAL = "<Internal><GenerateKeyhash>true</GenerateKeyhash></Internal>"
 INDEX = (
     "<ParticipantIndex>auto</ParticipantIndex><MaxAutoParticipantIndex>32</MaxAutoParticipantIndex>"
 )
@@ -62,7 +64,7 @@ def configuration(environment: Mapping[str, str]) -> str:
         general = discovery = ""
     own = (
         f"<CycloneDDS><Domain><General>{general}</General>"
-        f"<Discovery>{discovery}</Discovery>{COMPATIBILITY}</Domain></CycloneDDS>"
+        f"<Discovery>{discovery}</Discovery>{COMPATIBILITY}{INTERNAL}</Domain></CycloneDDS>"
     )
     return ",".join(filter(None, (own, environment.get("CYCLONEDDS_URI", ""))))
 
