@@ -1,0 +1,97 @@
+"""`catenary ros2` under rclpy of Jazzy and Kilted, as a process: services, joints, parameters."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import catenary as cat
+from catenary.virtual.devices import Servo
+from catenary.wire.cia402 import AxisState, Mode, state_of
+from tests.remote.programs import Running
+from tests.ros2.judge.machines import background_machine, bridge_under_rclpy
+from tests.ros2.judge.process import RELIABLE, Graph, NodeProcess, eventually
+from tests.ros2.judge.test_bridge_process import STATES, command
+from tests.ros2.judge.test_rclpy import own_domain
+
+PATIENT = "[services]\ntimeout = 30.0\n"
+
+
+@pytest.fixture
+def graph(ros2: Path) -> Graph:
+    environment = {
+        "ROS_DOMAIN_ID": own_domain(),
+        "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST",
+        "RMW_IMPLEMENTATION": "rmw_fastrtps_cpp",
+    }
+    return Graph(ros2, "rclpy", environment)
+
+
+@contextmanager
+def bridged(graph: Graph, folder: Path, servo: Servo) -> Iterator[tuple[Running, NodeProcess]]:
+    """Run an enabled machine, a bridge under rclpy and a client of rclpy."""
+    file = folder / "ros2.toml"
+    file.write_text(PATIENT)
+    with (
+        background_machine(servo) as running,
+        bridge_under_rclpy(running.name, graph, "--config", str(file)),
+        graph.peer() as peer,
+    ):
+        eventually(lambda: bool(running.arm.enabled.all()))
+        yield running, peer
+
+
+def request(peer: NodeProcess, service: str) -> None:
+    """Call a service of the bridge, which must succeed."""
+    answer = peer.ask("call", name=f"/left/{service}", type="std_srvs/srv/Trigger", fields={})
+    assert answer["success"], answer["message"]
+
+
+def test_services_change_the_state_of_the_axes(graph: Graph, tmp_path: Path) -> None:
+    servo = Servo()
+    with (
+        bridged(graph, tmp_path, servo) as (running, peer),
+        cat.attach(running.name) as reader,
+    ):
+
+        def state() -> Any:
+            return state_of(int(reader.read()["statusword"][0]))
+
+        request(peer, "stop")
+        eventually(lambda: not running.arm.enabled.any())
+        request(peer, "enable")
+        eventually(lambda: bool(running.arm.enabled.all()))
+        servo.inject_fault(0x7500)
+        eventually(lambda: state() is AxisState.FAULT)
+        servo.inject_fault(0)  # removes the cause
+        request(peer, "reset")
+        eventually(lambda: state() is not AxisState.FAULT)
+
+
+def test_home_changes_the_mode_of_the_axis(graph: Graph, tmp_path: Path) -> None:
+    with (
+        bridged(graph, tmp_path, Servo()) as (running, peer),
+        cat.attach(running.name) as reader,
+    ):
+        request(peer, "home")
+        eventually(lambda: Mode.HM in reader.rows(0)[0]["mode"])
+
+
+def test_rclpy_reads_the_joints_and_moves_them(graph: Graph, tmp_path: Path) -> None:
+    with bridged(graph, tmp_path, Servo()) as (running, peer):
+        arm = running.arm
+        peer.ask("subscribe", topic="/left/joint_states", type=STATES, qos=RELIABLE)
+        first = eventually(lambda: peer.ask("messages", topic="/left/joint_states"))[0]
+        assert first["name"] == list(arm.names)
+        goal = command(peer, arm, 0.2, 1)
+        eventually(lambda: abs(arm.actual.position - goal).max() < 0.01)
+
+        def read() -> bool:
+            last = peer.ask("messages", topic="/left/joint_states")[-1]
+            return bool(abs(last["position"][0] - goal[0]) < 0.01)
+
+        eventually(read)
