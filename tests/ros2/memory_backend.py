@@ -2,12 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any, Literal
 
 from msgspec import Struct
 
-from catenary.ros2.backend import STATE, NotAvailable, Qos, ServiceCallback, ServiceKind
+from catenary.ros2.backend import (
+    STATE,
+    NotAvailable,
+    Parameter,
+    ParametersCallback,
+    Qos,
+    ServiceCallback,
+    ServiceKind,
+)
 
 
 class MemoryPublisher:
@@ -33,6 +41,7 @@ class MemoryBackend:
         self.publishers: dict[str, MemoryPublisher] = {}
         self.subscriptions: dict[str, tuple[type[Struct], Qos, Callable[[Any], None]]] = {}
         self.services: dict[str, ServiceCallback] = {}
+        self.declared: dict[str, Parameter] = {}
         self.incompatible: list[str] = []
         self.closed = False
         self._has_services = services
@@ -52,6 +61,11 @@ class MemoryBackend:
             raise NotAvailable("no services")
         assert kind == "trigger"
         self.services[name] = callback
+
+    def parameters(self, found: Mapping[str, Parameter], change: ParametersCallback) -> None:
+        if not self._has_services:
+            raise NotAvailable("no parameters")
+        self.declared, self.change = dict(found), change
 
     def deliver(self, topic: str, message: Struct) -> None:
         """Queue a message, as a network would: the newest `depth` messages are kept."""

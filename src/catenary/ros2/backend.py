@@ -1,7 +1,7 @@
 """Connection to a ROS 2 graph: one interface for two implementations.
 
 `cyclone` needs the package `cyclonedds` (extra `ros2`) and no ROS installation. `rclpy` needs a
-sourced ROS 2 environment; services need it too.
+sourced ROS 2 environment; services and parameters need it too.
 """
 
 from __future__ import annotations
@@ -19,6 +19,8 @@ from catenary.ros2.interface import (
     STATE,
     Backend,
     NotAvailable,
+    Parameter,
+    ParametersCallback,
     Publisher,
     Qos,
     ServiceCallback,
@@ -33,6 +35,8 @@ __all__ = [
     "Backend",
     "BackendKind",
     "NotAvailable",
+    "Parameter",
+    "ParametersCallback",
     "Publisher",
     "Qos",
     "ServiceCallback",

@@ -23,6 +23,7 @@ from catenary.ros2.commands import REFUSED, Commands
 from catenary.ros2.config import Config, Forward, Point, Trajectory
 from catenary.ros2.diagnostics import Reports
 from catenary.ros2.followers import make_followers
+from catenary.ros2.law_parameters import NodeLawParameters
 from catenary.ros2.publishing import Publishing
 from catenary.ros2.requests import Requests
 from catenary.ros2.services import Services
@@ -67,6 +68,7 @@ class Bridge:
         self._shown = ""  # last shown report
         self._follow_run()
         self._subscribe()
+        self._parameters: NodeLawParameters | None = None
         self._offer_services()
 
     def __enter__(self) -> Self:
@@ -116,11 +118,15 @@ class Bridge:
             self._row = row
         self._command()
         self._publishing.step(self._row)
+        if self._parameters is not None:
+            self._parameters.step()
 
     def close(self) -> None:
         """Release the lease, so that the axes hold, and leave the graph."""
         if self._commands is not None:
             self._commands.stop()
+        if self._parameters is not None:
+            self._parameters.close()
         self._publishing.close()
         self._requests.close()
         self._source.close()
@@ -190,8 +196,16 @@ class Bridge:
         try:
             for name, call in services.calls.items():
                 self._backend.service(name, "trigger", call)
+            if self._config.services.parameters:
+                self._parameters = self._law_parameters()
         except NotAvailable:
-            self.reports.notes.append("services need rclpy; this backend has topics only")
+            text = "services and parameters need rclpy; this backend has topics only"
+            self.reports.notes.append(text)
+
+    def _law_parameters(self) -> NodeLawParameters:
+        source = self._source
+        requests = Requests(source.name, source.uid, self._config.services.timeout)
+        return NodeLawParameters(self._backend, requests)
 
     def _stop(self, reason: str) -> None:
         if self._commands is not None:

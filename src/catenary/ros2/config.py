@@ -169,9 +169,10 @@ class LawParameters(Table, frozen=True):
 
 
 class Services(Table, frozen=True):
-    """[services]: enable, stop, home and reset as std_srvs/Trigger. They need rclpy."""
+    """[services]: enable, stop, home and reset as std_srvs/Trigger, and parameters of the node."""
 
-    on: bool = True
+    on: bool = True  # they need rclpy
+    parameters: bool = True  # those of the running law, named LAW.NAME
     timeout: Seconds = 2.0
 
 

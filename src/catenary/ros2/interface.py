@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Literal, Protocol, TypeVar
 
@@ -15,6 +15,8 @@ Durability = Literal["volatile", "transient_local"]
 ServiceKind = Literal["trigger", "set_bool"]
 # The request is None for a trigger. The response is the fields `success` and `message`.
 ServiceCallback = Callable[[bool | None], tuple[bool, str]]
+# The argument is the values of one request by name. The result is the reason of a refusal, or "".
+ParametersCallback = Callable[[Mapping[str, object]], str]
 Message = TypeVar("Message", bound=Struct)
 
 
@@ -47,6 +49,16 @@ SENSOR = Qos("best_effort", "volatile", 5)  # rmw_qos_profile_sensor_data
 STATE = Qos("reliable", "volatile", 10)  # rmw_qos_profile_default
 COMMAND = Qos("reliable", "volatile", 1)  # an old command is obsolete
 CLOCK = Qos("best_effort", "volatile", 1)  # rclcpp::ClockQoS
+
+
+@dataclass(frozen=True, slots=True)
+class Parameter:
+    """Parameter of a node: a number within limits. None: no limit."""
+
+    value: float
+    minimum: float | None = None
+    maximum: float | None = None
+    description: str = ""
 
 
 class Publisher(Protocol):
@@ -104,6 +116,17 @@ class Backend(Protocol):
 
         Raises:
             NotAvailable: The backend has no services.
+        """
+
+    def parameters(self, found: Mapping[str, Parameter], change: ParametersCallback) -> None:
+        """Declare the parameters of the node. A later call replaces them, or their values.
+
+        Args:
+            found: all parameters by name.
+            change: receives the values of each request to the node, called by `spin_once`.
+
+        Raises:
+            NotAvailable: The backend has no parameters.
         """
 
     def spin_once(self, timeout: float) -> None:

@@ -6,7 +6,7 @@ field is copied into objects of ROS 2.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from importlib import import_module
 from typing import Any, Literal
 
@@ -22,8 +22,17 @@ from rclpy.signals import SignalHandlerOptions
 
 from catenary.errors import ConfigurationError, DecodeError
 from catenary.ros2 import cdr, names
-from catenary.ros2.interface import STATE, Message, Qos, ServiceCallback, ServiceKind
+from catenary.ros2.interface import (
+    STATE,
+    Message,
+    Parameter,
+    ParametersCallback,
+    Qos,
+    ServiceCallback,
+    ServiceKind,
+)
 from catenary.ros2.messages import message_type
+from catenary.ros2.rclpy_parameters import NodeParameters
 
 TAKEN_AT_ONCE = 64  # callbacks that one call of `spin_once` runs at most
 RELIABILITY = {
@@ -107,6 +116,7 @@ class RclpyBackend:
         )
         self._executor = SingleThreadedExecutor(context=self._context)
         self._executor.add_node(self._node)
+        self._parameters = NodeParameters(self._node)
         self._reports: dict[str, None] = {}  # a set in the order of insertion
         self._ran = False
         self._closed = False
@@ -189,6 +199,15 @@ class RclpyBackend:
         interface = "std_srvs/srv/SetBool" if kind == "set_bool" else "std_srvs/srv/Trigger"
         full_name = names.resolve(name, *self._names)
         self._node.create_service(ros_class(interface), full_name, answer)
+
+    def parameters(self, found: Mapping[str, Parameter], change: ParametersCallback) -> None:
+        """Declare the parameters of the node. A later call replaces them, or their values.
+
+        Args:
+            found: all parameters by name.
+            change: receives the values of each request to the node, called by `spin_once`.
+        """
+        self._parameters.show(found, change)
 
     def spin_once(self, timeout: float) -> None:
         """Run the callbacks of all received messages and requests in this thread.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -18,6 +19,7 @@ from tests.ros2.judge.process import RELIABLE, Graph, NodeProcess, eventually
 from tests.ros2.judge.test_bridge_process import STATES, command
 from tests.ros2.judge.test_rclpy import own_domain
 
+DOUBLE = 3  # rcl_interfaces/msg/ParameterType.PARAMETER_DOUBLE
 PATIENT = "[services]\ntimeout = 30.0\n"
 
 
@@ -49,6 +51,62 @@ def request(peer: NodeProcess, service: str) -> None:
     """Call a service of the bridge, which must succeed."""
     answer = peer.ask("call", name=f"/left/{service}", type="std_srvs/srv/Trigger", fields={})
     assert answer["success"], answer["message"]
+
+
+def ask_parameters(peer: NodeProcess, service: str, **fields: Any) -> Any:
+    """Call one of the services of parameters of the bridge."""
+    kind = "".join(word.capitalize() for word in service.split("_"))
+    return peer.ask(
+        "call", name=f"/left/catenary/{service}", type=f"rcl_interfaces/srv/{kind}", fields=fields
+    )
+
+
+def set_together(peer: NodeProcess, **values: float) -> Any:
+    """Set parameters of the law in one request. Return its result."""
+    made = [
+        {"name": f"impedance.{name}", "value": {"type": DOUBLE, "double_value": value}}
+        for name, value in values.items()
+    ]
+    return ask_parameters(peer, "set_parameters_atomically", parameters=made)["result"]
+
+
+def value_of(peer: NodeProcess, name: str) -> Any:
+    """Return the value of a parameter of the law; None before it is declared."""
+    [value] = ask_parameters(peer, "get_parameters", names=[f"impedance.{name}"])["values"] or [{}]
+    return value["double_value"] if value.get("type") == DOUBLE else None
+
+
+def test_parameters_of_the_law(graph: Graph, tmp_path: Path) -> None:
+    pytest.importorskip("numba")
+
+    @cat.law(parameters=[cat.Parameter("stiffness", 0, 40, "N·m/rad"), "damping"])
+    def impedance(target, parameters):  # type: ignore[no-untyped-def]
+        target.position[0] = 0.0 * parameters[0]
+
+    with bridged(graph, tmp_path, Servo()) as (running, peer):
+        run = running.loop.start(impedance, parameters=[1.0, 2.0])
+        eventually(lambda: value_of(peer, "damping") == 2.0)
+        names = ["impedance.stiffness"]
+        [found] = ask_parameters(peer, "describe_parameters", names=names)["descriptors"]
+        assert found["description"] == "[N·m/rad]"
+        [limits] = found["floating_point_range"]
+        assert (limits["from_value"], limits["to_value"]) == (0.0, 40.0)
+
+        assert set_together(peer, stiffness=3.0, damping=4.0) == {"successful": True, "reason": ""}
+        assert run.parameters.tolist() == [3.0, 4.0]
+        refused = set_together(peer, damping=5.0, stiffness=41.0)
+        assert not refused["successful"]
+        assert "out of range" in refused["reason"]
+        refused = set_together(peer, stiffness=5.0, damping=math.inf)
+        assert refused == {
+            "successful": False,
+            "reason": "parameter 'damping': inf is not a finite number",
+        }
+        assert run.parameters.tolist() == [3.0, 4.0]
+
+        run.parameters = [50.0, 6.0]  # another program changes them, even beyond the range
+        eventually(lambda: value_of(peer, "damping") == 6.0)
+        assert value_of(peer, "stiffness") == 50.0
 
 
 def test_services_change_the_state_of_the_axes(graph: Graph, tmp_path: Path) -> None:
