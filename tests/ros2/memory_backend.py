@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Literal
 
 from msgspec import Struct
 
 from catenary.ros2.backend import (
     STATE,
+    Executor,
     NotAvailable,
     Parameter,
     ParametersCallback,
@@ -30,6 +31,26 @@ class MemoryPublisher:
     def publish(self, message: Struct) -> None:
         assert isinstance(message, self.kind)
         self.messages.append(message)
+
+
+class MemoryAction:
+    """Server of an action that keeps its feedback. Tests use its executor."""
+
+    def __init__(self, name: str, executor: Executor) -> None:
+        self.name, self.executor = name, executor
+        self.sent: list[tuple[Sequence[str], Sequence[float], Sequence[float]]] = []
+        self.steps, self.closed = 0, False
+
+    def step(self) -> None:
+        self.steps += 1
+
+    def feedback(
+        self, joints: Sequence[str], desired: Sequence[float], actual: Sequence[float]
+    ) -> None:
+        self.sent.append((joints, desired, actual))
+
+    def close(self) -> None:
+        self.closed = True
 
 
 class MemoryBackend:
@@ -66,6 +87,12 @@ class MemoryBackend:
         if not self._has_services:
             raise NotAvailable("no parameters")
         self.declared, self.change = dict(found), change
+
+    def follow_joint_trajectory(self, name: str, executor: Executor) -> MemoryAction:
+        if not self._has_services:
+            raise NotAvailable("no actions")
+        self.action = MemoryAction(name, executor)
+        return self.action
 
     def deliver(self, topic: str, message: Struct) -> None:
         """Queue a message, as a network would: the newest `depth` messages are kept."""

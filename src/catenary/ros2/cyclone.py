@@ -31,6 +31,8 @@ from catenary.ros2 import cdr, cyclone_domain, discovery, names
 from catenary.ros2.idl import idl_type
 from catenary.ros2.interface import (
     STATE,
+    ActionServer,
+    Executor,
     Message,
     NotAvailable,
     Parameter,
@@ -247,6 +249,21 @@ class CycloneBackend:
         """
         raise NotAvailable(
             "parameters: the backend cyclone has none",
+            hint="run with rclpy: source a ROS 2 installation",
+        )
+
+    def follow_joint_trajectory(self, name: str, executor: Executor) -> ActionServer:
+        """Raise NotAvailable: actions are services and topics.
+
+        Args:
+            name: name of the action.
+            executor: not used.
+
+        Raises:
+            NotAvailable: Always.
+        """
+        raise NotAvailable(
+            f"action {name}: the backend cyclone has no actions",
             hint="run with rclpy: source a ROS 2 installation",
         )
 

@@ -22,8 +22,10 @@ from rclpy.signals import SignalHandlerOptions
 
 from catenary.errors import ConfigurationError, DecodeError
 from catenary.ros2 import cdr, names
+from catenary.ros2.action import FollowJointTrajectoryServer
 from catenary.ros2.interface import (
     STATE,
+    Executor,
     Message,
     Parameter,
     ParametersCallback,
@@ -208,6 +210,19 @@ class RclpyBackend:
             change: receives the values of each request to the node, called by `spin_once`.
         """
         self._parameters.show(found, change)
+
+    def follow_joint_trajectory(self, name: str, executor: Executor) -> FollowJointTrajectoryServer:
+        """Create a server of the action control_msgs/FollowJointTrajectory.
+
+        Args:
+            name: name; relative names are in the namespace of the node.
+            executor: executes the goals, called by `spin_once`.
+
+        Raises:
+            ConfigurationError: control_msgs is not installed.
+        """
+        full_name = names.resolve(name, *self._names)
+        return FollowJointTrajectoryServer(self._node, full_name, executor)
 
     def spin_once(self, timeout: float) -> None:
         """Run the callbacks of all received messages and requests in this thread.

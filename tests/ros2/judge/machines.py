@@ -59,7 +59,7 @@ def loader_for(judge: Path) -> Path:
 
 
 @contextmanager
-def bridge_under_rclpy(name: str, graph: Graph, *options: str) -> Iterator[None]:
+def bridge_under_rclpy(name: str, graph: Graph, *options: str) -> Iterator[subprocess.Popen[str]]:
     """Run `catenary ros2` as /left/catenary in the judge's environment."""
     command = [str(graph.judge), str(FOLDER / "command.py"), str(loader_for(graph.judge))]
     with subprocess.Popen(
@@ -71,6 +71,6 @@ def bridge_under_rclpy(name: str, graph: Graph, *options: str) -> Iterator[None]
         try:
             assert process.stdout is not None
             assert process.stdout.readline().startswith("/left/catenary by rclpy")
-            yield
+            yield process
         finally:
             process.terminate()

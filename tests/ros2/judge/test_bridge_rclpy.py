@@ -109,6 +109,17 @@ def test_parameters_of_the_law(graph: Graph, tmp_path: Path) -> None:
         assert value_of(peer, "stiffness") == 50.0
 
 
+def test_without_control_msgs_the_bridge_names_the_missing_action(graph: Graph) -> None:
+    with (
+        background_machine(Servo()) as running,
+        bridge_under_rclpy(running.name, graph) as process,
+    ):
+        assert process.stdout is not None
+        assert process.stdout.readline() == (
+            "note: the action FollowJointTrajectory needs control_msgs, which is not installed\n"
+        )
+
+
 def test_services_change_the_state_of_the_axes(graph: Graph, tmp_path: Path) -> None:
     servo = Servo()
     with (
