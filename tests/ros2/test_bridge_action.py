@@ -98,6 +98,8 @@ def test_a_refused_goal_moves_nothing() -> None:
             start(running, 50.0)
         running.step(50)
         assert (running.arm.target.position == before).all()
+        assert running.last_report.startswith("action: ")
+        assert running.bridge.reports.counts["refused commands"] == 1
 
 
 def test_a_goal_for_a_disabled_axis_is_refused() -> None:

@@ -155,7 +155,14 @@ class Bridge:
         self._commands.step(reader, row, ros_time)
 
     def _start_goal(self, request: GoalRequest) -> Goal:
-        """Start a goal of the action. Raises CatenaryError."""
+        """Start a goal of the action, or report and raise the CatenaryError of its refusal."""
+        try:
+            return self._started(request)
+        except CatenaryError as error:
+            self.reports.add(REFUSED, f"action: {error.message}")
+            raise
+
+    def _started(self, request: GoalRequest) -> Goal:
         commands, reader, row = self._commands, self._source.reader, self._row
         if commands is None or reader is None or row is None:
             raise CommandError("there is no running loop with these axes")

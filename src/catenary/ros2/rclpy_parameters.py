@@ -33,7 +33,7 @@ class NodeParameters:
             found: all parameters by name.
             change: receives requested values.
         """
-        self._change = None  # these changes are no requests
+        self._change = None  # not a request of another node
         for name in [name for name in self._declared if name not in found]:
             self._remove(name)
         for name, parameter in found.items():
