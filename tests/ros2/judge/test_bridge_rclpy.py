@@ -79,12 +79,15 @@ def value_of(peer: NodeProcess, name: str) -> Any:
 def test_parameters_of_the_law(graph: Graph, tmp_path: Path) -> None:
     pytest.importorskip("numba")
 
-    @cat.law(parameters=[cat.Parameter("stiffness", 0, 40, "N·m/rad"), "damping"])
+    stiffness = cat.Parameter("stiffness", 0, 40, "N·m/rad")
+    mass = cat.Parameter("mass", 0.0)  # without a largest value
+
+    @cat.law(parameters=[stiffness, "damping", mass])
     def impedance(target, parameters):  # type: ignore[no-untyped-def]
         target.position[0] = 0.0 * parameters[0]
 
     with bridged(graph, tmp_path, Servo()) as (running, peer):
-        run = running.loop.start(impedance, parameters=[1.0, 2.0])
+        run = running.loop.start(impedance, parameters=[1.0, 2.0, 1.0])
         eventually(lambda: value_of(peer, "damping") == 2.0)
         names = ["impedance.stiffness"]
         [found] = ask_parameters(peer, "describe_parameters", names=names)["descriptors"]
@@ -93,7 +96,9 @@ def test_parameters_of_the_law(graph: Graph, tmp_path: Path) -> None:
         assert (limits["from_value"], limits["to_value"]) == (0.0, 40.0)
 
         assert set_together(peer, stiffness=3.0, damping=4.0) == {"successful": True, "reason": ""}
-        assert run.parameters.tolist() == [3.0, 4.0]
+        assert run.parameters.tolist() == [3.0, 4.0, 1.0]
+        assert set_together(peer, mass=1e300)["successful"]
+        assert "out of range" in set_together(peer, mass=-1.0)["reason"]
         refused = set_together(peer, damping=5.0, stiffness=41.0)
         assert not refused["successful"]
         assert "out of range" in refused["reason"]
@@ -102,9 +107,9 @@ def test_parameters_of_the_law(graph: Graph, tmp_path: Path) -> None:
             "successful": False,
             "reason": "parameter 'damping': inf is not a finite number",
         }
-        assert run.parameters.tolist() == [3.0, 4.0]
+        assert run.parameters.tolist() == [3.0, 4.0, 1e300]
 
-        run.parameters = [50.0, 6.0]  # another program changes them, even beyond the range
+        run.parameters = [50.0, 6.0, 1.0]  # another program changes them, even beyond the range
         eventually(lambda: value_of(peer, "damping") == 6.0)
         assert value_of(peer, "stiffness") == 50.0
 
