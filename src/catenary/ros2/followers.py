@@ -173,7 +173,7 @@ class TrajectoryCommand:
         self._follower.cancel(self._now)
 
     def sample(self, now: float, state: State) -> SetPoints | None:
-        """Return the positions and velocities of the trajectory [rad, rad/s]; None after its end."""
+        """Return positions and velocities of the trajectory [rad, rad/s]; None after its end."""
         self._now = now
         position, velocity = self._follower.sample(now, axis_states(state))
         self.planned, self.measured = position, state.position
