@@ -40,6 +40,20 @@ def add_parser(commands: Commands) -> None:
         type=Path,
         help=f"picture to write: {', '.join(KINDS)} (FILE.png)",
     )
+    add_choice(parser)
+    parser.add_argument(
+        "--reference",
+        metavar="FIELD",
+        help="field of the reference, such as target_position (default in CSP: commanded_position)",
+    )
+    parser.add_argument(
+        "--degrees", action="store_true", help="show angles in degrees instead of radians"
+    )
+    parser.set_defaults(run=run)
+
+
+def add_choice(parser: argparse.ArgumentParser) -> None:
+    """Add the options that choose a part of the recording."""
     parser.add_argument(
         "--share", metavar="NAME", help="share to draw, in a file that `catenary merge` wrote"
     )
@@ -50,15 +64,6 @@ def add_parser(commands: Commands) -> None:
     parser.add_argument(
         "--end", metavar="S", type=seconds, default=math.inf, help="end at second S"
     )
-    parser.add_argument(
-        "--reference",
-        metavar="FIELD",
-        help="field of the reference, such as target_position (default in CSP: commanded_position)",
-    )
-    parser.add_argument(
-        "--degrees", action="store_true", help="show angles in degrees instead of radians"
-    )
-    parser.set_defaults(run=run)
 
 
 def run(arguments: argparse.Namespace) -> int:
