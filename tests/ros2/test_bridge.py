@@ -153,6 +153,22 @@ def test_a_trajectory_moves_the_axes_to_its_end() -> None:
         assert not running.bridge.reports.texts
 
 
+def test_positions_advance_in_every_cycle_between_two_commands() -> None:
+    with rig() as running:
+        running.backend.deliver("joint_trajectory", trajectory(running, 0.2, 1.0))
+        targets = []
+        for cycle in range(600):
+            next(running.loop)
+            running.share.apply(running.arm)
+            targets.append(running.arm.target.position[0])
+            if cycle % 4 == 0:
+                running.spin()
+        steps = np.diff(targets)
+        moving = steps[np.flatnonzero(steps)[0] :]
+        assert len(moving) > 500
+        np.testing.assert_allclose(moving, moving[0], rtol=1e-6)  # a straight line
+
+
 def test_a_trajectory_too_fast_is_refused_and_nothing_moves() -> None:
     with rig() as running:
         enable(running)

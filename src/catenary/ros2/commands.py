@@ -197,7 +197,12 @@ class Commands:
             return
         assert self._lease is not None  # taken with the first message
         try:
-            self._lease.send(**{name: values for name, values in found.items()})
+            self._lease.send(
+                found.get("position"),
+                velocity=found.get("velocity"),
+                torque=found.get("torque"),
+                extrapolate="position" in found and "velocity" in found,
+            )
         except CatenaryError as error:
             self._reports.add(LOST, error.message)
             self._lease = None  # it has ended, so a release is not possible

@@ -148,9 +148,9 @@ class TrajectoryCommand:
         self._settled_at = None
 
     def sample(self, now: float, state: State) -> SetPoints | None:
-        """Return the positions of the trajectory [rad]; None after its end."""
+        """Return the positions and velocities of the trajectory [rad, rad/s]; None after its end."""
         self._now = now
-        position, _ = self._follower.sample(now, axis_states(state))
+        position, velocity = self._follower.sample(now, axis_states(state))
         if not self._follower.active:
             self._raise_failure()
             if self._settled_at is None:
@@ -158,7 +158,7 @@ class TrajectoryCommand:
             lag = float(abs(position - state.commanded).max())
             if lag <= SETTLED or now >= self._settled_at:
                 return None
-        return {"position": position}
+        return {"position": position, "velocity": velocity}
 
     def cancel(self) -> None:
         """Forget the trajectory."""
@@ -235,9 +235,9 @@ class PoseFollower:
         self._command.accept(message, now, axis_states(state))
 
     def sample(self, now: float, state: State) -> SetPoints | None:
-        """Return the positions of the joints [rad]; None at the end of the motion."""
+        """Return the positions and velocities [rad, rad/s]; None at the end of the motion."""
         found = self._command.sample(now, axis_states(state))
-        return None if found is None else {"position": found}
+        return None if found is None else {"position": found, "velocity": self._command.velocity}
 
     def cancel(self) -> None:
         """Forget the pose."""

@@ -121,6 +121,11 @@ class PoseCommand:
         """True while set-points must be sent."""
         return self._target is not None
 
+    @property
+    def velocity(self) -> Row:
+        """Velocities of the joints after the last sample [rad/s], shape (joints,)."""
+        return self._velocity
+
     def accept(self, message: PoseStampedLike, now: float, state: AxisStates) -> None:
         """Check a pose and move to it. A motion that is under way continues from its velocity.
 

@@ -40,7 +40,8 @@ MAGIC = b"CATADESK"
 HEAD = struct.Struct("<8sII32s")
 PLACES = 16
 COMMANDS = 64  # maximum number of unread commands of a client
-QUANTITIES = ("position", "velocity", "torque")
+QUANTITIES = ("position", "velocity", "torque")  # bits 0 to 2 of the quantities of a command
+EXTRAPOLATE = 1 << 3  # bit of the quantities: the positions continue with the velocities
 
 PLACE = np.dtype(
     [

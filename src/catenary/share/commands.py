@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Protocol, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
 
-from catenary.share.command_table import QUANTITIES, Desk, Reason, Values
+from catenary.share.command_table import EXTRAPOLATE, QUANTITIES, Desk, Reason, Values
 from catenary.share.layout import ShareLayout
 from catenary.share.process import Process
 
@@ -37,6 +37,9 @@ class Commanded(Protocol):
     def target(self) -> Targets: ...
 
 
+Places: TypeAlias = Mapping[str, tuple[Targets, int]]
+
+
 @dataclass(frozen=True, slots=True)
 class AxisCommand:
     """Set-points of a client. A quantity that is not commanded is None."""
@@ -46,6 +49,7 @@ class AxisCommand:
     velocity: Values | None  # [rad/s]
     torque: Values | None  # [N·m]
     client: Process
+    extrapolate: bool = False  # True: the positions continue with the velocities
 
 
 @dataclass(frozen=True, slots=True)
@@ -114,7 +118,8 @@ class CommandReader:
             row[name][axes] if int(row["quantities"]) >> bit & 1 else None
             for bit, name in enumerate(QUANTITIES)
         )
-        return AxisCommand(known.axes, position, velocity, torque, known.client)
+        extrapolate = bool(int(row["quantities"]) & EXTRAPOLATE)
+        return AxisCommand(known.axes, position, velocity, torque, known.client, extrapolate)
 
     def _follow_leases(self) -> None:
         """Record new leases, and end those that are over."""
@@ -157,10 +162,15 @@ class CommandReader:
         self._ended.append(LeaseEnd(names, reason, known.client))
 
 
+def places_of(drives: Sequence[Commanded]) -> Places:
+    """Return the targets of drives, and the indices in them, by name of the axis."""
+    return {name: (each.target, k) for each in drives for k, name in enumerate(each.names)}
+
+
 def apply(
     commands: Sequence[AxisCommand],
     ended: Sequence[LeaseEnd],
-    drives: Sequence[Commanded],
+    places: Places,
     axes: Sequence[str],
     commanded: npt.NDArray[np.float64],
 ) -> None:
@@ -172,12 +182,11 @@ def apply(
     Args:
         commands: new commands, oldest first.
         ended: leases that have ended.
-        drives: the drives to command.
+        places: targets of the drives, and indices in them, by name of the axis.
         axes: names of the axes, in the order of the layout.
         commanded: commanded positions [rad], shape (axes,). NaN leaves the target
             position unchanged.
     """
-    places = {name: (each.target, k) for each in drives for k, name in enumerate(each.names)}
     for name in (name for end in ended for name in end.axes if name in places):
         target, k = places[name]
         held = commanded[axes.index(name)]

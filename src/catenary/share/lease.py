@@ -12,7 +12,14 @@ import numpy as np
 import numpy.typing as npt
 
 from catenary.errors import LeaseError
-from catenary.share.command_table import COMMANDS, PLACES, QUANTITIES, Desk, Reason
+from catenary.share.command_table import (
+    COMMANDS,
+    EXTRAPOLATE,
+    PLACES,
+    QUANTITIES,
+    Desk,
+    Reason,
+)
 from catenary.share.jog import (
     STATES,
     Jog,
@@ -62,6 +69,7 @@ class Lease:
         *,
         velocity: npt.ArrayLike | None = None,
         torque: npt.ArrayLike | None = None,
+        extrapolate: bool = False,
     ) -> None:
         """Send set-points for the axes of the lease, and renew the lease.
 
@@ -73,12 +81,17 @@ class Lease:
             position: positions [rad].
             velocity: velocities [rad/s].
             torque: torques [N·m].
+            extrapolate: True: the positions continue with the velocities until the next command,
+                for at most 20 ms. Use it if the client sends more slowly than the loop cycles.
 
         Raises:
             LeaseError: the lease has ended, the loop does not read commands, or the desk is locked
                 for too long.
-            ValueError: a value has the wrong shape or is not finite, or no value is given.
+            ValueError: a value has the wrong shape or is not finite, no value is given, or
+                `extrapolate` lacks positions or velocities.
         """
+        if extrapolate and (position is None or velocity is None):
+            raise ValueError("extrapolate=True needs position= and velocity=")
         row = np.zeros((), self._desk.row)
         given_values = zip(QUANTITIES, (position, velocity, torque), strict=True)
         for bit, (name, given) in enumerate(given_values):
@@ -88,6 +101,8 @@ class Lease:
                 row["quantities"] |= np.uint64(1 << bit)
         if not row["quantities"]:
             raise ValueError("nothing to send; pass position=, velocity= or torque=")
+        if extrapolate:
+            row["quantities"] |= np.uint64(EXTRAPOLATE)
         row["lease"] = self._serial
         self._renew(row.tobytes())
 

@@ -17,9 +17,17 @@ from catenary.plan.sink import Incident, SinkLayout
 from catenary.share import folder, memory
 from catenary.share._rows import CycleWriter, Ring
 from catenary.share.command_table import Desk, Values, make_desk
-from catenary.share.commands import AxisCommand, Commanded, CommandReader, LeaseEnd, apply
+from catenary.share.commands import (
+    AxisCommand,
+    Commanded,
+    CommandReader,
+    LeaseEnd,
+    apply,
+    places_of,
+)
 from catenary.share.desk_socket import DeskSocket
 from catenary.share.events import SharedEvent, encode_event, read_events
+from catenary.share.extrapolation import Extrapolation
 from catenary.share.layout import ShareLayout, decode_head, encode_head, make_layout
 from catenary.share.memory import Segment
 from catenary.share.process import this_process
@@ -71,6 +79,7 @@ class Share:
         self._desk: Desk | None = None
         self._socket: DeskSocket | None = None
         self._commands: CommandReader | None = None
+        self._extrapolation = Extrapolation((), period=1.0)
         self._layout: ShareLayout | None = None
         self._cycles: CycleWriter | None = None
         self._events: Ring | None = None
@@ -108,10 +117,14 @@ class Share:
         Axes whose lease has ended hold their commanded position. Return these leases, so that the
         application can react.
         """
-        reader = self._reader()
+        reader, number = self._reader(), 0 if self._cycles is None else self._cycles.newest
         commands, ended = reader.commands(), reader.ended()
-        if commands or ended:
-            apply(commands, ended, drives, self.layout.axes, self._commanded_position())
+        moving = self._extrapolation.follow(commands, ended, number)
+        if commands or ended or moving:
+            places = places_of(drives)
+            if commands or ended:
+                apply(commands, ended, places, self.layout.axes, self._commanded_position())
+            self._extrapolation.write(places, number)
         return ended
 
     def commands(self) -> list[AxisCommand]:
@@ -202,6 +215,7 @@ class Share:
         self._segment, self._layout, self._cycles = segment, made, cycles
         self._dtype = made.dtype
         self._desk, self._commands = desk, CommandReader(desk, made)
+        self._extrapolation = Extrapolation(made.axes, made.period)
         self._events = Ring(segment.memory, events.offset, events.count, events.size, writable=True)
         return cycles.capsule
 
