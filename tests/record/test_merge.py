@@ -66,7 +66,7 @@ def test_the_messages_of_both_files_alternate(two: tuple[Path, Path], tmp_path: 
 
 
 def test_an_offset_moves_the_times_and_the_stamps(two: tuple[Path, Path], tmp_path: Path) -> None:
-    record.merge([two[0], record.Source(two[1], OFFSET)], tmp_path / "c.mcap")
+    record.merge([two[0], record.MergeInput(two[1], OFFSET)], tmp_path / "c.mcap")
 
     def of(path: Path) -> dict[tuple[str, int], tuple[int, bytes]]:
         return {

@@ -63,7 +63,7 @@ def test_a_share_is_read_as_from_its_own_file(
 
 
 def test_an_offset_moves_the_time_in_utc_only(files: dict[str, Path], tmp_path: Path) -> None:
-    record.merge([files["left"], record.Source(files["right"], OFFSET)], tmp_path / "c.mcap")
+    record.merge([files["left"], record.MergeInput(files["right"], OFFSET)], tmp_path / "c.mcap")
     alone = record.read(files["right"])
     found = record.read(tmp_path / "c.mcap", share="right")
     assert np.array_equal(found.rows, alone.rows)

@@ -60,9 +60,9 @@ def run(arguments: argparse.Namespace) -> int:
             f"--offset {unknown[0]}: not a file to merge",
             hint=f"use one of {', '.join(arguments.files)}",
         )
-    from catenary.record import Source, merge
+    from catenary.record import MergeInput, merge
 
-    sources = [Source(file, offsets.get(file, 0.0)) for file in arguments.files]
+    sources = [MergeInput(file, offsets.get(file, 0.0)) for file in arguments.files]
     merged = merge(sources, arguments.output, force=arguments.force)
     if arguments.json:
         result = {

@@ -14,7 +14,7 @@ Like the dashboard, the package attaches to the share of a loop and has no other
 from catenary.record.figure import plot
 from catenary.record.layout import Field, Layout
 from catenary.record.log_file import read_csv
-from catenary.record.merge import Merged, Source, merge
+from catenary.record.merge import Merged, MergeInput, merge
 from catenary.record.recorder import Recorder
 from catenary.record.recording import Recording, read
 from catenary.record.repair import Repaired, repair
@@ -22,11 +22,11 @@ from catenary.record.repair import Repaired, repair
 __all__ = [
     "Field",
     "Layout",
+    "MergeInput",
     "Merged",
     "Recorder",
     "Recording",
     "Repaired",
-    "Source",
     "merge",
     "plot",
     "read",

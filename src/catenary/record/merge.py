@@ -46,7 +46,7 @@ CHUNK_SIZE = 1 << 20  # [bytes]
 
 
 @dataclass(frozen=True, slots=True)
-class Source:
+class MergeInput:
     """A recording to merge.
 
     Args:
@@ -77,7 +77,7 @@ class TimedMessage(NamedTuple):
 
 
 def merge(
-    sources: Sequence[Source | str | os.PathLike[str]],
+    sources: Sequence[MergeInput | str | os.PathLike[str]],
     path: str | os.PathLike[str],
     *,
     force: bool = False,
@@ -98,7 +98,7 @@ def merge(
             installed.
         OSError: A file cannot be read or written.
     """
-    inputs = [each if isinstance(each, Source) else Source(each) for each in sources]
+    inputs = [each if isinstance(each, MergeInput) else MergeInput(each) for each in sources]
     readers = [SourceReader(number, source) for number, source in enumerate(inputs)]
     _require_one_clock(readers)
     names = _names(readers)
@@ -118,7 +118,7 @@ class SourceReader:
         OSError: The file cannot be read.
     """
 
-    def __init__(self, number: int, source: Source) -> None:
+    def __init__(self, number: int, source: MergeInput) -> None:
         self.path = Path(source.path)
         self.offset_ns = round(source.offset * 1e9)
         self.channels: dict[int, Any] = {}  # by number in the file; known once read
