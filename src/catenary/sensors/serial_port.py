@@ -24,7 +24,7 @@ READ_SIZE = 4096  # [bytes] size of the kernel's buffer of a port
 WRITE_TIMEOUT = 1.0  # [s]
 REASONS = {
     errno.EAGAIN: "another program uses the port",
-    errno.EACCES: "Permission denied: `sudo usermod -aG dialout $USER` permits it after a new login",
+    errno.EACCES: "Permission denied: run `sudo usermod -aG dialout $USER`, and log in again",
 }
 
 

@@ -56,7 +56,9 @@ class UdpConnection:
         ready = self._poll.poll(timeout * 1e3)
         try:
             data = self._socket.recv(SIZE_MAX) if ready else b""
-        except BlockingIOError:  # the kernel has dropped a datagram with a wrong checksum, select(2)
+        except (
+            BlockingIOError
+        ):  # the kernel has dropped a datagram with a wrong checksum, select(2)
             data = b""
         return data, time.monotonic_ns()
 
