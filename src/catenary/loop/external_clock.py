@@ -29,7 +29,10 @@ class TimeSource(Protocol):
     """Clock that a program provides."""
 
     def time_ns(self) -> int:
-        """Return the time [ns]. Raise OSError if the clock does not answer."""
+        """Return the time [ns]. Raise OSError if the clock does not answer.
+
+        It is called in a thread of the loop, and must return within 100 us.
+        """
 
 
 @dataclass(frozen=True, slots=True)
