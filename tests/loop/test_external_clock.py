@@ -193,6 +193,16 @@ def test_a_missing_device_is_an_error_of_the_loop(cell: Cell) -> None:
         pass
 
 
+def test_a_device_of_root_has_a_hint(monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuse(path: str, flags: int) -> int:
+        raise PermissionError(13, "Permission denied", path)
+
+    monkeypatch.setattr("os.open", refuse)
+    with pytest.raises(cat.ClockError, match="Permission denied") as caught:
+        HardwareClock("/dev/ptp0")
+    assert "udev" in (caught.value.hint or "")
+
+
 def test_the_kernels_clocks() -> None:
     assert cat.ExternalClock("CLOCK_REALTIME").open().time_ns() == pytest.approx(
         time.time_ns(), abs=60e9
