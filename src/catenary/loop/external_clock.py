@@ -21,7 +21,7 @@ from catenary.loop.clock_discipline import BOUND, RATE_LIMIT, ClockSample
 
 KERNEL_CLOCKS = {"CLOCK_TAI": time.CLOCK_TAI, "CLOCK_REALTIME": time.CLOCK_REALTIME}
 FIND = "`ethtool -T NIC` shows the PTP hardware clock of a network card"
-ACCESS = 'run as root, or allow it with a udev rule: SUBSYSTEM=="ptp", GROUP="...", MODE="0640"'
+ACCESS = 'run as root, or add a udev rule: SUBSYSTEM=="ptp", GROUP="...", MODE="0640"'
 CLOCKFD = 3  # FD_TO_CLOCKID in clock_gettime(2): the descriptor, inverted, and these three bits
 READINGS = 5  # attempts per sample; the shortest one counts
 WINDOW_NS = 100_000  # longest usable reading; a longer one was interrupted
