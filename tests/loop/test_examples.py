@@ -1,7 +1,8 @@
-"""Every example runs without arguments. The output of two of them is checked."""
+"""Every example runs without arguments. The output of some of them is checked."""
 
 from __future__ import annotations
 
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -9,7 +10,13 @@ from pathlib import Path
 import pytest
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
-TESTED_ELSEWHERE = ("compiled_law.py", "three_tasks.py", "tool.py", "two_networks.py")
+TESTED_ELSEWHERE = (
+    "compiled_law.py",
+    "sensors.py",
+    "three_tasks.py",
+    "tool.py",
+    "two_networks.py",
+)
 
 
 def run(name: str, *arguments: str) -> str:
@@ -44,3 +51,10 @@ def test_two_networks() -> None:
     out = run("two_networks.py")
     assert "network 0: 0 lost" in out
     assert "network 1: 0 lost" in out
+
+
+def test_a_sensor_that_becomes_stale() -> None:
+    out = run("sensors.py")
+    turned = re.fullmatch(r"axis 0 at (\d\.\d\d) rad; stopped: .+\n", out)
+    assert turned is not None, out
+    assert float(turned[1]) > 0.1

@@ -1,4 +1,4 @@
-"""Two private machines: network namespaces with a cable between them."""
+"""Private machines: network namespaces that are connected by a switch."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from typing import IO
 
 from catenary.realtime.private_network import make_veth_pair, run_ip
 
+SWITCH = "switch"
 SLEEP = "import sys; print(flush=True); sys.stdin.read()"
 
 
@@ -21,9 +22,9 @@ class Machine:
     pid: int
     address: str
 
-    def command(self, *arguments: str) -> list[str]:
+    def command(self, *arguments: str, python: str = sys.executable) -> list[str]:
         """Return the command that runs Python with these arguments in the namespace."""
-        return ["nsenter", f"--net=/proc/{self.pid}/ns/net", sys.executable, *arguments]
+        return ["nsenter", f"--net=/proc/{self.pid}/ns/net", python, *arguments]
 
     def start(self, *arguments: str, output: int | IO[str] | None = None) -> subprocess.Popen[str]:
         """Start Python with these arguments in the namespace."""
@@ -31,21 +32,31 @@ class Machine:
 
 
 @contextmanager
-def two_machines() -> Iterator[tuple[Machine, Machine]]:
-    """Yield two machines that are connected by a veth pair. The caller is in a private network."""
-    holders = [_hold(), _hold()]
+def connected_machines(count: int) -> Iterator[list[Machine]]:
+    """Yield machines that are connected by a switch. The caller is in a private network."""
+    holders: list[subprocess.Popen[str]] = []
+    run_ip("link", "add", SWITCH, "type", "bridge", "mcast_snooping", "0")
     try:
-        machines = [Machine(holder.pid, f"10.77.0.{n}") for n, holder in enumerate(holders, 1)]
-        for name, machine in zip(make_veth_pair(), machines, strict=True):
-            run_ip("link", "set", name, "netns", str(machine.pid))
-            _ip(machine, "link", "set", "lo", "up")
-            _ip(machine, "address", "add", f"{machine.address}/24", "dev", name)
-            _ip(machine, "link", "set", name, "up")
-        yield machines[0], machines[1]
+        run_ip("link", "set", SWITCH, "up")
+        for number in range(1, count + 1):
+            holders.append(_hold())
+            _connect(Machine(holders[-1].pid, f"10.77.0.{number}"))
+        yield [Machine(each.pid, f"10.77.0.{n}") for n, each in enumerate(holders, 1)]
     finally:
         for holder in holders:
             holder.kill()
             holder.wait()
+        run_ip("link", "delete", SWITCH)
+
+
+def _connect(machine: Machine) -> None:
+    """Connect a machine to the switch."""
+    port, name = make_veth_pair()
+    run_ip("link", "set", port, "master", SWITCH)
+    run_ip("link", "set", name, "netns", str(machine.pid))
+    _ip(machine, "link", "set", "lo", "up")
+    _ip(machine, "address", "add", f"{machine.address}/24", "dev", name)
+    _ip(machine, "link", "set", name, "up")
 
 
 def _hold() -> subprocess.Popen[str]:

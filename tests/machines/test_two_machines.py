@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 import catenary as cat
-from tests.machines.namespaces import Machine, two_machines
+from tests.machines.namespaces import Machine, connected_machines
 from tests.share.names import own_name
 
 pytest.importorskip("cyclonedds", reason="needs cyclonedds (catenary[ros2])")
@@ -28,8 +28,8 @@ def machines(
     """Two machines; `veth` skips the test without a private network."""
     monkeypatch.setenv("ROS_DOMAIN_ID", str(1 + os.getpid() % 200))
     monkeypatch.delenv("ROS_AUTOMATIC_DISCOVERY_RANGE", raising=False)
-    with two_machines() as found:
-        yield found
+    with connected_machines(2) as (first, second):
+        yield first, second
 
 
 @contextmanager

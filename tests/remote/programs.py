@@ -22,6 +22,7 @@ class Running:
     loop: cat.Loop
     arm: cat.Drives
     main: cat.MainDevice
+    share: cat.Share
 
 
 def small_segment() -> Segment:
@@ -48,4 +49,4 @@ def program(
         with cat.Loop(arm, period=1e-3, sink=share, stop=stop or cat.StopPolicy()) as loop:
             if background:
                 loop.run_in_background()
-            yield Running(name, loop, arm, main)
+            yield Running(name, loop, arm, main, share)

@@ -2,12 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Literal
 
 from msgspec import Struct
 
-from catenary.ros2.backend import STATE, NotAvailable, Qos, ServiceCallback, ServiceKind
+from catenary.ros2.backend import (
+    STATE,
+    Executor,
+    NotAvailable,
+    Parameter,
+    ParametersCallback,
+    Qos,
+    ServiceCallback,
+    ServiceKind,
+)
 
 
 class MemoryPublisher:
@@ -24,6 +33,26 @@ class MemoryPublisher:
         self.messages.append(message)
 
 
+class MemoryAction:
+    """Server of an action that keeps its feedback. Tests use its executor."""
+
+    def __init__(self, name: str, executor: Executor) -> None:
+        self.name, self.executor = name, executor
+        self.sent: list[tuple[Sequence[str], Sequence[float], Sequence[float]]] = []
+        self.steps, self.closed = 0, False
+
+    def step(self) -> None:
+        self.steps += 1
+
+    def feedback(
+        self, joints: Sequence[str], desired: Sequence[float], actual: Sequence[float]
+    ) -> None:
+        self.sent.append((joints, desired, actual))
+
+    def close(self) -> None:
+        self.closed = True
+
+
 class MemoryBackend:
     """A node without a network."""
 
@@ -33,6 +62,7 @@ class MemoryBackend:
         self.publishers: dict[str, MemoryPublisher] = {}
         self.subscriptions: dict[str, tuple[type[Struct], Qos, Callable[[Any], None]]] = {}
         self.services: dict[str, ServiceCallback] = {}
+        self.declared: dict[str, Parameter] = {}
         self.incompatible: list[str] = []
         self.closed = False
         self._has_services = services
@@ -52,6 +82,17 @@ class MemoryBackend:
             raise NotAvailable("no services")
         assert kind == "trigger"
         self.services[name] = callback
+
+    def parameters(self, found: Mapping[str, Parameter], change: ParametersCallback) -> None:
+        if not self._has_services:
+            raise NotAvailable("no parameters")
+        self.declared, self.change = dict(found), change
+
+    def follow_joint_trajectory(self, name: str, executor: Executor) -> MemoryAction:
+        if not self._has_services:
+            raise NotAvailable("no actions")
+        self.action = MemoryAction(name, executor)
+        return self.action
 
     def deliver(self, topic: str, message: Struct) -> None:
         """Queue a message, as a network would: the newest `depth` messages are kept."""

@@ -43,6 +43,13 @@ class ActionServer:
         self.destroyed = True
 
 
+class Feedback:
+    """Double of FollowJointTrajectory.Feedback."""
+
+    def __init__(self) -> None:
+        self.desired, self.actual, self.error = (SimpleNamespace() for _ in range(3))
+
+
 class Handle:
     """Double of ServerGoalHandle."""
 
@@ -134,7 +141,7 @@ def module(name: str, **members: Any) -> ModuleType:
 
 @pytest.fixture
 def client(monkeypatch: pytest.MonkeyPatch) -> Client:
-    action = SimpleNamespace(Result=SimpleNamespace, Feedback=SimpleNamespace)
+    action = SimpleNamespace(Result=SimpleNamespace, Feedback=Feedback)
     doubles = [
         module("control_msgs"),
         module("control_msgs.action", FollowJointTrajectory=action),
@@ -218,10 +225,14 @@ def test_goals_for_joints_with_several_degrees_of_freedom_are_rejected(client: C
 def test_feedback_goes_to_the_active_goal(client: Client) -> None:
     handle = Handle(smooth(1.0, 0.5, -0.5))
     client.send(handle)
-    client.it.feedback("desired", "actual", "error")
+    client.it.feedback(JOINTS, [0.5, 1.0], [0.25, 1.0])
     client.run(1.2)
-    client.it.feedback("desired", "actual", "error")
-    assert [message.desired for message in handle.feedback] == ["desired"]
+    client.it.feedback(JOINTS, [0.0, 0.0], [0.0, 0.0])
+    [message] = handle.feedback
+    assert message.joint_names == list(JOINTS)
+    assert message.desired.positions == [0.5, 1.0]
+    assert message.actual.positions == [0.25, 1.0]
+    assert message.error.positions == [0.25, 0.0]
 
 
 def test_close_removes_the_action(client: Client) -> None:

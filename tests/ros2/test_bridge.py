@@ -349,7 +349,10 @@ def test_the_profile_rdda_streams_positions_and_publishes_efforts() -> None:
 
 def test_a_backend_without_services_is_noted() -> None:
     with rig(services=False) as running:
-        assert running.bridge.reports.notes == ["services need rclpy; this backend has topics only"]
+        assert running.bridge.reports.notes == [
+            "services and parameters need rclpy; this backend has topics only",
+            "no actions",
+        ]
 
 
 def test_commands_for_unknown_axes_are_reported() -> None:

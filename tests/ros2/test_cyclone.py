@@ -170,6 +170,13 @@ def test_services_are_not_available(nodes: tuple[Any, Any]) -> None:
         nodes[0].service("~/enable", "set_bool", lambda request: (True, ""))
 
 
+def test_parameters_and_actions_are_not_available(nodes: tuple[Any, Any]) -> None:
+    with pytest.raises(NotAvailable, match="run with rclpy"):
+        nodes[0].parameters({}, lambda values: "")
+    with pytest.raises(NotAvailable, match="run with rclpy"):
+        nodes[0].follow_joint_trajectory("~/follow", None)
+
+
 def test_without_a_network_interface_the_error_says_so() -> None:
     if isinstance(state := private_network.state(), private_network.Refused):
         pytest.skip(f"no private network: {state.reason}")

@@ -125,3 +125,31 @@ def test_parameters_of_a_running_law_are_set() -> None:
         backend.deliver("stiffness", messages.Float64MultiArray(data=[7.0]))
         backend.spin_once(0.0)
         assert until(lambda: run.parameters.tolist() == [7.0, 2.0])
+
+
+def test_parameters_of_a_law_are_parameters_of_the_node() -> None:
+    pytest.importorskip("numba")
+
+    @cat.law(parameters=["stiffness"])
+    def impedance(target, parameters):  # type: ignore[no-untyped-def]
+        target.position[0] = 0.0 * parameters[0]
+
+    with bridged() as (running, backend, bridge):
+        run = running.loop.start(impedance, parameters=[1.0])
+
+        def declared() -> bool:
+            bridge.step()
+            return "impedance.stiffness" in backend.declared
+
+        assert until(declared)
+        assert backend.change({"impedance.stiffness": 2.0}) == ""
+        assert run.parameters.tolist() == [2.0]
+
+
+def test_parameters_can_be_switched_off() -> None:
+    with program() as running:
+        backend = MemoryBackend()
+        config = Config(services=Services(parameters=False))
+        with Bridge(running.name, backend, config):
+            assert "enable" in backend.services
+            assert not hasattr(backend, "change")

@@ -19,12 +19,13 @@ from typing import Any, BinaryIO, NamedTuple
 import msgspec
 
 from catenary.errors import RecordingError
-from catenary.record.channels import SECOND_NS, ros_name
+from catenary.record.channels import FORMAT, SECOND_NS, ros_name
 from catenary.record.extra import require
 from catenary.record.layout import Layout
 from catenary.record.mcap_records import (
     CHANNEL,
     CHUNK,
+    END_RECORD,
     LAYOUT_RECORD,
     METADATA,
     SCHEMA,
@@ -36,9 +37,9 @@ from catenary.record.mcap_records import (
     read_record,
     refusing_damage,
 )
+from catenary.record.merged import MERGED_RECORD, MergedShare, end_record
 from catenary.record.output import Output
 
-MERGED_RECORD = "catenary.merged"  # metadata of a merged file
 STAMP = struct.Struct("<iI")  # seconds and nanoseconds, after the encapsulation header of CDR
 STAMP_AT = 4
 CHUNK_SIZE = 1 << 20  # [bytes]
@@ -122,21 +123,31 @@ class SourceReader:
         self.offset_ns = round(source.offset * 1e9)
         self.channels: dict[int, Any] = {}  # by number in the file; known once read
         self.schemas: dict[int, Any] = {}
+        self.end: dict[str, str] = {}  # metadata of its end; known once read
         self._number = number
         with self.path.open("rb") as stream, refusing_damage(stream.name):
-            self.layout = self._read_layout(stream)
+            self.layout, self.format = self._read_layout(stream)
 
     def messages(self) -> Iterator[TimedMessage]:
         """Yield the messages with shifted times, up to the first damaged record."""
         with self.path.open("rb") as stream, refusing_damage(stream.name):
             for place in places(stream):
-                if place.opcode != CHUNK:
+                if place.opcode not in (METADATA, CHUNK):
                     continue
-                chunk = read_record(stream, place)
-                data = None if chunk is None else chunk_bytes(chunk)
+                record = read_record(stream, place)
+                if record is None:
+                    return
+                if place.opcode == METADATA:
+                    self._read_end(record)
+                    continue
+                data = chunk_bytes(record)
                 if data is None:
                     return
                 yield from self._read_chunk(data)
+
+    def _read_end(self, record: Any) -> None:
+        if record.name == END_RECORD:
+            self.end = record.metadata
 
     def _read_chunk(self, data: bytes) -> Iterator[TimedMessage]:
         for opcode, at, end in chunk_records(data):
@@ -160,12 +171,14 @@ class SourceReader:
         stamp = STAMP.pack(*divmod(moved, SECOND_NS))
         return data[:STAMP_AT] + stamp + data[STAMP_AT + STAMP.size :]
 
-    def _read_layout(self, stream: BinaryIO) -> Layout:
+    def _read_layout(self, stream: BinaryIO) -> tuple[Layout, str]:
+        """Return the layout and the version of the format."""
         for place in places(stream):
             if place.opcode == METADATA:
                 record = read_record(stream, place)
                 if record is not None and record.name == LAYOUT_RECORD:
-                    return msgspec.json.decode(record.metadata["layout"], type=Layout)
+                    layout = msgspec.json.decode(record.metadata["layout"], type=Layout)
+                    return layout, record.metadata.get("format", FORMAT)
         raise RecordingError(
             f"{self.path} is not a recording of Catenary",
             hint="merge the files that `catenary record` wrote, not a merged file",
@@ -200,12 +213,21 @@ class MergedFile:
             self._writer.add_metadata(MERGED_RECORD, self._describe())
             streams = [reader.messages() for reader in self._readers]
             for message in heapq.merge(*streams, key=lambda each: each.time_ns):
+                if not self._channels:
+                    self._register_all()
                 first, last = first or message.time_ns, max(last, message.time_ns)
                 self._add(message)
+            self._add_ends()
             self._writer.finish()
         finally:
             self._output.close()
         return Merged(dict(self._counts), (last - first) / SECOND_NS)
+
+    def _register_all(self) -> None:
+        """Register all channels before the first message, so that a part can be read alone."""
+        for source, reader in enumerate(self._readers):
+            for channel in reader.channels:
+                self._channels[source, channel] = self._register(source, channel)
 
     def _add(self, message: TimedMessage) -> None:
         key = (message.source, message.channel)
@@ -215,6 +237,11 @@ class MergedFile:
         self._counts[topic] += 1
         time_ns = message.time_ns
         self._writer.add_message(number, time_ns, message.data, time_ns, message.sequence)
+
+    def _add_ends(self) -> None:
+        for name, reader in zip(self._names, self._readers, strict=True):
+            if reader.end:
+                self._writer.add_metadata(end_record(name), reader.end)
 
     def _register(self, source: int, channel: int) -> tuple[int, str]:
         """Register a channel of a source; return its number and its topic."""
@@ -231,17 +258,15 @@ class MergedFile:
         return int(number), topic
 
     def _describe(self) -> dict[str, str]:
-        """Return the file, offset [s] and layout of each source, by name."""
-        return {
-            name: msgspec.json.encode(
-                {
-                    "file": reader.path.name,
-                    "offset": reader.offset_ns / SECOND_NS,
-                    "layout": reader.layout,
-                }
-            ).decode()
-            for name, reader in zip(self._names, self._readers, strict=True)
-        }
+        """Return the description of each share, by name."""
+        shares = [
+            MergedShare(
+                reader.path.name, reader.offset_ns / SECOND_NS, reader.layout, reader.format
+            )
+            for reader in self._readers
+        ]
+        texts = [msgspec.json.encode(share).decode() for share in shares]
+        return dict(zip(self._names, texts, strict=True))
 
 
 def _names(readers: Sequence[SourceReader]) -> list[str]:

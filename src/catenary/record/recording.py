@@ -23,6 +23,7 @@ from catenary.record.channels import (
     decode_text,
     is_event,
     make_channels,
+    ros_name,
     topic,
 )
 from catenary.record.layout import NUMBER, TIME, Layout
@@ -43,6 +44,7 @@ from catenary.record.mcap_records import (
     read_record,
     refusing_damage,
 )
+from catenary.record.merged import MERGED_RECORD, end_record, select
 from catenary.share import SharedEvent
 
 LONGEST = 1e9  # [s] longer than any recording
@@ -106,24 +108,31 @@ class Recording:
         return found.unit if found is not None else ""
 
 
-def read(path: str | os.PathLike[str], *, start: float = 0.0, end: float = np.inf) -> Recording:
+def read(
+    path: str | os.PathLike[str],
+    *,
+    start: float = 0.0,
+    end: float = np.inf,
+    share: str | None = None,
+) -> Recording:
     """Read a recording, or a part of it. A truncated file is read up to its last complete chunk.
 
     Args:
         path: the file.
         start: start of the part [s], counted from the first cycle; 0 includes earlier events.
         end: end of the part [s], counted from the first cycle.
+        share: name of the share to read from a merged recording.
 
     Raises:
         RecordingError: The file is not a recording of Catenary, it is damaged, or the extra is not
-            installed.
+            installed; or it is a merged recording and does not contain `share`.
         ValueError: `start` or `end` is not a valid time.
         OSError: The file cannot be read.
     """
     if not start <= LONGEST or math.isnan(end):
         raise ValueError(f"start={start} s and end={end} s must be valid times of a recording")
     with Path(path).open("rb") as stream, refusing_damage(stream.name):
-        return PartReader(stream, start, end).read(places(stream))
+        return PartReader(stream, start, end, share).read(places(stream))
 
 
 class PartReader:
@@ -133,10 +142,16 @@ class PartReader:
         stream: the file.
         start: start of the part [s], counted from the first cycle.
         end: end of the part [s].
+        share: name of the share; None if the file contains only one.
     """
 
-    def __init__(self, stream: BinaryIO, start: float, end: float) -> None:
+    def __init__(
+        self, stream: BinaryIO, start: float, end: float, share: str | None = None
+    ) -> None:
         self._stream = stream
+        self._share = share
+        self._merged = ""  # name of the share in the topics of a merged file
+        self._prefix = ""  # start of its topics in a file of its own
         self._part = (start, end)  # [s] after the first cycle
         self._metadata: dict[str, dict[str, str]] = {}
         self._topics: dict[int, str] = {}  # by channel id
@@ -169,10 +184,26 @@ class PartReader:
             if record is None:
                 break
             if place.opcode == METADATA:
-                self._metadata[record.name] = record.metadata
+                self._read_metadata(record)
             elif not self._read_chunk(record):
                 break
         return self._make()
+
+    def _read_metadata(self, record: Any) -> None:
+        if record.name != MERGED_RECORD:
+            self._metadata[record.name] = record.metadata
+            return
+        self._merged, share = select(record.metadata, self._share, self._stream.name)
+        self._prefix = topic(share.layout, "")
+        layout = msgspec.json.encode(share.merged_layout).decode()
+        self._metadata[LAYOUT_RECORD] = {"format": share.format, "layout": layout}
+
+    def _own_topic(self, topic: str) -> str:
+        """Return the topic as in a file of this share alone; "" if it is another share's."""
+        if not self._merged:
+            return topic
+        prefix = f"/{self._merged}/"
+        return self._prefix + topic.removeprefix(prefix) if topic.startswith(prefix) else ""
 
     def _read_chunk(self, chunk: Any) -> bool:
         """Read a chunk. Return False if it is damaged; the caller then ignores the rest."""
@@ -186,7 +217,8 @@ class PartReader:
         for message in chunk_messages(data):
             if message.channel not in self._topics:
                 return False  # the chunk with the description of the channel is missing
-            self._read_message(self._topics[message.channel], message)
+            if name := self._topics[message.channel]:
+                self._read_message(name, message)
         return True
 
     def _read_message(self, topic: str, message: ChunkMessage) -> None:
@@ -203,7 +235,7 @@ class PartReader:
         for opcode, at, end in chunk_records(data):
             if opcode == CHANNEL:
                 channel = decode_record(data[at:end])
-                self._topics[channel.id] = channel.topic
+                self._topics[channel.id] = self._own_topic(channel.topic)
 
     def _make(self) -> Recording:
         head = self._metadata.get(LAYOUT_RECORD)
@@ -213,19 +245,33 @@ class PartReader:
                 hint="read other MCAP files with the packages mcap and mcap-ros2-support",
             )
         layout = self._layout(head.get("layout", ""))
-        tail = self._metadata.get(END_RECORD, {})
+        self._require_share(layout.name)
+        tail = self._metadata.get(end_record(self._merged) if self._merged else END_RECORD, {})
         messages = self._messages[topic(layout, "events")]
         texts = [decode_text(message.data) for message in messages]
         events = (msgspec.json.decode(text, type=SharedEvent) for text in texts)
         first = self._span[0]  # the part was unknown while events before the first cycle were read
         return Recording(
-            layout=layout,
+            layout=self._named(layout),
             rows=_rows(layout, self._messages, head["format"]),
             events=tuple(e for e in events if e.time * 1e9 + layout.utc_offset_ns >= first),
             lost=int(lost) if (lost := tail.get("lost", "0")).isdecimal() else 0,
             ended=tail.get("ended", "cut off") if self._complete else "cut off",
             began_ns=None if self._began is None else self._began - layout.utc_offset_ns,
         )
+
+    def _require_share(self, name: str) -> None:
+        if self._share is None or self._merged or ros_name(self._share) == ros_name(name):
+            return
+        raise RecordingError(
+            f"{self._stream.name} is a recording of {name!r}, not of {self._share!r}"
+        )
+
+    def _named(self, layout: Layout) -> Layout:
+        """Return the layout with the name in the merged file, if a merge replaced the name."""
+        if self._merged in ("", ros_name(layout.name)):
+            return layout
+        return msgspec.structs.replace(layout, name=self._merged)
 
     def _layout(self, text: str) -> Layout:
         try:

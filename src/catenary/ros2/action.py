@@ -2,7 +2,7 @@
 
 NOT RUN with rclpy: control_msgs has no wheel, so that no test environment of Catenary contains it.
 The tests use doubles of rclpy. The semantics are those of `trajectory.TrajectoryFollower`, which
-is fully tested. The bridge does not offer this action yet.
+is fully tested. The bridge offers this action where rclpy and control_msgs are importable.
 """
 
 from __future__ import annotations
@@ -10,32 +10,12 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from importlib import import_module
-from typing import Any, Protocol
+from typing import Any
 
 from catenary.errors import CatenaryError, ConfigurationError
 from catenary.ros2.goal import Goal, Result, Status
-from catenary.ros2.limits import ToleranceLike
-from catenary.ros2.waypoints import Code, TrajectoryError, TrajectoryLike, seconds
-
-
-class Executor(Protocol):
-    """Execution of the goals: usually a `TrajectoryFollower` and the source of its set-points."""
-
-    def start(
-        self,
-        trajectory: TrajectoryLike,
-        path: Sequence[ToleranceLike],
-        goal: Sequence[ToleranceLike],
-        goal_time: float,
-    ) -> Goal:
-        """Start a trajectory with the tolerances of `limits.overridden`.
-
-        Raises:
-            CatenaryError: The trajectory is refused.
-        """
-
-    def cancel(self) -> None:
-        """Cancel the goal that is being executed."""
+from catenary.ros2.interface import Executor
+from catenary.ros2.waypoints import Code, TrajectoryError, seconds
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,16 +64,20 @@ class FollowJointTrajectoryServer:
         for each in finished:
             each.future.set_result(each.goal.result)
 
-    def feedback(self, desired: Any, actual: Any, error: Any) -> None:
+    def feedback(
+        self, joints: Sequence[str], desired: Sequence[float], actual: Sequence[float]
+    ) -> None:
         """Send feedback for the executed goals.
 
         Args:
-            desired: JointTrajectoryPoint of the set-points.
-            actual: JointTrajectoryPoint of the measured values.
-            error: JointTrajectoryPoint of the difference.
+            joints: names of the joints.
+            desired: set-points [rad].
+            actual: measured positions [rad].
         """
         message = self._action.Feedback()
-        message.desired, message.actual, message.error = desired, actual, error
+        message.joint_names = list(joints)
+        message.desired.positions, message.actual.positions = list(desired), list(actual)
+        message.error.positions = [a - b for a, b in zip(desired, actual, strict=True)]
         for each in self._running:
             if each.goal.status is Status.ACTIVE:
                 each.handle.publish_feedback(message)

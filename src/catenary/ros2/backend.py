@@ -1,7 +1,7 @@
 """Connection to a ROS 2 graph: one interface for two implementations.
 
 `cyclone` needs the package `cyclonedds` (extra `ros2`) and no ROS installation. `rclpy` needs a
-sourced ROS 2 environment; services need it too.
+sourced ROS 2 environment; services, parameters and actions need it too.
 """
 
 from __future__ import annotations
@@ -17,8 +17,12 @@ from catenary.ros2.interface import (
     COMMAND,
     SENSOR,
     STATE,
+    ActionServer,
     Backend,
+    Executor,
     NotAvailable,
+    Parameter,
+    ParametersCallback,
     Publisher,
     Qos,
     ServiceCallback,
@@ -30,9 +34,13 @@ __all__ = [
     "COMMAND",
     "SENSOR",
     "STATE",
+    "ActionServer",
     "Backend",
     "BackendKind",
+    "Executor",
     "NotAvailable",
+    "Parameter",
+    "ParametersCallback",
     "Publisher",
     "Qos",
     "ServiceCallback",

@@ -16,17 +16,21 @@ from typing import Any, Self
 
 from msgspec import Struct
 
-from catenary.errors import CatenaryError
+from catenary.errors import CatenaryError, ConfigurationError
 from catenary.ros2 import messages
 from catenary.ros2.backend import COMMAND, Backend, NotAvailable
-from catenary.ros2.commands import REFUSED, Commands
+from catenary.ros2.commands import REFUSED, Commands, State
 from catenary.ros2.config import Config, Forward, Point, Trajectory
 from catenary.ros2.diagnostics import Reports
-from catenary.ros2.followers import make_followers
+from catenary.ros2.followers import GoalRequest, TrajectoryCommand, make_followers
+from catenary.ros2.forward import CommandError
+from catenary.ros2.goal import Goal
+from catenary.ros2.law_parameters import NodeLawParameters
 from catenary.ros2.publishing import Publishing
 from catenary.ros2.requests import Requests
 from catenary.ros2.services import Services
 from catenary.ros2.source import Source, stamp_ns
+from catenary.ros2.trajectory_action import TrajectoryAction
 from catenary.share import attach
 
 IDLE = 0.05  # [s] longest wait
@@ -65,9 +69,13 @@ class Bridge:
         self._run = ""
         self._send_at = self._show_at = 0.0
         self._shown = ""  # last shown report
+        self._trajectory: TrajectoryCommand | None = None
+        self._action: TrajectoryAction | None = None
+        self._parameters: NodeLawParameters | None = None
         self._follow_run()
         self._subscribe()
         self._offer_services()
+        self._offer_action()
 
     def __enter__(self) -> Self:
         return self
@@ -87,9 +95,12 @@ class Bridge:
 
         Args:
             stop: ends the bridge.
-            show: receives each report, such as a refused command, as text.
+            show: receives missing functions and each report, such as a refused command, as text.
         """
         stop = stop or threading.Event()
+        if show is not None:
+            for note in self.reports.notes:
+                show(note)
         while not stop.is_set():
             self._backend.spin_once(self._time_left())
             self.step()
@@ -115,12 +126,20 @@ class Bridge:
         elif row is not None:
             self._row = row
         self._command()
+        if self._action is not None:
+            self._action.step(self._trajectory)
         self._publishing.step(self._row)
+        if self._parameters is not None:
+            self._parameters.step()
 
     def close(self) -> None:
         """Release the lease, so that the axes hold, and leave the graph."""
         if self._commands is not None:
             self._commands.stop()
+        if self._action is not None:
+            self._action.close()
+        if self._parameters is not None:
+            self._parameters.close()
         self._publishing.close()
         self._requests.close()
         self._source.close()
@@ -135,6 +154,27 @@ class Bridge:
         ros_time = stamp_ns(reader, row) * 1e-9 if reader is not None and row is not None else 0.0
         self._commands.step(reader, row, ros_time)
 
+    def _start_goal(self, request: GoalRequest) -> Goal:
+        """Start a goal of the action, or report and raise the CatenaryError of its refusal."""
+        try:
+            return self._started(request)
+        except CatenaryError as error:
+            self.reports.add(REFUSED, f"action: {error.message}")
+            raise
+
+    def _started(self, request: GoalRequest) -> Goal:
+        commands, reader, row = self._commands, self._source.reader, self._row
+        if commands is None or reader is None or row is None:
+            raise CommandError("there is no running loop with these axes")
+        state = State(reader, row, commands.axes)
+        goal = commands.start("trajectory", request, reader, state, stamp_ns(reader, row) * 1e-9)
+        assert goal is not None  # trajectories have one
+        return goal
+
+    def _cancel_goal(self) -> None:
+        if self._trajectory is not None:
+            self._trajectory.decelerate()
+
     def _follow_run(self) -> None:
         """Prepare the commands for another run of the loop, whose axes may differ."""
         if self._commands is not None:
@@ -148,11 +188,13 @@ class Bridge:
             limits = self._requests.axes()
             followers = make_followers(self._config, axes, limits, self.reports)
         except CatenaryError as error:
-            self._commands = None
+            self._commands = self._trajectory = None
             self.reports.add(REFUSED, f"no commands are possible: {error.message}")
             return
         lease = self._config.commands.lease
         self._commands = Commands(followers, axes, lease, self.reports)
+        trajectory = followers["trajectory"]
+        self._trajectory = trajectory if isinstance(trajectory, TrajectoryCommand) else None
 
     def _subscribe(self) -> None:
         """Subscribe to the topics of commands. The queue of each topic has one message."""
@@ -183,6 +225,17 @@ class Bridge:
 
         return offer
 
+    def _offer_action(self) -> None:
+        name = self._config.commands.trajectory.action
+        if not (self._config.commands.on and self._config.commands.trajectory.on and name):
+            return
+        try:
+            self._action = TrajectoryAction(
+                self._backend, name, self._start_goal, self._cancel_goal
+            )
+        except (NotAvailable, ConfigurationError) as error:
+            self.reports.notes.append(error.message)
+
     def _offer_services(self) -> None:
         if not self._config.services.on:
             return
@@ -190,8 +243,16 @@ class Bridge:
         try:
             for name, call in services.calls.items():
                 self._backend.service(name, "trigger", call)
+            if self._config.services.parameters:
+                self._parameters = self._law_parameters()
         except NotAvailable:
-            self.reports.notes.append("services need rclpy; this backend has topics only")
+            text = "services and parameters need rclpy; this backend has topics only"
+            self.reports.notes.append(text)
+
+    def _law_parameters(self) -> NodeLawParameters:
+        source = self._source
+        requests = Requests(source.name, source.uid, self._config.services.timeout)
+        return NodeLawParameters(self._backend, requests)
 
     def _stop(self, reason: str) -> None:
         if self._commands is not None:

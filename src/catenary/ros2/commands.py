@@ -18,6 +18,7 @@ from catenary.errors import CatenaryError
 from catenary.ros2.config import Quantity
 from catenary.ros2.diagnostics import Reports
 from catenary.ros2.forward import CommandError
+from catenary.ros2.goal import Goal
 from catenary.share import Lease, Reader
 from catenary.wire.cia402 import Mode
 
@@ -66,8 +67,8 @@ class Follower(Protocol):
 
     quantity: Quantity
 
-    def accept(self, message: Any, now: float, state: State) -> None:
-        """Start to execute a message.
+    def accept(self, message: Any, now: float, state: State) -> Goal | None:
+        """Start to execute a message. Return the goal of a trajectory.
 
         Args:
             message: the message of the topic.
@@ -149,6 +150,37 @@ class Commands:
         if self._active is not None:
             self._send(self._active, state, now)
 
+    def start(
+        self, topic: str, message: Any, reader: Reader, state: State, now: float
+    ) -> Goal | None:
+        """Start to execute a message at once. Return the goal of a trajectory.
+
+        Args:
+            topic: name of a follower.
+            message: the message.
+            reader: reader of the share.
+            state: state of the axes.
+            now: time of the cycle as in the stamps of messages [s].
+
+        Raises:
+            CatenaryError: The message is refused. The current motion continues.
+        """
+        self._pending = None  # it is older
+        follower = self._followers[topic]
+        try:
+            state.check(follower.quantity)
+            goal = follower.accept(message, now, state)
+            if self._lease is None:
+                self._lease = reader.lease(self.axes, for_=self._duration)
+        except CatenaryError:
+            if self._active is None:
+                follower.cancel()
+            raise
+        if self._active is not follower and self._active is not None:
+            self._active.cancel()
+        self._active = follower
+        return goal
+
     def stop(self, reason: str = "") -> None:
         """End the motion and release the lease: the axes hold.
 
@@ -169,21 +201,10 @@ class Commands:
     def _accept(self, reader: Reader, state: State, now: float) -> None:
         assert self._pending is not None
         topic, message = self._pending
-        self._pending = None
-        follower = self._followers[topic]
         try:
-            state.check(follower.quantity)
-            follower.accept(message, now, state)
-            if self._lease is None:
-                self._lease = reader.lease(self.axes, for_=self._duration)
+            self.start(topic, message, reader, state, now)
         except CatenaryError as error:
             self._reports.add(REFUSED, f"{topic}: {error.message}")
-            if self._active is None:
-                follower.cancel()
-            return
-        if self._active is not follower and self._active is not None:
-            self._active.cancel()
-        self._active = follower
 
     def _send(self, follower: Follower, state: State, now: float) -> None:
         try:

@@ -28,6 +28,9 @@ Name: TypeAlias = Annotated[str, Meta(pattern=r"^[A-Za-z_][A-Za-z0-9_]*$")]
 Topic: TypeAlias = Annotated[
     str, Meta(pattern=r"^/?[A-Za-z_][A-Za-z0-9_]*(/[A-Za-z_][A-Za-z0-9_]*)*$")
 ]
+Action: TypeAlias = Annotated[
+    str, Meta(pattern=r"^((~?/)?[A-Za-z_][A-Za-z0-9_]*(/[A-Za-z_][A-Za-z0-9_]*)*)?$")
+]
 Namespace: TypeAlias = Annotated[
     str, Meta(pattern=r"^(/?[A-Za-z_][A-Za-z0-9_]*(/[A-Za-z_][A-Za-z0-9_]*)*)?$")
 ]
@@ -112,6 +115,7 @@ class Trajectory(Table, frozen=True):
 
     on: bool = True
     topic: Topic = "joint_trajectory"
+    action: Action = "~/follow_joint_trajectory"  # "": none; needs rclpy and control_msgs
     path_tolerance: Tolerance = 0.0  # [rad]
     goal_tolerance: Tolerance = 0.0  # [rad]
     goal_time: Tolerance = 0.0  # [s] after the end to reach the goal; 0: no limit
@@ -169,9 +173,10 @@ class LawParameters(Table, frozen=True):
 
 
 class Services(Table, frozen=True):
-    """[services]: enable, stop, home and reset as std_srvs/Trigger. They need rclpy."""
+    """[services]: enable, stop, home and reset as std_srvs/Trigger, and parameters of the node."""
 
-    on: bool = True
+    on: bool = True  # they need rclpy
+    parameters: bool = True  # those of the running law, named LAW.NAME
     timeout: Seconds = 2.0
 
 

@@ -6,7 +6,7 @@ Messages are encoded and decoded by `catenary.ros2.cdr`; Cyclone DDS transports 
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from typing import Any, Literal
 
 from cyclonedds._clayer import ddspy_take, ddspy_write
@@ -29,7 +29,18 @@ from msgspec import Struct
 from catenary.errors import CatenaryError, DecodeError
 from catenary.ros2 import cdr, cyclone_domain, discovery, names
 from catenary.ros2.idl import idl_type
-from catenary.ros2.interface import STATE, Message, NotAvailable, Qos, ServiceCallback, ServiceKind
+from catenary.ros2.interface import (
+    STATE,
+    ActionServer,
+    Executor,
+    Message,
+    NotAvailable,
+    Parameter,
+    ParametersCallback,
+    Qos,
+    ServiceCallback,
+    ServiceKind,
+)
 
 ANY = SampleState.Any | ViewState.Any | InstanceState.Any
 TAKEN_AT_ONCE = 64  # messages of one subscription that one call of `spin_once` handles
@@ -223,6 +234,36 @@ class CycloneBackend:
         """
         raise NotAvailable(
             f"service {name} ({kind}): the backend cyclone has no services",
+            hint="run with rclpy: source a ROS 2 installation",
+        )
+
+    def parameters(self, found: Mapping[str, Parameter], change: ParametersCallback) -> None:
+        """Raise NotAvailable: the parameters of a node are services.
+
+        Args:
+            found: parameters by name.
+            change: not called.
+
+        Raises:
+            NotAvailable: Always.
+        """
+        raise NotAvailable(
+            "parameters: the backend cyclone has none",
+            hint="run with rclpy: source a ROS 2 installation",
+        )
+
+    def follow_joint_trajectory(self, name: str, executor: Executor) -> ActionServer:
+        """Raise NotAvailable: actions are services and topics.
+
+        Args:
+            name: name of the action.
+            executor: not used.
+
+        Raises:
+            NotAvailable: Always.
+        """
+        raise NotAvailable(
+            f"action {name}: the backend cyclone has no actions",
             hint="run with rclpy: source a ROS 2 installation",
         )
 

@@ -18,7 +18,7 @@ from catenary.ros2.diagnostics import Reports
 from catenary.ros2.forward import CommandError, ForwardCommand
 from catenary.ros2.goal import AxisStates, Goal, Status
 from catenary.ros2.kinematics import Kinematics
-from catenary.ros2.limits import AxisLimits, Tolerances
+from catenary.ros2.limits import AxisLimits, ToleranceLike, Tolerances, overridden
 from catenary.ros2.pose import PoseCommand, PoseOptions
 from catenary.ros2.trajectory import TrajectoryFollower
 
@@ -118,8 +118,17 @@ def row(axes: Sequence[Axis], limit: Callable[[Axis], float | None], missing: fl
     return np.array([missing if value is None else value for value in found], np.float64)
 
 
+class GoalRequest(NamedTuple):
+    """Trajectory of the action FollowJointTrajectory, with its tolerances."""
+
+    trajectory: Any
+    path: Sequence[ToleranceLike]
+    goal: Sequence[ToleranceLike]
+    goal_time: float  # [s]
+
+
 class TrajectoryCommand:
-    """Follower of trajectory_msgs/JointTrajectory.
+    """Follower of trajectory_msgs/JointTrajectory and of `GoalRequest`.
 
     Args:
         joints: names of the joints.
@@ -136,21 +145,38 @@ class TrajectoryCommand:
             goal=config.goal_tolerance or math.inf,
             goal_time=config.goal_time or math.inf,
         )
+        self.planned: Values | None = None  # [rad], at the last sample
+        self.measured: Values | None = None  # [rad], at the last sample
         self._follower = TrajectoryFollower(joints, limits, tolerances)
         self._goal: Goal | None = None
         self._now = 0.0
         self._settled_at: float | None = None
 
-    def accept(self, message: Any, now: float, state: State) -> None:
+    @property
+    def joints(self) -> tuple[str, ...]:
+        """Names of the joints."""
+        return self._follower.joints
+
+    def accept(self, message: Any, now: float, state: State) -> Goal:
         """Start a trajectory; see `TrajectoryFollower.accept`."""
-        self._now = now
-        self._goal = self._follower.accept(message, now, axis_states(state))
+        self._now, tolerances = now, None
+        if isinstance(message, GoalRequest):
+            message, path, goal, goal_time = message
+            default = self._follower.tolerances
+            tolerances = overridden(default, self.joints, path, goal, goal_time)
+        self._goal = self._follower.accept(message, now, axis_states(state), tolerances)
         self._settled_at = None
+        return self._goal
+
+    def decelerate(self) -> None:
+        """Cancel the goal. The axes decelerate, then hold."""
+        self._follower.cancel(self._now)
 
     def sample(self, now: float, state: State) -> SetPoints | None:
-        """Return the positions and velocities of the trajectory [rad, rad/s]; None after its end."""
+        """Return positions and velocities of the trajectory [rad, rad/s]; None after its end."""
         self._now = now
         position, velocity = self._follower.sample(now, axis_states(state))
+        self.planned, self.measured = position, state.position
         if not self._follower.active:
             self._raise_failure()
             if self._settled_at is None:

@@ -2,19 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal, Protocol, TypeVar
 
 from msgspec import Struct
 
 from catenary.errors import CatenaryError
+from catenary.ros2.goal import Goal
+from catenary.ros2.limits import ToleranceLike
+from catenary.ros2.waypoints import TrajectoryLike
 
 Reliability = Literal["reliable", "best_effort"]
 Durability = Literal["volatile", "transient_local"]
 ServiceKind = Literal["trigger", "set_bool"]
 # The request is None for a trigger. The response is the fields `success` and `message`.
 ServiceCallback = Callable[[bool | None], tuple[bool, str]]
+# The argument is the values of one request by name. The result is the reason of a refusal, or "".
+ParametersCallback = Callable[[Mapping[str, object]], str]
 Message = TypeVar("Message", bound=Struct)
 
 
@@ -49,6 +54,16 @@ COMMAND = Qos("reliable", "volatile", 1)  # an old command is obsolete
 CLOCK = Qos("best_effort", "volatile", 1)  # rclcpp::ClockQoS
 
 
+@dataclass(frozen=True, slots=True)
+class Parameter:
+    """Parameter of a node: a number within limits. None: no limit."""
+
+    value: float
+    minimum: float | None = None
+    maximum: float | None = None
+    description: str = ""
+
+
 class Publisher(Protocol):
     """Publisher of one topic."""
 
@@ -58,6 +73,47 @@ class Publisher(Protocol):
 
     def publish(self, message: Struct) -> None:
         """Send a message. The call does not wait for the subscribers."""
+
+
+class Executor(Protocol):
+    """Execution of the goals of an action: a `TrajectoryFollower` and the source of its state."""
+
+    def start(
+        self,
+        trajectory: TrajectoryLike,
+        path: Sequence[ToleranceLike],
+        goal: Sequence[ToleranceLike],
+        goal_time: float,
+    ) -> Goal:
+        """Start a trajectory with the tolerances of `limits.overridden`.
+
+        Raises:
+            CatenaryError: The trajectory is refused.
+        """
+
+    def cancel(self) -> None:
+        """Cancel the goal that is being executed."""
+
+
+class ActionServer(Protocol):
+    """Server of the action FollowJointTrajectory."""
+
+    def step(self) -> None:
+        """Send the results of finished goals. Call it after each sample of the follower."""
+
+    def feedback(
+        self, joints: Sequence[str], desired: Sequence[float], actual: Sequence[float]
+    ) -> None:
+        """Send feedback for the executed goals.
+
+        Args:
+            joints: names of the joints.
+            desired: set-points [rad].
+            actual: measured positions [rad].
+        """
+
+    def close(self) -> None:
+        """Remove the action from the graph."""
 
 
 class Backend(Protocol):
@@ -104,6 +160,29 @@ class Backend(Protocol):
 
         Raises:
             NotAvailable: The backend has no services.
+        """
+
+    def parameters(self, found: Mapping[str, Parameter], change: ParametersCallback) -> None:
+        """Declare the parameters of the node. A later call replaces them, or their values.
+
+        Args:
+            found: all parameters by name.
+            change: receives the values of each request to the node, called by `spin_once`.
+
+        Raises:
+            NotAvailable: The backend has no parameters.
+        """
+
+    def follow_joint_trajectory(self, name: str, executor: Executor) -> ActionServer:
+        """Create a server of the action control_msgs/FollowJointTrajectory.
+
+        Args:
+            name: name; relative names are in the namespace of the node.
+            executor: executes the goals, called by `spin_once`.
+
+        Raises:
+            NotAvailable: The backend has no actions.
+            ConfigurationError: control_msgs is not installed.
         """
 
     def spin_once(self, timeout: float) -> None:

@@ -6,7 +6,7 @@ field is copied into objects of ROS 2.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from importlib import import_module
 from typing import Any, Literal
 
@@ -22,8 +22,19 @@ from rclpy.signals import SignalHandlerOptions
 
 from catenary.errors import ConfigurationError, DecodeError
 from catenary.ros2 import cdr, names
-from catenary.ros2.interface import STATE, Message, Qos, ServiceCallback, ServiceKind
+from catenary.ros2.action import FollowJointTrajectoryServer
+from catenary.ros2.interface import (
+    STATE,
+    Executor,
+    Message,
+    Parameter,
+    ParametersCallback,
+    Qos,
+    ServiceCallback,
+    ServiceKind,
+)
 from catenary.ros2.messages import message_type
+from catenary.ros2.rclpy_parameters import NodeParameters
 
 TAKEN_AT_ONCE = 64  # callbacks that one call of `spin_once` runs at most
 RELIABILITY = {
@@ -107,6 +118,7 @@ class RclpyBackend:
         )
         self._executor = SingleThreadedExecutor(context=self._context)
         self._executor.add_node(self._node)
+        self._parameters = NodeParameters(self._node)
         self._reports: dict[str, None] = {}  # a set in the order of insertion
         self._ran = False
         self._closed = False
@@ -189,6 +201,28 @@ class RclpyBackend:
         interface = "std_srvs/srv/SetBool" if kind == "set_bool" else "std_srvs/srv/Trigger"
         full_name = names.resolve(name, *self._names)
         self._node.create_service(ros_class(interface), full_name, answer)
+
+    def parameters(self, found: Mapping[str, Parameter], change: ParametersCallback) -> None:
+        """Declare the parameters of the node. A later call replaces them, or their values.
+
+        Args:
+            found: all parameters by name.
+            change: receives the values of each request to the node, called by `spin_once`.
+        """
+        self._parameters.show(found, change)
+
+    def follow_joint_trajectory(self, name: str, executor: Executor) -> FollowJointTrajectoryServer:
+        """Create a server of the action control_msgs/FollowJointTrajectory.
+
+        Args:
+            name: name; relative names are in the namespace of the node.
+            executor: executes the goals, called by `spin_once`.
+
+        Raises:
+            ConfigurationError: control_msgs is not installed.
+        """
+        full_name = names.resolve(name, *self._names)
+        return FollowJointTrajectoryServer(self._node, full_name, executor)
 
     def spin_once(self, timeout: float) -> None:
         """Run the callbacks of all received messages and requests in this thread.

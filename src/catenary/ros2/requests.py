@@ -9,7 +9,7 @@ from typing import TypeVar
 
 from catenary.errors import CatenaryError, ResponseTimeout
 from catenary.remote import Client, connect
-from catenary.remote.messages import Axis, Device
+from catenary.remote.messages import Axis, Device, Done
 from catenary.ros2.config import LawParameters
 from catenary.ros2.diagnostics import Reports
 from catenary.ros2.messages import Float64MultiArray
@@ -33,7 +33,7 @@ class Requests:
         self._worker = ThreadPoolExecutor(1, thread_name_prefix="catenary ros2 requests")
         self._devices: list[Device] = []
         self._asked: Future[list[Device]] | None = None
-        self._setting: dict[str, Future[object]] = {}
+        self._setting: dict[str, Future[Done]] = {}
         self.problem = ""  # why the devices are not known; "" without a problem
 
     def axes(self) -> list[Axis]:
@@ -47,7 +47,7 @@ class Requests:
             CatenaryError: The request failed, or had no answer before the deadline.
             ValueError: The request is not valid.
         """
-        pending = self._worker.submit(self._run, function)
+        pending = self.submit(function)
         try:
             return pending.result(self._timeout)
         except TimeoutError as error:
@@ -55,6 +55,10 @@ class Requests:
             raise ResponseTimeout(
                 f"the program of the share {self._name!r} did not answer in {self._timeout:g} s"
             ) from error
+
+    def submit(self, function: Callable[[Client], T]) -> Future[T]:
+        """Start a request. Never blocks."""
+        return self._worker.submit(self._run, function)
 
     def devices(self) -> list[Device]:
         """Return the devices as last reported, and request a new report. Never blocks."""
@@ -64,7 +68,7 @@ class Requests:
             self._devices = [] if error is not None else self._asked.result()
             self._asked = None
         if self._asked is None:
-            self._asked = self._worker.submit(self._run, Client.devices)
+            self._asked = self.submit(Client.devices)
         return self._devices
 
     def set_parameters(
@@ -88,9 +92,7 @@ class Requests:
             reports.add("refused parameters", f"{config.topic}: the last request is not done")
         else:
             given = dict(zip(config.names, values, strict=True))
-            made = self._worker.submit(
-                self._run, lambda client: client.set_parameters(config.law, given)
-            )
+            made = self.submit(lambda client: client.set_parameters(config.law, given))
             made.add_done_callback(lambda done: report_failure(done, config.topic, reports))
             self._setting[config.topic] = made
 
@@ -112,7 +114,7 @@ class Requests:
             raise
 
 
-def report_failure(done: Future[object], topic: str, reports: Reports) -> None:
+def report_failure(done: Future[Done], topic: str, reports: Reports) -> None:
     """Report the error of a request; a no-op without an error.
 
     Args:
