@@ -41,8 +41,8 @@ def run(role, name, namespace, nic, external, seconds):
     """Run the loop until `seconds` have passed (None: until Ctrl-C) or its bridge has ended."""
     servos = [cat.virtual.Servo() for _ in ROLES[role]["names"]]
     target = nic or cat.Segment([cat.virtual.Coupler(), *servos], clock="monotonic")
-    # late_limit=0: on a busy machine, the axes wait for the program
-    stop = cat.StopPolicy(late_limit=0, lost_limit=20)
+    # Virtual axes wait for the program on a busy machine. Real ones keep the default limits.
+    stop = cat.StopPolicy() if nic else cat.StopPolicy(late_limit=0, lost_limit=20)
     clocks = cat.ClockOptions(external=external)
     with cat.MainDevice(target) as main, cat.Share(name, jog=True) as share:
         drives = cat.Drives(main.scan().drives, counts_per_turn=2**20, **ROLES[role])

@@ -49,7 +49,7 @@ class Arm:
     @property
     def arrived(self):
         errors = (a - b for a, b in zip(self.goal, self.state.position, strict=True))
-        return max(map(abs, errors)) < 0.01
+        return max(map(abs, errors)) < 0.001
 
 
 def until(node, condition, what):

@@ -131,6 +131,23 @@ def test_the_system_clock(tmp_path: Path, commands: tuple[str, ...], status: str
 
 
 @pytest.mark.parametrize(
+    ("options", "clock", "others"),
+    [
+        ("-a -r -r", "PASS", "PASS"),  # the card follows CLOCK_REALTIME, which NTP may set
+        ("-arr", "PASS", "PASS"),
+        ("-a -r", "FAIL", "FAIL"),
+        ("-w -s eth1", "FAIL", "FAIL"),  # the unit phc2sys@ of Debian
+    ],
+)
+def test_a_grandmaster_must_not_follow_its_card(
+    tmp_path: Path, options: str, clock: str, others: str
+) -> None:
+    files = processes("ptp4l -i eth1", f"{PHC2SYS} {options}", "chronyd")
+    machine = make(tmp_path, files, ptp=PtpState(("MASTER",)))
+    assert (system_clock(machine).status, daemons(machine).status) == (clock, others)
+
+
+@pytest.mark.parametrize(
     ("here", "ptp", "status"),
     [(37, 37, "PASS"), (37, None, "PASS"), (0, None, "WARN"), (0, 37, "FAIL"), (36, 37, "FAIL")],
 )

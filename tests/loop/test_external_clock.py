@@ -28,6 +28,8 @@ class Crystal:
         self._rate = 1 + ppm * 1e-6
         self.offset_ns = 123_456_789
         self.answers = True
+        self.is_faulty = False
+        self.fault: Exception | None = None
 
     def at(self, local_ns: float) -> float:
         """Return its time [ns] at a time of the segment [ns]."""
@@ -36,6 +38,10 @@ class Crystal:
     def time_ns(self) -> int:
         if not self.answers:
             raise OSError("the device has gone")
+        if self.is_faulty:
+            if self.fault is not None:
+                raise self.fault
+            return None  # type: ignore[return-value]
         return round(self.at(self._segment.now_ns))
 
 
@@ -111,6 +117,24 @@ def test_a_jump_and_a_loss_are_reported_and_no_frame_is_lost(cell: Cell) -> None
     assert "jumped" in found[1].message
 
 
+@pytest.mark.parametrize("fault", [ValueError("no battery"), None])
+def test_a_fault_of_the_clock_of_a_program_is_a_loss(cell: Cell, fault: Exception | None) -> None:
+    crystal = Crystal(cell.segment, ppm=10)
+    clocks = cat.ClockOptions(external=cat.ExternalClock(crystal))
+    with cat.Loop(cell.drives(), period=PERIOD, clocks=clocks) as loop:
+        run_for(loop, 15.0)
+        crystal.fault, crystal.is_faulty = fault, True
+        run_for(loop, 5.0)
+        assert loop.external.state == "lost"
+        assert loop.external.rate == pytest.approx(10e-6, abs=1e-6)
+        crystal.is_faulty = False
+        run_for(loop, 5.0)
+        assert loop.external.locked
+    found = [event.message for event in changes(cell)]
+    assert len(found) == 5
+    assert ("no battery" if fault else "NoneType") in found[1]
+
+
 def test_a_loop_without_an_external_clock(cell: Cell) -> None:
     with (
         cat.Loop(cell.drives(), period=PERIOD) as loop,
@@ -167,6 +191,16 @@ def test_a_missing_device_is_an_error_of_the_loop(cell: Cell) -> None:
         cat.Loop(cell.drives(), period=PERIOD, clocks=clocks),
     ):
         pass
+
+
+def test_a_device_of_root_has_a_hint(monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuse(path: str, flags: int) -> int:
+        raise PermissionError(13, "Permission denied", path)
+
+    monkeypatch.setattr("os.open", refuse)
+    with pytest.raises(cat.ClockError, match="Permission denied") as caught:
+        HardwareClock("/dev/ptp0")
+    assert "udev" in (caught.value.hint or "")
 
 
 def test_the_kernels_clocks() -> None:

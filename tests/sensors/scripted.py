@@ -13,14 +13,14 @@ MS = 1_000_000
 
 
 class Script:
-    """A source. Each connection is a list of steps: (milliseconds, data) or an OSError.
+    """A source. Each connection is a list of steps: (milliseconds, data) or an exception.
 
     The event `stop` is set when the last script ends.
     """
 
     name = "script"
 
-    def __init__(self, *connections: Sequence[tuple[float, bytes] | OSError]) -> None:
+    def __init__(self, *connections: Sequence[tuple[float, bytes] | BaseException]) -> None:
         self.scripts = [list(each) for each in connections]
         self.stop = threading.Event()
         self.now_ns = time.monotonic_ns()
@@ -40,7 +40,7 @@ class Script:
             self.scripts.pop(0)
             if not self.scripts:
                 self.stop.set()
-        if isinstance(step, OSError):
+        if isinstance(step, BaseException):
             raise step
         self.now_ns += round(step[0] * MS)
         return step[1], self.now_ns

@@ -139,6 +139,8 @@ def test_frames_of_a_virtual_bus() -> None:
         connection.write(encode_frame(CanFrame(0x7, b"\x01")))
         answer = device.recv(1.0)
         assert (answer.arbitration_id, bytes(answer.data)) == (0x7, b"\x01")
+        connection.write(encode_frame(CanFrame(0x7, bytes(12))))
+        assert device.recv(1.0).is_fd
         connection.close()
 
 

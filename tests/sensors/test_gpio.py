@@ -46,6 +46,12 @@ def test_dropped_edges_are_counted() -> None:
     assert edges.counters.lost == 3
 
 
+def test_levels_are_unknown_after_dropped_edges() -> None:
+    edges = GpioEdges({"limit": 17, "index": 27})
+    data = event(10, RISING, 17, 1) + event(20, RISING, 27, 2) + event(30, FALLING, 27, 5)
+    assert dict(edges.feed(data, 40)[-1].values) == {"limit": -1, "index": 0}
+
+
 def test_the_number_of_the_events_wraps() -> None:
     edges = GpioEdges({"limit": 17})
     edges.feed(event(10, RISING, 17, 0xFFFF_FFFF) + event(20, FALLING, 17, 0), 30)
@@ -66,6 +72,8 @@ def test_lines_that_cannot_work(lines: dict[str, int]) -> None:
         GpioEdges(lines)
     with pytest.raises(ValueError, match="positive rate"):
         GpioEdges({"a": 1}, rate=0.0)
+    with pytest.raises(ValueError, match="bias='up': must be one of"):
+        GpioLines("/dev/gpiochip0", [1], bias="up")  # type: ignore[arg-type]
 
 
 @dataclass

@@ -117,12 +117,13 @@ def test_values_that_do_not_match_the_channels_are_refused(share, values, messag
         [Channel("")],
         [Channel("force", shape=(0,))],
         [Channel("force", shape=(3, 3))],
+        [Channel("force", shape=3)],
         [Channel("force", dtype="S8")],
         [Channel("force", dtype=">f8")],
     ],
 )
 def test_a_channel_that_cannot_be_shared_is_refused(channels):
-    with pytest.raises(ValueError, match=r"in use|must"):
+    with pytest.raises(ValueError, match=r"in use|must|the shape of a vector"):
         SensorShare("arm.wrist", channels, rate=500.0)
 
 

@@ -93,6 +93,7 @@ def test_a_box_that_restarts_is_started_again(rig):
     rig.box.send(force=1.0)
     rig.read(lambda now: now.valid)
     assert rig.read(lambda now: not now.valid).reason == "no data"
+    assert rig.box.receive() == STOP
     assert rig.box.receive() == START  # the same box, which has forgotten the stream
     rig.box.send(force=2.0)
     assert rig.read(lambda now: now.valid)["force"][0] == 2.0

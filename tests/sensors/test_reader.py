@@ -110,6 +110,18 @@ def test_the_end_of_the_program_is_seen_and_its_return_too(kill):
             process.stdout.close()
 
 
+def test_without_an_age_limit_a_sensor_that_ended_is_invalid():
+    with own_name("switch") as name:
+        with SensorShare(name, CHANNELS, 1.0) as share:
+            share.publish(GOOD, START)
+            switch = sensors.attach(name, max_age=math.inf)
+            assert switch.read(START + 1_000_000 * MS).valid
+        with switch:
+            now = switch.read(START + 1_000_001 * MS)
+    assert now.reason == "the program of the sensor has ended"
+    assert np.isnan(now["force"]).all()
+
+
 def wrist_state(kill: bool) -> str:
     return "died" if kill else "ended"
 

@@ -101,6 +101,29 @@ def test_a_missing_device_is_reported_and_tried_again():
     assert result.reasons == ["cannot open script: No such file or directory"]
 
 
+def test_an_exception_stops_the_device():
+    script = Script([*regular(1), KeyboardInterrupt()])
+    with pytest.raises(KeyboardInterrupt):
+        Result(script, Lines())
+    assert script.written == [b"start", b"stop"]
+    assert script.closed == 1
+
+
+def test_a_device_that_returns_without_data_reports_it():
+    missing = FileNotFoundError(2, "No such file or directory")
+    result = Result(Script([missing], [(30, b"\xff")]), Lines())
+    assert [reason[:11] for reason in result.reasons] == ["cannot open", "data withou"]
+
+
+def test_faults_are_logged_once(caplog):
+    missing = FileNotFoundError(2, "No such file or directory")
+    Result(Script([missing], [missing], regular(1)), Lines())
+    assert [record.getMessage().partition(": ")[2] for record in caplog.records] == [
+        "cannot open script: No such file or directory",
+        "valid again after 2 invalid samples",
+    ]
+
+
 def test_a_silent_device_is_started_again():
     script = Script([*regular(1), (500, b""), (600, b"")], regular(1, first=3000))
     decoder = Lines()

@@ -62,7 +62,7 @@ def test_bytes_from_before_the_opening_are_discarded(pair: tuple[int, str]) -> N
 
 def test_the_port_is_exclusive(pair: tuple[int, str]) -> None:
     connection = SerialPort(pair[1]).open()
-    with pytest.raises(OSError, match="exclusively lock"):
+    with pytest.raises(OSError, match="another program uses the port"):
         SerialPort(pair[1]).open()
     connection.close()
     SerialPort(pair[1]).open().close()
@@ -81,7 +81,7 @@ def test_an_unplugged_device() -> None:
         connection.write(b"x")
     connection.close()
     connection.close()
-    with pytest.raises(OSError, match="could not open port"):
+    with pytest.raises(OSError, match=r"\] No such file or directory$"):
         SerialPort(path).open()
 
 

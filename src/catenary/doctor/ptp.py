@@ -6,6 +6,7 @@ With `-S`, ptp4l sets CLOCK_REALTIME itself. Sources: ptp4l(8), phc2sys(8), pmc(
 
 from __future__ import annotations
 
+import re
 from itertools import pairwise
 
 from catenary.doctor.check import Check, failed, passed, skipped, warned
@@ -31,7 +32,7 @@ def daemons(machine: Machine) -> Check:
         return failed(
             id,
             f"{' and '.join(setters)} set the same clock (CLOCK_REALTIME) against each other",
-            f"keep one: sudo systemctl disable --now {stop}",
+            f"keep one: sudo systemctl disable --now {stop or 'phc2sys'}",
         )
     return passed(id, f"{setters[0]} sets CLOCK_REALTIME" if setters else "no daemon sets the time")
 
@@ -50,7 +51,7 @@ def synchronisation(machine: Machine) -> Check:
             f"{found}; more than {BOUND * 1e6:g} us",
             "wait some minutes; then use hardware time stamps: `ethtool -T NIC`",
         )
-    if all(port in ("MASTER", "GRAND_MASTER") for port in state.ports):
+    if _is_grandmaster(machine):
         return passed(id, "this machine is the grandmaster")
     return failed(
         id,
@@ -64,6 +65,8 @@ def system_clock(machine: Machine) -> Check:
     setters = _ptp_setters(machine)
     if "timemaster" in machine.processes:
         return passed(id, "timemaster sets CLOCK_REALTIME from PTP")
+    if _is_grandmaster(machine) and "phc2sys" in machine.processes:
+        return _grandmaster_clock(id, "phc2sys" in setters)
     if setters:
         return passed(id, f"{setters[0]} sets CLOCK_REALTIME from PTP")
     if "chronyd" in machine.processes:
@@ -71,8 +74,24 @@ def system_clock(machine: Machine) -> Check:
     return warned(
         id,
         "CLOCK_REALTIME does not follow PTP: UTC stamps differ between machines",
-        "sudo phc2sys -a -r, or its systemd unit; the grandmaster uses -a -r -r",
+        "sudo phc2sys -a -r -r",
     )
+
+
+def _grandmaster_clock(id: str, is_set: bool) -> Check:
+    """Return the check of phc2sys on a grandmaster.
+
+    Args:
+        id: name of the check.
+        is_set: True if phc2sys sets CLOCK_REALTIME.
+    """
+    if is_set:
+        return failed(
+            id,
+            "phc2sys sets CLOCK_REALTIME from the card of the grandmaster, which has no source",
+            "sudo phc2sys -a -r -r, which copies CLOCK_REALTIME to the card of a grandmaster",
+        )
+    return passed(id, "this machine is the grandmaster; CLOCK_REALTIME does not follow PTP")
 
 
 def tai(machine: Machine) -> Check:
@@ -94,23 +113,37 @@ def uses_ptp(machine: Machine) -> bool:
     return "ptp4l" in machine.processes
 
 
+def _is_grandmaster(machine: Machine) -> bool:
+    """Return True if ptp4l reports that all its ports are masters."""
+    state = machine.ptp
+    return state is not None and all(port in ("MASTER", "GRAND_MASTER") for port in state.ports)
+
+
 def _ptp_setters(machine: Machine) -> list[str]:
     """Return the programs of linuxptp that set CLOCK_REALTIME."""
     commands = machine.commands
     found = []
-    if any(_phc2sys_sets_realtime(words) for words in commands.get("phc2sys", ())):
+    is_master = _is_grandmaster(machine)
+    if any(_phc2sys_sets_realtime(words, is_master) for words in commands.get("phc2sys", ())):
         found.append("phc2sys")
     if any("-S" in words for words in commands.get("ptp4l", ())):
         found.append("ptp4l")
     return found
 
 
-def _phc2sys_sets_realtime(words: tuple[str, ...]) -> bool:
-    """Return True if phc2sys with these arguments sets CLOCK_REALTIME."""
+def _phc2sys_sets_realtime(words: tuple[str, ...], is_grandmaster: bool) -> bool:
+    """Return True if phc2sys sets CLOCK_REALTIME.
+
+    Args:
+        words: command line of phc2sys.
+        is_grandmaster: True if the machine is the grandmaster. The automatic mode with `-r -r` then
+            reads CLOCK_REALTIME.
+    """
     if "ntpshm" in words:  # its times go to another daemon
         return False
     if "-a" in words or any(word.startswith("-ar") for word in words):
-        return any(word.startswith("-r") or word.startswith("-ar") for word in words)
+        count = sum(word.count("r") for word in words if re.fullmatch("-a?r+", word))
+        return count == 1 or (count > 1 and not is_grandmaster)
     options = dict(pairwise(words))
     return options.get("-s") != "CLOCK_REALTIME" and options.get("-c", "CLOCK_REALTIME") == (
         "CLOCK_REALTIME"

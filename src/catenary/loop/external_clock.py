@@ -8,6 +8,7 @@ https://infosys.beckhoff.com/content/1033/tf6225_tc3_ethercat_external_sync/3623
 
 from __future__ import annotations
 
+import errno
 import math
 import os
 import time
@@ -19,6 +20,8 @@ from catenary.errors import ClockError
 from catenary.loop.clock_discipline import BOUND, RATE_LIMIT, ClockSample
 
 KERNEL_CLOCKS = {"CLOCK_TAI": time.CLOCK_TAI, "CLOCK_REALTIME": time.CLOCK_REALTIME}
+FIND = "`ethtool -T NIC` shows the PTP hardware clock of a network card"
+ACCESS = 'run as root, or add a udev rule: SUBSYSTEM=="ptp", GROUP="...", MODE="0640"'
 CLOCKFD = 3  # FD_TO_CLOCKID in clock_gettime(2): the descriptor, inverted, and these three bits
 READINGS = 5  # attempts per sample; the shortest one counts
 WINDOW_NS = 100_000  # longest usable reading; a longer one was interrupted
@@ -29,7 +32,10 @@ class TimeSource(Protocol):
     """Clock that a program provides."""
 
     def time_ns(self) -> int:
-        """Return the time [ns]. Raise OSError if the clock does not answer."""
+        """Return the time [ns]. Raise OSError if the clock does not answer.
+
+        It is called in a thread of the loop, and must return within 100 us.
+        """
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,17 +117,15 @@ class HardwareClock:
         try:
             self._descriptor = os.open(path, os.O_RDONLY | os.O_CLOEXEC)
         except OSError as error:
-            raise ClockError(
-                f"{path}: {error.strerror}",
-                hint="`ethtool -T NIC` shows the PTP hardware clock of a network card",
-            ) from error
+            hint = ACCESS if error.errno == errno.EACCES else FIND
+            raise ClockError(f"{path}: {error.strerror}", hint=hint) from error
         try:
             self.time_ns()
         except OSError as error:
             self.close()
             raise ClockError(
                 f"{path} is not a PTP hardware clock: {error.strerror}",
-                hint="`ethtool -T NIC` shows the PTP hardware clock of a network card",
+                hint=FIND,
             ) from error
 
     def time_ns(self) -> int:

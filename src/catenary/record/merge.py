@@ -198,6 +198,7 @@ class MergedFile:
         library: Any = require("mcap.writer")
         self._readers = readers
         self._names = names
+        self._path = Path(path)
         self._output = Output(path, force=force)
         self._writer = library.Writer(self._output, chunk_size=CHUNK_SIZE)
         self._library = library.LIBRARY_IDENTIFIER
@@ -219,6 +220,9 @@ class MergedFile:
                 self._add(message)
             self._add_ends()
             self._writer.finish()
+        except BaseException:
+            self._path.unlink()  # an incomplete file looks like a merge of shorter recordings
+            raise
         finally:
             self._output.close()
         return Merged(dict(self._counts), (last - first) / SECOND_NS)

@@ -24,6 +24,7 @@ from catenary.sensors.missing_values import missing_values
 from catenary.sensors.sensor import Channel, Clock, Counters, Sample, Value
 
 NS = 1_000_000_000
+CLASSIC_DATA_MAX = 8  # [bytes]; longer data needs CAN FD
 DELAY_MAX = 1.0  # [s]; an older time stamp of the kernel is on another clock
 
 
@@ -287,6 +288,7 @@ class CanConnection:
                     data=frame.data,
                     is_extended_id=frame.extended,
                     is_remote_frame=frame.remote,
+                    is_fd=len(frame.data) > CLASSIC_DATA_MAX,
                 )
             )
         except self._library.CanError as error:

@@ -24,7 +24,7 @@ import time
 from collections.abc import Mapping, Sequence
 from datetime import timedelta
 from types import TracebackType
-from typing import Any, Literal, Self
+from typing import Any, Literal, Self, get_args
 
 from catenary.sensors.extra import require
 from catenary.sensors.sensor import Channel, Clock, Counters, Sample, Value
@@ -41,7 +41,8 @@ class GpioEdges:
     """Decoder of the edges of some lines. Each edge is one sample.
 
     The channel of a line is 1 after a rising edge, 0 after a falling edge, and -1 before the first
-    edge. Edges that the kernel has dropped, because its queue was full, are counted as lost.
+    edge. If the queue of the kernel was full, the dropped edges are counted as lost. The channels
+    are then -1 until the next edge of their line.
     Edges have no fixed rate: `silence` of the runner and `max_age` of the reader must be longer
     than the longest pause between two edges.
 
@@ -66,7 +67,7 @@ class GpioEdges:
 
     def start(self) -> list[bytes]:
         """Forget the levels of the lines. No message is sent."""
-        self._levels: dict[str, Value] = dict.fromkeys(self._names.values(), -1)
+        self._levels = self._unknown()
         self._last: int | None = None
         return []
 
@@ -86,12 +87,17 @@ class GpioEdges:
         samples = (self._sample(*event) for event in EVENT.iter_unpack(data[:whole]))
         return [each for each in samples if each is not None]
 
+    def _unknown(self) -> dict[str, Value]:
+        return dict.fromkeys(self._names.values(), -1)
+
     def _sample(self, time_ns: int, kind: int, line: int, number: int, _own: int) -> Sample | None:
         if kind not in (RISING, FALLING) or line not in self._names:
             self.counters.bad_messages += 1
             return None
-        if self._last is not None:
-            self.counters.lost += (number - self._last - 1) & NUMBER_MASK
+        lost = 0 if self._last is None else (number - self._last - 1) & NUMBER_MASK
+        if lost:
+            self.counters.lost += lost
+            self._levels = self._unknown()
         self._last = number
         self._levels[self._names[line]] = 1 if kind == RISING else 0
         self.counters.samples += 1
@@ -107,6 +113,9 @@ class GpioLines:
         bias: resistor of the lines.
         active_low: True if a low voltage is level 1.
         debounce: shortest time between two edges of a line [s]; 0: each edge counts.
+
+    Raises:
+        ValueError: `bias` is unknown.
     """
 
     def __init__(
@@ -118,6 +127,8 @@ class GpioLines:
         active_low: bool = False,
         debounce: float = 0.0,
     ) -> None:
+        if bias not in get_args(Bias):
+            raise ValueError(f"bias={bias!r}: must be one of {get_args(Bias)}")
         self._chip, self._lines, self._bias = chip, tuple(lines), bias
         self._active_low, self._debounce = active_low, debounce
 

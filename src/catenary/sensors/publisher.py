@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import time
 from collections import deque
 from collections.abc import Mapping, Sequence
@@ -22,7 +23,9 @@ EVENT_PAUSE_NS = 1_000_000_000  # the same reason is not reported again earlier
 INVALID_DATA = "the sensor reports invalid data"
 NOT_FINITE = "a value is not finite"
 TIME_BACK = "the time of the samples went back"
-FUTURE = "the time of a sample is in the future"
+FUTURE = "the time of a sample is in the future: it must be on CLOCK_MONOTONIC"
+
+log = logging.getLogger(__name__)
 
 
 class SensorShare:
@@ -33,7 +36,7 @@ class SensorShare:
             share.publish({"force": [0, 0, 1.5], "torque": [0, 0, 0]}, time.monotonic_ns())
 
     Any process of this user reads it with `sensors.attach("arm.wrist")` or `cat.attach`. Only one
-    thread may publish.
+    thread may publish. Changes of the validity are events, and warnings of `logging`.
 
     Args:
         name: name of the share.
@@ -173,7 +176,7 @@ class SensorShare:
     def _write_invalid(self, row: np.void, time_ns: int, received_ns: int, reason: str) -> None:
         is_again = not self._invalid and received_ns - self._reported_ns >= EVENT_PAUSE_NS
         if reason != self._reason or is_again:
-            self.report(INVALID, reason, received_ns)
+            self._announce(INVALID, reason, received_ns)
             self._reason, self._reported_ns, self._announced = reason, received_ns, True
         self._invalid += 1
         row["valid"] = 0
@@ -181,11 +184,15 @@ class SensorShare:
 
     def _write(self, row: np.void, time_ns: int, received_ns: int) -> None:
         if self._announced:
-            self.report(VALID, f"valid again after {self._invalid} invalid samples", received_ns)
+            self._announce(VALID, f"valid again after {self._invalid} invalid samples", received_ns)
         self._invalid, self._announced = 0, False
         self._times.append(time_ns)
         row["valid"], row["flags"] = 1, CYCLE_OK
         self._append(row, time_ns, received_ns)
+
+    def _announce(self, kind: str, message: str, now_ns: int) -> None:
+        self.report(kind, message, now_ns)
+        log.warning("%s: %s", self.name, message)
 
     def _append(self, row: np.void, time_ns: int, received_ns: int) -> None:
         self._number += 1

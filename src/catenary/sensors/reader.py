@@ -17,6 +17,7 @@ from catenary.share import Reader, ShareLayout
 from catenary.share import attach as attach_share
 
 PERIODS = 3.0  # default of `max_age`, in periods of the sensor
+ALIVE_AGE = 0.25  # [s]; with an older sample, the program of the sensor is checked
 ATTACH_INTERVAL_NS = 500_000_000  # between two attempts to attach again
 ENDINGS = {"running": "returned", "ended": "ended", "dead": "died"}
 OWN = {name for name, *_ in (*CYCLE_FIELDS, *SENSOR_FIELDS)}
@@ -107,8 +108,10 @@ class SensorReader:
         age = (now - int(row["scheduled_ns"])) * 1e-9
         if not row["valid"]:
             reason = self._invalid_reason()
+        elif age > min(self.max_age, ALIVE_AGE) and not self._reader.alive:
+            reason = self._end()
         elif age > self.max_age:
-            reason = "the sample is too old" if self._reader.alive else self._end()
+            reason = "the sample is too old"
         else:
             return self._reading(row, row, now, "")
         return self._reading(self._empty, row, now, reason)

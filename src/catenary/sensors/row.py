@@ -61,6 +61,8 @@ def row_dtype(channels: Sequence[Channel], rate: float) -> np.dtype[np.void]:
 def check_channel(channel: Channel) -> None:
     """Raise ValueError unless a channel is a named scalar or vector of numbers."""
     kind = np.dtype(channel.dtype)
+    if not isinstance(channel.shape, tuple):
+        raise ValueError(f"{channel}: the shape of a vector of n numbers is (n,)")
     if not channel.name or len(channel.shape) > 1 or 0 in channel.shape:
         raise ValueError(f"{channel}: must have a name, and the shape () or (n,)")
     if kind.kind not in "iuf" or kind.newbyteorder("<") != kind:

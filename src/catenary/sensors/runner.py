@@ -128,12 +128,12 @@ class Runner:
         except OSError as error:
             self._lost(f"lost the connection to {self._source.name}: {error.strerror or error}")
         finally:
-            connection.close()
+            self._close(connection)
 
     def _receive(self, connection: Connection, stop: threading.Event) -> None:
         self._clock.restart()
         self._sample_ns = time.monotonic_ns()
-        self._data = False
+        self._data = self._silent = False
         for message in self._sensor.start():
             connection.write(message)
         while not stop.is_set():
@@ -144,8 +144,16 @@ class Runner:
             self._note(bool(data), bool(samples), received_ns)
             if received_ns - self._sample_ns > self._reopen_ns:
                 return
-        for message in self._sensor.stop():
-            connection.write(message)
+
+    def _close(self, connection: Connection) -> None:
+        """Stop the device if it is still connected, and close the connection."""
+        try:
+            for message in self._sensor.stop():
+                connection.write(message)
+        except OSError:
+            pass  # the connection is lost
+        finally:
+            connection.close()
 
     def _note(self, data: bool, samples: bool, now_ns: int) -> None:
         """Keep the time of the last sample, and invalidate the sensor when it is silent.

@@ -22,6 +22,10 @@ from catenary.sensors.extra import require
 
 READ_SIZE = 4096  # [bytes] size of the kernel's buffer of a port
 WRITE_TIMEOUT = 1.0  # [s]
+REASONS = {
+    errno.EAGAIN: "another program uses the port",
+    errno.EACCES: "Permission denied: run `sudo usermod -aG dialout $USER`, and log in again",
+}
 
 
 class SerialPort:
@@ -61,6 +65,8 @@ class SerialPort:
             )
         except (termios.error, ValueError) as error:
             raise OSError(errno.EINVAL, f"the port refuses its settings: {error}") from error
+        except OSError as error:
+            raise port_error(error) from error
         if self._low_latency:
             with contextlib.suppress(ValueError):  # ttyACM and pseudo terminals do not have it
                 port.set_low_latency_mode(True)
@@ -94,3 +100,9 @@ class SerialConnection:
         """Close the port."""
         with contextlib.suppress(OSError):  # the device was unplugged
             self._port.close()
+
+
+def port_error(error: OSError) -> OSError:
+    """Return an error without the path and number, which pyserial repeats in its text."""
+    number = error.errno
+    return OSError(number, REASONS.get(number) or os.strerror(number)) if number else error

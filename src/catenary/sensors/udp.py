@@ -54,7 +54,12 @@ class UdpConnection:
         Raises OSError if the device refuses a message, for example while it starts.
         """
         ready = self._poll.poll(timeout * 1e3)
-        data = self._socket.recv(SIZE_MAX) if ready else b""
+        try:
+            data = self._socket.recv(SIZE_MAX) if ready else b""
+        except (
+            BlockingIOError
+        ):  # the kernel has dropped a datagram with a wrong checksum, select(2)
+            data = b""
         return data, time.monotonic_ns()
 
     def write(self, data: bytes) -> None:

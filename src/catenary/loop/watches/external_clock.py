@@ -5,7 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from catenary.bus.event_types import Event, ExternalClockChanged
-from catenary.loop.clock_discipline import Discipline, DisciplineOptions, ExternalState
+from catenary.loop.clock_discipline import (
+    ClockSample,
+    Discipline,
+    DisciplineOptions,
+    ExternalState,
+)
 from catenary.loop.external_clock import ExternalClock, HardwareClock, read_sample
 from catenary.procedure.exchange import Procedure, after
 
@@ -50,6 +55,7 @@ class ExternalClockWatch:
         self._steer = steer
         self._put = put
         self._discipline = Discipline(options, now_ns())
+        self._fault = ""  # of the last reading
 
     @property
     def state(self) -> ExternalState:
@@ -86,8 +92,7 @@ class ExternalClockWatch:
         """Read the clock, set the rate of the periods, and put events for changes."""
         discipline = self._discipline
         state, jumps = discipline.state, discipline.jumps
-        sample = read_sample(self._source, self._now_ns, self._cycle_start_ns)
-        self._steer(discipline.step(self._now_ns(), sample))
+        self._steer(discipline.step(self._now_ns(), self._read()))
         if discipline.jumps > jumps:
             self._report(f"{self._clock.name} has jumped; the cycle starts move slowly")
         if discipline.state != state:
@@ -105,6 +110,18 @@ class ExternalClockWatch:
             f"external clock {self._clock.name}: {self.state}, phase error "
             f"{self.phase_error * 1e6:+.3f} us, rate {self.rate * 1e6:+.2f} ppm, {self.jumps} jumps"
         )
+
+    def _read(self) -> ClockSample | None:
+        """Return a reading; None if there is none. Report an exception of a program's clock."""
+        fault, sample = "", None
+        try:
+            sample = read_sample(self._source, self._now_ns, self._cycle_start_ns)
+        except Exception as error:  # the discipline must continue at the last rate
+            fault = f"{self._clock.name} has raised {type(error).__name__}: {error}"
+        if fault and fault != self._fault:
+            self._report(fault)
+        self._fault = fault
+        return sample
 
     def _report(self, message: str) -> None:
         self._put(
