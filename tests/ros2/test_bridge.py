@@ -88,7 +88,12 @@ def test_diagnostics_name_loop_axes_devices_and_cables() -> None:
 
         assert running.until(lambda: "cables of device 1" in names())
         assert names() >= {"bridge", "loop", "device 0", *running.arm.names}
-        levels = {each.name: each.level for each in running.sent("/diagnostics")[-1].status}
+        first, last = (
+            {each.name: each.level for each in running.sent("/diagnostics")[k].status}
+            for k in (0, -1)
+        )
+        assert first[f"{running.name}: loop"] == messages.DiagnosticStatus.OK
+        levels = last
         assert levels[f"{running.name}: bridge"] == messages.DiagnosticStatus.OK
 
 
@@ -126,6 +131,8 @@ def test_a_missing_field_is_reported_and_not_published() -> None:
         running.step()
         texts = [each.message for each in running.sent("/diagnostics")[-1].status]
         assert any("there is no field 'nothing'" in text for text in texts)
+        assert running.last_report.startswith("p: there is no field 'nothing'")
+        assert running.bridge.reports.counts["topics without data"] == 1
 
 
 def test_two_topics_with_one_name_are_refused() -> None:
@@ -179,6 +186,29 @@ def test_a_trajectory_too_fast_is_refused_and_nothing_moves() -> None:
         assert "velocity of" in running.last_report
         assert running.bridge.reports.counts["refused commands"] == 1
         np.testing.assert_allclose(running.arm.actual.position, before, atol=1e-6)
+
+
+def test_a_trajectory_refused_during_a_stream_leaves_no_start_behind() -> None:
+    with rig(FORWARD) as running:
+        enable(running)
+        start = running.arm.actual.position.copy()
+        for step in range(60):
+            data = (start + step * 0.002).tolist()
+            running.backend.deliver("forward_commands", messages.Float64MultiArray(data=data))
+            running.step()
+            if step == 10:
+                unfit = trajectory(running, 9.0, 0.1)
+                running.backend.deliver("joint_trajectory", unfit)
+                running.step()
+                assert "velocity of" in running.last_report
+        running.step(50)
+        assert not running.bridge._commands.active
+        before = running.arm.target.position.copy()
+        running.backend.deliver("joint_trajectory", trajectory(running, 0.1))
+        running.step()
+        running.step()
+        assert running.bridge._commands.active
+        assert (abs(running.arm.target.position - before) < 0.01).all()
 
 
 def test_a_disabled_axis_refuses_commands() -> None:

@@ -178,8 +178,8 @@ class Commands:
                 self._lease = reader.lease(self.axes, for_=self._duration)
         except CatenaryError as error:
             self._reports.add(REFUSED, f"{topic}: {error.message}")
-            if self._active is None:
-                follower.cancel()
+            if self._active is not follower:
+                follower.cancel()  # its next motion starts from the commanded positions of then
             return
         if self._active is not follower and self._active is not None:
             self._active.cancel()
