@@ -8,12 +8,14 @@ import numpy as np
 import pytest
 
 import catenary as cat
-from catenary.errors import ConfigurationError, ShareError
+from catenary.errors import ConfigurationError, ResponseTimeout, ShareError
 from catenary.ros2 import messages
 from catenary.ros2.backend import COMMAND
 from catenary.ros2.bridge import Bridge
-from catenary.ros2.config import Clock, Commands, Config, Forward, Point, ProcessData
+from catenary.ros2.config import Clock, Commands, Config, Diagnostics, Forward, Point, ProcessData
 from catenary.ros2.config_file import PROFILES, make_config
+from catenary.ros2.readings import process_value
+from catenary.ros2.requests import Requests
 from tests.ros2.bridges import Rig, rig
 from tests.ros2.memory_backend import MemoryBackend
 
@@ -121,6 +123,13 @@ def test_process_data_have_their_types() -> None:
             assert running.sent("n")[-1].data == reader.number
         assert running.sent("e")[-1] == messages.Bool(bool(running.arm.enabled[0]))
         assert len(running.sent("t")[-1].data) == 2
+
+
+def test_large_integers_are_exact() -> None:
+    row = np.zeros(1, [("time_ns", "i8")])[0]
+    row["time_ns"] = 1_700_000_000_000_000_001
+    config = ProcessData(field="time_ns", topic="t", type="int64")
+    assert process_value(config, row) == messages.Int64(1_700_000_000_000_000_001)
 
 
 def test_a_missing_field_is_reported_and_not_published() -> None:
@@ -380,6 +389,26 @@ def test_the_profile_rdda_streams_positions_and_publishes_efforts() -> None:
 def test_a_backend_without_services_is_noted() -> None:
     with rig(services=False) as running:
         assert running.bridge.reports.notes == ["services need rclpy; this backend has topics only"]
+
+
+def test_unknown_limits_refuse_commands_and_are_requested_again(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def silent(requests: Requests) -> list[object]:
+        raise ResponseTimeout("the program did not answer")
+
+    with monkeypatch.context() as patch:
+        patch.setattr(Requests, "axes", silent)
+        with rig(Config(diagnostics=Diagnostics(on=False))) as running:
+            enable(running)
+            running.backend.deliver("joint_trajectory", trajectory(running, 0.1))
+            running.step()
+            assert running.last_report == "trajectory: the program did not answer"
+            patch.undo()
+            running.bridge._prepare_at = 0.0  # lets the time until the next request pass
+            running.backend.deliver("joint_trajectory", trajectory(running, 0.1))
+            running.step()
+            assert running.bridge._commands.active
 
 
 def test_commands_for_unknown_axes_are_reported() -> None:

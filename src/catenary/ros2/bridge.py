@@ -30,6 +30,7 @@ from catenary.ros2.source import Source, stamp_ns
 from catenary.share import attach
 
 IDLE = 0.05  # [s] longest wait
+PREPARE_INTERVAL = 5.0  # [s] between two requests for limits that are not known
 SHOW_INTERVAL = 1.0  # [s] between the texts for the user
 
 
@@ -62,7 +63,8 @@ class Bridge:
         self._requests = Requests(name, uid, config.services.timeout)
         self._publishing = Publishing(config, backend, self._source, self._requests, self.reports)
         self._commands: Commands | None = None
-        self._run = ""
+        self._run = self._problem = ""  # reason why commands are not possible
+        self._prepare_at = 0.0
         self._send_at = self._show_at = 0.0
         self._shown = ""  # last shown report
         self._follow_run()
@@ -139,7 +141,13 @@ class Bridge:
         """Prepare the commands for another run of the loop, whose axes may differ."""
         if self._commands is not None:
             self._commands.stop("the loop has ended")
-        self._run = self._source.run
+        self._commands, self._run = None, self._source.run
+        self._problem = "there is no running loop with axes"
+        self._prepare()
+
+    def _prepare(self) -> None:
+        """Prepare the commands, if there are axes and the program reports their limits."""
+        self._prepare_at = time.monotonic() + PREPARE_INTERVAL
         reader = self._source.reader
         if reader is None or not self._config.commands.on or not reader.layout.axes:
             return
@@ -147,9 +155,9 @@ class Bridge:
         try:
             limits = self._requests.axes()
             followers = make_followers(self._config, axes, limits, self.reports)
-        except CatenaryError as error:
-            self._commands = None
-            self.reports.add(REFUSED, f"no commands are possible: {error.message}")
+        except (CatenaryError, ValueError) as error:
+            self._problem = str(getattr(error, "message", error))
+            self.reports.add(REFUSED, f"no commands are possible: {self._problem}")
             return
         lease = self._config.commands.lease
         self._commands = Commands(followers, axes, lease, self.reports)
@@ -176,8 +184,10 @@ class Bridge:
 
     def _offer(self, name: str) -> Callable[[Any], None]:
         def offer(message: Any) -> None:
+            if self._commands is None and time.monotonic() >= self._prepare_at:
+                self._prepare()
             if self._commands is None:
-                self.reports.add(REFUSED, f"{name}: there is no running loop with these axes")
+                self.reports.add(REFUSED, f"{name}: {self._problem}")
             else:
                 self._commands.offer(name, message)
 

@@ -23,6 +23,7 @@ from catenary.ros2.pose import PoseCommand, PoseOptions
 from catenary.ros2.trajectory import TrajectoryFollower
 
 UNLIMITED = 1e9  # [rad/s, rad/s²]; finite, because infinity times 0 s is not a number
+STOPPED = 0.01  # [rad/s] at the goal, if its tolerance is checked
 SETTLED = 1e-6  # [rad] between the last set-point and the commanded position
 SETTLE_TIME = 1.0  # [s] at most, after the end of a trajectory
 
@@ -58,8 +59,8 @@ def make_followers(
         ),
     }
     if forward.on:
-        torque = torque_limit_of(chosen)
-        if forward.quantity == "torque" and torque is None:
+        torque = row(chosen, lambda axis: axis.torque_limit, math.nan)
+        if forward.quantity == "torque" and np.isnan(torque).any():
             raise ConfigurationError(
                 "commands.forward: torques need a torque limit of each axis",
                 hint="pass torque_limit= to Drives",
@@ -135,6 +136,7 @@ class TrajectoryCommand:
             path=config.path_tolerance or math.inf,
             goal=config.goal_tolerance or math.inf,
             goal_time=config.goal_time or math.inf,
+            stopped_velocity=STOPPED if config.goal_tolerance else math.inf,
         )
         self._follower = TrajectoryFollower(joints, limits, tolerances)
         self._goal: Goal | None = None
@@ -148,7 +150,7 @@ class TrajectoryCommand:
         self._settled_at = None
 
     def sample(self, now: float, state: State) -> SetPoints | None:
-        """Return the positions and velocities of the trajectory [rad, rad/s]; None after its end."""
+        """Return the positions and velocities [rad, rad/s]; None after the end."""
         self._now = now
         position, velocity = self._follower.sample(now, axis_states(state))
         if not self._follower.active:
@@ -242,9 +244,3 @@ class PoseFollower:
     def cancel(self) -> None:
         """Forget the pose."""
         self._command.stop()
-
-
-def torque_limit_of(axes: Sequence[Axis]) -> float | None:
-    """Return the smallest torque limit of axes; None if an axis has no limit."""
-    limits = [axis.torque_limit for axis in axes]
-    return None if None in limits else min(each for each in limits if each is not None)
