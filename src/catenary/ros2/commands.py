@@ -2,8 +2,8 @@
 
 Rules: only the newest command counts. A command that cannot be executed is refused with a reason.
 It moves nothing, and the current motion continues (as in ros2_control). The axes hold after the end
-of a motion, after a time-out, and when one of them is disabled. After the loss of the lease, the
-bridge sends nothing until the next command.
+of a motion, after a time-out, and when one of them is disabled; torques become 0. After the loss
+of the lease, the bridge sends nothing until the next command.
 """
 
 from __future__ import annotations
