@@ -109,6 +109,15 @@ def test_a_mismatch_of_qos_is_part_of_the_diagnostics() -> None:
         assert status.message == "/joint_trajectory: reliability of /teleop"
 
 
+def test_a_mismatch_of_qos_is_shown_once() -> None:
+    shown: list[str] = []
+    with rig() as running:
+        running.backend.incompatible.append("/joint_trajectory: reliability of /teleop")
+        for _ in range(2):
+            running.bridge._show(shown.append)
+    assert shown == ["/joint_trajectory: reliability of /teleop"]
+
+
 def test_process_data_have_their_types() -> None:
     topics = (
         ProcessData(field="position[1]", topic="p"),

@@ -66,6 +66,7 @@ class Bridge:
         self._run = self._problem = ""  # reason why commands are not possible
         self._prepare_at = 0.0
         self._send_at = self._show_at = 0.0
+        self._mismatches = 0  # number of shown QoS mismatches
         self._shown = ""  # last shown report
         self._follow_run()
         self._subscribe()
@@ -101,7 +102,9 @@ class Bridge:
     def _show(self, show: Callable[[str], None]) -> None:
         """Show the new reports. A flood of refused commands must not become a flood of texts."""
         self._show_at = time.monotonic() + SHOW_INTERVAL
-        for text in dict.fromkeys(self.reports.unread()):
+        mismatches = self._backend.incompatible
+        new, self._mismatches = mismatches[self._mismatches :], len(mismatches)
+        for text in dict.fromkeys([*new, *self.reports.unread()]):
             if text != self._shown:
                 show(text)
                 self._shown = text
