@@ -126,7 +126,7 @@ def test_what_is_refused_leaves_no_file(two: tuple[Path, Path], tmp_path: Path) 
 
 
 def test_a_failed_merge_leaves_no_file(two: tuple[Path, Path], tmp_path: Path) -> None:
-    late = record.Source(two[1], offset=1e11)  # beyond the seconds of a stamp
+    late = record.MergeInput(two[1], offset=1e11)  # beyond the seconds of a stamp
     with pytest.raises(RecordingError):
         record.merge([two[0], late], tmp_path / "c.mcap")
     assert not (tmp_path / "c.mcap").exists()

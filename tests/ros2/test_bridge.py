@@ -8,12 +8,14 @@ import numpy as np
 import pytest
 
 import catenary as cat
-from catenary.errors import ConfigurationError, ShareError
+from catenary.errors import ConfigurationError, ResponseTimeout, ShareError
 from catenary.ros2 import messages
 from catenary.ros2.backend import COMMAND
 from catenary.ros2.bridge import Bridge
-from catenary.ros2.config import Clock, Commands, Config, Forward, Point, ProcessData
+from catenary.ros2.config import Clock, Commands, Config, Diagnostics, Forward, Point, ProcessData
 from catenary.ros2.config_file import PROFILES, make_config
+from catenary.ros2.readings import process_value
+from catenary.ros2.requests import Requests
 from tests.ros2.bridges import Rig, rig
 from tests.ros2.memory_backend import MemoryBackend
 
@@ -88,7 +90,12 @@ def test_diagnostics_name_loop_axes_devices_and_cables() -> None:
 
         assert running.until(lambda: "cables of device 1" in names())
         assert names() >= {"bridge", "loop", "device 0", *running.arm.names}
-        levels = {each.name: each.level for each in running.sent("/diagnostics")[-1].status}
+        first, last = (
+            {each.name: each.level for each in running.sent("/diagnostics")[k].status}
+            for k in (0, -1)
+        )
+        assert first[f"{running.name}: loop"] == messages.DiagnosticStatus.OK
+        levels = last
         assert levels[f"{running.name}: bridge"] == messages.DiagnosticStatus.OK
 
 
@@ -100,6 +107,15 @@ def test_a_mismatch_of_qos_is_part_of_the_diagnostics() -> None:
         status = running.sent("/diagnostics")[-1].status[0]
         assert status.level == messages.DiagnosticStatus.WARN
         assert status.message == "/joint_trajectory: reliability of /teleop"
+
+
+def test_a_mismatch_of_qos_is_shown_once() -> None:
+    shown: list[str] = []
+    with rig() as running:
+        running.backend.incompatible.append("/joint_trajectory: reliability of /teleop")
+        for _ in range(2):
+            running.bridge._show(shown.append)
+    assert shown == ["/joint_trajectory: reliability of /teleop"]
 
 
 def test_process_data_have_their_types() -> None:
@@ -118,6 +134,13 @@ def test_process_data_have_their_types() -> None:
         assert len(running.sent("t")[-1].data) == 2
 
 
+def test_large_integers_are_exact() -> None:
+    row = np.zeros(1, [("time_ns", "i8")])[0]
+    row["time_ns"] = 1_700_000_000_000_000_001
+    config = ProcessData(field="time_ns", topic="t", type="int64")
+    assert process_value(config, row) == messages.Int64(1_700_000_000_000_000_001)
+
+
 def test_a_missing_field_is_reported_and_not_published() -> None:
     with rig(Config(process_data=(ProcessData(field="nothing", topic="p"),))) as running:
         running.step()
@@ -126,6 +149,8 @@ def test_a_missing_field_is_reported_and_not_published() -> None:
         running.step()
         texts = [each.message for each in running.sent("/diagnostics")[-1].status]
         assert any("there is no field 'nothing'" in text for text in texts)
+        assert running.last_report.startswith("p: there is no field 'nothing'")
+        assert running.bridge.reports.counts["topics without data"] == 1
 
 
 def test_two_topics_with_one_name_are_refused() -> None:
@@ -179,6 +204,29 @@ def test_a_trajectory_too_fast_is_refused_and_nothing_moves() -> None:
         assert "velocity of" in running.last_report
         assert running.bridge.reports.counts["refused commands"] == 1
         np.testing.assert_allclose(running.arm.actual.position, before, atol=1e-6)
+
+
+def test_a_trajectory_refused_during_a_stream_leaves_no_start_behind() -> None:
+    with rig(FORWARD) as running:
+        enable(running)
+        start = running.arm.actual.position.copy()
+        for step in range(60):
+            data = (start + step * 0.002).tolist()
+            running.backend.deliver("forward_commands", messages.Float64MultiArray(data=data))
+            running.step()
+            if step == 10:
+                unfit = trajectory(running, 9.0, 0.1)
+                running.backend.deliver("joint_trajectory", unfit)
+                running.step()
+                assert "velocity of" in running.last_report
+        running.step(50)
+        assert not running.bridge._commands.active
+        before = running.arm.target.position.copy()
+        running.backend.deliver("joint_trajectory", trajectory(running, 0.1))
+        running.step()
+        running.step()
+        assert running.bridge._commands.active
+        assert (abs(running.arm.target.position - before) < 0.01).all()
 
 
 def test_a_disabled_axis_refuses_commands() -> None:
@@ -353,6 +401,26 @@ def test_a_backend_without_services_is_noted() -> None:
             "services and parameters need rclpy; this backend has topics only",
             "no actions",
         ]
+
+
+def test_unknown_limits_refuse_commands_and_are_requested_again(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def silent(requests: Requests) -> list[object]:
+        raise ResponseTimeout("the program did not answer")
+
+    with monkeypatch.context() as patch:
+        patch.setattr(Requests, "axes", silent)
+        with rig(Config(diagnostics=Diagnostics(on=False))) as running:
+            enable(running)
+            running.backend.deliver("joint_trajectory", trajectory(running, 0.1))
+            running.step()
+            assert running.last_report == "trajectory: the program did not answer"
+            patch.undo()
+            running.bridge._prepare_at = 0.0  # lets the time until the next request pass
+            running.backend.deliver("joint_trajectory", trajectory(running, 0.1))
+            running.step()
+            assert running.bridge._commands.active
 
 
 def test_commands_for_unknown_axes_are_reported() -> None:

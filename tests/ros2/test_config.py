@@ -76,6 +76,7 @@ def test_tables_and_lists_are_read(tmp_path: Path) -> None:
         ),
         ("[[wrench]]\ntopic = 'w'", "wrench[0]: object missing required field `share`"),
         ("[joint_states]\ntopic = 'a b'", "joint_states.topic: 'a b' is not a valid name"),
+        ("[commands]\nrate = 10", "ros2.toml:2: commands.rate: expected `float` >= 50.0"),
         ("namespace = '1x'", "ros2.toml:1: namespace: '1x' is not a valid name"),
         ("domain = 233", "ros2.toml:1: domain: expected `int` <= 232"),
         ("a = ?", "ros2.toml: not TOML: Invalid value (at line 1, column 5)"),

@@ -91,6 +91,23 @@ def test_a_message_that_cannot_be_decoded_is_ignored_and_reported(
     assert report.startswith("/text: ignored a message: ")
 
 
+def test_bad_messages_do_not_add_up(
+    nodes: tuple[Any, Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    left, right = nodes
+    publisher = left.publisher("text", String)
+    right.subscription("text", String, STATE, print)
+    until(lambda: publisher.matched == 1)
+    reports = []
+    for bad in (NOT_UTF_8, bytes.fromhex("00010000 03000000 41ff0000")):
+        monkeypatch.setattr(cyclone.cdr, "encode", lambda message, bad=bad: bad)
+        publisher.publish(String("a"))
+        right.spin_once(PATIENCE)
+        reports.append(right.incompatible)
+    assert reports[0] == reports[1]
+    assert len(reports[1]) == 1
+
+
 def test_a_message_that_cyclone_refuses_raises(
     nodes: tuple[Any, Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:

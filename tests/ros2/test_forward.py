@@ -114,6 +114,13 @@ def test_a_torque_ends_with_the_time_out() -> None:
     assert it.sample(10.2, state()) is None
 
 
+def test_each_axis_has_its_own_torque_limit() -> None:
+    it = ForwardCommand(JOINTS, limits(), "torque", 0.1, torque_limit=[10.0, 2.0])
+    it.accept(array(9.0, -2.0), 10.0, state())
+    with pytest.raises(CommandError, match="torque -3 N·m for b is beyond the limit -2"):
+        it.accept(array(9.0, -3.0), 10.0, state())
+
+
 def test_torques_need_a_limit() -> None:
     with pytest.raises(ValueError, match="torque_limit"):
         ForwardCommand(JOINTS, limits(), "torque", 0.1)

@@ -57,6 +57,7 @@ def test_without_a_trajectory_the_axes_hold_where_they_are_commanded() -> None:
     ("message", "code", "text"),
     [
         (trajectory(point(1, [0, math.nan])), Code.INVALID_GOAL, "positions that are not finite"),
+        (trajectory(*[point(1, [0, 0])] * 10_001), Code.INVALID_GOAL, "10001 points; the limit is"),
         (trajectory(point(1, [0, 0], [0, math.inf])), Code.INVALID_GOAL, "not finite"),
         (trajectory(point(1, [0, 0]), joints=("a", "c")), Code.INVALID_JOINTS, "unknown joint 'c'"),
         (trajectory(point(1, [0, 0]), joints=("a", "a")), Code.INVALID_JOINTS, "given twice"),

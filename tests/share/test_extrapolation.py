@@ -49,6 +49,7 @@ def test_the_position_stops_after_20_ms(cell: Cell) -> None:
         lease.send([0.0], velocity=[1.0], extrapolate=True)
         found = targets(cell, 40)
         assert found[20:] == [pytest.approx(0.020)] * 20
+        assert cell.arm.target.velocity[0] == 0.0
 
 
 def test_a_command_without_it_ends_the_motion(cell: Cell) -> None:

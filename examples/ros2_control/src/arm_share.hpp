@@ -37,7 +37,7 @@ public:
 
     // Take the lease. Throws std::runtime_error, for example if another client has an axis.
     void activate();
-    // Release the lease. The axes hold their commanded position.
+    // Release the lease. The axes hold their commanded position, and torques become 0.
     void deactivate();
 
     // Copy the newest cycle. Return false if the loop has ended or died; error() has the reason.

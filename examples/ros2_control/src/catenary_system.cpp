@@ -46,10 +46,12 @@ std::unique_ptr<ArmShare> make_arm(const hardware_interface::HardwareInfo &info)
         }
         interface = name;
     }
+    if (axes.empty()) throw std::invalid_argument("the URDF has no joint for this hardware");
+    const auto share = info.hardware_parameters.find("share");
+    if (share == info.hardware_parameters.end()) throw std::invalid_argument("<hardware> needs the parameter 'share'");
     const auto lease = info.hardware_parameters.find("lease");
     const double duration = lease == info.hardware_parameters.end() ? 0.1 : std::stod(lease->second);
-    return std::make_unique<ArmShare>(
-        info.hardware_parameters.at("share"), axes, quantity_of(interface), duration);
+    return std::make_unique<ArmShare>(share->second, axes, quantity_of(interface), duration);
 }
 
 }  // namespace

@@ -34,6 +34,7 @@ from catenary.ros2.trajectory_action import TrajectoryAction
 from catenary.share import attach
 
 IDLE = 0.05  # [s] longest wait
+PREPARE_INTERVAL = 5.0  # [s] between two requests for limits that are not known
 SHOW_INTERVAL = 1.0  # [s] between the texts for the user
 
 
@@ -66,8 +67,10 @@ class Bridge:
         self._requests = Requests(name, uid, config.services.timeout)
         self._publishing = Publishing(config, backend, self._source, self._requests, self.reports)
         self._commands: Commands | None = None
-        self._run = ""
+        self._run = self._problem = ""  # reason why commands are not possible
+        self._prepare_at = 0.0
         self._send_at = self._show_at = 0.0
+        self._mismatches = 0  # number of shown QoS mismatches
         self._shown = ""  # last shown report
         self._trajectory: TrajectoryCommand | None = None
         self._action: TrajectoryAction | None = None
@@ -110,7 +113,9 @@ class Bridge:
     def _show(self, show: Callable[[str], None]) -> None:
         """Show the new reports. A flood of refused commands must not become a flood of texts."""
         self._show_at = time.monotonic() + SHOW_INTERVAL
-        for text in dict.fromkeys(self.reports.unread()):
+        mismatches = self._backend.incompatible
+        new, self._mismatches = mismatches[self._mismatches :], len(mismatches)
+        for text in dict.fromkeys([*new, *self.reports.unread()]):
             if text != self._shown:
                 show(text)
                 self._shown = text
@@ -165,7 +170,7 @@ class Bridge:
     def _started(self, request: GoalRequest) -> Goal:
         commands, reader, row = self._commands, self._source.reader, self._row
         if commands is None or reader is None or row is None:
-            raise CommandError("there is no running loop with these axes")
+            raise CommandError(self._problem or "there is no running loop with these axes")
         state = State(reader, row, commands.axes)
         goal = commands.start("trajectory", request, reader, state, stamp_ns(reader, row) * 1e-9)
         assert goal is not None  # trajectories have one
@@ -179,7 +184,14 @@ class Bridge:
         """Prepare the commands for another run of the loop, whose axes may differ."""
         if self._commands is not None:
             self._commands.stop("the loop has ended")
+        self._commands = self._trajectory = None
         self._run = self._source.run
+        self._problem = "there is no running loop with axes"
+        self._prepare()
+
+    def _prepare(self) -> None:
+        """Prepare the commands, if there are axes and the program reports their limits."""
+        self._prepare_at = time.monotonic() + PREPARE_INTERVAL
         reader = self._source.reader
         if reader is None or not self._config.commands.on or not reader.layout.axes:
             return
@@ -187,9 +199,9 @@ class Bridge:
         try:
             limits = self._requests.axes()
             followers = make_followers(self._config, axes, limits, self.reports)
-        except CatenaryError as error:
-            self._commands = self._trajectory = None
-            self.reports.add(REFUSED, f"no commands are possible: {error.message}")
+        except (CatenaryError, ValueError) as error:
+            self._problem = str(getattr(error, "message", error))
+            self.reports.add(REFUSED, f"no commands are possible: {self._problem}")
             return
         lease = self._config.commands.lease
         self._commands = Commands(followers, axes, lease, self.reports)
@@ -218,8 +230,10 @@ class Bridge:
 
     def _offer(self, name: str) -> Callable[[Any], None]:
         def offer(message: Any) -> None:
+            if self._commands is None and time.monotonic() >= self._prepare_at:
+                self._prepare()
             if self._commands is None:
-                self.reports.add(REFUSED, f"{name}: there is no running loop with these axes")
+                self.reports.add(REFUSED, f"{name}: {self._problem}")
             else:
                 self._commands.offer(name, message)
 

@@ -2,8 +2,8 @@
 
 Rules: only the newest command counts. A command that cannot be executed is refused with a reason.
 It moves nothing, and the current motion continues (as in ros2_control). The axes hold after the end
-of a motion, after a time-out, and when one of them is disabled. After the loss of the lease, the
-bridge sends nothing until the next command.
+of a motion, after a time-out, and when one of them is disabled; torques become 0. After the loss
+of the lease, the bridge sends nothing until the next command.
 """
 
 from __future__ import annotations
@@ -173,8 +173,8 @@ class Commands:
             if self._lease is None:
                 self._lease = reader.lease(self.axes, for_=self._duration)
         except CatenaryError:
-            if self._active is None:
-                follower.cancel()
+            if self._active is not follower:
+                follower.cancel()  # its next motion starts from the commanded positions of then
             raise
         if self._active is not follower and self._active is not None:
             self._active.cancel()

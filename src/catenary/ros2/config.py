@@ -156,7 +156,8 @@ class Commands(Table, frozen=True):
 
     on: bool = True
     axes: tuple[Text, ...] | None = None  # names of axes in the share; None: all
-    rate: Rate = 250.0  # set-points sent to the loop
+    # Set-points sent to the loop. They continue for 20 ms, so a lower rate would stop between them.
+    rate: Annotated[float, Meta(ge=50.0, le=10_000.0)] = 250.0
     lease: Annotated[float, Meta(ge=0.05, le=10.0)] = 0.5  # duration of the lease
     trajectory: Trajectory = Trajectory()
     forward: Forward = Forward()

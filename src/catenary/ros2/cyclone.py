@@ -123,7 +123,7 @@ class CycloneSubscription:
         )
         self._message = message
         self._callback = callback
-        self.undecodable = ""
+        self.undecodable = ""  # report of the first message that could not be decoded
 
     def deliver(self) -> None:
         """Call the callback for the received messages, oldest first."""
@@ -138,7 +138,9 @@ class CycloneSubscription:
         try:
             message = cdr.decode(data, self._message)
         except DecodeError as error:
-            self.undecodable = f"{self.topic}: ignored a message: {error.message}"
+            # Only the first one: the reports of a node must not grow with the bad messages.
+            if not self.undecodable:
+                self.undecodable = f"{self.topic}: ignored a message: {error.message}"
         else:
             self._callback(message)
 

@@ -96,7 +96,7 @@ class LoopTiming:
 
     def __init__(self, reader: Reader) -> None:
         self._reader = reader
-        self._number = reader.number
+        self._number = max(reader.number - 1, 0)  # the first status has the newest cycle
 
     def status(self) -> DiagnosticStatus:
         """Return the status of the loop in the cycles since the last call."""

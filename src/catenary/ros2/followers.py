@@ -23,6 +23,7 @@ from catenary.ros2.pose import PoseCommand, PoseOptions
 from catenary.ros2.trajectory import TrajectoryFollower
 
 UNLIMITED = 1e9  # [rad/s, rad/s²]; finite, because infinity times 0 s is not a number
+STOPPED = 0.01  # [rad/s] at the goal, if its tolerance is checked
 SETTLED = 1e-6  # [rad] between the last set-point and the commanded position
 SETTLE_TIME = 1.0  # [s] at most, after the end of a trajectory
 
@@ -58,8 +59,8 @@ def make_followers(
         ),
     }
     if forward.on:
-        torque = torque_limit_of(chosen)
-        if forward.quantity == "torque" and torque is None:
+        torque = row(chosen, lambda axis: axis.torque_limit, math.nan)
+        if forward.quantity == "torque" and np.isnan(torque).any():
             raise ConfigurationError(
                 "commands.forward: torques need a torque limit of each axis",
                 hint="pass torque_limit= to Drives",
@@ -144,6 +145,7 @@ class TrajectoryCommand:
             path=config.path_tolerance or math.inf,
             goal=config.goal_tolerance or math.inf,
             goal_time=config.goal_time or math.inf,
+            stopped_velocity=STOPPED if config.goal_tolerance else math.inf,
         )
         self.planned: Values | None = None  # [rad], at the last sample
         self.measured: Values | None = None  # [rad], at the last sample
@@ -173,7 +175,7 @@ class TrajectoryCommand:
         self._follower.cancel(self._now)
 
     def sample(self, now: float, state: State) -> SetPoints | None:
-        """Return positions and velocities of the trajectory [rad, rad/s]; None after its end."""
+        """Return the positions and velocities [rad, rad/s]; None after the end."""
         self._now = now
         position, velocity = self._follower.sample(now, axis_states(state))
         self.planned, self.measured = position, state.position
@@ -268,9 +270,3 @@ class PoseFollower:
     def cancel(self) -> None:
         """Forget the pose."""
         self._command.stop()
-
-
-def torque_limit_of(axes: Sequence[Axis]) -> float | None:
-    """Return the smallest torque limit of axes; None if an axis has no limit."""
-    limits = [axis.torque_limit for axis in axes]
-    return None if None in limits else min(each for each in limits if each is not None)

@@ -12,6 +12,7 @@ from typing import Literal, Protocol
 
 import numpy as np
 
+from catenary.control.parts import PerAxis, checked
 from catenary.errors import CatenaryError
 from catenary.ros2.goal import AxisStates
 from catenary.ros2.limits import AxisLimits
@@ -44,10 +45,10 @@ class ForwardCommand:
         limits: limits of the axes.
         quantity: meaning of the values.
         timeout: longest time between two messages [s].
-        torque_limit: largest torque [N·m]; required for "torque".
+        torque_limit: largest torque [N·m], one value or one per axis; required for "torque".
 
     Raises:
-        ValueError: `timeout` is not positive, or "torque" has no `torque_limit`.
+        ValueError: `timeout` is not positive, or `torque_limit` is missing or not valid.
     """
 
     def __init__(
@@ -57,7 +58,7 @@ class ForwardCommand:
         quantity: Quantity,
         timeout: float,
         *,
-        torque_limit: float | None = None,
+        torque_limit: PerAxis | None = None,
     ) -> None:
         if not 0 < timeout < math.inf:
             raise ValueError(f"timeout={timeout} s must be positive and finite")
@@ -67,7 +68,7 @@ class ForwardCommand:
         self.quantity: Quantity = quantity
         self.timeouts = 0  # number of commands that ended by the time-out
         self._limits, self._timeout = limits, timeout
-        self._bounds = self._permitted(torque_limit or 0.0)
+        self._bounds = self._permitted(0.0 if torque_limit is None else torque_limit)
         self._wanted: Row | None = None
         self._sent: Row | None = None
         self._expires = self._then = -math.inf
@@ -117,11 +118,12 @@ class ForwardCommand:
         """End the command without a deceleration, because the axes cannot be commanded."""
         self._wanted = self._sent = None
 
-    def _permitted(self, torque: float) -> tuple[Row, Row]:
-        limits = self._limits
+    def _permitted(self, torque: PerAxis) -> tuple[Row, Row]:
+        limits, axes = self._limits, len(self.joints)
         if self.quantity == "position":
             return limits.position_min, limits.position_max
-        most = limits.velocity if self.quantity == "velocity" else np.full(len(self.joints), torque)
+        velocity = self.quantity == "velocity"
+        most = limits.velocity if velocity else checked("torque_limit", torque, axes)
         return -most, most
 
     def _check(self, wanted: Row) -> None:

@@ -20,23 +20,35 @@ from catenary.ros2.source import Source, stamp_ns
 from catenary.share import Reader
 
 Make = Callable[[Reader, np.void], msgspec.Struct]
+WITHOUT_DATA = "topics without data"
 
 
 class Topic:
     """Publisher of one topic: one message per period at most, and none without a new cycle.
 
     Args:
+        name: name of the topic, for reports.
         publisher: publisher of the backend.
         source: attachment to the share with the data.
         rate: largest rate [Hz].
         make: makes a message from a cycle.
+        reports: receives the reason when the topic stops.
     """
 
-    def __init__(self, publisher: Publisher, source: Source, rate: float, make: Make) -> None:
+    def __init__(
+        self,
+        name: str,
+        publisher: Publisher,
+        source: Source,
+        rate: float,
+        make: Make,
+        reports: Reports,
+    ) -> None:
         self.source = source
         self.reason = ""  # why the newest cycle is not published; "" if it is
         self.next_time = 0.0
-        self._publisher, self._make = publisher, make
+        self._name, self._publisher, self._make = name, publisher, make
+        self._reports = reports
         self._period = 1.0 / rate
         self._last: np.void | None = None
 
@@ -58,6 +70,8 @@ class Topic:
             self._publisher.publish(self._make(reader, row))
             self.reason = ""
         except (readings.InvalidReading, ValueError) as error:
+            if not self.reason:
+                self._reports.add(WITHOUT_DATA, f"{self._name}: {error}")
             self.reason = str(error)
 
 
@@ -163,7 +177,7 @@ class Publishing:
         # A reliable publisher also serves subscribers with `best_effort`.
         qos = CLOCK if kind is messages.Clock else STATE
         publisher = self._backend.publisher(name, kind, qos)
-        self._topics.append(Topic(publisher, source, rate, make))
+        self._topics.append(Topic(name, publisher, source, rate, make, self._reports))
 
     def _check_name(self, name: str) -> None:
         if name in self._names:

@@ -184,10 +184,11 @@ def process_value(config: ProcessData, row: np.void) -> Any:
         values = np.atleast_1d(value_of(row, config.field)).astype(np.float64)
         return messages.Float64MultiArray(data=values.tolist())
     kind, convert = SCALARS[config.type]
-    return kind(data=convert(numbers(row, (config.field,))[0]))
+    numbers(row, (config.field,))  # checks the value
+    return kind(data=convert(value_of(row, config.field)))
 
 
-SCALARS: Mapping[str, tuple[Any, Callable[[float], Any]]] = {
+SCALARS: Mapping[str, tuple[Any, Callable[[Any], Any]]] = {
     "float64": (messages.Float64, float),
     "int64": (messages.Int64, int),
     "bool": (messages.Bool, bool),

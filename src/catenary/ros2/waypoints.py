@@ -16,6 +16,7 @@ from catenary.errors import CatenaryError
 from catenary.ros2.spline import Motion, Row, Waypoint
 
 NANOSECOND = 1e-9  # [s]
+MOST_POINTS = 10_000  # a longer check would outlast the lease of the bridge
 
 
 class Code(IntEnum):
@@ -108,11 +109,13 @@ def checked(trajectory: TrajectoryLike, joints: Sequence[str], partial: bool) ->
         Joints and waypoints of the message.
 
     Raises:
-        TrajectoryError: The message has an unknown, duplicate or missing joint, a field with a
-            wrong number of values, efforts, a value that is not finite, times that do not
-            increase, or a last velocity other than 0.
+        TrajectoryError: The message has more than 10 000 points, an unknown, duplicate or missing
+            joint, a field with a wrong number of values, efforts, a value that is not finite,
+            times that do not increase, or a last velocity other than 0.
     """
     axes = numbers(trajectory.joint_names, joints, partial)
+    if len(trajectory.points) > MOST_POINTS:
+        wrong(f"it has {len(trajectory.points)} points; the limit is {MOST_POINTS}")
     points = tuple(waypoint(k, p, len(axes)) for k, p in enumerate(trajectory.points))
     before = -1.0
     for k, point in enumerate(points):

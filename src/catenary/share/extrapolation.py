@@ -29,6 +29,7 @@ class Extrapolation:
     def __init__(self, axes: Sequence[str], period: float) -> None:
         self._axes = axes
         self._period = period
+        self._longest = LONGEST / period  # [cycles]
         self._motions: dict[str, _Motion] = {}
 
     def follow(
@@ -46,8 +47,6 @@ class Extrapolation:
                 self._motions.pop(name, None)
         for command in commands:
             self._motions |= self._started(command, number)
-        latest = LONGEST / self._period
-        self._motions = {n: m for n, m in self._motions.items() if number - m.number <= latest}
         return bool(self._motions)
 
     def _started(self, command: AxisCommand, number: int) -> Mapping[str, _Motion]:
@@ -64,12 +63,21 @@ class Extrapolation:
     def write(self, places: Places, number: int) -> None:
         """Write the present positions into the targets of drives.
 
+        An axis without a command for 20 ms stays where it is, with velocity 0.
+
         Args:
             places: targets of the drives, and indices in them, by name of the axis.
             number: number of the newest cycle.
         """
-        for name, motion in self._motions.items():
-            if name in places:
-                target, k = places[name]
-                age = (number - motion.number) * self._period
+        for name, motion in list(self._motions.items()):
+            cycles = number - motion.number
+            if cycles > self._longest:
+                del self._motions[name]
+            if name not in places:
+                continue
+            target, k = places[name]
+            if cycles > self._longest:
+                target.velocity[k] = 0.0
+            else:
+                age = cycles * self._period
                 target.position[k] = motion.position + motion.velocity * age

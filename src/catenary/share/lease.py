@@ -82,7 +82,8 @@ class Lease:
             velocity: velocities [rad/s].
             torque: torques [N·m].
             extrapolate: True: the positions continue with the velocities until the next command,
-                for at most 20 ms. Use it if the client sends more slowly than the loop cycles.
+                for at most 20 ms; then the velocities become 0. Use it if the client sends more
+                slowly than the loop cycles.
 
         Raises:
             LeaseError: the lease has ended, the loop does not read commands, or the desk is locked
