@@ -10,7 +10,7 @@ presses it.
 
 import argparse
 import sys
-from contextlib import closing, contextmanager
+from contextlib import closing, contextmanager, suppress
 from pathlib import Path
 
 import numpy as np
@@ -25,6 +25,9 @@ from catenary.virtual import read_segment
 
 sys.path.append(str(Path(__file__).resolve().parents[2]))  # the repository has `benchmarks`
 from benchmarks.cobot import Measured, Outcome, report
+
+with suppress(ImportError):  # each task imports this file before its first release
+    import catenary.ros2.cyclone
 
 HERE = Path(__file__).parent
 PERIOD, JOINTS = 1e-3, 6  # [s]
@@ -83,7 +86,8 @@ def trajectory(task, cost, state, phase, rows, done, goals):
 def ros2(task, cost, name, key, key_at):
     """Publish the joint states for ROS 2, and print them. On virtual drives, press the key."""
     seen = 0
-    with cat.attach(name, patience=task) as arm, joint_states(arm.layout) as publish:
+    with ros2_node() as node, cat.attach(name, patience=task) as arm:
+        publish = joint_states(node, arm.layout)
         for job in task:
             publish(row := arm.read())
             if job.number % 100 == 0:
@@ -97,17 +101,22 @@ def ros2(task, cost, name, key, key_at):
 
 
 @contextmanager
-def joint_states(layout):
-    """Yield a function that publishes a cycle on /cobot/joint_states; without ROS 2 it ignores it.
-
-    The node needs `pip install 'catenary[ros2]'` or an environment with rclpy.
-    """
+def ros2_node():
+    """Yield a node of ROS 2; None without `pip install 'catenary[ros2]'` and without rclpy."""
     try:
         node = backend.open_backend("cobot", namespace="cobot")
     except cat.errors.ConfigurationError as error:
         print(f"ROS 2: no joint states are published: {error}")
-        yield lambda row: None
+        yield None
         return
+    with closing(node):
+        yield node
+
+
+def joint_states(node, layout):
+    """Return a function that publishes a cycle on /cobot/joint_states; a no-op without a node."""
+    if node is None:
+        return lambda row: None
     publisher = node.publisher("joint_states", messages.JointState)
 
     def publish(row):
@@ -115,8 +124,7 @@ def joint_states(layout):
         rows = [row[name].tolist() for name in ("position", "velocity", "torque")]
         publisher.publish(messages.JointState(messages.Header(stamp), JOINT_NAMES, *rows))
 
-    with closing(node):
-        yield publish
+    return publish
 
 
 def log(task, cost, name, path):

@@ -40,8 +40,8 @@ def test_a_cycle_becomes_a_joint_state(cobot: ModuleType, monkeypatch: pytest.Mo
     monkeypatch.setattr(cobot.backend, "open_backend", lambda name, namespace: node)
     row = CYCLE.copy()
     row["scheduled_ns"], row["position"] = 5_000_000_001, np.arange(6)
-    with cobot.joint_states(LAYOUT) as publish:
-        publish(row)
+    with cobot.ros2_node() as opened:
+        cobot.joint_states(opened, LAYOUT)(row)
     [message] = node.publishers["joint_states"].messages
     assert message.header.stamp.to_ns() == 1_700_000_005_000_000_001
     assert list(message.position) == [0, 1, 2, 3, 4, 5]
@@ -56,8 +56,8 @@ def test_without_ros_2_the_reason_is_printed(
         raise ConfigurationError("cyclonedds is not importable", hint="pip install it")
 
     monkeypatch.setattr(cobot.backend, "open_backend", missing)
-    with cobot.joint_states(LAYOUT) as publish:
-        publish(CYCLE)
+    with cobot.ros2_node() as opened:
+        cobot.joint_states(opened, LAYOUT)(CYCLE)
     assert "no joint states are published: cyclonedds is not importable" in capsys.readouterr().out
 
 
