@@ -21,8 +21,8 @@ def add_parser(commands: Commands) -> None:
         help="connect a running loop to a ROS 2 graph",
         description="Publishes the joints, sensors and diagnostics of a loop from its share "
         "(Loop(..., sink=cat.Share(NAME))), and accepts trajectories and set-points. Needs "
-        "catenary[ros2] or a sourced ROS 2 installation. Ends on Ctrl-C: the axes hold, and torques "
-        "become 0.",
+        "catenary[ros2] or a sourced ROS 2 installation. Ends on Ctrl-C: the axes hold, and "
+        "torques become 0.",
         example="catenary ros2 arm\ncatenary ros2 arm --config ros2.toml --domain 7",
     )
     parser.add_argument("share", metavar="SHARE", help="name of the loop's share")
