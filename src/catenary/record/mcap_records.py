@@ -134,6 +134,23 @@ def chunk_records(data: bytes) -> Iterator[tuple[int, int, int]]:
         at += HEAD.size + length
 
 
+def add_descriptions(schemas: dict[int, Any], channels: dict[int, Any], data: bytes) -> None:
+    """Add the schemas and channels of a chunk, by their ids.
+
+    Args:
+        schemas: receives the schemas.
+        channels: receives the channels.
+        data: records of the chunk.
+    """
+    for opcode, at, end in chunk_records(data):
+        if opcode == SCHEMA:
+            schema = decode_record(data[at:end])
+            schemas[schema.id] = schema
+        elif opcode == CHANNEL:
+            channel = decode_record(data[at:end])
+            channels[channel.id] = channel
+
+
 def chunk_messages(data: bytes) -> Iterator[ChunkMessage]:
     """Yield the messages in the content of a chunk, in file order."""
     for opcode, at, end in chunk_records(data):

@@ -23,16 +23,13 @@ from catenary.record.channels import FORMAT, SECOND_NS, ros_name
 from catenary.record.extra import require
 from catenary.record.layout import Layout
 from catenary.record.mcap_records import (
-    CHANNEL,
     CHUNK,
     END_RECORD,
     LAYOUT_RECORD,
     METADATA,
-    SCHEMA,
+    add_descriptions,
     chunk_bytes,
     chunk_messages,
-    chunk_records,
-    decode_record,
     places,
     read_record,
     refusing_damage,
@@ -150,13 +147,7 @@ class SourceReader:
             self.end = record.metadata
 
     def _read_chunk(self, data: bytes) -> Iterator[TimedMessage]:
-        for opcode, at, end in chunk_records(data):
-            if opcode == SCHEMA:
-                schema = decode_record(data[at:end])
-                self.schemas[schema.id] = schema
-            elif opcode == CHANNEL:
-                channel = decode_record(data[at:end])
-                self.channels[channel.id] = channel
+        add_descriptions(self.schemas, self.channels, data)
         for message in chunk_messages(data):
             time_ns = message.time_ns + self.offset_ns
             content = self._shifted(message.channel, message.data)

@@ -13,7 +13,6 @@ from catenary.errors import RecordingError
 from catenary.record.channels import is_event
 from catenary.record.extra import require
 from catenary.record.mcap_records import (
-    CHANNEL,
     CHUNK,
     DATA_END,
     END_RECORD,
@@ -23,12 +22,10 @@ from catenary.record.mcap_records import (
     MAGIC,
     MESSAGE_INDEX,
     METADATA,
-    SCHEMA,
     Place,
+    add_descriptions,
     chunk_bytes,
     chunk_messages,
-    chunk_records,
-    decode_record,
     places,
     read_record,
 )
@@ -134,7 +131,7 @@ def _add_chunk(summary: Summary, stream: BinaryIO, place: Place, indexes: list[P
     if not indexed:
         offsets, summary.missing = _make_index(data, place.end)
         length = len(summary.missing)
-    _add_descriptions(summary, data)
+    add_descriptions(summary.schemas, summary.channels, data)
     if summary.first_ns is None:
         summary.first_ns = _first_cycle(summary, data)
     index = records.ChunkIndex(
@@ -181,16 +178,6 @@ def _channel(stream: BinaryIO, index: Place) -> int:
     """Return the channel id of a MessageIndex."""
     stream.seek(index.offset + HEAD.size)
     return int.from_bytes(stream.read(2), "little")
-
-
-def _add_descriptions(summary: Summary, data: bytes) -> None:
-    for opcode, at, end in chunk_records(data):
-        if opcode == SCHEMA:
-            schema = decode_record(data[at:end])
-            summary.schemas[schema.id] = schema
-        elif opcode == CHANNEL:
-            channel = decode_record(data[at:end])
-            summary.channels[channel.id] = channel
 
 
 def encode_end(summary: Summary, entries: dict[str, str]) -> bytes:
