@@ -20,7 +20,7 @@ from catenary.ros2.waypoints import Code, TrajectoryError, seconds
 
 @dataclass(frozen=True, slots=True)
 class Running:
-    """Goal whose client waits for the result."""
+    """Goal without a result yet."""
 
     goal: Goal
     handle: Any  # rclpy.action.server.ServerGoalHandle

@@ -181,7 +181,7 @@ class Bridge:
             self._trajectory.decelerate()
 
     def _follow_run(self) -> None:
-        """Prepare the commands for another run of the loop, whose axes may differ."""
+        """Prepare the commands for another run of the loop. Its axes may differ."""
         if self._commands is not None:
             self._commands.stop("the loop has ended")
         self._commands = self._trajectory = None

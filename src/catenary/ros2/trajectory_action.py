@@ -64,7 +64,7 @@ class TrajectoryAction:
         self._cancel()
 
     def step(self, command: TrajectoryCommand | None) -> None:
-        """Send results and, when due, feedback. `command` is None without a loop."""
+        """Send results and, when due, feedback. Without a loop, pass None for `command`."""
         self._server.step()
         now = time.monotonic()
         if command is None or now < self._feedback_at:

@@ -45,7 +45,7 @@ class Calibration:
         return result
 
     def tare(self, samples: npt.ArrayLike) -> Calibration:
-        """Return the calibration whose bias is the mean of samples without load.
+        """Return a calibration with the mean of samples without load as its bias.
 
         Args:
             samples: raw values, shape (samples, raw).

@@ -64,7 +64,7 @@ class CanSignal:
 
 @dataclass(frozen=True, slots=True)
 class CanMessage:
-    """Message whose data is described by a format of `struct`.
+    """Message with data in a format of `struct`.
 
     Args:
         identifier: identifier of the frames.

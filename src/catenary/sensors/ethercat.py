@@ -101,7 +101,7 @@ class LoopConnection:
 
 
 class EtherCat:
-    """Sensor whose channels are fields of the share of a loop.
+    """Sensor that reads fields of the share of a loop as its channels.
 
         loop = LoopSource("arm")
         ft = EtherCat(loop, {Channel("force", "N", (3,)): ["Fx", "Fy", "Fz"]})

@@ -71,7 +71,7 @@ def encode_packet(descriptor_set: int, fields: Iterable[Field]) -> bytes:
 
 
 def decode_packet(data: bytes) -> Packet:
-    """Return the packet in `data`, whose checksum is correct.
+    """Return the packet in `data`. Its checksum must be correct.
 
     Raises DecodeError if the lengths of the fields do not add up to the length of the packet.
     """

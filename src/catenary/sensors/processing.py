@@ -31,7 +31,7 @@ class Step(Protocol):
 
 
 class Processed:
-    """Sensor whose samples pass through steps, in their order.
+    """Sensor with steps that process each sample, in their order.
 
         ft = Processed(Rdt(500.0), [Filter(["force", "torque"], 50.0, 500.0), Transform(frame)])
 

@@ -162,7 +162,7 @@ class SensorReader:
         return self._invalid
 
     def _end(self) -> str:
-        """Try to attach again to a share whose writer has ended. Return the reason of the end."""
+        """Try to attach again after the end of the writer. Return the reason of the end."""
         reason = f"the program of the sensor has {ENDINGS[self._reader.state]}"
         now = time.monotonic_ns()
         if now < self._next_attach_ns:

@@ -19,7 +19,7 @@ class _Motion(NamedTuple):
 
 
 class Extrapolation:
-    """Motions of the axes whose client has asked to continue them.
+    """Motions that continue until the next command, as their clients have requested.
 
     Args:
         axes: names of the axes, in the order of the layout.

@@ -13,7 +13,7 @@
 
 enum { CAT_NAME_MAX = 64, CAT_FOLDER_SIZE = 64, CAT_UID_LINES = 4096 };
 
-/* Search of a share: the users whose files are accepted, and the first file of another user. */
+/* Search of a share: the accepted users, and the first file of another user. */
 typedef struct cat_search {
     uid_t owners[2];
     int owner_count;

@@ -173,7 +173,7 @@ static int cat_json_bool(cat_json *j) {
     return 0;
 }
 
-/* Begin the next item of an array or object, whose opening bracket is the first item's separator.
+/* Begin the next item of an array or object. The opening bracket is the separator of the first item.
  * `count` is 0 at first. Return 0 at the closing bracket or after an error. */
 static int cat_json_next(cat_json *j, uint32_t *count, char open, char close) {
     if (*count == 0) {

@@ -52,7 +52,7 @@ static void cat_free_place(const catenary_share *share, uint32_t place, uint64_t
     }
 }
 
-/* Free a place whose lease is over. The caller holds the mutex. */
+/* Free the place of a lease that is over. The caller holds the mutex. */
 static void cat_free_if_over(const catenary_share *share, uint32_t place, int64_t now) {
     cat_desk_place *entry = &cat_desk_places(share)[place];
     uint64_t serial = cat_load_acquire64(&entry->lease);
