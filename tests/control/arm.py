@@ -59,3 +59,45 @@ URDF = """<?xml version="1.0"?>
   </joint>
 </robot>
 """
+
+SEVEN = """
+<mujoco>
+  <compiler angle="radian"/>
+  <worldbody>
+    <body name="base" pos="0.5 -0.2 0.3" quat="0.8 0.1 -0.3 0.5">
+      <freejoint name="float"/>
+      <geom type="sphere" size="0.1" mass="5"/>
+      <body name="torso" pos="0 0 0.2" euler="0.1 0.2 0.3">
+        <joint name="waist" axis="0 0 1" ref="0.4"/>
+        <geom type="sphere" size="0.1" mass="5"/>
+        <body name="upper" pos="0.1 0.2 0" quat="1 0.2 0 0.4">
+          <joint name="pitch" axis="0 1 0" pos="0 0 0.02" armature="0.1"/>
+          <joint name="roll" axis="1 0.3 0" pos="0.01 0 0" armature="0.1"/>
+          <geom type="capsule" fromto="0 0 0 0.3 0 0" size="0.04" mass="2"/>
+          <body name="rail" pos="0.3 0 0.05">
+            <joint name="slide" type="slide" axis="0.2 0 1" ref="0.1" armature="0.5"/>
+            <geom type="sphere" size="0.04" mass="1"/>
+            <body name="bracket" pos="0 0.1 0" euler="0 0.5 0">
+              <geom type="sphere" size="0.03" mass="0.2"/>
+              <body name="lower" pos="0.1 0 0">
+                <joint name="elbow" axis="0 1 0" armature="0.1"/>
+                <joint name="forearm" axis="1 0 0" armature="0.05"/>
+                <geom type="capsule" fromto="0 0 0 0.25 0 0" size="0.03" mass="1"/>
+                <body name="hand" pos="0.25 0 0" quat="0.5 0.5 -0.5 0.5">
+                  <joint name="wrist" axis="0 0.6 0.8" armature="0.02"/>
+                  <geom type="sphere" size="0.03" mass="0.3"/>
+                  <site name="grip" pos="0.05 0.01 -0.02" euler="0.3 0 0.9"/>
+                </body>
+              </body>
+            </body>
+          </body>
+        </body>
+      </body>
+      <body name="head" pos="0 0 0.6">
+        <joint name="neck" axis="0 0 1" armature="0.02"/>
+        <geom type="sphere" size="0.08" mass="1"/>
+      </body>
+    </body>
+  </worldbody>
+</mujoco>
+"""

@@ -114,6 +114,11 @@ def everything(memory, parameters):
         x += control.natural_admittance(control.part(memory, 5), yields, i, 0.1, 0.0, 0.2, q, v, dt)
         found = control.residual(control.part(memory, 6), control.part(parameters, 7), i, x, v, dt)
         hit = control.threshold(control.part(memory, 7), control.part(parameters, 8), i, found, dt)
+        pull = control.part(parameters, 10)
+        tau = control.coupling(control.part(memory, 9), pull, i, 0.1, sweep > 0, q, v, dt)
+        port = control.part(parameters, 11)
+        x += control.passivity(control.part(memory, 10), port, i, tau, -0.1, q, v, dt)
+        x += control.force_feedback(control.part(parameters, 12), i, tau, v)
         way = control.part(parameters, 9)
         kept[i] += x + found + hit + control.homing(control.part(memory, 8), way, i, q, x, dt)
     if control.homed(control.part(memory, 8)):
@@ -130,10 +135,13 @@ def test_every_compiled_block_gives_the_same_result_and_allocates_nothing() -> N
         control.Residual(2, 50.0, 0.01),
         control.Threshold(2, 0.5, 0.003),
         control.Homing(2, 0.5, 0.3, 2.0, time=0.002),
+        control.Coupling(2, 2.0, 0.1, 0.01, 1e-3),
+        control.Passivity(2, 2.0, 1.0, 1e-3, damping=0.1),
     ]
     chirp = control.Chirp(1, 1.0, 1.0, 30.0, 2.0)
     known = control.FeedForward(2, 0.1, 0.2), control.Friction(2, 0.1, 0.2)
-    given = [chirp, blocks[0], *known, *blocks[1:]]
+    felt = control.ForceFeedback(2, 0.5, 0.2, (5.0, 0.1), 0.01, 1e-3)
+    given = [chirp, blocks[0], *known, *blocks[1:], felt]
     parameters = control.join(*(block.parameters for block in given))
     memory = control.join([0.0], [0.0, 0.0], *(block.memory for block in blocks))
     ends = []

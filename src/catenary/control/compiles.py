@@ -23,6 +23,8 @@ Row = npt.NDArray[np.float64]
 MODULES = (
     *("parts", "pid", "cascade", "dynamics", "low_pass", "feed_forward", "impedance"),
     *("admittance", "collision", "identification", "homing"),
+    *("kinematics", "null_space", "cartesian", "energy", "delay"),
+    *("coupling", "force_feedback", "passivity"),
 )
 MARK = "__catenary_compiles__"
 

@@ -38,7 +38,12 @@ class Model:
 
 
 def load_model(
-    path: Path, joints: Sequence[str] | None, axes: int | None, armature: PerAxis
+    path: Path,
+    joints: Sequence[str] | None,
+    axes: int | None,
+    armature: PerAxis,
+    *,
+    fixed_links: bool = False,
 ) -> Model:
     """Load a model and select its joints.
 
@@ -49,6 +54,8 @@ def load_model(
         joints: names of the joints, in the order of the axes; None for all.
         axes: required number of joints; None for any.
         armature: inertia to add to each joint [kg·m²].
+        fixed_links: True to keep the links of a URDF that no joint moves, such as a tool frame.
+            Otherwise MuJoCo merges them with their parents.
 
     Raises:
         ConfigurationError: MuJoCo, the file or a joint is missing, the file is not a valid model,
@@ -56,7 +63,7 @@ def load_model(
         ValueError: `armature` is negative or NaN, or has a wrong number of values.
     """
     mujoco = _mujoco()
-    native = _native(mujoco, path)
+    native = _native(mujoco, path, fixed_links)
     flags = mujoco.mjtDisableBit
     native.opt.disableflags |= flags.mjDSBL_CONTACT | flags.mjDSBL_LIMIT | flags.mjDSBL_FRICTIONLOSS
     chosen = _chosen(native, path, joints, axes)
@@ -77,7 +84,7 @@ def _mujoco() -> Any:
         ) from error
 
 
-def _native(mujoco: Any, path: Path) -> Any:
+def _native(mujoco: Any, path: Path, fixed_links: bool) -> Any:
     """Return the mjModel of a file.
 
     The shapes of a URDF are removed, so that its mesh files need not exist. The dynamics depend
@@ -95,9 +102,20 @@ def _native(mujoco: Any, path: Path) -> Any:
         for link in root.iter("link"):
             for shape in [*link.iter("visual"), *link.iter("collision")]:
                 link.remove(shape)
+        if fixed_links:
+            _compiler(root).set("fusestatic", "false")
         return mujoco.MjModel.from_xml_string(ElementTree.tostring(root, "unicode"))
     except ValueError as error:
         raise ConfigurationError(f"{path}: MuJoCo rejects it: {error}", hint=XACRO) from error
+
+
+def _compiler(robot: ElementTree.Element) -> ElementTree.Element:
+    """Return the element of a URDF with MuJoCo's compiler options, after adding it if missing."""
+    own = robot.find("mujoco")
+    if own is None:
+        own = ElementTree.SubElement(robot, "mujoco")
+    found = own.find("compiler")
+    return ElementTree.SubElement(own, "compiler") if found is None else found
 
 
 def _chosen(
@@ -116,12 +134,12 @@ def _chosen(
             raise ConfigurationError(
                 f"{path}: joint {name!r} is neither hinge nor slide, so a single axis cannot "
                 "move it",
-                hint=f"name the joints of the axes: Dynamics(..., joints=[...]); {known}",
+                hint=f"name the joints of the axes: joints=[...]; {known}",
             )
     if axes is not None and len(chosen) != axes:
         raise ConfigurationError(
             f"{path}: {len(chosen)} joints ({', '.join(chosen)}) for {axes} axes",
-            hint=f"name one joint for each axis, in order: Dynamics(..., joints=[...]); {known}",
+            hint=f"name one joint for each axis, in order: joints=[...]; {known}",
         )
     if not chosen:
         raise ConfigurationError(
