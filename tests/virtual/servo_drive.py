@@ -25,11 +25,13 @@ class Inputs:
 
 
 class Drive:
-    """Cyclic exchange with one servo in OP."""
+    """Cyclic exchange with one servo in OP, the first device of `segment`; None: a new segment."""
 
-    def __init__(self, servo: Servo, *, control: int = 0x64) -> None:
+    def __init__(
+        self, servo: Servo, *, control: int = 0x64, segment: Segment | None = None
+    ) -> None:
         self.servo = servo
-        self.main = MainDevice(Segment([servo]))
+        self.main = MainDevice(segment or Segment([servo]))
         self.main.number_stations()
         self.main.let_pass(30)
         self.main.start_servo(STATION, 0, control=control)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import signal
 import socket
 import time
 
@@ -10,7 +11,7 @@ import pytest
 
 from catenary.errors import LinkError
 from catenary.realtime import private_network
-from catenary.virtual import Coupler, Segment, Server
+from catenary.virtual import Coupler, FaultEvent, Segment, Served, Server, serve_all
 from catenary.virtual.faults import cut
 from catenary.wire.datagram import Datagram, EcatCommand
 from catenary.wire.frame import decode_frame, encode_frame
@@ -113,6 +114,41 @@ def test_served_segment_plays_faults(veth: tuple[str, str]) -> None:
             assert len(counters) < 100_000
     assert counters[0] == 3
     assert set(counters) <= {3, None, 1}
+
+
+def test_several_segments_in_one_process(veth: tuple[str, str]) -> None:
+    """Both answer until SIGTERM. Faults of both are reported."""
+    first = Segment([Coupler()], clock="monotonic")
+    second = Segment([Coupler(), Coupler()], clock="monotonic")
+    counters, reported = [], []
+
+    def ready() -> None:
+        for near in (veth[0], one[0]):
+            with wire(near) as link:
+                link.send(BRD)
+                counters.append(answer(link))
+        second.inject(cut(between=(0, 1)))
+
+    def on_fault(event: FaultEvent) -> None:
+        reported.append(event.fault.kind)
+        os.kill(os.getpid(), signal.SIGTERM)
+
+    with private_network.veth_pair() as one:
+        served = [Served(first, veth[1]), Served(second, one[1])]
+        serve_all(served, max_age=None, ready=ready, on_fault=on_fault)
+    assert counters == [1, 2]
+    assert reported == ["cut"]
+
+
+def test_no_segment_is_served_if_an_interface_is_missing(veth: tuple[str, str]) -> None:
+    first, second = (Segment([Coupler()], clock="monotonic") for _ in range(2))
+    with pytest.raises(LinkError, match="no network interface 'absent'"):
+        serve_all([Served(first, veth[1]), Served(second, "absent")])
+    with wire(veth[0]) as near:
+        near.settimeout(0.2)
+        near.send(BRD)
+        with pytest.raises(TimeoutError):
+            answer(near)
 
 
 def test_forked_child_does_not_end_the_server(veth: tuple[str, str]) -> None:

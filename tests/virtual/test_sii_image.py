@@ -15,6 +15,7 @@ from catenary.virtual import (
     DigitalInputs,
     DigitalOutputs,
     Junction,
+    ModelSensor,
     Servo,
     ServoQuirks,
     SiiQuirks,
@@ -24,6 +25,14 @@ from catenary.virtual.sii_image import checksum, make_sii_image
 from catenary.wire.sii import decode_sii
 from catenary.wire.sii_categories import GeneralFlags
 
+
+def model_sensor(**options: object) -> ModelSensor:
+    """Return a sensor of a quaternion and a vector, without a plant."""
+    sensor = ModelSensor(sensors=("orientation", "gyro"), **options)  # type: ignore[arg-type]
+    sensor.measure({"orientation": 4, "gyro": 3})
+    return sensor
+
+
 DEVICES: list[Device] = [
     Coupler(),
     Servo(serial=7, alias=3),
@@ -32,6 +41,7 @@ DEVICES: list[Device] = [
     DigitalInputs(bits=9),
     AnalogInputs(channels=8),
     Junction(port_count=3),
+    model_sensor(),
 ]
 
 
@@ -46,7 +56,9 @@ def test_decoder_returns_the_description(device: Device) -> None:
     assert sii.general.physical_ports == {2: 0x0011, 3: 0x0111}[len(device.ports)]
 
 
-@pytest.mark.parametrize("device", [Servo, DigitalOutputs, DigitalInputs, AnalogInputs])
+@pytest.mark.parametrize(
+    "device", [Servo, DigitalOutputs, DigitalInputs, AnalogInputs, model_sensor]
+)
 @pytest.mark.parametrize("lrw", [True, False])
 def test_general_category_shows_missing_lrw_support(
     device: Callable[..., Device], lrw: bool
@@ -63,6 +75,7 @@ VARIANTS: list[Device] = [
     Servo(quirks=ServoQuirks(watchdog_trigger=False)),
     Servo(sii_quirks=SiiQuirks(pdos="absent")),
     *(AnalogInputs(lrw=lrw, mailbox_bytes=size) for lrw in (True, False) for size in (64, 256)),
+    *(model_sensor(lrw=lrw, mailbox_bytes=size) for lrw in (True, False) for size in (64, 256)),
     *(DigitalOutputs(lrw=lrw, bits=bits) for lrw in (True, False) for bits in (1, 8)),
     *(DigitalInputs(lrw=lrw, bits=bits) for lrw in (True, False) for bits in (1, 8)),
 ]

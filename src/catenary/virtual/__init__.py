@@ -11,16 +11,18 @@ from catenary.virtual.devices import (
     DigitalInputs,
     DigitalOutputs,
     Junction,
+    ModelSensor,
     Servo,
 )
 from catenary.virtual.devices.described import DescribedDevice, from_esi
 from catenary.virtual.devices.servo_quirks import ServoQuirks
 from catenary.virtual.fault_player import FaultEvent, Loss
 from catenary.virtual.faults import Fault
+from catenary.virtual.joint import Joint
 from catenary.virtual.mapping_quirks import MappingQuirks
-from catenary.virtual.plant import Joint, Plant
+from catenary.virtual.plant import Plant, PlantPart
 from catenary.virtual.segment import FrameCounters, Segment, demo_segment
-from catenary.virtual.server import Server, serve
+from catenary.virtual.server import Served, Server, serve, serve_all
 from catenary.virtual.sii_quirks import SiiQuirks
 
 __all__ = [
@@ -39,8 +41,11 @@ __all__ = [
     "Loss",
     "MailboxQuirks",
     "MappingQuirks",
+    "ModelSensor",
     "Plant",
+    "PlantPart",
     "Segment",
+    "Served",
     "Server",
     "Servo",
     "ServoQuirks",
@@ -50,4 +55,5 @@ __all__ = [
     "from_esi",
     "read_segment",
     "serve",
+    "serve_all",
 ]

@@ -9,7 +9,7 @@ cdef extern from "clock.h":
         int64_t (*now)(void *) noexcept nogil
 
 cdef extern from "segment_memory.h" nogil:
-    int MAX_AXES, MAX_MAPPED, AXIS_SLOTS, MODEL_SERVO, MODEL_SLOTS, PORTS, MAX_FRAME_FAULTS
+    int MAX_AXES, MAX_MAPPED, MAX_MEMBERS, MAX_SENSORS, AXIS_SLOTS, MODEL_SERVO, MODEL_SLOTS, PORTS, MAX_FRAME_FAULTS
     int LOSS_LOG
     int64_t NEVER
     ctypedef struct sync_manager:
@@ -63,6 +63,11 @@ cdef extern from "segment_memory.h" nogil:
         double *friction
         double ratio, zero, dry, brake
         int64_t brake_delay
+    ctypedef struct plant_sensor:
+        const double *value
+        int64_t *slot
+        double scale, bias, noise
+        uint64_t random
     ctypedef struct mujoco_message:
         pass
     ctypedef struct plant:
@@ -71,7 +76,10 @@ cdef extern from "segment_memory.h" nogil:
         const void *model
         void *data
         plant_joint *joints
-        int count, wild, ending
+        plant_sensor *sensors
+        cat_segment **members
+        uint8_t *freed
+        int count, sensor_count, member_count, wild, apart, ending
         int64_t period, due
         uint64_t steps
         char words[256]
@@ -114,7 +122,7 @@ cdef extern from "segment_memory.h" nogil:
     ctypedef struct cat_segment:
         controller *controllers
         plant *plant
-        int count, pending, event_fd, is_virtual, ring, cable_count, fault_count
+        int count, pending, event_fd, is_virtual, ring, cable_count, fault_count, failed
         cable *cables
         route *routes
         segment_end *ends
@@ -137,8 +145,11 @@ cdef extern from "segment_memory.h" nogil:
     void segment_light(cat_segment *, int at_once)
     void routes_refresh(cat_segment *)
     void segment_advance(cat_segment *, int64_t until)
-    void segment_work(cat_segment *, int64_t until, int steps_plant)
     void plant_free(plant *)
+    void plant_lock(plant *)
+    void plant_unlock(plant *)
+    void plant_begin(plant *, int64_t now)
+    void plant_run(plant *)
     void plant_hang(plant_joint *, servo_axis *)
     void servo_place(servo_axis *, double position)
     void al_show(controller *, uint16_t status, uint16_t code)
@@ -177,7 +188,9 @@ cdef class Core:
     cdef cat_segment *_segment
     cdef object _service
     cdef object _clock
-    cdef object _plant               # owner of the plant's model and data
+    cdef object _plant               # owner of the plant, which keeps it alive
+    cdef object _partners            # segments with the same plant
+    cdef bint _serving               # the service runs in virtual time
     cdef readonly object failure
     cdef readonly int count
     cdef controller *_at(self, int position) except NULL

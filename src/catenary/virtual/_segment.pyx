@@ -185,7 +185,11 @@ cdef class Core:
 
     @property
     def now(self) -> int:
-        return line_now(&self._segment.ends[0])
+        """Present time [ns]. For the service in virtual time, it is the time of its work.
+
+        A shared clock can be ahead of a segment.
+        """
+        return self._segment.now if self._serving else line_now(&self._segment.ends[0])
 
     @property
     def epoch(self) -> int:
@@ -213,6 +217,11 @@ cdef class Core:
         self._segment.clock = table
         self._segment.now = self._segment.epoch = table.now(table.self)
 
+    @property
+    def shares_clock(self) -> bool:
+        """True if the time of the segment is that of a shared clock."""
+        return self._segment.clock != NULL
+
     def use_service(self, service):
         """Set the service: a function that runs the applications and returns its next due time [ns]."""
         self._service = service
@@ -226,6 +235,7 @@ cdef class Core:
 
     cdef int _run_service(self) noexcept:
         self._segment.service_due = NEVER
+        self._serving = True
         try:
             self._segment.service_due = self._service()
             return 0
@@ -236,12 +246,21 @@ cdef class Core:
         except BaseException as failure:
             self.failure = failure
             return -EIO
+        finally:
+            self._serving = False
 
     def raise_failure(self):
         """Raise and clear the exception that the service has raised, if any."""
+        for core in (self, *(self._partners or ())):
+            failure = core.take_failure()
+            if failure is not None:
+                raise failure
+
+    def take_failure(self):
+        """Return and clear the exception that the service has raised; None if there is none."""
         failure, self.failure = self.failure, None
-        if failure is not None:
-            raise failure
+        self._segment.failed = 0
+        return failure
 
     def advance(self):
         """Execute the due compiled work of the segment. A no-op in virtual time."""

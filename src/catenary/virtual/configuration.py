@@ -34,7 +34,8 @@ from catenary.errors import CatenaryError, ConfigurationError
 from catenary.virtual.device_tables import DeviceTable, located
 from catenary.virtual.devices.device import Device
 from catenary.virtual.faults import Fault
-from catenary.virtual.plant import STEP, Joint, Plant
+from catenary.virtual.joint import Joint
+from catenary.virtual.plant import STEP, Plant
 from catenary.virtual.segment import ClockKind, Segment
 from catenary.virtual.wiring import Place
 
@@ -45,6 +46,8 @@ class PlantTable(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
     passive: tuple[str, ...] = ()
     step: float = STEP
     contacts: bool = True
+    keyframe: str | None = None
+    held: str | None = None
 
     def plant(self, path: str | Path) -> Plant:
         """Create the plant. The path of its model is relative to the folder of the file `path`."""
@@ -54,6 +57,8 @@ class PlantTable(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
             passive=self.passive,
             step=self.step,
             contacts=self.contacts,
+            keyframe=self.keyframe,
+            held=self.held,
         )
 
 

@@ -15,6 +15,7 @@ from catenary.virtual.devices.device import Device
 from catenary.virtual.devices.digital_inputs import DigitalInputs
 from catenary.virtual.devices.digital_outputs import DigitalOutputs
 from catenary.virtual.devices.junction import Junction
+from catenary.virtual.devices.model_sensor import ModelSensor
 from catenary.virtual.devices.servo import Servo
 from catenary.virtual.devices.servo_quirks import NO_QUIRKS, ServoQuirks
 from catenary.virtual.mapping_quirks import NO_MAPPING_QUIRKS, MappingQuirks
@@ -129,6 +130,33 @@ class AnalogInputsTable(_AppliedTable, tag="analog_inputs", frozen=True, kw_only
         )
 
 
+class ModelSensorTable(_AppliedTable, tag="model_sensor", frozen=True, kw_only=True):
+    sensors: tuple[str, ...]
+    noise: dict[str, float] = {}
+    bias: dict[str, float] = {}
+    scale: dict[str, float] = {}
+    seed: int = 0
+
+    def device(self) -> Device:
+        return ModelSensor(
+            sensors=self.sensors,
+            noise=self.noise,
+            bias=self.bias,
+            scale=self.scale,
+            seed=self.seed,
+            name=self.name,
+            alias=self.alias,
+            serial=self.serial,
+            mailbox_bytes=self.mailbox_bytes,
+            mailbox_delay=self.mailbox_delay,
+            lrw=self.lrw,
+            crystal=self.crystal.crystal(),
+            clock_bits=self.clock_bits,
+            mailbox_quirks=self.mailbox_quirks,
+            sii_quirks=self.sii_quirks,
+        )
+
+
 class ServoTable(_AppliedTable, tag="servo", frozen=True, kw_only=True):
     axes: int = 1
     counts_per_turn: int = 1 << 20
@@ -201,6 +229,7 @@ DeviceTable = (
     | DigitalOutputsTable
     | DigitalInputsTable
     | AnalogInputsTable
+    | ModelSensorTable
     | ServoTable
     | EsiTable
 )

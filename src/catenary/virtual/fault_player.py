@@ -7,12 +7,15 @@ from dataclasses import replace
 from functools import partial
 from typing import Literal, NamedTuple, TypeAlias
 
+from catenary.errors import ConfigurationError
 from catenary.virtual import faults as f
 from catenary.virtual._segment import Core
 from catenary.virtual._wires import FRAME_FAULTS_MAX, Wires
 from catenary.virtual.devices.applied import AppliedDevice
 from catenary.virtual.devices.device import Device
+from catenary.virtual.devices.model_sensor import ModelSensor
 from catenary.virtual.devices.servo import Servo
+from catenary.virtual.plant import PlantPart
 from catenary.virtual.scheduler import Agenda
 from catenary.virtual.wiring import Wiring
 
@@ -58,14 +61,14 @@ class FaultPlayer:
         devices: list[Device],
         wiring: Wiring,
         agenda: Agenda,
-        replaced: Callable[[Device, Device], None] | None = None,
+        part: PlantPart | None = None,
     ) -> None:
         self._core = core
         self._wires = wires
         self._devices = devices
         self.wiring = wiring
         self._agenda = agenda
-        self._replaced = replaced
+        self._part = part
         self._waiting: list[f.Fault] = []  # faults that wait for the first frame, in real time
         self._planned = 0
         self._frame_faults: list[tuple[int, f.FrameFault]] = []
@@ -172,6 +175,7 @@ class FaultPlayer:
                     raise ValueError(f"axis: device {fault.device} has no axis {fault.axis}")
             case f.Swap():
                 self._check_ports("with", fault.with_, fault.device)
+                self._check_sensor(fault.with_)
             case f.Exchange():
                 if fault.device == fault.other:
                     raise ValueError("other: a device cannot change places with itself")
@@ -192,6 +196,17 @@ class FaultPlayer:
                 raise ValueError(
                     f"{name}: {device.name} has no port {port}, but a cable is connected there"
                 )
+
+    def _check_sensor(self, device: Device) -> None:
+        """Check that the plant has the sensors of a device, and set their sizes."""
+        if not isinstance(device, ModelSensor):
+            return
+        if self._part is None:
+            raise ValueError(f"with: {device.name} needs a plant, but the segment has none")
+        try:
+            self._part.prepare(device)
+        except ConfigurationError as error:
+            raise ValueError(f"with: {error.message}") from error
 
     def _applied(self, position: int) -> AppliedDevice:
         device = self._devices[position]
@@ -337,8 +352,8 @@ class FaultPlayer:
         self._core.remove_controller(position)
         self._devices[position] = device
         device.attach(self._core, position, self._agenda)
-        if self._replaced is not None:
-            self._replaced(old, device)
+        if self._part is not None:
+            self._part.replaced(old, device)
 
     def _exchange(self, one: int, other: int) -> None:
         devices = self._devices

@@ -7,52 +7,13 @@
 #ifndef CATENARY_VIRTUAL_LINE_H
 #define CATENARY_VIRTUAL_LINE_H
 
-#include <errno.h>
-#include <time.h>
-#include <unistd.h>
-
-#include "controller/controller.h"
-#include "controller/datagram.h"
-#include "device_cycle.h"
-#include "plant.h"
+#include "due_work.h"
+#include "plant_time.h"
 
 enum {
     BYTE_NS = 80,                     /* 100 Mbit/s */
-    FRAME_OVERHEAD = 8 + 4 + 12,      /* preamble, check sequence, gap */
-    INSTANTS_MAX = 10000              /* maximum number of due times before the next frame in real time */
+    FRAME_OVERHEAD = 8 + 4 + 12       /* preamble, check sequence, gap */
 };
-
-static int64_t monotonic_now(void) {
-    struct timespec t;
-    clock_gettime(CLOCK_MONOTONIC, &t);
-    return (int64_t)t.tv_sec * 1000000000 + t.tv_nsec;
-}
-
-static void wake_service(cat_segment *s) {
-    if (s->event_fd >= 0) {
-        uint64_t one = 1;
-        ssize_t written = write(s->event_fd, &one, sizeof one);   /* if it fails, the thread is already awake */
-        (void)written;
-    }
-}
-
-static inline void lock(cat_segment *s) { pthread_mutex_lock(&s->mutex); }
-static inline void unlock(cat_segment *s) { pthread_mutex_unlock(&s->mutex); }
-
-/* Do all compiled work of one controller that is due now. Return its next due time. */
-static int64_t controller_advance(controller *c) {
-    int64_t *due = c->segment->dues + c->position;
-    *due = NEVER;
-    device_advance(c);
-    watchdog_check(c);
-    sii_check(c);
-    int64_t next = c->step_due < c->sync.due ? c->step_due : c->sync.due;
-    next = c->watchdog_due < next ? c->watchdog_due : next;
-    next = c->pdi_watchdog_due < next ? c->pdi_watchdog_due : next;
-    next = c->sii.due < next ? c->sii.due : next;
-    *due = next < *due ? next : *due;
-    return *due;
-}
 
 /* Drop the frames that are on a cable when it goes dark. Later controllers have already processed
  * them, but these are only the frames of a few microseconds. */
@@ -89,42 +50,6 @@ static void segment_light(cat_segment *s, int at_once) {
     if (at_once)
         links_check(s);
 }
-
-/* Do the compiled work up to `until`, in the order of due times. In virtual time, stop when an event
- * needs the application. With a plant, process every due time separately, so that motors and joints
- * stay synchronous even after a delay. Joints come first, because encoders show the earlier state.
- * In real time, INSTANTS_MAX limits the work, because frames can request any number of SYNC0 pulses
- * and these must not delay later frames. */
-static void segment_work(cat_segment *s, int64_t until, int steps_plant) {
-    int64_t bound = plant_bound(s, until, steps_plant);
-    for (uint32_t left = INSTANTS_MAX; s->next_due <= bound && (s->is_virtual || left > 0); left--) {
-        if (s->next_due > s->now)
-            s->now = s->next_due;
-        int64_t instant = s->plant ? s->next_due : s->now;
-        if (s->plant && s->plant->due <= instant)
-            plant_step(s);
-        int64_t next = s->plant ? s->plant->due : NEVER;
-        s->next_due = NEVER;
-        if (s->link_due <= s->now)
-            links_check(s);
-        next = s->link_due < next ? s->link_due : next;
-        for (int n = 0; n < s->count; n++) {
-            int64_t due = s->dues[n];
-            if (due <= instant)
-                due = controller_advance(&s->controllers[n]);
-            next = due < next ? due : next;
-        }
-        s->next_due = next < s->next_due ? next : s->next_due;
-        if (s->is_virtual && s->pending)
-            return;
-    }
-    if (until > s->now)
-        s->now = until;
-}
-
-/* Do the compiled work up to `until`. In real time, a separate thread steps the plant, and other
- * threads stop before its next step. */
-static inline void segment_advance(cat_segment *s, int64_t until) { segment_work(s, until, s->is_virtual); }
 
 /* Return the next free place in the queue of frames towards an interface. */
 static inline queued_frame *queue_place(segment_end *e) {
@@ -250,8 +175,6 @@ static int line_receive(void *self, const uint8_t **frame) {
     return length;
 }
 
-static inline int64_t earlier(int64_t a, int64_t b) { return a < b ? a : b; }
-
 /* Return the arrival time of the next frame; NEVER if no frame is queued. */
 static int64_t line_due(void *self) {
     const queued_frame *q = queue_first(self);
@@ -266,11 +189,9 @@ static int64_t line_wake_time(const segment_end *e, int64_t deadline, int wake_o
 static int wait_in_virtual_time(segment_end *e, int64_t deadline, int wake_on_frame) {
     cat_segment *s = e->segment;
     for (;;) {
-        if (s->pending || s->service_due <= s->now) {
-            int failed = s->service(s->owner);
-            if (failed)
-                return failed;
-        }
+        int failed = segment_serve(s);
+        if (failed)
+            return failed;
         if (wake_on_frame && line_ready(e, s->now))
             return 1;
         if (deadline <= s->now)
@@ -280,11 +201,12 @@ static int wait_in_virtual_time(segment_end *e, int64_t deadline, int wake_on_fr
             int result = s->clock->wait_until(s->clock->self, until);
             if (result < 0)
                 return result;
-            until = earlier(until, s->clock->now(s->clock->self));
+            /* During the wait, another segment of the plant may have run the service. */
+            until = earlier(earlier(until, s->service_due), s->clock->now(s->clock->self));
         }
-        lock(s);
-        segment_advance(s, until);
-        unlock(s);
+        failed = virtual_advance(s, until);
+        if (failed)
+            return failed;
     }
 }
 

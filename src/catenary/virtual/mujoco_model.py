@@ -1,30 +1,28 @@
-"""MuJoCo model of a plant: reading MJCF and URDF, joints by name, and addresses of its arrays.
-
-Only this module imports MuJoCo, and only when a plant is created.
+"""MuJoCo model of a plant: joints and sensors by name, and addresses of its arrays.
 
 Under load, MuJoCo's dry friction creeps. To make it stiff, the model uses `SOLIMP` and the shortest
 time constant that the step allows. The arm of examples/cobot then creeps by 1e-6 rad/s on its
-brakes.
+brakes. The constraint that holds a body is equally stiff.
 """
 
 from __future__ import annotations
 
 import ctypes
-import xml.etree.ElementTree as ElementTree
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from catenary.errors import ConfigurationError
+from catenary.virtual.mujoco_file import HELD, import_mujoco, read_model
 
 if TYPE_CHECKING:
-    import mujoco
     import numpy as np
 
-ROOTS = ("mujoco", "robot")
 SOLIMP = (0.9999, 0.9999, 0.001, 0.5, 2.0)
 TIME_CONSTANT_STEPS, DAMPING_RATIO = 2.0, 1.0  # at least two steps, as MuJoCo's manual requires
+HOLDING_TIME_CONSTANT = 0.01  # of the constraint that holds a body [s]
 DEEPEST = 1e-3  # maximum penetration of bodies at the start [m]
+DEEPEST_IN_GROUND = 3e-3  # the same with the world, where the load compresses soft contacts [m]
 
 
 class Addresses(NamedTuple):
@@ -36,110 +34,53 @@ class Addresses(NamedTuple):
     friction: int
 
 
-def read_model(path: str | Path, *, step: float, contacts: bool) -> Model:
-    """Read an MJCF or URDF file.
+class Sensor(NamedTuple):
+    """Sensor of the model: number of its values, and the address of the first in sensordata."""
 
-    Args:
-        path: Path of the file.
-        step: Time step of the simulation [s].
-        contacts: False disables contacts and ignores the collision shapes of a URDF.
-
-    Raises:
-        ConfigurationError: MuJoCo or the file is missing, or the model is invalid.
-    """
-    path = Path(path)
-    mujoco = _mujoco(path)
-    root = _root(path)
-    try:
-        if root.tag == "mujoco":
-            model = mujoco.MjModel.from_xml_path(str(path))
-        else:
-            meshes = _remove_shapes(root, path) if contacts else _remove_shapes(root)
-            model = mujoco.MjModel.from_xml_string(ElementTree.tostring(root, "unicode"), meshes)
-    except (ValueError, mujoco.FatalError) as error:
-        raise ConfigurationError(f"{path}: MuJoCo rejects the model: {error}") from error
-    model.opt.timestep = step
-    flags = mujoco.mjtDisableBit
-    # Only the virtual motors act on the joints, and a failed simulation must not reset itself.
-    model.opt.disableflags |= flags.mjDSBL_ACTUATION | flags.mjDSBL_AUTORESET
-    if not contacts:
-        model.opt.disableflags |= flags.mjDSBL_CONTACT
-    return Model(path, model)
-
-
-def _mujoco(path: Path) -> Any:
-    try:
-        import mujoco
-    except ImportError as error:
-        raise ConfigurationError(
-            f"{path} cannot be simulated: MuJoCo is not installed",
-            hint="pip install 'catenary[sim]'",
-        ) from error
-    return mujoco
-
-
-def _root(path: Path) -> ElementTree.Element:
-    try:
-        root = ElementTree.fromstring(path.read_bytes())
-    except OSError as error:
-        raise ConfigurationError(f"cannot read the model {path}: {error.strerror}") from error
-    except ElementTree.ParseError as error:
-        raise ConfigurationError(f"{path} is not valid XML: {error}") from error
-    if root.tag not in ROOTS:
-        raise ConfigurationError(
-            f"{path}: <{root.tag}> is neither MJCF (<mujoco>) nor URDF (<robot>)",
-            hint="expand the xacro file first: xacro robot.urdf.xacro > robot.urdf"
-            if path.suffix == ".xacro"
-            else "",
-        )
-    return root
-
-
-def _remove_shapes(root: ElementTree.Element, path: Path | None = None) -> dict[str, bytes]:
-    """Remove the visual shapes of a URDF. Without `path`, also remove the collision shapes.
-
-    Returns:
-        Contents of the remaining mesh files by name, searched from `path` upwards.
-    """
-    for link in root.iter("link"):
-        for shape in [*link.iter("visual"), *([] if path else link.iter("collision"))]:
-            link.remove(shape)
-    meshes = [mesh.get("filename", "") for mesh in root.iter("mesh")] if path else []
-    return {Path(name).name: _mesh(name, path).read_bytes() for name in meshes if path}
-
-
-def _mesh(name: str, path: Path) -> Path:
-    """Return the path of a mesh, relative to one of the folders above the URDF file.
-
-    For a URI such as `package://name/meshes/x.stl`, leading folders of the name can be missing.
-
-    Raises:
-        ConfigurationError: The mesh does not exist.
-    """
-    below = name.removeprefix("package://").removeprefix("file://")
-    parts = Path(below).parts
-    for start in range(len(parts) if "://" in name else 1):
-        for folder in path.resolve().parents:
-            if (folder / Path(*parts[start:])).is_file():
-                return folder / Path(*parts[start:])
-    raise ConfigurationError(
-        f"{path}: the mesh {name} does not exist",
-        hint="correct the name, or pass contacts=False (in TOML: contacts = false), which does not "
-        "need meshes",
-    )
+    size: int
+    address: int
 
 
 class Model:
-    """MuJoCo model and its state."""
+    """MuJoCo model and its state.
 
-    def __init__(self, path: Path, model: mujoco.MjModel) -> None:
-        import mujoco
+    Args:
+        path: Path of an MJCF or URDF file.
+        step: Time step of the simulation [s].
+        contacts: False lets bodies pass through each other.
+        keyframe: Name of the keyframe that is the initial state; None: the default state.
+        held: Name of a body that is held in its initial pose; None: no body.
 
-        self._mujoco = mujoco
-        self.path = path
-        self.model = model
-        self.data = mujoco.MjData(model)
+    Raises:
+        ConfigurationError: MuJoCo or the file is missing, the model is invalid, or it does not have
+            the keyframe or the body.
+    """
+
+    def __init__(
+        self,
+        path: str | Path,
+        *,
+        step: float,
+        contacts: bool,
+        keyframe: str | None = None,
+        held: str | None = None,
+    ) -> None:
+        self.path = Path(path)
+        self.model = read_model(path, step=step, contacts=contacts, held=held)
+        self._mujoco = import_mujoco(self.path)
+        self.data = self._mujoco.MjData(self.model)
+        self._keyframe = None if keyframe is None else self._keyframe_number(keyframe)
+        self.held = held
         self._starts: dict[str, float] = {}
+
+    def _keyframe_number(self, name: str) -> int:
+        names = [self.model.key(n).name for n in range(self.model.nkey)]
+        if name not in names:
+            raise ConfigurationError(
+                f"{self.path} has no keyframe {name!r}; its keyframes are"
+                f" {', '.join(names) or 'none'}"
+            )
+        return names.index(name)
 
     @property
     def joints(self) -> tuple[str, ...]:
@@ -202,17 +143,33 @@ class Model:
 
     def _start(self) -> None:
         self._mujoco.mj_resetData(self.model, self.data)
+        if self._keyframe is not None:
+            self._mujoco.mj_resetDataKeyframe(self.model, self.data, self._keyframe)
+            self.data.time = 0.0
         for name, position in self._starts.items():
             self.data.qpos[self.model.jnt_qposadr[self._id(name)]] = position
+        if self.held is not None:
+            self._hold(self.held)
         self._mujoco.mj_forward(self.model, self.data)
+
+    def _hold(self, body: str) -> None:
+        """Let the constraint hold the body in its present pose."""
+        self._mujoco.mj_kinematics(self.model, self.data)
+        number, pose = self.model.equality(HELD).id, self.data.body(body)
+        # Anchor in the body, pose in the world, and weight of the rotation (MuJoCo, eq_data).
+        self.model.eq_data[number, :11] = [0, 0, 0, *pose.xpos, *pose.xquat, 1]
+        self.model.eq_solref[number] = HOLDING_TIME_CONSTANT, DAMPING_RATIO
+        self.model.eq_solimp[number] = SOLIMP
 
     def check_start(self) -> None:
         """Raise ConfigurationError if bodies overlap at the start and would repel each other."""
         self._start()
         for contact in self.data.contact:
-            if contact.dist > -DEEPEST:
+            geoms = contact.geom1, contact.geom2
+            in_ground = any(self.model.geom_bodyid[geom] == 0 for geom in geoms)
+            if contact.dist > -(DEEPEST_IN_GROUND if in_ground else DEEPEST):
                 continue
-            one, other = (self._body(geom) for geom in (contact.geom1, contact.geom2))
+            one, other = map(self._body, geoms)
             raise ConfigurationError(
                 f"{self.path}: {one} and {other} overlap by {-1e3 * contact.dist:.1f} mm at the"
                 " start; their contact would block or overload the joints",
@@ -236,6 +193,11 @@ class Model:
         dof = self._dof(name)
         self.model.dof_armature[dof] += inertia
         self.model.dof_damping[dof] += viscous
+        self.stiffen_friction(name)
+
+    def stiffen_friction(self, name: str) -> None:
+        """Make the dry friction of a joint stiff."""
+        dof = self._dof(name)
         time_constant = TIME_CONSTANT_STEPS * self.model.opt.timestep
         self.model.dof_solref[dof] = time_constant, DAMPING_RATIO
         self.model.dof_solimp[dof] = SOLIMP
@@ -269,6 +231,22 @@ class Model:
         """Return the dry friction that the model specifies for the joint [N·m]."""
         return float(self.model.dof_frictionloss[self._dof(name)])
 
+    @property
+    def sensors(self) -> tuple[str, ...]:
+        """Names of the sensors."""
+        return tuple(self.model.sensor(n).name for n in range(self.model.nsensor))
+
+    def sensor(self, name: str) -> Sensor:
+        """Return a sensor by name. Raises ConfigurationError if there is none."""
+        if not name or name not in self.sensors:
+            raise ConfigurationError(
+                f"{self.path} has no sensor {name!r}; its sensors are"
+                f" {', '.join(self.sensors) or 'none'}"
+            )
+        number = self.sensors.index(name)
+        first = int(self.model.sensor_adr[number])
+        return Sensor(int(self.model.sensor_dim[number]), _address(self.data.sensordata, first))
+
     # -- for compiled code ---------------------------------------------------------------------
 
     def addresses(self, name: str) -> Addresses:
@@ -285,6 +263,11 @@ class Model:
         [library] = Path(str(self._mujoco.__file__)).parent.glob("libmujoco.so*")
         function = getattr(ctypes.CDLL(str(library)), name, None)
         return 0 if function is None else ctypes.cast(function, ctypes.c_void_p).value or 0
+
+    @property
+    def holding_address(self) -> int:
+        """Address of the value in eq_active that holds a body."""
+        return _address(self.data.eq_active, int(self.model.equality(HELD).id))
 
     @property
     def model_address(self) -> int:

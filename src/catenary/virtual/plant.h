@@ -1,12 +1,14 @@
 /* Plant: one MuJoCo model that the motors of several servos drive, instead of a separate shaft for
- * each motor.
+ * each motor. The servos can belong to several segments, the members of the plant.
  *
- * The plant has a fixed step on the segment's clock. Each step writes the motor torques, calls
- * mj_step, and reads the joint states. A torque that a servo computes at time t acts from t on. At
- * t + step, the servos read the state of t + step. The code calls MuJoCo through a function pointer
- * and accesses its arrays by address, without Python and without allocation. It never runs in the
- * frame path. In real time, only one thread steps the plant, and it releases the segment while
- * MuJoCo computes. Time budget: 10 us per step of a six-axis arm, nearly all of it in mj_step.
+ * The plant has a fixed step on the clock of its members. Each step writes the motor torques, calls
+ * mj_step, and reads the joint states and the sensors. A torque that a servo computes at time t acts
+ * from t on. At t + step, the servos read the state of t + step. The code calls MuJoCo through a
+ * function pointer and accesses its arrays by address, without Python and without allocation. It
+ * never runs in the frame path. Time budget: 10 us per step of a six-axis arm, 30 us of a humanoid
+ * that stands on its feet, nearly all of it in mj_step. `plant_time.h` takes the steps.
+ *
+ * `due` is written while all members are locked. A thread that holds one of them may read it.
  *
  * The model includes the inertia, viscous friction and dry friction of the motors (armature, damping
  * and frictionloss). A brake is additional dry friction that is switched on and off. */
@@ -17,6 +19,7 @@
 
 #include "device_cycle.h"
 
+enum { MAX_MEMBERS = 8, MAX_SENSORS = 256 };
 #define WILD 1e6                      /* maximum plausible velocity of a motor [rad/s] */
 
 /* Joint of the model, and its motor: motor angle = ratio (q - zero). */
@@ -30,6 +33,15 @@ typedef struct plant_joint {
     uint8_t placed;
 } plant_joint;
 
+/* Value of a sensor of the model, as a REAL32 in a slot of a device:
+ * scale (value + bias + noise), with Gaussian noise of its own sequence. */
+typedef struct plant_sensor {
+    const double *value;              /* in sensordata */
+    int64_t *slot;                    /* NULL: no device is connected */
+    double scale, bias, noise;        /* noise: standard deviation */
+    uint64_t random;                  /* state of the generator */
+} plant_sensor;
+
 /* First fields of mjLogMessage (MuJoCo 4). */
 typedef struct { int level, topic; char subject[1024]; } mujoco_message;
 enum { MUJOCO_WARNING = 2, MUJOCO_ERROR = 3 };
@@ -41,8 +53,14 @@ typedef struct plant {
     void *data;
     plant_joint *joints;
     int count;
+    plant_sensor sensors[MAX_SENSORS];
+    int sensor_count;
+    uint8_t *freed;                   /* constraint to deactivate before the next step; NULL: none */
+    struct cat_segment *members[MAX_MEMBERS];
+    int member_count;
     int64_t period, due;              /* [ns] */
     int wild;                         /* number, from 1, of the joint that exceeded WILD; 0: none */
+    int apart;                        /* set if the members do not have the same clock */
     int ending;                       /* real time: the thread must end */
     uint64_t steps;
     char words[256];                  /* warning or error message of MuJoCo, which stops the plant */
@@ -57,6 +75,9 @@ static inline int plant_braked(plant_joint *j, int64_t now) {
 }
 
 static void plant_apply(plant *p, int64_t now) {
+    if (p->freed)
+        *p->freed = 0;
+    p->freed = NULL;
     for (int k = 0; k < p->count; k++) {
         plant_joint *j = &p->joints[k];
         *j->force = j->axis ? j->ratio * (j->axis->torque + j->axis->load) : 0;
@@ -69,7 +90,28 @@ static void plant_apply(plant *p, int64_t now) {
     }
 }
 
-/* Update the encoder values, and set `wild` if a motor is too fast. */
+/* Return a uniform random number in (0, 1] (splitmix64, Steele et al., OOPSLA 2014). */
+static inline double sensor_uniform(plant_sensor *n) {
+    uint64_t z = n->random += 0x9E3779B97F4A7C15u;
+    z = (z ^ z >> 30) * 0xBF58476D1CE4E5B9u;
+    z = (z ^ z >> 27) * 0x94D049BB133111EBu;
+    return (double)((z ^ z >> 31) >> 11) * 0x1p-53 + 0x1p-53;
+}
+
+/* Update the slot of a sensor. The noise is a Box-Muller transform of two uniform numbers. */
+static void sensor_show(plant_sensor *n) {
+    double noise = 0;
+    if (n->slot == NULL)
+        return;
+    if (n->noise > 0)
+        noise = n->noise * sqrt(-2 * log(sensor_uniform(n))) * cos(2 * M_PI * sensor_uniform(n));
+    float shown = (float)(n->scale * (*n->value + n->bias + noise));
+    uint32_t bits;
+    memcpy(&bits, &shown, sizeof bits);
+    *n->slot = bits;
+}
+
+/* Update the encoder values and the sensors, and set `wild` if a motor is too fast. */
 static void plant_show(plant *p) {
     for (int k = 0; k < p->count; k++) {
         plant_joint *j = &p->joints[k];
@@ -81,6 +123,8 @@ static void plant_show(plant *p) {
         j->axis->position = j->ratio * (*j->q - j->zero);
         j->axis->velocity = velocity;
     }
+    for (int k = 0; k < p->sensor_count; k++)
+        sensor_show(&p->sensors[k]);
 }
 
 static __thread plant *plant_stepped;  /* the plant that this thread is stepping */
@@ -109,32 +153,9 @@ static void plant_simulate(plant *p) {
     p->set_handler(NULL);
 }
 
-/* Do the step that is due. After a failure, stop the plant and wake the service. In real time, other
- * threads can run while MuJoCo computes, but they do not pass p->due. */
-static void plant_step(cat_segment *s) {
-    plant *p = s->plant;
-    plant_apply(p, s->now);
-    if (!s->is_virtual)
-        pthread_mutex_unlock(&s->mutex);
-    plant_simulate(p);
-    if (!s->is_virtual)
-        pthread_mutex_lock(&s->mutex);
-    p->steps++;
-    plant_show(p);
-    p->due += p->period;
-    if (p->due <= s->now - CATCH_UP_STEPS * p->period)
-        p->due = s->now + p->period;
-    if (!p->wild && !p->words[0])
-        return;
-    p->due = NEVER;
-    s->pending = 1;
-    wake_service(s);
-}
-
-/* Return the time up to which the caller may work. Only the thread that steps the plant may pass the
- * due time of a step. */
-static inline int64_t plant_bound(const cat_segment *s, int64_t until, int steps_plant) {
-    return !s->plant || steps_plant || until < s->plant->due ? until : s->plant->due - 1;
+/* Return the time up to which a segment may work: before the next step of its plant. */
+static inline int64_t plant_bound(const cat_segment *s, int64_t until) {
+    return !s->plant || until < s->plant->due ? until : s->plant->due - 1;
 }
 
 static void plant_hang(plant_joint *j, servo_axis *a) {
@@ -144,8 +165,11 @@ static void plant_hang(plant_joint *j, servo_axis *a) {
     a->velocity = j->ratio * *j->v;
 }
 
-/* Disconnect the motors of a device that is removed. */
+/* Disconnect the motors and sensors of a device that is removed. */
 static void plant_forget(plant *p, const controller *c) {
+    for (int k = 0; p && k < p->sensor_count; k++)
+        if (p->sensors[k].slot >= c->slots && p->sensors[k].slot < c->slots + c->slot_count)
+            p->sensors[k].slot = NULL;
     for (int k = 0; p && k < p->count; k++)
         for (int n = 0; n < c->axis_count; n++)
             if (p->joints[k].axis == &c->axes[n])

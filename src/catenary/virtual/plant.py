@@ -5,25 +5,26 @@
         plant=Plant("arm.xml", [Joint("shoulder", gear=101), Joint("elbow", gear=50)]),
     )
 
-The compiled segment steps the model (`plant.h`). This module connects the motors to the joints.
+The motors can be on several segments: each gets a part of the plant, `Plant.part`. The compiled
+segments step the model (`plant_time.h`).
 """
 
 from __future__ import annotations
 
-import math
-import threading
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
-
-import msgspec
+from typing import TYPE_CHECKING, Protocol
 
 from catenary.errors import ConfigurationError
 from catenary.virtual._plant import CompiledPlant
 from catenary.virtual._segment import Core
 from catenary.virtual.devices.device import Device
+from catenary.virtual.devices.model_sensor import ModelSensor
 from catenary.virtual.devices.servo import Servo
-from catenary.virtual.mujoco_model import read_model
+from catenary.virtual.joint import Joint
+from catenary.virtual.motor_pairs import pair_motors
+from catenary.virtual.mujoco_model import Model
+from catenary.virtual.plant_thread import PlantThread
 
 if TYPE_CHECKING:
     import mujoco
@@ -35,63 +36,19 @@ if TYPE_CHECKING:
 STEP = 250e-6
 SHORTEST_STEP, LONGEST_STEP = 20e-6, 1e-3
 SECOND = 1e9
+LOCKED = 1e5  # friction of a joint whose segment does not exist [N·m]
 
 
-class Joint(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """Joint of the model, and the motor that drives it.
+class Runner(Protocol):
+    """Service of a segment, which the segments of a plant run together in real time."""
 
-    Motor angle [rad] = direction · gear · (joint position - zero).
+    def acquire(self) -> None: ...
 
-    The brake closes `brake_delay` [s] after the drive removes the torque. It opens when the drive
-    enters operation enabled. Without power it is closed.
-
-    Attributes:
-        name: Name of the joint in the model.
-        gear: Gear ratio, motor angle per joint angle. For a slide joint, the unit is [rad/m].
-        direction: 1 or -1.
-        zero: Joint position at which the motor angle is 0 [rad or m].
-        start: Initial position of the joint [rad or m]; None: the position in the model.
-        brake: Holding torque of the brake at the joint [N·m]. 0: no brake. None: the maximum
-            torque of the motor at the joint.
-        brake_delay: Closing time of the brake [s].
-        axis: (position of the servo, axis number); None: the next axis on the line.
-    """
-
-    name: str
-    gear: float = 1.0
-    direction: Literal[1, -1] = 1
-    zero: float = 0.0
-    start: float | None = None
-    brake: float | None = None
-    brake_delay: float = 0.0
-    axis: tuple[int, int] | None = None
-
-    def __post_init__(self) -> None:
-        if not 0 < self.gear < math.inf:
-            raise ValueError(f"joint {self.name!r}: gear must be positive, not {self.gear}")
-        if self.direction not in (1, -1):
-            raise ValueError(
-                f"joint {self.name!r}: direction must be 1 or -1, not {self.direction}"
-            )
-        if not math.isfinite(self.zero) or not math.isfinite(self.start or 0.0):
-            raise ValueError(
-                f"joint {self.name!r}: zero and start must be finite, "
-                f"not {self.zero} and {self.start}"
-            )
-        if self.brake is not None and not 0 <= self.brake < math.inf:
-            raise ValueError(f"joint {self.name!r}: brake must be at least 0 N·m, not {self.brake}")
-        if not 0 <= self.brake_delay <= 10:
-            raise ValueError(
-                f"joint {self.name!r}: brake_delay must be 0 to 10 s, not {self.brake_delay}"
-            )
-
-    @property
-    def ratio(self) -> float:
-        return self.direction * self.gear
+    def release(self) -> None: ...
 
 
 class Plant:
-    """MuJoCo model whose joints are driven by the servos of one segment.
+    """MuJoCo model whose joints are driven by the servos of one segment, or of several.
 
     Args:
         path: Path of an MJCF or URDF file.
@@ -100,10 +57,14 @@ class Plant:
         passive: Names of the joints without a motor.
         step: Time step of the simulation [s].
         contacts: False lets bodies pass through each other.
+        keyframe: Name of the keyframe of the model that is the initial state. The `start` of a
+            joint has priority. None: the default state.
+        held: Name of a body that is held in its initial pose until `release`. It can hang a robot
+            with a free base until its drives are enabled. None: no body.
 
     Raises:
         ConfigurationError: MuJoCo or the file is missing, the model is invalid, bodies overlap at
-            the start, or the joints do not match the model.
+            the start, or the joints, the keyframe or the body do not match the model.
         ValueError: The step is out of range.
     """
 
@@ -115,6 +76,8 @@ class Plant:
         passive: Sequence[str] = (),
         step: float = STEP,
         contacts: bool = True,
+        keyframe: str | None = None,
+        held: str | None = None,
     ) -> None:
         if not SHORTEST_STEP <= step <= LONGEST_STEP:
             raise ValueError(
@@ -122,13 +85,14 @@ class Plant:
                 " a longer step adds dead time to the velocity loops of the drives"
             )
         self.step = step
-        self._model = read_model(path, step=step, contacts=contacts)
+        self._model = Model(path, step=step, contacts=contacts, keyframe=keyframe, held=held)
         self.joints = self._select_joints(joints, passive)
-        self._compiled: CompiledPlant | None = None
-        self._wired: list[tuple[Device, int]] = []  # motor (servo, axis) of each joint
+        self._compiled = self._compile()
         self._pushes: dict[int, npt.NDArray[np.float64]] = {}  # newest of each body
-        self._inertias: list[float] = []  # initial inertia at each motor shaft
-        self._thread: threading.Thread | None = None
+        self._claimed: set[str] = set()  # joints of the segments
+        self._cores: list[Core] = []
+        self._services: list[Runner] = []
+        self._thread = PlantThread(self._compiled, self.check)
 
     def _select_joints(
         self, joints: Sequence[Joint] | None, passive: Sequence[str]
@@ -142,13 +106,33 @@ class Plant:
         self._model.check_start()
         return tuple(joints)
 
+    def _compile(self) -> CompiledPlant:
+        """Return the compiled plant. Its joints are locked, because they have no motors yet."""
+        model = self._model
+        compiled = CompiledPlant(
+            len(self.joints),
+            step=model.function("mj_step"),
+            set_handler=model.function("_mjPRIVATE_setTlsLogHandler"),
+            model=model.model_address,
+            data=model.data_address,
+            period_ns=round(self.step * SECOND),
+            keep=model,
+        )
+        for n, joint in enumerate(self.joints):
+            model.stiffen_friction(joint.name)
+            at, dry = model.addresses(joint.name), model.dry_friction(joint.name)
+            compiled.make_joint(
+                n, **at._asdict(), ratio=joint.ratio, zero=joint.zero, dry=dry, brake=LOCKED
+            )
+        return compiled
+
     @property
     def path(self) -> Path:
         return self._model.path
 
     @property
     def model(self) -> mujoco.MjModel:
-        """MuJoCo model. It includes the motors after the segment has been created."""
+        """MuJoCo model. It includes the motors of the segments that have been created."""
         return self._model.model
 
     @property
@@ -156,113 +140,69 @@ class Plant:
         """MuJoCo state. Read it in virtual time only: in real time, a thread changes it."""
         return self._model.data
 
-    # -- motors and joints ---------------------------------------------------------------------
+    @property
+    def sensors(self) -> tuple[str, ...]:
+        """Names of the sensors of the model."""
+        return self._model.sensors
 
-    def attach(self, core: Core, devices: Sequence[Device]) -> None:
-        """Connect the joints to the servos. Called by the segment when it is created.
+    def part(self, names: Sequence[str] | None = None) -> PlantPart:
+        """Return some of the joints, for a segment: `Segment(devices, plant=plant.part(names))`.
+
+        The segments of a plant are created before the first of them is opened, with the same
+        clock: "monotonic", or the same `realtime.VirtualClock`. A joint whose segment does not
+        exist is locked.
+
+        Args:
+            names: Names of the joints, in the order of the axes of the segment. None: all joints.
+                An empty sequence is for a segment that has only sensors.
+
+        Raises:
+            ConfigurationError: A joint has no motor or is named twice, or `names` is a string.
+        """
+        if isinstance(names, str):
+            raise ConfigurationError(
+                f"names must be a sequence of names, not the string {names!r}; use [{names!r}]"
+            )
+        chosen = [joint.name for joint in self.joints] if names is None else list(names)
+        places = {joint.name: n for n, joint in enumerate(self.joints)}
+        for name in chosen:
+            if name not in places or chosen.count(name) > 1:
+                what = "is named twice" if name in places else "is not a joint with a motor"
+                raise ConfigurationError(
+                    f"{self.path.name}: {name!r} {what}; the joints are {', '.join(places)}"
+                )
+        joints = {places[name]: self.joints[places[name]] for name in chosen}
+        return PlantPart(self, self._model, self._compiled, joints)
+
+    def claim(self, core: Core, joints: Sequence[Joint]) -> None:
+        """Reserve joints for a segment. Called by `PlantPart.attach`.
 
         Args:
             core: The compiled segment.
-            devices: The devices of the segment.
+            joints: Joints that its servos drive.
 
         Raises:
-            ValueError: The plant already belongs to a segment.
-            ConfigurationError: The joints do not match the axes of the servos, or MuJoCo cannot
-                simulate the model.
+            ValueError: A joint already belongs to a segment, the plant already moves, or the
+                segments of the plant do not have the same clock.
         """
-        if self._compiled is not None:
+        name = self.path.name
+        if any(joint.name in self._claimed for joint in joints):
             raise ValueError(
-                f"{self.path.name} already belongs to another segment; make a new Plant"
+                f"{name} already belongs to another segment; make a new Plant, or give each segment"
+                " its joints: Segment(..., plant=plant.part(names))"
             )
-        motors = self._pair_motors(devices)
-        for joint, (servo, _axis) in zip(self.joints, motors, strict=True):
-            self._model.add_motor(
-                joint.name,
-                inertia=servo.inertia * joint.gear**2,
-                viscous=servo.viscous_friction * joint.gear**2,
+        if self.steps > 0 or self._thread.runs:
+            raise ValueError(
+                f"{name} already moves; create all its segments before the first one is opened"
             )
-        self._model.settle()
-        self._inertias = [self._model.inertia(j.name) / j.gear**2 for j in self.joints]
-        compiled = CompiledPlant(
-            core,
-            len(self.joints),
-            step=self._model.function("mj_step"),
-            set_handler=self._model.function("_mjPRIVATE_setTlsLogHandler"),
-            model=self._model.model_address,
-            data=self._model.data_address,
-            period_ns=round(self.step * SECOND),
-            keep=self._model,
-        )
-        for n, (servo, axis) in enumerate(motors):
-            self._make_joint(compiled, n, servo)
-            self._connect_motor(compiled, n, servo, axis)
-        self._wired = [*motors]
-        self._compiled = compiled
-        compiled.begin()
-
-    def _pair_motors(self, devices: Sequence[Device]) -> list[tuple[Servo, int]]:
-        """Return the (servo, axis) that drives each joint."""
-        present = {
-            (position, axis): device
-            for position, device in enumerate(devices)
-            if isinstance(device, Servo)
-            for axis in range(device.axes)
-        }
-        rest = iter(sorted(present.keys() - {joint.axis for joint in self.joints}))
-        places = [joint.axis or next(rest, None) for joint in self.joints]
-        axes = ", ".join(f"({position}, {axis})" for position, axis in present) or "none"
-        for joint, place in zip(self.joints, places, strict=True):
-            if place is None or place not in present:
-                missing = "axis" if place is None else f"axis {place}"
-                raise ConfigurationError(
-                    f"{self.path.name}: no {missing} for joint {joint.name!r}; the axes are {axes}"
-                )
-            if places.count(place) > 1:
-                raise ConfigurationError(f"{self.path.name}: two joints use axis {place}")
-        if any(rest) and not any(joint.axis for joint in self.joints):
-            raise ConfigurationError(
-                f"{self.path.name}: {len(self.joints)} joints have motors, but the segment has"
-                f" {len(present)} axes",
-                hint="if some axes do not drive the model, give each joint its"
-                " axis=(position, axis)",
+        kinds = {(each.is_virtual, each.shares_clock) for each in (*self._cores, core)}
+        if self._cores and kinds not in ({(False, False)}, {(True, True)}):
+            raise ValueError(
+                f"the segments of {name} need one clock; pass the same VirtualClock to all of them,"
+                ' or clock="monotonic"'
             )
-        return [(present[place], place[1]) for place in places if place is not None]
-
-    def _make_joint(self, compiled: CompiledPlant, n: int, servo: Servo) -> None:
-        joint = self.joints[n]
-        most = servo.rated_torque * servo.max_torque_ratio * joint.gear
-        at = self._model.addresses(joint.name)
-        compiled.make_joint(
-            n,
-            q=at.q,
-            v=at.v,
-            force=at.force,
-            friction=at.friction,
-            ratio=joint.ratio,
-            zero=joint.zero,
-            dry=self._model.dry_friction(joint.name) + servo.coulomb_friction * joint.gear,
-            brake=most if joint.brake is None else joint.brake,
-            brake_delay_ns=round(joint.brake_delay * SECOND),
-        )
-
-    def _connect_motor(self, compiled: CompiledPlant, n: int, servo: Servo, axis: int) -> None:
-        """Connect a motor to joint `n`, and tune its loops for the inertia of the joint."""
-        compiled.hang(n, servo.position, axis)
-        servo.tune(self._inertias[n], axis)
-
-    def replaced(self, old: Device, new: Device) -> None:
-        """Connect the joints that `old` drove to the motors of `new`.
-
-        Args:
-            old: The device that was replaced.
-            new: The device in its place.
-        """
-        for n, (device, axis) in enumerate(self._wired):
-            if device is not old:
-                continue
-            self._wired[n] = new, axis
-            if isinstance(new, Servo) and axis < new.axes and self._compiled is not None:
-                self._connect_motor(self._compiled, n, new, axis)
+        self._claimed.update(joint.name for joint in joints)
+        self._cores.append(core)
 
     # -- forces --------------------------------------------------------------------------------
 
@@ -301,15 +241,33 @@ class Plant:
             )
         return names.index(name)
 
+    def release(self) -> None:
+        """Release the body that is held, from the next step on. Any thread may call it.
+
+        A no-op if the body was released before.
+
+        Raises:
+            ValueError: The plant was created without `held`.
+        """
+        if self._model.held is None:
+            raise ValueError(f'{self.path.name}: no body is held; use Plant(..., held="pelvis")')
+        self._compiled.free(self._model.holding_address)
+
     # -- time ----------------------------------------------------------------------------------
 
     def check(self) -> None:
         """Raise ConfigurationError if the simulation has diverged or failed, and thus stopped."""
-        if self._compiled is None or (self._compiled.wild < 0 and not self._compiled.complaint):
+        compiled = self._compiled
+        if compiled.apart:
+            raise ConfigurationError(
+                f"{self.path.name}: the segments of the plant have different clocks",
+                hint="pass the same VirtualClock to all of them: Segment(..., clock=clock)",
+            )
+        if compiled.wild < 0 and not compiled.complaint:
             return
-        what = [f"MuJoCo reports: {self._compiled.complaint}"] if self._compiled.complaint else []
-        if self._compiled.wild >= 0:
-            name = self.joints[self._compiled.wild].name
+        what = [f"MuJoCo reports: {compiled.complaint}"] if compiled.complaint else []
+        if compiled.wild >= 0:
+            name = self.joints[compiled.wild].name
             what.insert(0, f"joint {name!r} exceeded 1e6 rad/s at its motor")
         raise ConfigurationError(
             f"{self.path.name}: the simulation stopped after {self.data.time:.4f} s:"
@@ -322,23 +280,130 @@ class Plant:
     @property
     def steps(self) -> int:
         """Number of steps simulated so far."""
-        return 0 if self._compiled is None else self._compiled.steps
+        return self._compiled.steps
+
+    @property
+    def services(self) -> list[Runner]:
+        """Services of the segments. In real time, they run while one of the segments is open."""
+        return self._services
 
     def start(self) -> None:
-        """Start the thread that steps the plant in real time, without the GIL."""
-        if self._compiled is not None:
-            self._thread = threading.Thread(
-                target=self._run, args=(self._compiled,), name="virtual-plant", daemon=True
-            )
-            self._thread.start()
+        """Start the thread that steps the plant in real time, without the GIL.
 
-    def _run(self, compiled: CompiledPlant) -> None:
-        compiled.run()
-        self.check()  # the thread prints this error and ends; frames are still answered
+        Each call needs a call of `stop`. Only the first one starts the thread.
+        """
+        self._thread.start()
 
     def stop(self) -> None:
-        """Stop the thread and wait for its end. The plant does not move until `start`."""
-        if self._compiled is not None and self._thread is not None:
-            self._compiled.end()
-            self._thread.join()
-            self._thread = None
+        """Stop the thread after the last `stop`, and wait for its end. The plant then stands."""
+        self._thread.stop()
+
+
+class PlantPart:
+    """Joints of a plant for the servos of one segment. `Plant.part` creates it.
+
+    Args:
+        plant: The plant.
+        model: The model of the plant.
+        compiled: The compiled plant.
+        joints: The joints of the part by their number in the plant, in the order of the axes.
+    """
+
+    def __init__(
+        self, plant: Plant, model: Model, compiled: CompiledPlant, joints: Mapping[int, Joint]
+    ) -> None:
+        self.plant = plant
+        self._model = model
+        self._compiled = compiled
+        self._numbers = tuple(joints)
+        self.joints = tuple(joints.values())
+        self._wired: list[tuple[Device, int]] = []  # motor (servo, axis) of each joint
+        self._inertias: list[float] = []  # initial inertia at each motor shaft
+
+    def prepare(self, device: Device) -> None:
+        """Tell a sensor the number of its values, before it is added to the segment.
+
+        Raises:
+            ConfigurationError: The model has no such sensor.
+        """
+        if isinstance(device, ModelSensor):
+            device.measure({name: self._model.sensor(name).size for name in device.sensors})
+
+    def attach(self, core: Core, devices: Sequence[Device]) -> None:
+        """Connect the joints to the servos. Called by the segment when it is created.
+
+        Args:
+            core: The compiled segment.
+            devices: The devices of the segment.
+
+        Raises:
+            ValueError: A joint already belongs to a segment, the plant already moves, or the
+                segments of the plant do not have the same clock.
+            ConfigurationError: The joints do not match the axes of the servos, or MuJoCo cannot
+                simulate the model.
+        """
+        motors = pair_motors(self._model.path.name, self.joints, devices)
+        self.plant.claim(core, self.joints)
+        for joint, (servo, _axis) in zip(self.joints, motors, strict=True):
+            self._model.add_motor(
+                joint.name,
+                inertia=servo.inertia * joint.gear**2,
+                viscous=servo.viscous_friction * joint.gear**2,
+            )
+        self._model.settle()
+        self._inertias = [self._model.inertia(j.name) / j.gear**2 for j in self.joints]
+        for n, (servo, axis) in enumerate(motors):
+            self._make_joint(n, servo)
+            self._connect_motor(n, servo, axis)
+        self._wired = [*motors]
+        for device in devices:
+            self._connect_sensor(device)
+        self._compiled.add_member(core)
+
+    def _make_joint(self, n: int, servo: Servo) -> None:
+        joint = self.joints[n]
+        most = servo.rated_torque * servo.max_torque_ratio * joint.gear
+        self._compiled.make_joint(
+            self._numbers[n],
+            **self._model.addresses(joint.name)._asdict(),
+            ratio=joint.ratio,
+            zero=joint.zero,
+            dry=self._model.dry_friction(joint.name) + servo.coulomb_friction * joint.gear,
+            brake=most if joint.brake is None else joint.brake,
+            brake_delay_ns=round(joint.brake_delay * SECOND),
+        )
+
+    def _connect_motor(self, n: int, servo: Servo, axis: int) -> None:
+        """Connect a motor to joint `n`, and tune its loops for the inertia of the joint."""
+        self._compiled.hang(self._numbers[n], servo.core, servo.position, axis)
+        servo.tune(self._inertias[n], axis)
+
+    def _connect_sensor(self, device: Device) -> None:
+        if not isinstance(device, ModelSensor):
+            return
+        for slot, (name, offset, seed) in enumerate(device.values()):
+            self._compiled.show(
+                self._model.sensor(name).address + 8 * offset,
+                device.core,
+                device.position,
+                slot,
+                scale=device.scale.get(name, 1.0),
+                bias=device.bias.get(name, 0.0),
+                noise=device.noise.get(name, 0.0),
+                seed=seed,
+            )
+
+    def replaced(self, old: Device, new: Device) -> None:
+        """Connect the joints that `old` drove to the motors of `new`, or its sensors.
+
+        Args:
+            old: The device that was replaced.
+            new: The device in its place.
+        """
+        for n, (device, axis) in enumerate(self._wired):
+            if device is not old:
+                continue
+            self._wired[n] = new, axis
+            if isinstance(new, Servo) and axis < new.axes:
+                self._connect_motor(n, new, axis)
+        self._connect_sensor(new)

@@ -15,8 +15,8 @@ from catenary.virtual.devices.digital_outputs import DigitalOutputs
 from catenary.virtual.devices.servo import Servo
 from catenary.virtual.fault_player import FaultEvent, FaultPlayer, Loss
 from catenary.virtual.faults import Fault
-from catenary.virtual.plant import Plant
-from catenary.virtual.service import Service, ServiceThread
+from catenary.virtual.plant import Plant, PlantPart
+from catenary.virtual.service import Service
 from catenary.virtual.wiring import Place, Wiring
 
 SECOND = 1e9
@@ -74,7 +74,8 @@ class Segment:
             A `realtime.VirtualClock`, or a participant of it (`clock.participate()`): virtual time
             that is shared with tasks. The loop on this segment then runs as this participant, and
             in its thread.
-        plant: Simulated mechanism that the motors of the servos drive.
+        plant: Simulated mechanism that the motors of the servos drive, or a part of it
+            (`Plant.part`) if the motors of other segments drive it too.
         faults: Faults to inject. Their times are on the segment's clock (`time`).
         behind: Mapping from a device to the (device, port) that it is connected to. The default is
             port 1 of the previous device.
@@ -93,7 +94,7 @@ class Segment:
         devices: Sequence[Device],
         *,
         clock: ClockKind | SharedClock = "virtual",
-        plant: Plant | None = None,
+        plant: Plant | PlantPart | None = None,
         faults: Sequence[Fault] = (),
         behind: Mapping[int, Place] | None = None,
         ring: bool = False,
@@ -113,18 +114,18 @@ class Segment:
             self._wires.lay_cable(number, cable.up, cable.down)
         if isinstance(clock, SharedClock):
             self._core.use_clock(clock)
-        self.plant = plant
-        self._service = Service(self._core, self._devices, plant)
+        part = plant.part() if isinstance(plant, Plant) else plant
+        self.plant = None if part is None else part.plant
+        self._service = Service(self._core, self._devices, part)
         self._faults = FaultPlayer(
             self._core,
             self._wires,
             self._devices,
             wiring,
             self._service.agenda,
-            None if plant is None else plant.replaced,
+            part,
         )
         self._service.at_first_frame(self._faults.start)
-        self._thread: ServiceThread | None = None
         self._links: dict[bool, SegmentLink] = {}
         for fault in faults:
             self.inject(fault)
@@ -195,8 +196,7 @@ class Segment:
         name = "virtual, second end" if second else "virtual"
         link = SegmentLink(self._core, name, lambda: self._link_closed(second), second=second)
         if self.clock == "monotonic" and not self._links:
-            self._thread = ServiceThread(self._service)
-            self._thread.start()
+            self._service.start()
         self._links[second] = link
         if second:
             self._wires.raise_end(1, True)
@@ -206,9 +206,8 @@ class Segment:
         del self._links[second]
         if second:
             self._wires.raise_end(1, False)
-        if self._thread is not None and not self._links:
-            self._thread.stop()
-            self._thread = None
+        if self.clock == "monotonic" and not self._links:
+            self._service.stop()
 
     # -- faults --------------------------------------------------------------------------------
 

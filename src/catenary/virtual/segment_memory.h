@@ -144,7 +144,6 @@ static void segment_free(cat_segment *s) {
         free(s->routes[n].times);
         free(s->ends[n].queue);
     }
-    plant_free(s->plant);
     free(s->cables);
     free(s->dues);
     free(s->controllers);

@@ -10,14 +10,15 @@ import signal
 import socket
 import struct
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import ExitStack, contextmanager
 from types import FrameType
+from typing import NamedTuple
 
 from catenary.errors import LinkError
 from catenary.interpreter import permission_advice
 from catenary.virtual.fault_player import FaultEvent
 from catenary.virtual.segment import Segment
-from catenary.virtual.service import ServiceThread
 
 ETHERCAT = 0x88A4
 SOL_PACKET, PACKET_IGNORE_OUTGOING, PACKET_QDISC_BYPASS = 263, 23, 20
@@ -132,7 +133,7 @@ class Server:
         self._socket = _open_socket(interface)
         self._second = None if second is None else self._open_second(second)
         self._stop = os.eventfd(0, os.EFD_CLOEXEC)
-        self._service = ServiceThread(segment.service)
+        self._service = segment.service
         self._thread = threading.Thread(target=self._run, name="virtual-packets", daemon=True)
         self._started = threading.Event()
         self._ended = threading.Event()
@@ -231,6 +232,20 @@ def die_with_parent() -> None:
         raise OSError(ctypes.get_errno(), "prctl(PR_SET_PDEATHSIG) failed")
 
 
+class Served(NamedTuple):
+    """Segment and the interfaces that serve it.
+
+    Attributes:
+        segment: The segment, with clock="monotonic".
+        interface: The network interface.
+        second: The interface at the other end of a ring; None: a line.
+    """
+
+    segment: Segment
+    interface: str
+    second: str | None = None
+
+
 def serve(
     segment: Segment,
     interface: str,
@@ -260,9 +275,57 @@ def serve(
         ConfigurationError: The simulation of the plant stopped.
         ValueError: An option does not fit the segment or is out of range.
     """
+    serve_all(
+        [Served(segment, interface, second)],
+        priority=priority,
+        max_age=max_age,
+        with_parent=with_parent,
+        ready=ready,
+        on_fault=on_fault,
+    )
+
+
+def serve_all(
+    served: Sequence[Served],
+    *,
+    priority: int | None = None,
+    max_age: float | None = MAX_AGE,
+    with_parent: bool = False,
+    ready: Callable[[], None] | None = None,
+    on_fault: Callable[[FaultEvent], None] | None = None,
+) -> None:
+    """Serve several segments in this process, for example those of one plant. See `serve`.
+
+    Args:
+        served: The segments and their interfaces.
+        priority: See `Server`.
+        max_age: See `Server`.
+        with_parent: True also ends the servers when the parent process ends.
+        ready: Function to call once when all servers answer frames.
+        on_fault: Function to call with each entry of the fault logs.
+
+    Raises:
+        LinkError: See `serve`.
+        ConfigurationError: The simulation of a plant stopped.
+        ValueError: An option does not fit a segment or is out of range.
+    """
     if with_parent:
         die_with_parent()
-    server = Server(segment, interface, second=second, priority=priority, max_age=max_age)
+    servers: list[Server] = []
+    with _stop_signals() as stop_requested, ExitStack() as stack:
+        for segment, interface, second in served:
+            server = Server(segment, interface, second=second, priority=priority, max_age=max_age)
+            servers.append(stack.enter_context(server))
+        if ready is not None:
+            ready()
+        _watch(servers, stop_requested, on_fault)
+    for server in servers:
+        server.raise_failure()
+
+
+@contextmanager
+def _stop_signals() -> Iterator[threading.Event]:
+    """Yield an event that SIGINT and SIGTERM set."""
     stop_requested = threading.Event()
 
     def end(_signal: int, _frame: FrameType | None) -> None:
@@ -270,18 +333,24 @@ def serve(
 
     before = {number: signal.signal(number, end) for number in (signal.SIGINT, signal.SIGTERM)}
     try:
-        with server:
-            if ready is not None:
-                ready()
-            reported = 0
-            while not stop_requested.wait(0.2) and not server.wait(0):
-                server.raise_failure()
-                if on_fault is not None:
-                    news = segment.fault_log[reported:]
-                    reported += len(news)
-                    for event in news:
-                        on_fault(event)
-        server.raise_failure()
+        yield stop_requested
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)
+
+
+def _watch(
+    servers: Sequence[Server],
+    stop_requested: threading.Event,
+    on_fault: Callable[[FaultEvent], None] | None,
+) -> None:
+    """Report faults until a stop is requested or a packet loop ends. Raise failures."""
+    reported = [0] * len(servers)
+    while not stop_requested.wait(0.2) and not any(server.wait(0) for server in servers):
+        for n, server in enumerate(servers):
+            server.raise_failure()
+            news = server.segment.fault_log[reported[n] :]
+            reported[n] += len(news)
+            if on_fault is not None:
+                for event in news:
+                    on_fault(event)

@@ -14,7 +14,7 @@ from collections.abc import Callable, Sequence
 
 from catenary.virtual._segment import EVENT_RESET, Core
 from catenary.virtual.devices.device import Device
-from catenary.virtual.plant import Plant
+from catenary.virtual.plant import PlantPart, Runner
 from catenary.virtual.scheduler import FOREVER, Agenda
 
 STOP_SIGNALS = {signal.SIGINT, signal.SIGTERM}
@@ -25,16 +25,23 @@ IDLE_SECONDS = 0.02  # maximum interval between steps of device models without f
 class Service:
     """Application side of a segment: its agenda, and the dispatch of events to its devices."""
 
-    def __init__(self, core: Core, devices: Sequence[Device], plant: Plant | None = None) -> None:
+    def __init__(
+        self, core: Core, devices: Sequence[Device], part: PlantPart | None = None
+    ) -> None:
         self.core = core
-        self.plant = plant
+        self.plant = None if part is None else part.plant
         self.agenda = Agenda(core)
         self._devices = devices
         self._at_first_frame: Callable[[], None] | None = None
+        self._thread: ServiceThread | None = None
+        self._users = 0  # number of calls of `acquire` without `release`
         for position, device in enumerate(devices):
+            if part is not None:
+                part.prepare(device)
             device.attach(core, position, self.agenda)
-        if plant is not None:
-            plant.attach(core, devices)
+        if part is not None:
+            part.attach(core, devices)
+            part.plant.services.append(self)
         core.use_service(self.run)
 
     def at_first_frame(self, action: Callable[[], None]) -> None:
@@ -71,6 +78,50 @@ class Service:
             if not events:
                 return
 
+    # -- real time -----------------------------------------------------------------------------
+
+    def start(self) -> None:
+        """Run the service in a thread, together with its plant.
+
+        The segments of a plant run together, because its devices continue without a link. Each call
+        needs a call of `stop`.
+        """
+        for service in self._together():
+            service.acquire()
+        if self.plant is not None:
+            self.plant.start()
+
+    def stop(self) -> None:
+        """End the thread, unless another segment of the plant needs it.
+
+        The plant ends first, because its thread wakes the services.
+        """
+        if self.plant is not None:
+            self.plant.stop()
+        for service in self._together():
+            service.release()
+
+    def _together(self) -> Sequence[Runner]:
+        return [self] if self.plant is None else self.plant.services
+
+    def acquire(self) -> None:
+        """Start the thread of this service at the first call."""
+        self._users += 1
+        if self._users == 1:
+            self._thread = ServiceThread(self)
+            self._thread.start()
+
+    def release(self) -> None:
+        """End the thread of this service at the last call."""
+        self._users -= 1
+        if self._users == 0 and self._thread is not None:
+            self._thread.stop()
+
+    @property
+    def failure(self) -> BaseException | None:
+        """Exception that ended the last thread; None if there is none."""
+        return None if self._thread is None else self._thread.failure
+
 
 class ServiceThread:
     """Thread that runs a service in real time."""
@@ -85,8 +136,6 @@ class ServiceThread:
     def start(self) -> None:
         self._service.core.wake_by(self._event)
         self._thread.start()
-        if self._service.plant is not None:
-            self._service.plant.start()
 
     def _run(self) -> None:
         try:
@@ -126,7 +175,5 @@ class ServiceThread:
         self._stopping = True
         os.eventfd_write(self._event, 1)
         self._thread.join()
-        if self._service.plant is not None:
-            self._service.plant.stop()
         self._service.core.wake_by(-1)
         os.close(self._event)

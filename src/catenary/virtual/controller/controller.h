@@ -287,6 +287,7 @@ typedef struct cat_segment {
     loss losses[LOSS_LOG];
     uint64_t loss_count;
     segment_end ends[2];
+    int failed;                      /* -errno of a service that ran during the time of another segment */
     int (*service)(void *owner);      /* virtual time: run the service with the GIL; 0 or -errno */
     void *owner;
 } cat_segment;

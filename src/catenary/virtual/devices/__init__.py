@@ -6,6 +6,7 @@ from catenary.virtual.devices.device import Device
 from catenary.virtual.devices.digital_inputs import DigitalInputs
 from catenary.virtual.devices.digital_outputs import DigitalOutputs
 from catenary.virtual.devices.junction import Junction
+from catenary.virtual.devices.model_sensor import ModelSensor
 from catenary.virtual.devices.servo import Servo
 
 __all__ = [
@@ -15,5 +16,6 @@ __all__ = [
     "DigitalInputs",
     "DigitalOutputs",
     "Junction",
+    "ModelSensor",
     "Servo",
 ]
