@@ -238,5 +238,12 @@ class BusyError(ShareError):
         self.retry = retry
 
 
+class RequestRefused(ShareError):
+    """A request for an operating mode or a preset that the program of a share refused.
+
+    The message is the reason of the program.
+    """
+
+
 class RecordingError(CatenaryError):
     """A recording that cannot be written or read."""

@@ -6,8 +6,10 @@
 #include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
+#include <time.h>
 #include "packet_ring.h"
 #include "pointer_handover.h"
+#include "trigger.h"
 #include "triple_buffer.h"
 
 #define WORDS 100
@@ -168,6 +170,50 @@ void hammer_pointer(uint64_t count, int requests, uint64_t *wrong, uint64_t *bac
     *backward = w.backward;
 }
 
+/* Triggers: the sender sends as soon as the receiver has processed the previous one, while the
+ * receiver is about to sleep. A lost wake-up lasts until the deadline. */
+#define TRIGGER_NS 500000000LL
+
+typedef struct {
+    cat_trigger trigger;
+    uint64_t processed;
+    uint64_t count;
+} trigger_work;
+
+static int64_t monotonic(void) {
+    struct timespec t;
+    clock_gettime(CLOCK_MONOTONIC, &t);
+    return t.tv_sec * 1000000000LL + t.tv_nsec;
+}
+
+static void *send_triggers(void *argument) {
+    trigger_work *w = argument;
+    for (uint64_t n = 1; n <= w->count; n++) {
+        cat_trigger_send(&w->trigger, (int64_t)n, 1000);
+        while (cat_load_acquire64(&w->processed) < n) sched_yield();
+    }
+    return 0;
+}
+
+/* Return the number of triggers that were not received in time, or with a wrong cycle start. */
+uint64_t hammer_trigger(uint64_t count) {
+    static trigger_work w;
+    pthread_t sender;
+    uint64_t wrong = 0;
+    memset(&w, 0, sizeof w);
+    w.count = count;
+    pthread_create(&sender, 0, send_triggers, &w);
+    for (uint32_t n = 0; n < count; n++) {
+        int rc = cat_trigger_wait(&w.trigger, n, 0, monotonic() + TRIGGER_NS);
+        while (rc == -EINTR) rc = cat_trigger_wait(&w.trigger, n, 0, monotonic() + TRIGGER_NS);
+        if (rc != 1 || cat_load_relaxed64(&w.trigger.scheduled) != n + 1) wrong++;
+        while (cat_load_acquire32(&w.trigger.tick) == n) sched_yield();
+        cat_store_release64(&w.processed, n + 1);
+    }
+    pthread_join(sender, 0);
+    return wrong;
+}
+
 #ifdef HAMMER_MAIN
 #include <stdio.h>
 #include "law.h"
@@ -295,6 +341,7 @@ int main(void) {
     failures += report("pointer (stream)", first + second);
     hammer_pointer(200000, 1, &first, &second);
     failures += report("pointer (law)", first + second);
+    failures += report("trigger", hammer_trigger(50000));
     failures += report("rows of a share", hammer_rows(200000));
     failures += report("law monitors", hammer_laws());
     return failures ? 1 : 0;

@@ -1,6 +1,7 @@
 """Laws in a loop: compiled and as Python, arguments, refusals and failures."""
 
 import math
+import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any
@@ -51,6 +52,22 @@ def count(actual, target, memory, time, parameters, enabled, dt, ok, n):
     memory[3] = ok
     memory[4] = n
     return memory[0] > 100.0
+
+
+@cat.law
+def returns_in_one_branch(memory):
+    memory[0] += 1.0
+    if memory[0] > 20.0:
+        return True
+
+
+def test_a_law_without_a_return_continues(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Numba's result is then optional. Its conversion must not raise in the cycle thread."""
+    raised: list[Any] = []
+    monkeypatch.setattr(sys, "unraisablehook", raised.append)
+    with opened() as (_, loop):
+        assert loop.run(returns_in_one_branch, memory=[0.0]).tolist() == [21.0]
+    assert raised == []
 
 
 @pytest.mark.parametrize("run", ["threaded", "inline"])

@@ -39,8 +39,8 @@ def names(options: type) -> set[str]:
         (schema.ClocksTable, names(ClockOptions), set(), set()),
         (schema.ClockTable, names(DistributedClock), set(), set()),
         (schema.HomingTable, names(HomingMethod), set(), set()),
-        # laws and sinks are objects of a program; clocks has a table at the top
-        (schema.LoopTable, parameters(Loop), set(), {"laws", "sink", "clocks"}),
+        # laws, sinks and triggers are objects of a program; clocks has a table at the top
+        (schema.LoopTable, parameters(Loop), set(), {"laws", "sink", "trigger", "clocks"}),
         # start-up objects and modules stand at the device; a clock is called dc in Python
         (schema.DrivesTable, parameters(Drives), {"axes", "clock"}, {"dc", "start_up", "modules"}),
         (

@@ -164,6 +164,17 @@ class ExternalClockChanged(Event):
 
 
 @dataclass(frozen=True, slots=True)
+class TriggerChanged(Event):
+    """Change between cycle starts that follow the trigger of another process and those that do not.
+
+    `sub` is None.
+    """
+
+    following: bool
+    missed: int  # number of cycles so far that began without a trigger
+
+
+@dataclass(frozen=True, slots=True)
 class AxisStopped(Event):
     """Stop of an axis by the core, without a request from the application."""
 

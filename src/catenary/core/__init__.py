@@ -52,6 +52,7 @@ from catenary.core._law import (
     Law,
 )
 from catenary.core._stream import Stream
+from catenary.core._trigger import TRIGGER_SIZE, TriggerBlock
 
 __all__ = [
     "AXIS_DROPPED",
@@ -87,6 +88,7 @@ __all__ = [
     "REQUEST_ENABLED",
     "REQUEST_QUICK_STOP",
     "REQUEST_RESET",
+    "TRIGGER_SIZE",
     "Clock",
     "Cycle",
     "Engine",
@@ -94,6 +96,7 @@ __all__ = [
     "Law",
     "PhaseController",
     "Stream",
+    "TriggerBlock",
     "controlword_towards",
     "state_of",
 ]

@@ -9,6 +9,7 @@ from catenary.core._acyclic_queue cimport acyclic_queue_t
 from catenary.core._law cimport law_t
 from catenary.core._native cimport cat_image, cat_law_monitor, cat_link, cat_pointer, cat_sink
 from catenary.core._stream cimport stream_t
+from catenary.core._trigger cimport trigger_t
 
 cdef enum:
     THREADED = 0
@@ -68,6 +69,7 @@ cdef struct cycle_t:
     cat_pointer law_request    # law_t to start; CAT_POINTER_NONE: stop. `law` is the claimed one
     cat_pointer stream         # stream_t; none: the application or the law sets the set-points
     const cat_sink *sink       # NULL: none
+    trigger_t trigger          # cycles that start with those of another process
     int execution
     bint patient               # several engines in one thread: a cycle may begin at any time in its period
     int64_t period

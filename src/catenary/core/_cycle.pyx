@@ -20,7 +20,8 @@ that begins late is sent if its frames can return before the next cycle start (`
 law, they must return before the law's reserve begins. Otherwise the cycle is skipped and counted.
 Cycles are never sent in bursts to catch up. Inline, a body that ends after the next cycle start
 skips that cycle, because its frames cannot return in time. With clocks, frames that leave later
-than the margin before SYNC0 are sent and counted (`missed_sync`).
+than the margin before SYNC0 are sent and counted (`missed_sync`). Another process can start the
+cycles (_trigger.pyx). Its cycle start is then that of the cycle.
 
 Phases, from → to:
     period          last wake-up → wake-up
@@ -97,8 +98,10 @@ from catenary.core._native cimport (
     cat_pointer_is_offered,
     cat_pointer_release,
     cat_pointer_take,
+    cat_trigger_send,
 )
 from catenary.core._stream cimport stream_t, stream_take
+from catenary.core._trigger cimport trigger_await, trigger_seek
 
 CYCLE_OK = OK
 CYCLE_LATE = LATE
@@ -210,8 +213,25 @@ cdef int cycle_wait(cycle_t *c) noexcept nogil:
     cdef int64_t present
     cdef int rc
     skip_missed(c, now(c))
+    if c.trigger.awaits != NULL and not c.trigger.following:
+        c.next += trigger_seek(&c.trigger, c.next, c.period, now(c))
     cycle_await_acyclic(c, c.next - c.busy_wait)
-    rc = c.link.wait_until(c.link.self, c.next - c.busy_wait, 0)
+    rc = wait_for_trigger(c) if c.trigger.following else wait_for_time(c)
+    if rc < 0:
+        return rc
+    present = now(c)
+    if skip_missed(c, present):
+        return -EINTR
+    if c.trigger.awaits != NULL and not c.trigger.following:
+        c.trigger.missed += 1
+    begin(c, present)
+    return 0
+
+
+cdef int wait_for_time(cycle_t *c) noexcept nogil:
+    """Wait until the next cycle start. Return 0 or -errno."""
+    cdef int64_t present
+    cdef int rc = c.link.wait_until(c.link.self, c.next - c.busy_wait, 0)
     if rc < 0:
         return rc
     present = now(c)
@@ -219,9 +239,24 @@ cdef int cycle_wait(cycle_t *c) noexcept nogil:
         return -EINTR
     while present < c.next:  # at most busy_wait
         present = now(c)
-    if skip_missed(c, present):
-        return -EINTR
-    begin(c, present)
+    return 0
+
+
+cdef int wait_for_trigger(cycle_t *c) noexcept nogil:
+    """Wait until the sender begins its next cycle, whose start becomes the next cycle start. Return
+    0, also after the deadline, or -errno."""
+    cdef int64_t start, missed
+    cdef int rc = 0
+    if c.busy_wait > 0:
+        rc = c.link.wait_until(c.link.self, c.next - c.busy_wait, 0)
+    if rc >= 0:
+        rc = trigger_await(&c.trigger, c.link, c.next, c.period, c.busy_wait, &start)
+    if rc <= 0:
+        return rc
+    missed = (start - c.next + c.period // 2) // c.period
+    c.skipped += <uint32_t>missed
+    c.late += <uint64_t>missed
+    c.next = start
     return 0
 
 
@@ -357,6 +392,8 @@ cdef void send(cycle_t *c) noexcept nogil:
     if c.clock != NULL and c.begun > 0 and c.sent - c.scheduled > c.sync_margin:
         c.missed_sync += 1
     record.output_delay_ns = short_ns(c.sent - c.scheduled)
+    if c.trigger.sends != NULL:
+        cat_trigger_send(c.trigger.sends, c.scheduled, c.period)
 
 
 cdef bint take_streamed(cycle_t *c, target_t *target, bint fresh, uint64_t number) noexcept nogil:
@@ -563,6 +600,7 @@ cdef void cycle_start(cycle_t *c, int64_t origin) noexcept nogil:
     c.computed = 0
     c.outstanding = 0
     c.kept = 0
+    c.trigger.following = False
     c.monitor.guard.known = 0  # the cycle may run in another thread now
     clear_next_record(c)
 
@@ -594,7 +632,7 @@ cdef void cycle_native(cycle_t *c) noexcept nogil:
     cdef target_t *committed = handover_latch(c.handover, &fresh)
     cdef target_t *target = committed
     cdef actual_t *actual = &c.handover.actual[c.handover.actual_triple.back]
-    cdef int64_t reserve = c.law_reserve if c.law != NULL else 0
+    cdef int64_t reserve = c.law_reserve if c.law != NULL and not c.patient else 0
     cdef int64_t published
     if c.outstanding:  # left by an inline cycle
         c.image.collect(c.image.self, 0)

@@ -11,6 +11,7 @@ from catenary.core._law cimport Law
 from catenary.core._native cimport cat_image, cat_link, cat_sink
 from catenary.core._stream cimport Stream
 from catenary.core._thread cimport cat_scheduling, thread_t
+from catenary.core._trigger cimport TriggerBlock
 
 cdef struct engine_t:
     cycle_t cycle
@@ -48,6 +49,7 @@ cdef class Engine:
     cdef uint64_t writing_since  # number of the cycle that this thread sees
     cdef bint emitted          # inline: the frames of this cycle were sent
     cdef object sink           # keeps the sink's capsule alive
+    cdef TriggerBlock trigger  # memory shared with a loop in another process; None: none
     cdef int64_t left          # time at which `next` returned [ns]; -1: no application since then
     cdef int64_t input_age     # age of the inputs at that time [ns]
     cdef int64_t zero          # cycle start of the first iteration, on the link's clock; 0: none yet

@@ -3,6 +3,7 @@
 from catenary.core._clocks import Clock
 from catenary.core._law import Law
 from catenary.core._stream import Stream
+from catenary.core._trigger import TriggerBlock
 
 class Engine:
     """Owner of one cyclic exchange: frames, buffers, acyclic queue, histograms, native thread.
@@ -243,6 +244,7 @@ class Engine:
         - cycles; lost: cycles that were not ok; late: skipped cycles; uncommitted: cycles without
           new targets; underrun: cycles that found the stream empty.
         - missed_sync: cycles whose frames left later than the margin before SYNC0.
+        - missed_triggers: cycles that began without the trigger of another process.
         - page_faults: page faults of the native thread, in runs that have ended.
         - stale, alien, corrupt, duplicate, repeated, unprocessed: frames that were received but not
           used (core/_frames.pxd).
@@ -393,6 +395,22 @@ class Engine:
             OSError: The link has failed.
             RuntimeError: The engine is not running, or no law runs.
         """
+
+    def set_trigger(self, block: TriggerBlock, sends: bool) -> None:
+        """Start the cycles of other processes, or start cycles with those of another process.
+
+        Args:
+            block: Shared memory of the trigger.
+            sends: True: each cycle of this engine starts a cycle of the receivers.
+
+        Raises:
+            RuntimeError: The engine is running.
+            ValueError: The cycle runs inline or in virtual time.
+        """
+
+    @property
+    def following(self) -> bool:
+        """True if the sender of the trigger starts the cycles of this engine."""
 
     def set_stream(self, stream: Stream | None) -> None:
         """Use one row of a stream per cycle as set-points.

@@ -90,6 +90,7 @@ from catenary.core._native cimport (
 )
 from catenary.core._motion cimport motion_attach
 from catenary.core._stream cimport Stream
+from catenary.core._trigger cimport TriggerBlock
 from catenary.core._thread cimport (
     cat_scheduling,
     scheduling_restore,
@@ -868,6 +869,19 @@ cdef class Engine:
                       (<uint64_t *><const char *>seed)[0])
         return 0
 
+    def set_trigger(self, TriggerBlock block not None, bint sends):
+        if self.running:
+            raise RuntimeError("the engine is running: stop it before you set a trigger")
+        if not self.native:
+            raise ValueError("a trigger needs a native thread: a threaded cycle in real time")
+        self.trigger = block
+        self.e.cycle.trigger.sends = block.c if sends else NULL
+        self.e.cycle.trigger.awaits = NULL if sends else block.c
+
+    @property
+    def following(self):
+        return bool(self.e.cycle.trigger.following)
+
     @property
     def stopper(self):
         if self.axes.c.motion.words == NULL:
@@ -907,6 +921,7 @@ cdef class Engine:
             "uncommitted": self.e.cycle.uncommitted,
             "underrun": self.e.cycle.underruns,
             "missed_sync": self.e.cycle.missed_sync,
+            "missed_triggers": self.e.cycle.trigger.missed,
             "page_faults": self.e.thread.page_faults,
             "stale": 0,
             "alien": 0,

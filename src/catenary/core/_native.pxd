@@ -176,6 +176,18 @@ cdef extern from "sink.h" nogil:
         uint32_t jog
 
 
+cdef extern from "trigger.h" nogil:
+    const uint32_t CAT_TRIGGER_SIZE
+
+    ctypedef struct cat_trigger:
+        uint32_t tick
+        uint64_t scheduled
+        uint64_t period
+
+    void cat_trigger_send(cat_trigger *t, int64_t scheduled, int64_t period)
+    int cat_trigger_wait(cat_trigger *t, uint32_t seen, int64_t awake, int64_t deadline)
+
+
 cdef extern from "law.h" nogil:
     const int CAT_LAW_GOES_ON
     const int CAT_LAW_FINISHED

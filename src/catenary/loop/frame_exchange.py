@@ -90,6 +90,8 @@ class FrameExchange:
         watches = [self.watch.run(), self.errors.run(), self.frames.run()]
         if session.external is not None:
             watches.append(session.external.run())
+        if session.trigger is not None:
+            watches.append(session.trigger.run())
         return [session.service.runner.submit(watch) for watch in watches]
 
     def query_silence(self, suspects: Sequence[int]) -> Evidence:

@@ -21,13 +21,14 @@ from catenary.log import Log
 from catenary.loop.background import Background, program_ends
 from catenary.loop.clocks import Clocks
 from catenary.loop.devices import LoopRequest
-from catenary.loop.laws.law import Law, LawFunction
+from catenary.loop.laws.law import Law, LawFunction, Laws
 from catenary.loop.laws.law import law as made_law
 from catenary.loop.laws.run import LawRun, Numbers
 from catenary.loop.moves import Awaited, require_move, wait_for_move
-from catenary.loop.network import ENDING, TROUBLE, Network, Settings, leave_method
+from catenary.loop.network import TROUBLE, Network, Settings, leave_method
 from catenary.loop.networks import (
     NetworksIteration,
+    chosen_network,
     leave_all,
     make_networks,
     share_time,
@@ -41,6 +42,7 @@ from catenary.loop.watches.external_clock import ExternalClockWatch
 from catenary.plan.cycle import ExecutionMode
 from catenary.plan.planner import Plan
 from catenary.plan.sink import Sink
+from catenary.plan.trigger import Trigger
 from catenary.wire.al import AlState
 
 LEAVE_TIMEOUT = 60.0  # [s] to wait for another thread that leaves the loop
@@ -70,12 +72,15 @@ class Loop:
             for several networks the last CPUs, if there are more CPUs than networks.
         priority: SCHED_FIFO priority of the native thread; None: that of the process.
         log: Number of cycles in the log and in the log of an error.
-        laws: Laws to compile on entry, before OP. Other laws are compiled when they are started.
+        laws: Laws to compile on entry, before OP; with several networks for each of them, or one
+            list of laws for each network. Other laws are compiled when they are started.
         sink: Receiver of every cycle, for example a `Share` for other processes, or one for each
             network.
         stop: Conditions that stop axes or end the loop.
         scheduling: Options for sleeping and for receiving frames: see `Scheduling`.
         clocks: Synchronisation of the distributed clocks.
+        trigger: `TriggerSender` or `TriggerReceiver` of `cat.share`: start the cycles of loops in
+            other processes with those of this loop, or the reverse (docs/how_to/networks.md).
         log_axes: True to also log the values of every axis (docs/how_to/recording.md).
 
     Raises:
@@ -94,11 +99,12 @@ class Loop:
         cpu: int | Sequence[int] | None = None,
         priority: int | None = 80,
         log: int = 1000,
-        laws: Sequence[Law | LawFunction] = (),
+        laws: Laws = (),
         sink: Sink | Sequence[Sink] | None = None,
         stop: StopPolicy = StopPolicy(),
         scheduling: Scheduling = Scheduling(),
         clocks: ClockOptions = ClockOptions(),
+        trigger: Trigger | None = None,
         log_axes: bool = False,
     ) -> None:
         settings = Settings(
@@ -108,12 +114,12 @@ class Loop:
             priority=priority,
             log=log,
             log_axes=log_axes,
-            laws=[made_law(law) for law in laws],
             stop=stop,
             scheduling=scheduling,
             clocks=clocks,
+            trigger=trigger,
         )
-        self._networks = make_networks(requests, settings, cpu, sink)
+        self._networks = make_networks(requests, settings, cpu, sink, laws)
         self._quorum = checked_quorum(scheduling.quorum, len(self._networks))
         self._enable = enable
         leaving = (Loop.close, Loop.__exit__, Loop._leave, leave_open_loop)
@@ -305,10 +311,12 @@ class Loop:
         *,
         budget: float | None = None,
         overruns: int = 3,
+        network: int | None = None,
     ) -> LawRun:
         """Start a compiled law. From the next cycle on, it computes the set-points.
 
-        It runs in the cycle thread. You can iterate the loop at the same time, to monitor it.
+        It runs in the cycle thread. You can iterate the loop at the same time, to monitor it. Each
+        network runs one law at a time. Your program sets the targets of the other networks.
 
         Args:
             law: Function or `Law`. It starts from the commanded set-points.
@@ -317,6 +325,8 @@ class Loop:
             budget: Longest time of one step [s]; None: 0.4 periods; 0: no check. The frames need
                 the remainder of the period.
             overruns: Number of consecutive steps over the budget that end the law.
+            network: Number of the network, in the order of `networks`. Required if there are
+                several.
 
         Returns:
             Handle of the running law.
@@ -324,11 +334,12 @@ class Loop:
         Raises:
             LawError: The law cannot be compiled, or does not return. The iteration raises it for an
                 exception, a NaN or infinite target, overruns, and a step that does not return.
-            ValueError: An argument is impossible, the budget leaves too little of the period for
-                the frames, or the loop has several networks.
-            RuntimeError: The loop is not open, or an axis is in a move.
+            ValueError: An argument is impossible, or the budget leaves too little of the period for
+                the frames.
+            RuntimeError: The loop is not open, or an axis of the network is in a move.
         """
-        return self._only("a law").laws.start(made_law(law), memory, parameters, budget, overruns)
+        laws = self._network("a law", network).session.laws
+        return laws.start(made_law(law), memory, parameters, budget, overruns)
 
     def run(
         self,
@@ -339,8 +350,11 @@ class Loop:
         budget: float | None = None,
         overruns: int = 3,
         compiled: bool = True,
+        network: int | None = None,
     ) -> Numbers:
         """Run a law to its end and return its memory. After it, the axes hold.
+
+        Networks without a law hold during this time. Laws of other networks continue.
 
         Args:
             law: Function or `Law`: see `start`.
@@ -350,52 +364,64 @@ class Loop:
             overruns: Number of consecutive steps over the budget: see `start`.
             compiled: False: run it as Python, in the thread of the caller. This is slow, but shows
                 Python's errors. Use it to find mistakes. `budget` and `overruns` are then ignored.
+            network: Number of the network: see `start`.
 
         Returns:
             Memory of the law after its last step.
 
         Raises:
             LawError: The law cannot be compiled, or failed: see `start`.
-            ValueError: An argument is impossible, or the loop has several networks.
-            RuntimeError: The loop is not open, an axis is in a move, or a background thread
-                iterates the loop.
+            ValueError: An argument is impossible.
+            RuntimeError: The loop is not open, an axis of the network is in a move, or a background
+                thread iterates the loop.
         """
         self._require_foreground()
-        session = self._only("a law")
+        one = self._network("a law", network)
         if not compiled:
-            return self._run_as_python(made_law(law), memory, parameters)
-        run = session.laws.start(made_law(law), memory, parameters, budget, overruns)
-        session.laws.run(run, ENDING, self._networks[0].advance)
+            return self._run_as_python(one, made_law(law), memory, parameters)
+        run = one.session.laws.start(made_law(law), memory, parameters, budget, overruns)
+        if len(self._networks) > 1:
+            one.session.laws.run(run, lambda: self._hold_beside(one))
+        else:
+            one.session.laws.run(run, one.advance_law)
         return run.memory
+
+    def _hold_beside(self, led: Network) -> None:
+        """Run one cycle of all networks in which only laws set targets."""
+        iteration = self._iterating()
+        assert isinstance(iteration, NetworksIteration)
+        iteration.hold(led.session)
 
     def _run_as_python(
         self,
+        network: Network,
         law: Law,
         memory: Sequence[float] | Numbers,
         parameters: Sequence[float] | Numbers,
     ) -> Numbers:
-        step, kept = self._opened.laws.python_step(law, memory, parameters)
+        step, kept = network.session.laws.python_step(law, memory, parameters)
         start: float | None = None
         for cycle in self:
             start = cycle.time if start is None else start
-            if cycle.refused:
+            if cycle.networks[network.number].refused:
                 raise LawError(f"law {law} left NaN or infinity in a target")
             if step(cycle.time - start):
                 break
         return kept
 
-    def stream(self, capacity: int = 1000) -> Stream:
+    def stream(self, capacity: int = 1000, *, network: int | None = None) -> Stream:
         """Return a `Stream`, which a slower thread can fill with set-points in advance.
 
         Args:
             capacity: Number of rows that the stream can hold. One row is for one cycle.
+            network: Number of the network, in the order of `networks`. Required if there are
+                several.
 
         Raises:
-            ValueError: `capacity` is out of range, or the loop has several networks.
-            RuntimeError: The loop is not open, or an axis is in a move.
+            ValueError: An argument is out of range, or `network` is missing.
+            RuntimeError: The loop is not open, or an axis of the network is in a move.
         """
-        self._only("a stream")
-        return self._networks[0].stream(capacity)
+        return self._network("a stream", network).stream(capacity)
 
     def restore(self, sub: SubDevice) -> None:
         """Allow a held device (event DeviceHeld or DeviceReplaced) to go to OP.
@@ -498,21 +524,24 @@ class Loop:
             )
         self._opened.require_open()
 
-    def _only(self, what: str) -> Session:
-        """Return the session of the only network.
+    def _network(self, what: str, number: int | None) -> Network:
+        """Return the network in which a law or a stream may start.
+
+        Args:
+            what: Text for the errors: "a law", "a stream".
+            number: Number of the network; None: the only one.
 
         Raises:
-            ValueError: The loop has several networks.
+            ValueError: There is no such network, or there are several and `number` is None.
             RuntimeError: The loop has never been entered, or an axis is in a move.
         """
-        if len(self._networks) > 1:
-            raise ValueError(f"{what} works on one network: make a separate Loop for that network")
-        if self._opened.views.movers:
+        network = chosen_network(self._networks, what, number)
+        if network.session.views.movers:
             raise RuntimeError(
                 f"{what} cannot start during a move: first call loop.wait(move), or move.stop() "
                 "and then loop.wait(move)"
             )
-        return self._opened
+        return network
 
     @property
     def _sessions(self) -> list[Session]:

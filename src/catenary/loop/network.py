@@ -15,7 +15,7 @@ from catenary.core import (
     CYCLE_STOPPED,
     CYCLE_WORKING_COUNTER,
 )
-from catenary.errors import ConfigurationError
+from catenary.errors import ConfigurationError, LawError
 from catenary.log import Log
 from catenary.loop.clock_discipline import DisciplineOptions
 from catenary.loop.clocks import Clocks
@@ -28,14 +28,17 @@ from catenary.loop.session import Session
 from catenary.loop.stream import Stream
 from catenary.loop.timing import Timing
 from catenary.loop.watches.external_clock import ExternalClockWatch
+from catenary.loop.watches.trigger import TriggerWatch
 from catenary.plan.cycle import ExecutionMode, ReceiveMode
 from catenary.plan.options import PlanOptions, period_in_ns
 from catenary.plan.planner import Plan, make_plan
 from catenary.plan.sink import ServingSink, Sink
+from catenary.plan.trigger import Trigger
 from catenary.wire.al import AlState
 
 ENDING = CYCLE_WORKING_COUNTER | CYCLE_DROPPED | CYCLE_STOPPED | CYCLE_NONE | CYCLE_LAW_FAILED
 TROUBLE = ENDING | CYCLE_CLOCKS
+LAW_SLICE_NS = 10_000_000  # between checks for signals while a law runs
 LOG_LIMIT = 2**24  # cycles, about a gigabyte
 
 
@@ -54,10 +57,10 @@ class Settings:
     priority: int | None
     log: int
     log_axes: bool
-    laws: Sequence[Law]
     stop: StopPolicy
     scheduling: Scheduling
     clocks: ClockOptions
+    trigger: Trigger | None
 
     def __post_init__(self) -> None:
         one_of("execution", self.execution, ("threaded", "inline"))
@@ -70,6 +73,23 @@ class Settings:
             )
         if not 1 <= self.log <= LOG_LIMIT:
             raise ValueError(f"log={self.log} cycles: must be 1 to {LOG_LIMIT}")
+        self._check_trigger()
+
+    def _check_trigger(self) -> None:
+        if self.trigger is None:
+            return
+        if isinstance(self.trigger, type) or not hasattr(self.trigger, "sends"):
+            raise TypeError(
+                f'trigger={self.trigger!r}: use cat.share.TriggerSender("name") or '
+                'cat.share.TriggerReceiver("name")'
+            )
+        if self.execution != "threaded":
+            raise ValueError('trigger= needs execution="threaded"')
+        if self.clocks.external is not None and not self.trigger.sends:
+            raise ValueError(
+                "trigger= and external=: the cycle starts cannot follow a trigger and a clock; let "
+                "the sender of the trigger follow the clock"
+            )
 
     def plan_options(self, main: MainDevice, cpu: int | None) -> PlanOptions:
         """Return the options of one network's plan.
@@ -122,6 +142,7 @@ class Network:
         *,
         cpu: int | None,
         sink: Sink | None,
+        laws: Sequence[Law],
     ) -> None:
         self.main = main
         self.current_session: Session | None = None
@@ -131,6 +152,7 @@ class Network:
         self._settings = settings
         self._cpu = cpu
         self._sink = sink
+        self._laws = laws  # to compile before OP
 
     @property
     def plan(self) -> Plan:
@@ -167,6 +189,20 @@ class Network:
         if watch is None:
             raise RuntimeError(
                 'no external clock in this loop: use ClockOptions(external="/dev/ptp0")'
+            )
+        return watch
+
+    @property
+    def trigger(self) -> TriggerWatch:
+        """Trigger that the loop sends or awaits.
+
+        Raises:
+            RuntimeError: The loop has no trigger.
+        """
+        watch = self.session.trigger
+        if watch is None:
+            raise RuntimeError(
+                "no trigger in this loop: use Loop(trigger=cat.share.TriggerReceiver(...))"
             )
         return watch
 
@@ -217,15 +253,50 @@ class Network:
             exchange=CarriedExchange if is_carried else FrameExchange,
         )
         session.switch_interval = self._settings.scheduling.switch_interval
-        for law in self._settings.laws:
-            session.laws.compile(law)
+        self._compile_laws(session)
         session.external = self._make_external(session)
+        if self._settings.trigger is not None:
+            session.attach_trigger(self._make_trigger(self._settings.trigger, session))
         self.current_session = session
         if self._sink is not None:
             session.publish(self._sink)
         if isinstance(self._sink, ServingSink):
             self._sink.serve(self)
         return session
+
+    def _compile_laws(self, session: Session) -> None:
+        """Compile the laws of the options. Raise LawError with the number of the network."""
+        try:
+            for law in self._laws:
+                session.laws.compile(law)
+        except LawError as error:
+            if self.count > 1:
+                error.add_note(
+                    f"the law was compiled for network {self.number} of {self.count}: give each "
+                    "network its own laws with Loop(laws=[[...], [...]])"
+                )
+            raise
+
+    def _make_trigger(self, trigger: Trigger, session: Session) -> TriggerWatch:
+        """Return the watch of the trigger.
+
+        Raises:
+            ConfigurationError: Another master makes the frames, or the loop awaits the trigger and
+                has distributed clocks.
+        """
+        cycle = session.plan.cycle
+        if self.main.carrier is not None:
+            raise ConfigurationError(
+                "trigger= is not possible: an external master makes the frames",
+                hint="omit the option, or open the network interface directly",
+            )
+        if not trigger.sends and cycle.clock is not None:
+            raise ConfigurationError(
+                "the cycle starts of a loop that awaits a trigger move when the sender restarts: "
+                "distributed clocks cannot follow them",
+                hint="omit dc=, or run both networks in one loop",
+            )
+        return TriggerWatch(trigger, session.engine, cycle.period_ns, self.main.events.put)
 
     def _make_external(self, session: Session) -> ExternalClockWatch | None:
         """Return the watch of the external clock; None without one.
@@ -264,6 +335,10 @@ class Network:
         self.main.read_mappings(*self.requests, period=its.period)
         devices = [sub.description for sub in self.main.subs]
         return make_plan(devices, self.requests, its.plan_options(self.main, self._cpu))
+
+    def advance_law(self) -> None:
+        """Wait for the end of the law, at most a slice of time, and raise the error of a cycle."""
+        self.advance(self.session.engine.run_law(LAW_SLICE_NS, ENDING))
 
     def advance(self, flags: int) -> None:
         """Judge a cycle that ran without an iteration, and raise its error, if any.

@@ -11,10 +11,17 @@ from collections.abc import Sequence
 from dataclasses import replace
 from threading import Lock
 
-from catenary.core import CYCLE_NONE, CYCLE_STOPPED, CYCLE_WORKING_COUNTER, Cycle
+from catenary.core import (
+    CYCLE_LAW_FAILED,
+    CYCLE_NONE,
+    CYCLE_STOPPED,
+    CYCLE_WORKING_COUNTER,
+    Cycle,
+)
 from catenary.errors import CatenaryError, LoopError
 from catenary.link import Link
 from catenary.loop.devices import LoopRequest, by_network
+from catenary.loop.laws.law import Laws, laws_of_networks
 from catenary.loop.network import TROUBLE, Network, Settings
 from catenary.loop.options import ClockOptions
 from catenary.loop.publishing import one_sink_each
@@ -88,15 +95,32 @@ class NetworksIteration:
         for one in self._sessions:
             one.service.step_without_thread()
         if self._cycle is None:
-            flags = [one.engine.run(1) for one in self._sessions]
-            self._cycle = NetworksCycle(self._sessions, self._quorum)
-            for one in self._sessions:
-                one.engine.zero_ns = self._sessions[0].engine.zero_ns
-        else:
-            self._commit_if_free()
-            flags = [one.engine.next() for one in self._sessions]
+            return self._first()
+        self._commit_if_free()
+        self._judge(self._cycle, [one.engine.next() for one in self._sessions])
+        return self._cycle
+
+    def _first(self) -> NetworksCycle:
+        """Run and check the first cycle, from which `time` and `number` count."""
+        flags = [one.engine.run(1) for one in self._sessions]
+        self._cycle = NetworksCycle(self._sessions, self._quorum)
+        for one in self._sessions:
+            one.engine.zero_ns = self._sessions[0].engine.zero_ns
         self._judge(self._cycle, flags)
         return self._cycle
+
+    def hold(self, led: Session) -> None:
+        """Run and check one cycle without targets of the application: networks without a law hold.
+
+        Args:
+            led: Network that runs the law whose end the caller waits for.
+        """
+        for one in self._sessions:
+            one.service.step_without_thread()
+        if self._cycle is None:
+            self._first()
+            return
+        self._judge(self._cycle, [_held_cycle(one, led) for one in self._sessions])
 
     def _commit_if_free(self) -> None:
         """Write the targets of moving axes and commit, unless another thread writes targets."""
@@ -124,16 +148,19 @@ class NetworksIteration:
     def _judge(self, cycle: NetworksCycle, flags: Sequence[int]) -> None:
         """Update `cycle.alive`, and check the networks.
 
-        Raise an error if too few networks are alive, or if a live one has a fault. If a dead
-        network ends the loop, the axes of the others are stopped first.
+        Raise an error if too few networks are alive, if a live one has a fault, or if a law has
+        failed. If a dead network or a law ends the loop, the axes of the others are stopped first.
         """
         alive = [self._lives(one, mine) for one, mine in zip(self._sessions, flags, strict=True)]
         cycle.alive = tuple(alive)
         for one, mine, lives in zip(self._sessions, flags, alive, strict=True):
+            failed_law = mine & CYCLE_LAW_FAILED
             if not lives and sum(alive) >= self._quorum:
-                continue
+                if not failed_law:
+                    continue
+                mine = failed_law  # the quorum excuses everything else
             if mine & TROUBLE or one.engine.al_status != AlState.OP:
-                if not lives:
+                if failed_law or not lives:
                     self._stop_others(one)
                 one.judge(mine)
 
@@ -160,6 +187,7 @@ def make_networks(
     settings: Settings,
     cpu: int | Sequence[int] | None,
     sink: Sink | Sequence[Sink] | None,
+    laws: Laws,
 ) -> tuple[Network, ...]:
     """Return one network for each MainDevice of the requests.
 
@@ -168,10 +196,12 @@ def make_networks(
         settings: Options that all networks share.
         cpu: CPU of the native thread, or one for each network; None: see `cpus_for`.
         sink: Receiver of every cycle, or one for each network.
+        laws: Laws to compile on entry: see `laws_of_networks`.
 
     Raises:
         ValueError: An option is impossible for this number of networks, or see `by_network`.
-        TypeError: See `by_network`.
+        TypeError: See `by_network` and `laws_of_networks`.
+        LawError: A law has an argument with an unknown name.
     """
     groups = by_network(requests)
     count = len(groups)
@@ -179,14 +209,40 @@ def make_networks(
         refuse_for_several(settings)
         settings = replace(settings, clocks=clocks_of_several(settings.clocks))
     networks = tuple(
-        Network(main, mine, settings, cpu=one, sink=its)
-        for (main, mine), one, its in zip(
-            groups, cpus_for(count, cpu), one_sink_each(sink, count), strict=True
+        Network(main, mine, settings, cpu=one, sink=its, laws=own)
+        for (main, mine), one, its, own in zip(
+            groups,
+            cpus_for(count, cpu),
+            one_sink_each(sink, count),
+            laws_of_networks(laws, count),
+            strict=True,
         )
     )
     for number, network in enumerate(networks):
         network.number, network.count = number, count
     return networks
+
+
+def chosen_network(networks: Sequence[Network], what: str, number: int | None) -> Network:
+    """Return the network with a number.
+
+    Args:
+        networks: Networks of the loop.
+        what: Text for the error: "a law", "a stream".
+        number: Number of the network; None: the only one.
+
+    Raises:
+        ValueError: There is no such network, or there are several and `number` is None.
+    """
+    last = len(networks) - 1
+    if number is None and last > 0:
+        raise ValueError(
+            f"{what} works on one of the {len(networks)} networks of this loop: give network=0 to "
+            f"network={last}"
+        )
+    if number is not None and not 0 <= number <= last:
+        raise ValueError(f"network={number}: the loop has the networks 0 to {last}")
+    return networks[number or 0]
 
 
 def refuse_for_several(settings: Settings) -> None:
@@ -196,8 +252,11 @@ def refuse_for_several(settings: Settings) -> None:
             'several networks need execution="threaded": an iterating thread can keep the cycle '
             "starts of only one network"
         )
-    if settings.laws:
-        raise ValueError("laws work on one network: make a separate Loop for that network")
+    if settings.trigger is not None:
+        raise ValueError(
+            "trigger= works on one network: the networks of one loop have common cycle starts; "
+            "use a loop for each network, in its own process"
+        )
 
 
 def share_time(sessions: Sequence[Session]) -> None:
@@ -311,6 +370,18 @@ def _have_one_clock(links: Sequence[Link]) -> bool:
     for link in others:
         link.wait_until(0, False)  # updates its clock
     return all(link.now() >= later for link in others)
+
+
+def _held_cycle(one: Session, led: Session) -> int:
+    """Run one cycle without targets of the application; only follow the led network.
+
+    Returns:
+        Flags of the cycle. A law can fail in a cycle that is not seen here.
+    """
+    if one is led:
+        return one.engine.run_law(0, 0)
+    flags = one.engine.run(1)
+    return flags | CYCLE_LAW_FAILED if one.laws.has_failed else flags
 
 
 def _stands(session: Session) -> bool:

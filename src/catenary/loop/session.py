@@ -37,6 +37,7 @@ from catenary.loop.safe_outputs import confirm_safe, make_safe
 from catenary.loop.signals import SignalGuard
 from catenary.loop.timing import Timing
 from catenary.loop.watches.external_clock import ExternalClockWatch
+from catenary.loop.watches.trigger import TriggerWatch
 from catenary.plan.planner import Plan
 from catenary.plan.request import ProcessDataRequest, Views
 from catenary.plan.sink import Sink
@@ -79,6 +80,7 @@ class Session:
         self.watch = self.exchange.watch
         self.switch_interval: float | None = None  # [s] of the interpreter; used by an inline loop
         self.external: ExternalClockWatch | None = None
+        self.trigger: TriggerWatch | None = None
         self._attached = ExitStack()
         self._opened = self._left = False
         self._abandon = abandon  # leaves the loop if the MainDevice is closed first
@@ -114,6 +116,11 @@ class Session:
     def publish(self, sink: Sink) -> None:
         """Publish every cycle to the sink, from the first one on."""
         self._publisher = Publisher(sink, self.main, self.engine, self.plan)
+
+    def attach_trigger(self, watch: TriggerWatch) -> None:
+        """Start the cycles with those of another process, or the reverse; leaving releases it."""
+        self.trigger = watch
+        self._attached.callback(watch.close)
 
     def report_end(self, error: BaseException) -> None:
         """Publish the error that ends the loop."""
@@ -304,6 +311,8 @@ class Session:
         """Release the cycle, threads and devices in a forked child: they belong to the parent."""
         self._left = True
         self.engine.forget()
+        if self.trigger is not None:
+            self.trigger.close()  # the parent keeps its lock
 
     def leave(self, guard: SignalGuard) -> list[Exception]:
         """Stop the loop and return the problems. A failed step does not prevent the next ones.

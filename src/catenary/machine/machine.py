@@ -15,7 +15,7 @@ from catenary.drive.process_data import ProcessData
 from catenary.link import LinkSource
 from catenary.loop import ClockOptions, Loop, Scheduling, StopPolicy
 from catenary.loop.devices import LoopRequest
-from catenary.loop.laws.law import Law, LawFunction
+from catenary.loop.laws.law import Laws
 from catenary.machine.by_name import ByName
 from catenary.machine.comparison import compare
 from catenary.machine.esi_files import esi_places
@@ -24,6 +24,7 @@ from catenary.machine.options import loop_options
 from catenary.machine.read import read_machine
 from catenary.plan.cycle import ExecutionMode
 from catenary.plan.sink import Sink
+from catenary.plan.trigger import Trigger
 from catenary.target import MainDevice, segment_of, source_of
 
 if TYPE_CHECKING:
@@ -143,11 +144,12 @@ class Machine:
         priority: int | None = None,
         log: int | None = None,
         log_axes: bool | None = None,
-        laws: Sequence[Law | LawFunction] = (),
+        laws: Laws = (),
         sink: Sink | Sequence[Sink] | None = None,
         stop: StopPolicy | None = None,
         scheduling: Scheduling | None = None,
         clocks: ClockOptions | None = None,
+        trigger: Trigger | None = None,
     ) -> Loop:
         """Return a loop with all drives and process data of the machine.
 
@@ -175,7 +177,7 @@ class Machine:
             "clocks": clocks,
         }
         options |= {name: value for name, value in given.items() if value is not None}
-        return Loop(*self.requests, laws=laws, sink=sink, **options)
+        return Loop(*self.requests, laws=laws, sink=sink, trigger=trigger, **options)
 
     def _file_options(self) -> dict[str, Any]:
         """Return the options of the file for a loop.

@@ -31,6 +31,11 @@ SOURCES = {
     "ok": "actual.ok",
     "n": "actual.n",
 }
+RESULTS = {
+    "none": "0",
+    "number": "1 if finished else 0",
+    "optional": "0 if finished is None else (1 if finished else 0)",
+}
 SHELL = """
 def shell(actual_at, target_at, memory_at, memory_count, parameters_at, parameter_count, time):
     actual = carray(actual_at, 1, ACTUAL)[0]
@@ -121,7 +126,8 @@ def _inner(numba: Any, function: Callable[..., Any]) -> Any:
 
 
 def _returned(numba: Any, law: Law, inner: Any, layout: LawLayout) -> str:
-    """Compile the law, and return the kind of its result: "none" or "number".
+    """Compile the law, and return the kind of its result: "none", "number" or
+    "optional": True or False, or None from another branch.
 
     Raises LawError for any other result.
     """
@@ -140,11 +146,12 @@ def _returned(numba: Any, law: Law, inner: Any, layout: LawLayout) -> str:
     signature = tuple(types[name] for name in law.arguments)
     inner.compile(signature)
     returned = inner.overloads[signature].signature.return_type
-    inside = returned.type if isinstance(returned, numba.types.Optional) else returned
-    if isinstance(inside, numba.types.NoneType):
+    if isinstance(returned, numba.types.NoneType):
         return "none"
-    if isinstance(inside, numba.types.Boolean | numba.types.Integer):
+    if isinstance(returned, numba.types.Boolean | numba.types.Integer):
         return "number"
+    if returned == numba.types.Optional(numba.boolean):
+        return "optional"
     raise LawError(
         f"law {law} returns {returned}",
         hint="a law must return True when it has finished, otherwise False or None",
@@ -154,7 +161,7 @@ def _returned(numba: Any, law: Law, inner: Any, layout: LawLayout) -> str:
 def _shell(numba: Any, law: Law, inner: Any, layout: LawLayout, returned: str) -> Any:
     source = SHELL.format(
         arguments=", ".join(SOURCES[name] for name in law.arguments),
-        result="0" if returned == "none" else "1 if finished else 0",
+        result=RESULTS[returned],
     )
     names: dict[str, Any] = {
         "carray": numba.carray,

@@ -13,6 +13,7 @@ from typing import TypeAlias, overload
 from catenary.errors import LawError
 
 LawFunction: TypeAlias = Callable[..., object]  # its arguments are among ARGUMENTS
+Laws: TypeAlias = "Sequence[Law | LawFunction] | Sequence[Sequence[Law | LawFunction]]"
 
 ARGUMENTS = ("actual", "target", "memory", "time", "parameters", "enabled", "dt", "ok", "n")
 """Names of the arguments that a law may have."""
@@ -113,6 +114,27 @@ def law(
     if function is None:
         return functools.partial(Law, parameters=parameters)
     return function if isinstance(function, Law) else Law(function)
+
+
+def laws_of_networks(laws: Laws, count: int) -> list[list[Law]]:
+    """Return the laws of every network.
+
+    Args:
+        laws: Laws for all networks, or one list of laws for each network.
+        count: Number of networks.
+
+    Raises:
+        TypeError: A law is not a plain function, or `laws` contains laws and lists.
+        ValueError: The number of lists is not the number of networks.
+    """
+    lists = [each for each in laws if isinstance(each, Sequence)]
+    if not lists:
+        return [[law(each) for each in laws if not isinstance(each, Sequence)]] * count
+    if len(lists) != len(laws):
+        raise TypeError("laws: give either laws or one list of laws for each network, not both")
+    if len(lists) != count:
+        raise ValueError(f"laws: {len(lists)} lists for {count} networks; give one for each")
+    return [[law(each) for each in its] for its in lists]
 
 
 def named_parameters(given: Sequence[Parameter | str]) -> tuple[Parameter, ...]:

@@ -55,6 +55,11 @@ class LawRun:
         return not self._native.ended
 
     @property
+    def failed(self) -> bool:
+        """True if the law has ended by an error, such as an exception or a NaN target."""
+        return self._native.status > core.LAW_STOPPED
+
+    @property
     def memory(self) -> Numbers:
         """Copy of the law's memory after its last step.
 

@@ -18,7 +18,6 @@ from catenary.loop.laws.layout import law_layout, record_at
 from catenary.loop.laws.run import LawRun, Numbers, numbers
 from catenary.plan.planner import Plan
 
-SLICE_NS = 10_000_000  # between checks for signals while a law runs
 GUARD_ABOVE = 1  # priority of the guard thread above that of the cycle thread
 PRIORITY_MAX = 99
 BUDGET_SHARE = 0.4  # share of the period; the frames need the remainder
@@ -41,6 +40,11 @@ class LawRunner:
     def current(self) -> LawRun | None:
         """The law that was started last; None before the first one, and after a failure."""
         return self._run
+
+    @property
+    def has_failed(self) -> bool:
+        """True if the law has failed, and `failure` has not returned its error yet."""
+        return self._run is not None and self._run.failed
 
     def compile(self, law: Law) -> CompiledLaw:
         """Compile a law once, and return the result."""
@@ -120,16 +124,16 @@ class LawRunner:
                 hint="check for a loop whose end depends on the inputs",
             )
 
-    def run(self, run: LawRun, trouble: int, judge: Callable[[int], None]) -> None:
+    def run(self, run: LawRun, advance: Callable[[], None]) -> None:
         """Wait for the end of a law, and raise its error, if any.
 
         Args:
             run: Handle of the running law.
-            trouble: Cycle flags that end a wait.
-            judge: Function that gets the flags. It raises the error of a bad cycle or a failed law.
+            advance: Function that waits or runs cycles for a short time. It raises the error of a
+                bad cycle or a failed law.
         """
         while run.running:
-            judge(self._engine.run_law(SLICE_NS, trouble))
+            advance()
         if (failure := self.failure(None)) is not None:
             raise failure
 
