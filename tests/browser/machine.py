@@ -1,8 +1,11 @@
-"""Program of a machine with a share: `python -m tests.browser.machine SHARE INTERFACE NAMES`.
+"""Program of a machine with a share.
+
+    python -m tests.browser.machine SHARE INTERFACE NAMES [modes]
 
 NAMES is a JSON list with the names of the servos and axes. An empty INTERFACE is a segment in this
 process. The commands "stall" and "resume" on the standard input stop and continue the body of the
-loop, but not its cycle.
+loop, but not its cycle. With "modes", the program offers operating modes and presets: it accepts
+all except the mode "balance".
 """
 
 from __future__ import annotations
@@ -22,6 +25,9 @@ POLICY = cat.StopPolicy(
 )
 VELOCITY_LIMIT, ACCELERATION = 10.0, 20.0
 WATCHDOG = 0.5  # [s]
+MODES = {"damping": "hold softly", "stand": "hold the pose", "balance": "react to pushes"}
+PRESETS = {"home": "arms down", "wave": "wave with the left arm"}
+REFUSAL = "the robot does not stand: request 'stand' first"
 
 
 class Body:
@@ -37,14 +43,23 @@ class Body:
     def resume(self) -> None:
         self._may_run.set()
 
-    def run(self, loop: cat.Loop) -> None:
+    def run(self, loop: cat.Loop, share: cat.Share) -> None:
         next(loop)
         answer_line("ready")
         for _ in loop:
             self._may_run.wait()
+            for request in share.requests():
+                decide(share, request)
 
 
-def main(share_name: str, interface: str, names: str) -> None:
+def decide(share: cat.Share, request: cat.share.OperatorRequest) -> None:
+    if request.name == "balance":
+        request.refuse(REFUSAL)
+    elif request.accept() and request.kind == "mode":
+        share.mode = request.name
+
+
+def main(share_name: str, interface: str, names: str, *options: str) -> None:
     segment = None if interface else make_segment(json.loads(names))
     body = Body()
     monitor = Monitor(segment if segment is not None else make_segment([]))
@@ -52,10 +67,16 @@ def main(share_name: str, interface: str, names: str) -> None:
     monitor.answers["resume"] = lambda _: body.resume()
     monitor.start()
     with cat.MainDevice(interface if segment is None else segment) as main:
-        run(main, share_name, json.loads(names), body)
+        share = cat.Share(share_name, jog=True, **offered(options))
+        run(main, share, json.loads(names), body)
 
 
-def run(main: cat.MainDevice, share_name: str, names: list[str], body: Body) -> None:
+def offered(options: Sequence[str]) -> dict[str, dict[str, str]]:
+    """Return the modes and presets of the program."""
+    return {"modes": MODES, "presets": PRESETS} if "modes" in options else {}
+
+
+def run(main: cat.MainDevice, share: cat.Share, names: list[str], body: Body) -> None:
     arm = cat.Drives(
         main.scan().drives,
         names=names,
@@ -64,10 +85,10 @@ def run(main: cat.MainDevice, share_name: str, names: list[str], body: Body) -> 
         acceleration_limit=ACCELERATION,
     )
     with (
-        cat.Share(share_name, jog=True) as share,
+        share,
         cat.Loop(arm, period=PERIOD, sink=share, stop=POLICY, watchdog=WATCHDOG) as loop,
     ):
-        body.run(loop)
+        body.run(loop, share)
 
 
 if __name__ == "__main__":

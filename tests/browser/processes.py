@@ -113,10 +113,11 @@ def servos_on(interface: str, names: Sequence[str]) -> contextlib.AbstractContex
 
 
 def machine(
-    share: str, names: Sequence[str], interface: str = ""
+    share: str, names: Sequence[str], interface: str = "", *options: str
 ) -> contextlib.AbstractContextManager[Process]:
     """Run a loop with a share. Without an interface, the process also contains the servos."""
-    return python("-m", "tests.browser.machine", share, interface, json.dumps(list(names)))
+    arguments = (share, interface, json.dumps(list(names)), *options)
+    return python("-m", "tests.browser.machine", *arguments)
 
 
 class Dashboard:

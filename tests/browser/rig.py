@@ -85,10 +85,20 @@ class Rig:
         return comes_true(lambda: self.velocity(axis) < STANDSTILL)
 
 
-def local_rig(stack: ExitStack, browser: Browser, names: tuple[str, ...] = NAMES) -> Rig:
-    """Start a machine whose servos are in the process of its loop."""
+def local_rig(
+    stack: ExitStack, browser: Browser, names: tuple[str, ...] = NAMES, *, modes: bool = False
+) -> Rig:
+    """Start a machine whose servos are in the process of its loop.
+
+    Args:
+        stack: owner of the processes.
+        browser: browser of the pages.
+        names: names of the axes.
+        modes: True if the program offers operating modes and presets.
+    """
     share = stack.enter_context(own_name("browser"))
-    loop = stack.enter_context(processes.machine(share, names))
+    options = ("modes",) if modes else ()
+    loop = stack.enter_context(processes.machine(share, names, "", *options))
     dashboard = stack.enter_context(processes.dashboard(share))
     return Rig(share, loop, loop, dashboard, opener(browser, dashboard))
 

@@ -70,6 +70,66 @@ def test_without_one_share_the_name_is_needed(
         dashboard.only_share(None)
 
 
+def test_a_moving_base_needs_a_model() -> None:
+    arguments = make_parser().parse_args(["dashboard", "upper", "--base", "robot.base"])
+    with pytest.raises(UsageError, match="--base needs --model"):
+        dashboard.check_paths(arguments)
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["upper", "--also", "a/b"], "--also: invalid name 'a/b'"),
+        (["upper", "--also", ""], "--also: invalid name ''"),
+        (["share:a/b"], "SHARE: invalid name 'a/b'"),
+        (["upper", "--also", "lower", "--also", "lower"], "--also lower: the page already"),
+        (["share:upper", "--also", "share:upper"], "--also upper: the page already"),
+    ],
+)
+def test_invalid_and_repeated_shares_are_refused(
+    words: list[str], said: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    pytest.importorskip("starlette")
+    assert main(["dashboard", *words]) == 2
+    assert said in capsys.readouterr().err
+
+
+def test_further_shares_reach_the_server_and_missing_ones_are_noted(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    pytest.importorskip("starlette")
+    from catenary.dashboard import server
+
+    found: list[server.Options] = []
+    model = tmp_path / "robot.xml"
+    model.write_text("<mujoco/>")
+    monkeypatch.setattr(
+        server, "run_server", lambda share, options, announce: found.append(options)
+    )
+    monkeypatch.setattr("catenary.dashboard.source.names", lambda uid: ["upper"])
+    words = [
+        "dashboard",
+        "upper",
+        "--also",
+        "share:lower",
+        "--also",
+        "hand",
+        "--base",
+        "robot.base",
+    ]
+    assert main([*words, "--model", str(model)]) == 0
+    (options,) = found
+    assert (options.panels.also, options.panels.base) == (("lower", "hand"), "robot.base")
+    noted = capsys.readouterr().err
+    assert [
+        name for name in ("upper", "lower", "hand", "robot.base") if f"'{name}' yet" in noted
+    ] == [
+        "lower",
+        "hand",
+        "robot.base",
+    ]
+
+
 @pytest.mark.parametrize(
     "words",
     [["arm", "--model", "none.xml"], ["arm", "--recordings", "none"], ["none.toml"]],

@@ -24,7 +24,7 @@ pytest.importorskip("uvicorn")
 from websockets.sync.client import ClientConnection, connect
 
 from catenary.dashboard.hub import Hub
-from catenary.dashboard.panels import make_scene
+from catenary.dashboard.panels import make_companions, make_scene
 from catenary.dashboard.requests import Requests
 from catenary.dashboard.security import Access, Role
 from catenary.dashboard.server import Options, make_access, make_server, open_socket
@@ -173,7 +173,12 @@ def serving(share: str, *, port: int = 0, **options: object) -> Iterator[Page]:
     listening = open_socket("127.0.0.1", port)
     given = Options(port=listening.getsockname()[1], **options)  # type: ignore[arg-type]
     access = make_access(given)
-    hub = Hub(Source(share), Requests(share), scene=make_scene(given.panels))
+    hub = Hub(
+        Source(share),
+        Requests(share),
+        scene=make_scene(given.panels),
+        companions=make_companions(given.panels),
+    )
     server = make_server(access, hub, given)
     thread = threading.Thread(target=server.run, kwargs={"sockets": [listening]})
     thread.start()

@@ -26,17 +26,17 @@ def test_a_request_waits_while_another_thread_reads_the_model(
 ) -> None:
     begun, read = threading.Event(), scene_feed.Scene
 
-    def slow(*arguments: Any) -> Any:
+    def slow(*arguments: Any, **options: Any) -> Any:
         begun.set()
         time.sleep(0.2)
-        return read(*arguments)
+        return read(*arguments, **options)
 
     monkeypatch.setattr(scene_feed, "Scene", slow)
     reader = cast(Reader, SimpleNamespace(layout=SimpleNamespace(run="1", axes=JOINTS)))
     feed = SceneFeed(ARM, {})
     with ThreadPoolExecutor(1) as pool:
-        first = pool.submit(feed.scene, reader)
+        first = pool.submit(feed.scene, [reader])
         assert begun.wait(10.0)
-        second = feed.scene(reader)
+        second = feed.scene([reader])
     assert second is not None
     assert second is first.result()

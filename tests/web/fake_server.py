@@ -26,6 +26,10 @@ CSP = (
 Message = dict[str, Any]
 
 
+class Refusal(Exception):
+    """Error of a method: the name of its class and its message."""
+
+
 class FakeServer:
     """Answers of the server for one page, without a network."""
 
@@ -43,6 +47,10 @@ class FakeServer:
         self.state = "running"
         self.run = "run-1"
         self.number = 480_000
+        self.modes: dict[str, str] = {}  # description by name
+        self.presets: dict[str, str] = {}
+        self.mode: str | None = None
+        self.scene_problem = ""  # why there is no scene; "": there is no model
         self.methods: dict[str, Callable[[Message], object]] = {
             "devices": lambda _: make_devices(devices, self.axes),
             "axes": lambda _: [make_axis(at, name) for at, name in enumerate(self.axes)],
@@ -116,16 +124,27 @@ class FakeServer:
                 }
             )
         elif path == "/scene":
-            route.fulfill(status=204)
+            self._serve_scene(route)
         elif path == "/login":
             route.fulfill(status=204 if "right" in (route.request.post_data or "") else 403)
         else:
             self._serve_file(route, path)
 
+    def _serve_scene(self, route: Route) -> None:
+        if not self.scene_problem:
+            route.fulfill(status=204)
+            return
+        error = {"kind": "Refused", "message": self.scene_problem, "hint": ""}
+        route.fulfill(status=404, json={"error": error})
+
     def _answer(self, method: str, params: Message) -> Message:
         if method not in self.methods:
             return {"result": None}
-        return {"result": self.methods[method](params)}
+        try:
+            return {"result": self.methods[method](params)}
+        except Refusal as error:
+            kind, message = error.args
+            return {"error": {"kind": kind, "message": message, "hint": ""}}
 
     def _serve_file(self, route: Route, path: str) -> None:
         file = STATIC / (path.lstrip("/") or "index.html")
@@ -171,6 +190,8 @@ def make_hello(server: FakeServer) -> Message:
         "reason_no_jog": server.reason_no_jog,
         "program": "cobot.py (4711)",
         "remote": True,
+        "modes": make_choices(server.modes),
+        "presets": make_choices(server.presets),
     }
 
 
@@ -185,8 +206,13 @@ def make_status(server: FakeServer) -> Message:
         "lost_in_row": 0,
         "lateness": 4.2e-6,
         "clients": 1,
+        "mode": server.mode,
         "axes": [make_axis_status(server, at, name, now) for at, name in enumerate(server.axes)],
     }
+
+
+def make_choices(descriptions: dict[str, str]) -> list[Message]:
+    return [{"name": name, "description": text} for name, text in descriptions.items()]
 
 
 def make_axis_status(server: FakeServer, at: int, name: str, now: float) -> Message:

@@ -43,6 +43,7 @@ export function Header({ connection }: { connection: Connection }) {
           </dd>
         </div>
         <RoleFact connection={connection} />
+        <ModeFact connection={connection} />
       </dl>
       <ThemeButton />
       <StopButton connection={connection} />
@@ -91,6 +92,19 @@ function RoleFact({ connection }: { connection: Connection }) {
     <div>
       <dt>{text.header.role}</dt>
       <dd>{role === null ? text.header.unknown : text.header.roles[role]}</dd>
+    </div>
+  );
+}
+
+/** Operating mode; nothing if the program has no modes. */
+function ModeFact({ connection }: { connection: Connection }) {
+  if ((connection.hello.value?.modes.length ?? 0) === 0) return null;
+  return (
+    <div class="mode">
+      <dt>{text.header.mode}</dt>
+      <dd class="cut">
+        <LiveText of={() => connection.status.value?.mode ?? text.operation.unknown} />
+      </dd>
     </div>
   );
 }

@@ -152,6 +152,12 @@ export interface Layout {
   utc_offset_ns: number;
 }
 
+/** Operating mode or preset that the program offers. */
+export interface Choice {
+  name: string;
+  description: string;
+}
+
 /** The server has attached to a share. Subscriptions of an earlier run have ended. */
 export interface Hello {
   op: "hello";
@@ -165,6 +171,8 @@ export interface Hello {
   program: string;
   /** True if the program answers requests (POST /api/call). */
   remote: boolean;
+  modes: Choice[];
+  presets: Choice[];
 }
 
 /** The share has ended, or does not exist yet. The server attaches again and sends `hello`. */
@@ -214,6 +222,8 @@ export interface Status {
   lateness: number;
   /** Number of clients of this server. */
   clients: number;
+  /** Operating mode; null: the program has set none. */
+  mode: string | null;
 }
 
 export interface Event {

@@ -95,6 +95,7 @@ export const text = {
     hide: "Hide",
     hint: "Drag: turn. Wheel or two fingers: zoom. Right button: move.",
     pushHint: "Drag the robot to push it. Drag the background to turn the view.",
+    missing: (reason: string) => `The model cannot be shown: ${reason}`,
     failed: (reason: string) => `This browser cannot show the scene: ${reason}`,
   },
   scope: {
@@ -196,6 +197,7 @@ export const text = {
     login: "not logged in",
   },
   header: {
+    mode: "Mode",
     connection: "Server",
     bus: "Loop",
     cycle: "Cycle",
@@ -227,6 +229,24 @@ export const text = {
     unconfirmed: "The server has not confirmed the stop.",
     failed: "The stop was not sent: there is no connection to the server.",
     failedHint: "Use the emergency stop of the machine.",
+  },
+  operation: {
+    title: "Operation",
+    modes: "Mode",
+    presets: "Preset",
+    unknown: "no mode",
+    hint: "Hold a button for 0.6 s to request it. The program decides, and reports its answer here.",
+    viewer: "Only operators can request modes and presets.",
+    kinds: { mode: "Mode", preset: "Preset" },
+    outcomes: {
+      requested: "requested",
+      accepted: "accepted",
+      refused: "refused",
+      unanswered: "not answered",
+      failed: "failed",
+    },
+    question: (what: string) => `Request ${what}?`,
+    request: "Request",
   },
   overview: {
     cycles: "Cycles",

@@ -11,7 +11,8 @@ type Hello = NonNullable<Connection["hello"]["value"]>;
 function hello(run: string): Hello {
   const fields = ["a", "b"].map((name) => ({ name, unit: "", shape: [], per_axis: false }));
   const layout = { fields, axes: [], period: PERIOD, clock: "monotonic" as const, utc_offset_ns: 0 };
-  return { op: "hello", share: "arm", run, layout, role: "viewer", reason_no_jog: null, program: "", remote: false };
+  const none = { reason_no_jog: null, program: "", remote: false, modes: [], presets: [] };
+  return { op: "hello", share: "arm", run, layout, role: "viewer", ...none };
 }
 
 /** A connection whose frames the test sends. */

@@ -7,7 +7,7 @@ import os
 import shutil
 import signal
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 from catenary.cli.arguments import number
 from catenary.cli.failure import UsageError
 from catenary.cli.parsers import Commands, add_command, add_uid
+from catenary.cli.share_target import PREFIX
 
 if TYPE_CHECKING:
     from catenary.dashboard.security import Access
@@ -87,6 +88,18 @@ def add_panels(parser: argparse.ArgumentParser) -> None:
         help="joint of the model for an axis (default: of the same name, or in order)",
     )
     parser.add_argument(
+        "--also",
+        action="append",
+        default=[],
+        metavar="SHARE",
+        help="share of a further network, for the 3D view; STOP stops its axes, too",
+    )
+    parser.add_argument(
+        "--base",
+        metavar="SHARE",
+        help="share with the fields position and quaternion of the robot's base, for the 3D view",
+    )
+    parser.add_argument(
         "--recordings", type=Path, metavar="FOLDER", help="folder of MCAP files for the page"
     )
 
@@ -112,6 +125,10 @@ def run(arguments: argparse.Namespace) -> int:
 
     require_packages()
     check_paths(arguments)
+    source = arguments.source or only_share(arguments.uid)
+    further = [share_name("--also", each) for each in arguments.also]
+    base = None if arguments.base is None else share_name("--base", arguments.base)
+    check_distinct([source.removeprefix(PREFIX), *further])
     options = Options(
         host=arguments.host,
         port=arguments.port,
@@ -120,14 +137,20 @@ def run(arguments: argparse.Namespace) -> int:
         viewer_only=arguments.viewer_only,
         new_links=arguments.new_links,
         uid=arguments.uid,
-        panels=Panels(arguments.model, dict(arguments.joint), arguments.recordings),
+        panels=Panels(
+            arguments.model,
+            dict(arguments.joint),
+            arguments.recordings,
+            tuple(further),
+            base,
+        ),
     )
     announce = Announcer(window=arguments.window)
-    source = arguments.source or only_share(arguments.uid)
     with interrupted_by_sigterm():
         if not is_target(source):
-            share = source.removeprefix("share:")
-            note_missing(share, arguments.uid)
+            share = share_name("SHARE", source)
+            for each in (share, *further, *filter(None, [base])):
+                note_missing(each, arguments.uid)
             run_server(share, options, announce)
         else:
             share = f"dashboard-{os.getpid()}"
@@ -141,12 +164,41 @@ def check_paths(arguments: argparse.Namespace) -> None:
     """Raise UsageError for a file or folder of an option that does not exist."""
     if arguments.model is not None and not arguments.model.is_file():
         raise UsageError(f"--model: there is no file {arguments.model}")
+    if arguments.base is not None and arguments.model is None:
+        raise UsageError("--base needs --model: only the 3D view shows the base")
     if arguments.recordings is not None and not arguments.recordings.is_dir():
         raise UsageError(f"--recordings: there is no folder {arguments.recordings}")
     source = arguments.source or ""
     if source.endswith(".toml") and ":" not in source and not Path(source).is_file():
         raise UsageError(
             f"there is no file {source}", hint=f"create it: catenary init TARGET -o {source}"
+        )
+
+
+def share_name(option: str, text: str) -> str:
+    """Return the name of a share without its prefix. Raises UsageError if it is invalid.
+
+    Args:
+        option: name of the option, for the error.
+        text: NAME or share:NAME.
+    """
+    from catenary.share.folder import STATE, file_name
+
+    name = text.removeprefix(PREFIX)
+    try:
+        file_name(STATE, name)
+    except ValueError as error:
+        raise UsageError(f"{option}: {error}") from error
+    return name
+
+
+def check_distinct(names: Sequence[str]) -> None:
+    """Raise UsageError if a share is named twice."""
+    twice = next((name for name in names if names.count(name) > 1), None)
+    if twice is not None:
+        raise UsageError(
+            f"--also {twice}: the page already has this share",
+            hint="name each network once: catenary dashboard UPPER --also LOWER",
         )
 
 
@@ -194,7 +246,7 @@ def is_target(source: str) -> bool:
     """Return True if a name is a target and not the name of a share."""
     from catenary.dashboard.source import existing_shares
 
-    if source.startswith("share:") or source in existing_shares():
+    if source.startswith(PREFIX) or source in existing_shares():
         return False
     looks_like_one = source.endswith(".toml") or any(mark in source for mark in ":,")
     known = source in ("virtual", "virtual-realtime") or (INTERFACES / source).exists()

@@ -138,7 +138,7 @@ class Client:
             case Subscribe():
                 self._subscribe(message)
             case Stop():
-                self._reader().stop()
+                self._hub.stop()
                 self.send(encode_message("stopped"))
             case Poses(on=on):
                 self.wants_poses = on

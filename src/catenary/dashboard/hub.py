@@ -11,6 +11,7 @@ from typing import Protocol
 
 import msgspec
 
+from catenary.dashboard.companions import Companions, stop
 from catenary.dashboard.messages import encode_message
 from catenary.dashboard.outbox import Outbox
 from catenary.dashboard.requests import FAILURES, Requests
@@ -59,6 +60,7 @@ class Hub:
         requests: connection to the program of the loop.
         problem: returns the error of the program, or "".
         scene: 3D scene; None: there is none.
+        companions: further shares of the machine; None: there are none.
     """
 
     def __init__(
@@ -67,6 +69,7 @@ class Hub:
         requests: Requests,
         problem: Callable[[], str] = str,
         scene: SceneFeed | None = None,
+        companions: Companions | None = None,
     ) -> None:
         self.source = source
         self.requests = requests
@@ -82,6 +85,7 @@ class Hub:
         self._advising = False
         self._token = 0
         self.scene = scene
+        self.companions = companions or Companions()
         self._status_due = self._timing_due = self._poses_due = 0.0
         self._tasks: set[asyncio.Task[None]] = set()
 
@@ -96,6 +100,7 @@ class Hub:
                 await asyncio.sleep(due - time.monotonic())
         finally:
             self.source.close()
+            self.companions.close()
             self.requests.close()
             self.workers.shutdown(wait=False)
 
@@ -113,6 +118,7 @@ class Hub:
 
     def step(self, now: float) -> None:
         """Send all due messages. `now` is a monotonic time [s]."""
+        self.companions.step()
         if self.source.step():
             self._change()
         reader = self.source.reader
@@ -123,7 +129,7 @@ class Hub:
         if self.subscriptions is not None:
             self.subscriptions.deliver(reader, now)
         self._send_token(reader)
-        self._send_poses(reader, now)
+        self._send_poses(now)
         for client in list(self.clients):
             client.follow_motion()
         if now >= self._status_due - TICK / 2:
@@ -132,6 +138,29 @@ class Hub:
         if now >= self._timing_due and self.clients:
             self._timing_due = now + TIMING_INTERVAL
             self._start(self._send_timing())
+
+    @property
+    def readers(self) -> list[Reader]:
+        """Readers of the shares with axes; empty if the share of the page does not exist."""
+        reader = self.source.reader
+        return [] if reader is None else [reader, *self.companions.networks]
+
+    def stop(self) -> None:
+        """Stop all axes of the share and of the further networks. Try all of them.
+
+        Raises ShareError with the names of the shares that the stop did not reach.
+        """
+        failures = []
+        try:
+            stop(self.source)
+        except CatenaryError as error:
+            failures.append(f"{self.source.name!r}: {error.message}")
+        failures += self.companions.stop()
+        if failures:
+            raise ShareError(
+                f"the stop did not reach {'; '.join(failures)}",
+                hint="stop these axes in another way, for example with the emergency stop",
+            )
 
     def add(self, client: Client) -> bool:
         """Add a client and send the present state. Return False if there are too many."""
@@ -205,6 +234,8 @@ class Hub:
             reason_no_jog=client.reason_no_jog(),
             program=str(layout.writer),
             remote=self.requests.is_available(),
+            modes=layout.modes,
+            presets=layout.presets,
         )
 
     def _take_events(self) -> None:
@@ -267,17 +298,21 @@ class Hub:
             silent=silent,
             axes=axis_statuses(row, reader.layout, self._notes),
             clients=len(self.clients),
+            mode=reader.mode,
             **cycle_status(row),
         )
         for client in self.clients:
             client.outbox.put_if_idle(text)
 
-    def _send_poses(self, reader: Reader, now: float) -> None:
+    def _send_poses(self, now: float) -> None:
         wanting = [client for client in self.clients if client.wants_poses]
-        if self.scene is None or not wanting or now < self._poses_due or reader.number == 0:
+        if self.scene is None or not wanting or now < self._poses_due:
             return
         self._poses_due = now + POSES_INTERVAL
-        data = self.scene.poses(reader)
+        try:
+            data = self.scene.poses(self.readers, self.companions.base)
+        except ShareError:
+            return  # a share is damaged; the 3D view keeps its last poses
         for client in wanting if data else ():
             client.outbox.put_latest(data)
 

@@ -16,6 +16,7 @@ from starlette.responses import Response
 from starlette.routing import BaseRoute, Route
 
 from catenary.dashboard.app import Page, json_response, protected, read_body, refusal
+from catenary.dashboard.companions import Companions
 from catenary.dashboard.options import Panels
 from catenary.dashboard.recordings import Folder, Progress, Window
 from catenary.dashboard.scene_feed import SceneFeed
@@ -28,7 +29,20 @@ BINARY = "application/octet-stream"
 
 def make_scene(panels: Panels) -> SceneFeed | None:
     """Return the scene of a server; None without a model."""
-    return None if panels.model is None else SceneFeed(panels.model, panels.joints)
+    if panels.model is None:
+        return None
+    moves, shares = panels.base is not None, 1 + len(panels.also)
+    return SceneFeed(panels.model, panels.joints, moves=moves, shares=shares)
+
+
+def make_companions(panels: Panels, uid: int | None = None) -> Companions:
+    """Return the further shares of a server.
+
+    Args:
+        panels: files and shares to show.
+        uid: owner of the shares; None: this user or root.
+    """
+    return Companions(panels.also, panels.base, uid)
 
 
 def panel_routes(panels: Panels, page: Page) -> list[BaseRoute]:
@@ -51,12 +65,12 @@ async def no_recordings(page: Page, request: Request, role: Role) -> Response:
 
 async def scene(page: Page, request: Request, role: Role) -> Response:
     """Return the 3D scene; an empty response if the server has no model."""
-    feed, reader = page.hub.scene, page.hub.source.reader
+    feed, readers = page.hub.scene, page.hub.readers
     if feed is None:
         return Response(status_code=204)  # not an error: browsers report those in their console
-    if reader is None:
+    if not readers:
         return refusal(404, page.hub.source.reason)
-    found = await asyncio.to_thread(feed.scene, reader)
+    found = await asyncio.to_thread(feed.scene, readers)
     if found is None:
         return refusal(404, feed.problem)
     return Response(found.data, headers={"Cache-Control": "no-store"}, media_type=BINARY)

@@ -23,12 +23,13 @@ RETRY_SECONDS = 0.2
 READS = frozenset(
     {
         *("hello", "devices", "axes", "objects", "sdo_read", "diagnosis"),
-        *("emergencies", "events", "timing", "clocks", "plan", "laws"),
+        *("emergencies", "events", "timing", "clocks", "plan", "laws", "modes"),
     }
 )
 WRITES = frozenset(
     {
         *("sdo_write", "set_state", "reset_error", "clear_counters", "set_parameters", "home"),
+        *("set_mode", "run_preset"),
         *("virtual_cable", "virtual_power", "virtual_push"),
         "registers",  # reading can change a device: it empties a mailbox, or resets a latch
     }

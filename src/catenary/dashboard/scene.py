@@ -53,7 +53,7 @@ POSE_HEAD = struct.Struct("<BBHIIIdd")
 PLANE, HEIGHT_FIELD, SPHERE, CAPSULE, ELLIPSOID, CYLINDER, BOX, MESH = range(8)  # mjtGeom
 SHAPES = (PLANE, SPHERE, CAPSULE, ELLIPSOID, CYLINDER, BOX, MESH)
 VISIBLE_GROUPS = 3  # groups 0 to 2, as MuJoCo's viewer shows
-SLIDE, HINGE = 2, 3  # mjtJoint
+FREE, SLIDE, HINGE = 0, 2, 3  # mjtJoint
 LARGEST = 64 << 20  # [bytes] of a scene
 CONTACTS = 64
 DEFAULT_COLOUR = (0.5, 0.5, 0.5, 1.0)  # of MuJoCo
@@ -80,13 +80,21 @@ class Scene:
             axis. If no joint has the name of an axis, and as many joints as axes exist, they
             correspond in their order.
 
+        moves: True if the base moves: its pose is that of the first free joint.
+
     Raises:
         ConfigurationError: MuJoCo is not installed, the model cannot be read, a joint does not
-            exist or cannot be moved by one axis, or the scene is too large.
+            exist or cannot be moved by one axis, the model has no free joint for its base, or the
+            scene is too large.
     """
 
     def __init__(
-        self, path: str | Path, axes: Sequence[str], joints: Mapping[str, str] | None = None
+        self,
+        path: str | Path,
+        axes: Sequence[str],
+        joints: Mapping[str, str] | None = None,
+        *,
+        moves: bool = False,
     ) -> None:
         self._model = load_model(Path(path))
         self._mujoco = _mujoco()
@@ -96,16 +104,24 @@ class Scene:
         self._places = [
             int(self._model.joint(joint).qposadr[0]) for joint in self.joints if joint is not None
         ]
+        self._initial = self._data.qpos.copy()
+        self._base = free_joint(self._model) if moves else None
         self.data = encode_scene(self._model, self.joints)
 
-    def poses(self, time: float, position: Values, target: Values) -> bytes:
+    def poses(
+        self, time: float, position: Values, target: Values, base: Values | None = None
+    ) -> bytes:
         """Return the message with the poses of all bodies.
 
         Args:
             time: time of the positions [s].
             position: (axes,) [rad or m]; NaN: the initial position of the model.
             target: (axes,) [rad or m]; NaN: the same as `position`.
+            base: (7,) position [m] and quaternion (w, x, y, z) of the base; None: the last one, or
+                the initial pose of the model.
         """
+        if base is not None and self._base is not None:
+            self._initial[self._base : self._base + 7] = base
         target = np.where(np.isfinite(target), target, position)
         ghost = self._solve(target)
         actual = self._solve(position)
@@ -116,7 +132,7 @@ class Scene:
     def _solve(self, position: Values) -> npt.NDArray[np.float32]:
         """Return the poses of all bodies, (bodies, 7)."""
         data = self._data
-        data.qpos[:] = self._model.qpos0
+        data.qpos[:] = self._initial
         driven = position[self._driven]
         data.qpos[self._places] = np.where(np.isfinite(driven), driven, data.qpos[self._places])
         self._mujoco.mj_fwdPosition(self._model, data)
@@ -127,6 +143,20 @@ class Scene:
         contact = self._data.contact
         count = min(self._data.ncon, CONTACTS)
         return np.hstack([contact.pos[:count], contact.frame[:count, :3]]).astype("<f4")
+
+
+def free_joint(model: Any) -> int:
+    """Return the place of the first free joint in qpos.
+
+    Raises ConfigurationError if the model has none.
+    """
+    for joint in range(model.njnt):
+        if model.jnt_type[joint] == FREE:
+            return int(model.jnt_qposadr[joint])
+    raise ConfigurationError(
+        "the model has no free joint, so its base cannot move",
+        hint="omit --base, or add <freejoint/> to the base of the model",
+    )
 
 
 def joints_of_axes(

@@ -236,14 +236,16 @@ def run_server(
     """
     require_packages()
     from catenary.dashboard.hub import Hub
-    from catenary.dashboard.panels import make_scene
+    from catenary.dashboard.panels import make_companions, make_scene
     from catenary.dashboard.requests import Requests
     from catenary.dashboard.source import Source
 
     with open_socket(options.host, options.port) as listening:
         access = make_access(replace(options, port=listening.getsockname()[1]))
         scene = make_scene(options.panels)
-        hub = Hub(Source(share, uid=options.uid), Requests(share, options.uid), problem, scene)
+        companions = make_companions(options.panels, options.uid)
+        source, requests = Source(share, uid=options.uid), Requests(share, options.uid)
+        hub = Hub(source, requests, problem, scene, companions)
         server = make_server(access, hub, options)
         announce(access)
         server.run(sockets=[listening])

@@ -19,6 +19,7 @@ ADVICE: Mapping[str, str] = {
     "DuplicateFrames": "look for a loop in the wiring or a second master",
     "ClockUnlocked": "check the load of the machine (`catenary doctor`) and the named device",
     "ExternalClockChanged": "check ptp4l and phc2sys (`catenary doctor`)",
+    "TriggerChanged": "check the program that sends the trigger; both periods must be the same",
     "ModeRefused": "check that the drive supports the mode (0x6502)",
     "WorkingCounterError": "check the power and the cable of the named devices, then restart",
     "StateError": "check the AL status code of the device, then restart the program",

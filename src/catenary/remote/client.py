@@ -259,6 +259,33 @@ class Client:
         """Return the plan of the loop as text."""
         return self.call("plan")  # type: ignore[no-any-return]
 
+    # Operating modes and presets
+
+    def modes(self) -> messages.Modes:
+        """Return the operating modes and presets of the program, and its present mode."""
+        return self.call("modes")  # type: ignore[no-any-return]
+
+    def set_mode(self, mode: str) -> messages.Done:
+        """Request an operating mode, and wait until the program has accepted it.
+
+        The program changes its mode afterwards: read it with `modes`, or as `Reader.mode`.
+
+        Raises:
+            RequestRefused: The program refused it, or another request waits for an answer. The
+                message is the reason.
+            ResponseTimeout: The program has not answered within 1 s. The request is withdrawn.
+            ShareError: The loop has ended.
+            ValueError: The program does not offer this mode.
+        """
+        return self.call("set_mode", mode=mode)  # type: ignore[no-any-return]
+
+    def run_preset(self, preset: str) -> messages.Done:
+        """Request a preset, and wait until the program has accepted it.
+
+        The preset runs afterwards. Raises the same errors as `set_mode`.
+        """
+        return self.call("run_preset", preset=preset)  # type: ignore[no-any-return]
+
     # Motion and laws
 
     def laws(self) -> list[messages.LawEntry]:

@@ -11,6 +11,8 @@ from typing import Any, TypeAlias
 
 import msgspec
 
+from catenary.share.choice import Choice
+
 VERSION = 1
 MESSAGE_SIZE = 64 * 1024  # largest message [bytes]
 PART_SIZE = 32 * 1024  # largest part of a result [bytes]
@@ -269,6 +271,14 @@ class LawEntry(msgspec.Struct, frozen=True, kw_only=True):
     parameters: dict[str, Parameter]
 
 
+class Modes(msgspec.Struct, frozen=True, kw_only=True):
+    """Operating modes and presets of a program."""
+
+    mode: str | None  # present mode; None until the program sets it
+    modes: list[Choice]
+    presets: list[Choice]
+
+
 class Done(msgspec.Struct, frozen=True, kw_only=True):
     """Completion of a request. `note` describes a side effect; empty without one."""
 
@@ -294,13 +304,18 @@ RESULTS: dict[str, Any] = {
     "plan": Text,
     "laws": list[LawEntry],
     "set_parameters": Done,
+    "modes": Modes,
+    "set_mode": Done,
+    "run_preset": Done,
     "home": Done,
     "move": Done,
     "virtual_cable": Done,
     "virtual_power": Done,
     "virtual_push": Done,
 }
-WRITES = (  # methods that publish an event RemoteWrite; pushes are too frequent
+# Methods that publish an event RemoteWrite. Pushes are too frequent. Accepted modes and presets are
+# events RequestAccepted.
+WRITES = (
     "sdo_write",
     "set_state",
     "reset_error",

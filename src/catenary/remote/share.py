@@ -37,9 +37,12 @@ class Share(share.Share):
             the cycles.
         jog: accept jogs from clients, and their requests to enable and reset axes. They can always
             stop and disable axes.
+        modes: operating modes that operators can request: names, or description by name.
+        presets: presets that operators can request, in the same form.
 
     Raises:
         ShareError: on entry, if the name belongs to a running process or another user.
+        TypeError: `mode` is not a number, or a name or description is not a text.
         ValueError: an argument is out of range.
     """
 
@@ -55,7 +58,7 @@ class Share(share.Share):
             raise TypeError(f"{network!r} is not a network of a loop")
         where = folder.own_folder()
         methods = Methods(Program(self, network, self.shared_events))
-        listener = Listener(where, self.mode)
+        listener = Listener(where, self.permissions)
         service = Service(listener, methods, self._report_write)
         self._network = network
         try:

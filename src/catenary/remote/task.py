@@ -42,7 +42,8 @@ class Task:
             return self._failed(
                 ValueError(f"timeout={request.timeout} s: must be 0 to {TIMEOUT_MAX:g}")
             )
-        return self._attempt(lambda: methods.start(request.method, request.params))
+        peer = self.connection.peer
+        return self._attempt(lambda: methods.start(request.method, request.params, peer))
 
     def step(self, until: float) -> list[bytes] | None:
         """Continue the request until it waits, ends, or the time `until` has come.

@@ -4,6 +4,7 @@ with cat.Share("arm") as share, cat.Loop(arm, sink=share) as loop: ...      # on
 with cat.attach("arm") as arm: ...                                          # any other process
 """
 
+from catenary.share.choice import Choice
 from catenary.share.command_table import Reason
 from catenary.share.commands import AxisCommand, LeaseEnd
 from catenary.share.events import SharedEvent
@@ -12,17 +13,21 @@ from catenary.share.jog import Jog, JogStatus, RequestStatus, StateRequest
 from catenary.share.layout import ShareField, ShareLayout
 from catenary.share.lease import Lease
 from catenary.share.mutex import Mutex
+from catenary.share.operator_request import OperatorRequest
 from catenary.share.process import Process
 from catenary.share.reader import Reader, attach
 from catenary.share.sweep import Sweep
+from catenary.share.trigger import TriggerReceiver, TriggerSender
 
 __all__ = [
     "AxisCommand",
+    "Choice",
     "Jog",
     "JogStatus",
     "Lease",
     "LeaseEnd",
     "Mutex",
+    "OperatorRequest",
     "Process",
     "Reader",
     "Reason",
@@ -32,6 +37,8 @@ __all__ = [
     "SharedEvent",
     "StateRequest",
     "Sweep",
+    "TriggerReceiver",
+    "TriggerSender",
     "attach",
     "include_folder",
 ]

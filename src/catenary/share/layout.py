@@ -6,6 +6,7 @@
 16  u64      bytes of the segment
 24           description: a ShareLayout as JSON
 ...          ring of cycles and ring of events (ring.h), at the offsets in the description
+...          u8   number of the operating mode in the description, counted from 1; 0: none
 """
 
 from __future__ import annotations
@@ -22,6 +23,8 @@ import numpy as np
 from catenary.errors import ShareError
 from catenary.plan.sink import SinkField, SinkLayout
 from catenary.share import _rows
+from catenary.share.choice import Choice
+from catenary.share.operation import NO_MODE, Operation
 from catenary.share.process import Process
 
 MAGIC = b"CATSHARE"
@@ -81,6 +84,13 @@ class ShareLayout(msgspec.Struct, frozen=True):
     rows: RingPlace
     events: RingPlace
     jog: bool = False  # True if the core accepts jogs
+    modes: tuple[Choice, ...] = ()  # operating modes of the program
+    presets: tuple[Choice, ...] = ()  # presets of the program
+
+    @property
+    def mode_offset(self) -> int:
+        """Offset of the byte with the number of the operating mode [bytes]."""
+        return self.events.offset + _rows.memory_size(self.events.count, self.events.size)
 
     @property
     def dtype(self) -> np.dtype[np.void]:
@@ -97,7 +107,7 @@ class ShareLayout(msgspec.Struct, frozen=True):
     @property
     def size(self) -> int:
         """Size of the segment [bytes]."""
-        return self.events.offset + _rows.memory_size(self.events.count, self.events.size)
+        return self.mode_offset + (1 if self.modes else 0)
 
 
 def make_layout(
@@ -108,6 +118,7 @@ def make_layout(
     opened: float,
     writer: Process,
     jog: bool = False,
+    operation: Operation | None = None,
 ) -> ShareLayout:
     """Return the layout of a segment for a loop.
 
@@ -118,7 +129,9 @@ def make_layout(
         opened: time at which the share was opened, UTC [s].
         writer: process of the loop.
         jog: True if the core accepts jogs.
+        operation: operating modes and presets; None: none.
     """
+    offered = operation or Operation()
     blocks = (sink.record_size, sink.actual_size, sink.target_size)
     *starts, row_size = _rows.row_parts(*blocks)
     places = dict(zip(("record", "actual", "target"), starts, strict=True))
@@ -142,9 +155,29 @@ def make_layout(
             rows=RingPlace(rows_at, count, row_size),
             events=RingPlace(events_at, EVENT_COUNT, EVENT_SIZE),
             jog=jog,
+            modes=offered.modes,
+            presets=offered.presets,
         )
 
     return made(len(msgspec.json.encode(made(0))) + ALIGNMENT)
+
+
+def decode_mode(memory: mmap.mmap, layout: ShareLayout) -> str | None:
+    """Return the operating mode in a segment; None if the program has set none.
+
+    Args:
+        memory: memory of the segment.
+        layout: layout of the segment.
+
+    Raises:
+        ShareError: the number of the mode is invalid.
+    """
+    number = memory[layout.mode_offset] if layout.modes else NO_MODE
+    if number > len(layout.modes):
+        raise ShareError(
+            f"the share {layout.name!r} is damaged: mode {number} of {len(layout.modes)}"
+        )
+    return None if number == NO_MODE else layout.modes[number - 1].name
 
 
 def make_field(field: SinkField, start: int) -> ShareField:

@@ -16,7 +16,7 @@ from catenary.share import folder, memory
 from catenary.share._rows import Ring
 from catenary.share.command_table import Desk, open_desk
 from catenary.share.events import SharedEvent, decode_event
-from catenary.share.layout import ShareLayout, decode_head
+from catenary.share.layout import ShareLayout, decode_head, decode_mode
 from catenary.share.lease import Lease, lease_of
 from catenary.share.memory import Segment
 
@@ -112,6 +112,7 @@ class Reader:
             Ring(segment.memory, rows.offset, rows.count, rows.size),
             Ring(segment.memory, events.offset, events.count, events.size),
         )
+        self._memory = segment.memory
         self._seen = 0
         self._owner = segment.owner
         _, _, share = segment.path.name.partition("-")
@@ -149,6 +150,15 @@ class Reader:
     def number(self) -> int:
         """Number of the newest cycle; 0 before the first cycle."""
         return self._ring(CYCLES).newest
+
+    @property
+    def mode(self) -> str | None:
+        """Operating mode of the program, one of `layout.modes`; None if it has set none.
+
+        Raises ShareError if the share is damaged.
+        """
+        self._ring(CYCLES)  # raises an error if the reader is closed
+        return decode_mode(self._memory, self.layout)
 
     def wait(self, timeout: float | None = None) -> bool:
         """Wait for a cycle after the last one that `read` or `wait` has reported.

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from types import TracebackType
 from typing import Self
@@ -16,6 +16,7 @@ from catenary.errors import ShareError
 from catenary.plan.sink import Incident, SinkLayout
 from catenary.share import folder, memory
 from catenary.share._rows import CycleWriter, Ring
+from catenary.share.choice import Names
 from catenary.share.command_table import Desk, Values, make_desk
 from catenary.share.commands import (
     AxisCommand,
@@ -30,6 +31,8 @@ from catenary.share.events import SharedEvent, encode_event, read_events
 from catenary.share.extrapolation import Extrapolation
 from catenary.share.layout import ShareLayout, decode_head, encode_head, make_layout
 from catenary.share.memory import Segment
+from catenary.share.operation import Operation
+from catenary.share.operator_request import OperatorRequest
 from catenary.share.process import this_process
 
 HISTORY = 2.0  # [s]
@@ -55,24 +58,38 @@ class Share:
         jog: accept jogs from clients, and their requests to enable and reset axes. They can always
             stop and disable axes.
 
+        modes: operating modes that operators can request: names, or description by name.
+        presets: presets that operators can request, in the same form.
+
     Raises:
         ShareError: on entry, if the name belongs to a running process or another user.
+        TypeError: `mode` is not a number, or a name or description is not a text.
         ValueError: an argument is out of range.
     """
 
     def __init__(
-        self, name: str, *, history: float = HISTORY, mode: int = 0o600, jog: bool = False
+        self,
+        name: str,
+        *,
+        history: float = HISTORY,
+        mode: int = 0o600,
+        jog: bool = False,
+        modes: Names = (),
+        presets: Names = (),
     ) -> None:
         if not history > 0:
             raise ValueError(f"history={history} s: must be positive")
+        if not isinstance(mode, int):
+            raise TypeError(f"mode={mode!r}: permissions are a number; operating modes are modes=")
         if not 0 <= mode <= 0o777:
             raise ValueError(f"mode={mode:#o}: must be permissions as for chmod, such as 0o600")
         self.name = name
         self._file = folder.file_name(folder.STATE, name)
         self._socket_file = folder.file_name(folder.SOCKET, name)
         self._history = history
-        self._mode = mode
+        self._permissions = mode
         self._jog = jog
+        self._operation = Operation(modes, presets, self._report_accepted)
         self._entered = False
         self._pid = 0  # process that entered the block
         self._segment: Segment | None = None
@@ -165,6 +182,48 @@ class Share:
         number, row = cycles.copy() if cycles is not None else (0, b"")
         return np.frombuffer(row, self._dtype)[0] if number else None
 
+    # Operating modes and presets. Only the process of the loop calls these methods.
+
+    @property
+    def mode(self) -> str | None:
+        """Operating mode of the program; None until the program sets it.
+
+        A new mode is published to readers, and becomes an event `ModeChanged`. Setting it raises
+        ValueError for a mode that `modes` does not name, and RuntimeError in a forked child.
+        """
+        return self._operation.mode
+
+    @mode.setter
+    def mode(self, name: str) -> None:
+        if self._entered and self.is_inherited:
+            raise RuntimeError(
+                f"the mode of the share {self.name!r} belongs to process {self._pid}; set it there"
+            )
+        before = self._operation.change_mode(name)
+        if before == name:
+            return
+        after = "" if before is None else f", after {before!r}"
+        details = {"mode": name, "before": before}
+        self._report_now("ModeChanged", f"operating mode {name!r}{after}", details)
+
+    def requests(self) -> Sequence[OperatorRequest]:
+        """Return the request of an operator that has arrived since the last call, if any.
+
+            for cycle in loop:
+                for request in share.requests():
+                    if request.kind == "mode" and request.accept():
+                        share.mode = request.name
+
+        Never blocks, and takes no lock. Accept or refuse each request within 1 s; its client then
+        receives an error. Until then, requests of other clients are refused.
+        """
+        return self._operation.take()
+
+    @property
+    def operation(self) -> Operation:
+        """Operating modes and presets, for the service of the share."""
+        return self._operation
+
     @property
     def layout(self) -> ShareLayout:
         """Layout of the data of the current loop, or of the last one."""
@@ -189,14 +248,7 @@ class Share:
             raise RuntimeError(
                 f"the share {self.name!r} already belongs to a loop; use one share for each loop"
             )
-        made = make_layout(
-            self.name,
-            layout,
-            history=self._history,
-            opened=time.time(),
-            writer=this_process(),
-            jog=self._jog,
-        )
+        made = self._make_layout(layout)
         segment, desk, listening = self._make_files(made)
         blocks = (layout.record_size, layout.actual_size, layout.target_size)
         rows, events = made.rows, made.events
@@ -246,6 +298,7 @@ class Share:
         """
         if self.is_inherited:
             return
+        self._operation.detach()
         with self._reporting:
             for ring in (self._events, self._cycles):
                 if ring is not None:
@@ -258,9 +311,9 @@ class Share:
                 self._socket = None
 
     @property
-    def mode(self) -> int:
-        """Permissions of the share as for chmod."""
-        return self._mode
+    def permissions(self) -> int:
+        """Permissions of the share as for chmod: the argument `mode`."""
+        return self._permissions
 
     def shared_events(self, after: int) -> tuple[Iterator[SharedEvent], int]:
         """Copy the events of the open loop after serial `after`: see `events.read_events`."""
@@ -272,17 +325,41 @@ class Share:
         """True in a forked child, which must not end the share of its parent."""
         return self._pid != os.getpid()
 
+    def _report_accepted(self, request: OperatorRequest) -> None:
+        details = {"kind": request.kind, "name": request.name, "client": request.client}
+        message = f"{request.client} requested {request.kind} {request.name!r}: accepted"
+        self._report_now("RequestAccepted", message, details)
+
+    def _report_now(self, kind: str, message: str, details: Mapping[str, object]) -> None:
+        """Append an event with the time of the newest cycle."""
+        newest = self.newest()
+        now = 0.0 if newest is None else float(newest["scheduled_ns"]) * 1e-9
+        self.report(Incident(kind, message, now, details=details))
+
+    def _make_layout(self, layout: SinkLayout) -> ShareLayout:
+        return make_layout(
+            self.name,
+            layout,
+            history=self._history,
+            opened=time.time(),
+            writer=this_process(),
+            jog=self._jog,
+            operation=self._operation,
+        )
+
     def _make_files(self, made: ShareLayout) -> tuple[Segment, Desk, DeskSocket]:
         """Create the file and the socket as drafts. Raises ShareError if the memory is full."""
         where = folder.own_folder()
-        mode = self._mode & ~OTHERS_WRITE
+        mode = self._permissions & ~OTHERS_WRITE
         folder.prepare(where, mode)
         segment = memory.create(where, made.size, mode)
         try:
             head = encode_head(made)
             segment.memory[: len(head)] = head
+            if made.modes:
+                self._operation.attach(segment.memory, made.mode_offset)
             desk, descriptor = make_desk(made)
-            return segment, desk, DeskSocket(where, descriptor, self._mode)
+            return segment, desk, DeskSocket(where, descriptor, self._permissions)
         except BaseException:
             segment.path.unlink()
             raise

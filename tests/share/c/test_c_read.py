@@ -60,6 +60,15 @@ def test_description_is_that_of_python(cell: Cell, name: str, library: Library) 
             assert (found.kind.decode(), found.size) == (kind.kind, kind.itemsize)
 
 
+def test_modes_and_presets_do_not_disturb_a_reader_in_c(name: str, library: Library) -> None:
+    with cat.Share(name, modes={"stand": 'a \\ "b"'}, presets=("wave",)) as share:
+        share.open(LAYOUT)
+        share.append(bytes(share.layout.rows.size - 8))
+        with library.attach(name) as found:
+            assert library.field_count(found.handle) == len(share.layout.fields)
+        share.close()
+
+
 def test_newest_cycle_equals_that_of_python(cell: Cell, name: str, library: Library) -> None:
     with cell.reader.lease(for_=600.0) as command, library.attach(name) as share:
         command.send(position=[0.01, 0.02, 0.03])

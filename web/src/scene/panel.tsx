@@ -4,7 +4,7 @@ import { useEffect, useRef, useState } from "preact/hooks";
 import type { Connection } from "../connection.ts";
 import { isPhone } from "../media.ts";
 import { Panel } from "../parts/common.tsx";
-import { KIND_POSES } from "../protocol.ts";
+import { KIND_POSES, type ErrorBody } from "../protocol.ts";
 import { notifyError } from "../notices.ts";
 import type { Greeting } from "../remote.ts";
 import { useResource } from "../resource.ts";
@@ -14,9 +14,9 @@ import type { Push, Viewer } from "./viewer.ts";
 
 const PUSH_SECONDS = 0.2; // the force ends by itself when the pushes end
 
-type Loading = { scene: SceneData } | { reason: string } | null;
+type Loading = { scene: SceneData } | { reason: string } | null; // null: there is no model
 
-/** Show the robot of the share; nothing if the server has no model. */
+/** Show the robot of the share, or why this is not possible; nothing if the server has no model. */
 export function ScenePanel({ connection }: { connection: Connection }) {
   const [loading, setLoading] = useState<Loading>(null);
   const run = connection.hello.value?.run;
@@ -28,8 +28,17 @@ export function ScenePanel({ connection }: { connection: Connection }) {
     return () => abort.abort();
   }, [run]);
   if (loading === null) return null;
-  if ("reason" in loading) return null;
+  if ("reason" in loading) return <Missing reason={loading.reason} />;
   return <CollapsiblePanel connection={connection} scene={loading.scene} />;
+}
+
+/** Why the server cannot show its model. */
+function Missing({ reason }: { reason: string }) {
+  return (
+    <Panel title={text.scene.title} class="scene-panel">
+      <p class="empty" role="status">{text.scene.missing(reason)}</p>
+    </Panel>
+  );
 }
 
 interface RobotProps {
@@ -60,7 +69,8 @@ function ToggleButton(props: { label: string; open: boolean; onClick: () => void
 
 async function load(signal: AbortSignal): Promise<Loading> {
   const reply = await fetch("/scene", { signal });
-  if (reply.status !== 200) return { reason: `HTTP ${reply.status}` };
+  if (reply.status === 204 || reply.status === 401) return null;
+  if (!reply.ok) return { reason: ((await reply.json()) as { error: ErrorBody }).error.message };
   return { scene: decodeScene(await reply.arrayBuffer()) };
 }
 

@@ -4,6 +4,7 @@ import { useComputed, useSignal } from "@preact/signals";
 import { useEffect, useMemo } from "preact/hooks";
 import type { Connection } from "../connection.ts";
 import { isPhone } from "../media.ts";
+import { OperationPanel } from "../operation/panel.tsx";
 import { Segmented } from "../parts/common.tsx";
 import { confirmed } from "../parts/confirm.tsx";
 import type { AxisInfo } from "../remote.ts";
@@ -28,6 +29,7 @@ export function Axes({ connection }: { connection: Connection }) {
   if (names.length === 0) return <p class="empty">{text.axes.none}</p>;
   return (
     <>
+      <OperationPanel connection={connection} />
       <Toolbar {...{ connection, jogging, noJog, units }} />
       {!isPhone.value && <ScenePanel connection={connection} />}
       <div class="axes-grid">

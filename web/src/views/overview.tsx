@@ -1,6 +1,7 @@
 /** Overview: state of the bus, timing, events, and checks. */
 
 import type { Connection } from "../connection.ts";
+import { OperationPanel } from "../operation/panel.tsx";
 import type { Device } from "../remote.ts";
 import { useResource } from "../resource.ts";
 import { Clocks } from "./overview/clocks.tsx";
@@ -17,6 +18,7 @@ export function Overview({ connection }: { connection: Connection }) {
   const devices = useResource<Device[]>(connection, "devices", {}, DEVICES_INTERVAL);
   return (
     <div class="overview">
+      <OperationPanel connection={connection} />
       <Summary connection={connection} devices={devices.value.value} />
       <div class="overview-columns">
         <div class="stack">
