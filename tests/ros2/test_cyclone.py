@@ -14,7 +14,7 @@ import pytest
 
 from catenary.errors import CatenaryError, ConfigurationError
 from catenary.realtime import private_network
-from catenary.ros2.backend import COMMAND, SENSOR, STATE, NotAvailable, Qos, open_backend
+from catenary.ros2.backend import COMMAND, GLOVE, SENSOR, STATE, NotAvailable, Qos, open_backend
 from catenary.ros2.messages import Float64MultiArray, JointState, String
 
 cyclone = pytest.importorskip("catenary.ros2.cyclone", reason="cyclonedds is not installed")
@@ -71,6 +71,18 @@ def test_only_the_newest_messages_are_kept(nodes: tuple[Any, Any]) -> None:
         publisher.publish(Float64MultiArray(data=(float(number),)))
     right.spin_once(PATIENCE)
     assert [message.data for message in received] == [(999.0,)]
+
+
+@pytest.mark.parametrize("qos", [SENSOR, STATE], ids=["sensor", "state"])
+def test_a_glove_is_received_with_both_usual_qualities(nodes: tuple[Any, Any], qos: Qos) -> None:
+    left, right = nodes
+    received: list[JointState] = []
+    publisher = left.publisher("glove", JointState, qos)
+    right.subscription("glove", JointState, GLOVE, received.append)
+    until(lambda: publisher.matched == 1)
+    publisher.publish(MESSAGE)
+    right.spin_once(PATIENCE)
+    assert [list(each.name) for each in received] == [["a", "b"]]
 
 
 def test_a_message_that_cannot_be_decoded_is_ignored_and_reported(

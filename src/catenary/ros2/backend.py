@@ -15,6 +15,7 @@ from catenary.ros2 import names
 from catenary.ros2.interface import (
     CLOCK,
     COMMAND,
+    GLOVE,
     SENSOR,
     STATE,
     ActionServer,
@@ -32,6 +33,7 @@ from catenary.ros2.interface import (
 __all__ = [
     "CLOCK",
     "COMMAND",
+    "GLOVE",
     "SENSOR",
     "STATE",
     "ActionServer",

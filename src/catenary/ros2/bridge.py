@@ -18,7 +18,7 @@ from msgspec import Struct
 
 from catenary.errors import CatenaryError, ConfigurationError
 from catenary.ros2 import messages
-from catenary.ros2.backend import COMMAND, Backend, NotAvailable
+from catenary.ros2.backend import COMMAND, GLOVE, Backend, NotAvailable
 from catenary.ros2.commands import REFUSED, Commands, State
 from catenary.ros2.config import Config, Forward, Point, Trajectory
 from catenary.ros2.diagnostics import Reports
@@ -224,6 +224,10 @@ class Bridge:
         if commands.pose is not None:
             offer = self._offer("pose")
             self._backend.subscription(commands.pose.topic, messages.PoseStamped, COMMAND, offer)
+        if commands.joint_states is not None:  # gloves often publish with the QoS of sensors
+            offer = self._offer("joint_states")
+            glove = commands.joint_states.topic
+            self._backend.subscription(glove, messages.JointState, GLOVE, offer)
         for each in self._config.parameters:
             update = partial(self._requests.set_parameters, each, self.reports)
             self._backend.subscription(each.topic, messages.Float64MultiArray, COMMAND, update)

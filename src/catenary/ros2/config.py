@@ -151,6 +151,24 @@ class Pose(Table, frozen=True):
     timeout: Seconds = 0.5
 
 
+class MappedJoint(Table, frozen=True):
+    """[commands.joint_states.axes.NAME]: position of an axis, scale * joint + offset [rad]."""
+
+    joint: Text  # name in the message
+    scale: float = 1.0
+    offset: float = 0.0  # [rad]
+    minimum: float | None = None  # [rad]; the position is clamped
+    maximum: float | None = None  # [rad]
+
+
+class MappedJoints(Table, frozen=True):
+    """[commands.joint_states]: sensor_msgs/JointState of a glove or another device."""
+
+    axes: Annotated[dict[str, MappedJoint], Meta(min_length=1)]  # by the name of the axis
+    topic: Topic = "glove/joint_states"
+    timeout: Seconds = 0.2
+
+
 class Commands(Table, frozen=True):
     """[commands]: commands that the bridge accepts."""
 
@@ -163,6 +181,7 @@ class Commands(Table, frozen=True):
     forward: Forward = Forward()
     point: Point = Point()
     pose: Pose | None = None
+    joint_states: MappedJoints | None = None
 
 
 class LawParameters(Table, frozen=True):

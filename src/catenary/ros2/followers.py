@@ -17,6 +17,7 @@ from catenary.ros2.config import Trajectory as TrajectoryConfig
 from catenary.ros2.diagnostics import Reports
 from catenary.ros2.forward import CommandError, ForwardCommand
 from catenary.ros2.goal import AxisStates, Goal, Status
+from catenary.ros2.joint_map import JointMap
 from catenary.ros2.kinematics import Kinematics
 from catenary.ros2.limits import AxisLimits, ToleranceLike, Tolerances, overridden
 from catenary.ros2.pose import PoseCommand, PoseOptions
@@ -69,6 +70,10 @@ def make_followers(
             joints, limits, forward.quantity, forward.timeout, torque_limit=torque
         )
         made["forward"] = StreamCommand(command, lambda m: m.data, reports)
+    if commands.joint_states is not None:
+        mapped = commands.joint_states
+        command = ForwardCommand(joints, limits, "position", mapped.timeout)
+        made["joint_states"] = StreamCommand(command, JointMap(mapped.axes, axes), reports)
     if commands.pose is not None:
         made["pose"] = make_pose(commands.pose, len(axes), limits)
     return made

@@ -51,6 +51,7 @@ class Qos:
 SENSOR = Qos("best_effort", "volatile", 5)  # rmw_qos_profile_sensor_data
 STATE = Qos("reliable", "volatile", 10)  # rmw_qos_profile_default
 COMMAND = Qos("reliable", "volatile", 1)  # an old command is obsolete
+GLOVE = Qos("best_effort", "volatile", 1)  # of sensors, and of reliable publishers
 CLOCK = Qos("best_effort", "volatile", 1)  # rclcpp::ClockQoS
 
 
