@@ -2,7 +2,9 @@
 #
 # PYTHON=/path/to/python3.12 selects another interpreter and recreates .venv.
 # `make docs` builds the documentation site into out/docs.
-# TEST="-k axis" passes options to pytest, and COBOT=--realtime to `make cobot`. `make dashboard`
+# TEST="-k axis" passes options to pytest, COBOT=--realtime to `make cobot`, HUMANOID=--realtime to
+# `make humanoid`, and TELEOPERATION=--realtime to `make teleoperation`, which couples two simulated
+# devices over slow networks. HUMANOID=--page serves the operator's page of the humanoid. `make dashboard`
 # serves the operator's page of a simulated cobot, or of a target: DASHBOARD=eth0. PORT=8711 selects its
 # port. `make rtlab` runs the benchmarks on a real-time kernel in QEMU. TABLE=quick or
 # TABLE=pyigh,tasks selects tables, and RTLAB="--out FOLDER" selects the folder of the results.
@@ -12,6 +14,8 @@ PYTHON ?= python3
 VENV := .venv
 TEST ?=
 COBOT ?=
+HUMANOID ?=
+TELEOPERATION ?=
 DASHBOARD ?=
 PORT ?=
 TABLE ?= all
@@ -36,13 +40,20 @@ ifeq ($(wildcard $(VENV)/.built)$(filter clean,$(MAKECMDGOALS)),)
   endif
 endif
 
-.PHONY: demo cobot dashboard rtlab test lint docs hooks build clean
+.PHONY: demo cobot humanoid teleoperation dashboard rtlab test lint docs hooks build clean
 
 demo: $(VENV)/.built
 	@$(VENV)/bin/catenary demo
 
 cobot: $(VENV)/.with-cobot
 	@$(VENV)/bin/python -m catenary.realtime.private_network examples/cobot/cobot.py $(COBOT)
+
+PAGE := $(findstring --page,$(HUMANOID))
+humanoid: $(VENV)/.with-humanoid $(if $(PAGE),$(VENV)/.with-dashboard)
+	@$(VENV)/bin/python $(if $(PAGE),,-m catenary.realtime.private_network) examples/humanoid/humanoid.py $(HUMANOID)
+
+teleoperation: $(VENV)/.with-teleoperation
+	@$(VENV)/bin/python examples/teleoperation/teleoperation.py $(TELEOPERATION)
 
 dashboard: $(VENV)/.with-dashboard $(VENV)/.with-sim
 	@$(VENV)/bin/$(if $(DASHBOARD),catenary dashboard $(DASHBOARD),python examples/cobot/dashboard.py --page)$(if $(PORT), --port $(PORT))

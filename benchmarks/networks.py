@@ -58,6 +58,7 @@ class NetworkRound:
     lost: int
     late: int
     phases_ns: dict[str, list[int]]  # of KEPT; -1: did not occur in that cycle
+    missed_triggers: int = 0  # cycles that began without the trigger of another process
 
 
 def measure(*, rates: Sequence[int], seconds: float, rounds: int, file: Path | None) -> None:

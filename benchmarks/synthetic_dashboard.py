@@ -55,6 +55,8 @@ def hello(axes: int) -> dict[str, Any]:
         "reason_no_jog": "this session is a viewer",
         "program": "benchmark",
         "remote": False,
+        "modes": [],
+        "presets": [],
     }
 
 

@@ -39,7 +39,7 @@ def main() -> None:
     with ExitStack() as stack:
         playwright = stack.enter_context(sync_playwright())
         browser = stack.enter_context(started(playwright, command)).browser
-        rig = local_rig(stack, browser)
+        rig = local_rig(stack, browser, modes=True)
         for width, scheme in product(WIDTHS, SCHEMES):
             with rig.open(width=width, touch=width < 1000, scheme=scheme) as shown:
                 shown.open()

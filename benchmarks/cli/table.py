@@ -48,12 +48,13 @@ def add_table(group: Commands) -> None:
         "--rates",
         type=positive_numbers,
         metavar="HZ,HZ",
-        help="rates of the loops (default for tocabi: 4000,8000; rteml: 5000)",
+        help="rates of the loops (default for tocabi: 4000,8000; humanoid_tasks: 4000; "
+        "rteml: 5000; rdda: 2000)",
     )
     parser.add_argument(
         "--peers",
         metavar="A,B",
-        help="peers of tocabi: loop, law, c (default: all that this machine can run)",
+        help="peers of tocabi: loop, laws, law, triggered, c (default: all that can run here)",
     )
     parser.add_argument(
         "--axes",

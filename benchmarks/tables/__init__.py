@@ -21,9 +21,11 @@ class Table(NamedTuple):
 TABLES = {
     "pyigh": Table("one loop, three drives, 1 kHz: Python compared with C", True),
     "tocabi": Table("18 + 15 axes on two networks, 4 and 8 kHz: latency, send, receive", True),
+    "humanoid_tasks": Table("a humanoid's two networks and stand-ins of its tasks", True),
     "cobot": Table("six tasks of a six-axis cobot, with the program of examples/cobot", False),
     "tasks": Table("three busy tasks: C, Python processes, Python threads, and analysis", False),
     "rteml": Table("intervals of cyclic frames in a capture at 5 kHz", True),
+    "rdda": Table("a gripper with two drives at 2 kHz, idle and loaded; its experiments", True),
     "skew": Table("two digital outputs at both ends of the line, with and without SYNC0", False),
     "interrupt": Table("reaction of a waiting task to an event: eventfd, signal, timer", False),
 }

@@ -216,3 +216,19 @@ SKEW = Spread(1.45, 2.5, 0.68, 0.18)  # [us]
 
 RTEML_CONDITIONS = "theirs: INtime on Windows, frames of 60 bytes, 5702 captured packets"
 RTEML_PACKETS, RTEML_INTERVAL_US = 5702, 200.0  # on average
+
+# RDDA, section 5: a gripper with two drives at 2 kHz, SOEM, an isolated core without a real-time
+# patch; Z. Yu, An EtherCAT-based real-time control system design for a remote-direct-drive 2-DOF
+# manipulator, MSc thesis, Northeastern University, 2019; github.com/RoboticsCollaborative/RDDA
+
+RDDA_CONDITIONS = "theirs: SOEM on an isolated core, no real-time patch, 2 drives, 2 kHz"
+RDDA_CYCLES, RDDA_RATE = 10_000, 2000
+RDDA_LATENCY_US = 100.0  # below, under load
+RDDA_PERIOD_TOLERANCE = 0.1  # fraction of the period
+RDDA_COLUMNS = ("following_error", "velocity_offset", "torque_offset")  # 0x60F4, 0x60B1, 0x60B2
+RDDA_EXPERIMENTS: Mapping[str, str] = {
+    "homing": "three phases against hard stops, by the torque",
+    "stiffness": "0 to 20 N·m/rad, with a disturbance observer",
+    "contact": "by current and by a momentum residual, no force sensor",
+    "chirp": "corner at about 10 rad/s",
+}

@@ -1,10 +1,14 @@
 """`python -m benchmarks table tocabi`: 18 + 15 axes on two networks, 4 and 8 kHz.
 
-Three variants take turns:
+Five variants take turns:
 
 - `loop`: one loop over both networks, with targets from Python in every cycle.
-- `law`: a separate process with a loop and a law for each network, and a 1 kHz Python task.
+- `laws`: one loop over both networks with a law on each, and a 1 kHz Python task.
+- `law`: a separate process with a loop and a law for each network, and the same task.
+- `triggered`: the same, but the second process starts its cycles with those of the first.
 - `c`: two C programs.
+
+The publication has one process for each network, and the first triggers the second.
 
 The published loop waits within the cycle for the answer to its frame, while `c` receives the frame
 of the previous cycle. Compare `receive` only among our variants. Compare `output delay` (from cycle
@@ -17,40 +21,40 @@ missed. `--peers law --rates 4000,5000,6000` searches for the highest rate.
 from __future__ import annotations
 
 import contextlib
-import os
-import signal
 import tempfile
-import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import partial
 from importlib.util import find_spec
 from pathlib import Path
 
-import msgspec
 import numpy as np
 
 from benchmarks.compiler import has_programs
-from benchmarks.network_law import GO, GO_TIMEOUT
 from benchmarks.networks import DRIVES, C, NetworkRound, run_c, run_ours
 from benchmarks.peers import modules_of
-from benchmarks.processor import processor_time
 from benchmarks.tables.published import TOCABI, TOCABI_CONDITIONS, Channel, spread_of
 from benchmarks.tables.sheet import Options, Sheet, as_failures, grid, slashed
-from benchmarks.tasks import compute_little
+from benchmarks.tables.tocabi_laws import (
+    LAW,
+    LAWS,
+    NETWORKS,
+    TRIGGERED,
+    Places,
+    WayRounds,
+    one_process,
+    triggered_process,
+    two_processes,
+)
 from catenary.bench.job import Body, Job
 from catenary.bench.loop import make_jobs, show_progress
-from catenary.bench.rounds import BRING_UP_SECONDS, RoundError, run_with_retries
-from catenary.bench.segment import Served, processors, served
+from catenary.bench.rounds import run_with_retries
+from catenary.bench.segment import served
 from catenary.bench.statistics import summarise
-from catenary.realtime import Statistics, Task, Tasks, session
-from catenary.realtime.child import Child, start_python
+from catenary.realtime import Statistics
 
 RATES, SECONDS, ROUNDS = (4000, 8000), 10.0, 2
-NETWORKS = ("upper", "lower")
-LOOKED_AT = 0.8  # fraction of the measurement in which processor shares are measured
-LOOP, LAW = "loop", "law"
-TASK_PERIOD, TASK_PRIORITY = 1e-3, 60  # below loops and segments
+LOOP = "loop"
 HEADER = ("avg/max/min/sd [us]", "latency", "send", "receive", "output delay", "overflows", "lost")
 OUTPUT_DELAY = "output_delay"
 
@@ -63,6 +67,7 @@ class Column:
     cycles: int
     lost: int
     overflows: int  # missed cycle starts; for C, cycles that began a period late
+    missed_triggers: int  # cycles that began without the trigger of the other process
     timing_us: dict[str, dict[str, float]]
 
     def channel(self) -> Channel:
@@ -113,24 +118,7 @@ def axes_of(options: Options) -> tuple[int, ...]:
     return axes
 
 
-@dataclass(slots=True)
-class WayRounds:
-    """Owns the results of one variant, round by round."""
-
-    networks: list[list[NetworkRound]]
-    task: list[Statistics]  # of the Python task; empty without one
-    shares: list[dict[str, float]]  # processor shares by process; empty if not measured
-
-
 Way = Callable[[Sequence[Job], "Places", WayRounds], None]
-
-
-@dataclass(frozen=True, slots=True)
-class Places:
-    """Segments and folder of a variant."""
-
-    segments: Sequence[Served]
-    folder: Path
 
 
 def ways_for(options: Options) -> tuple[dict[str, Way], list[str]]:
@@ -139,7 +127,13 @@ def ways_for(options: Options) -> tuple[dict[str, Way], list[str]]:
     Raises:
         ValueError: A variant does not exist.
     """
-    ways: dict[str, Way] = {LOOP: one_loop, LAW: two_laws, C: two_programs}
+    ways: dict[str, Way] = {
+        LOOP: one_loop,
+        LAWS: one_process,
+        LAW: two_processes,
+        TRIGGERED: triggered_process,
+        C: two_programs,
+    }
     asked = options.peers or tuple(ways)
     for name in asked:
         if name not in ways:
@@ -155,7 +149,8 @@ def why_not(options: Options) -> dict[str, str]:
     """Return the reasons why variants cannot run on this machine."""
     reasons = {}
     if find_spec("numba") is None:
-        reasons[LAW] = "Numba is not installed (pip install 'catenary[law]')"
+        missing = "Numba is not installed (pip install 'catenary[law]')"
+        reasons.update(dict.fromkeys((LAWS, LAW, TRIGGERED), missing))
     if options.ring:
         reasons[C] = "the C programs support one wire, not the two wires of a ring"
     elif not has_programs():
@@ -199,94 +194,6 @@ def two_programs(jobs: Sequence[Job], places: Places, found: WayRounds) -> None:
     found.networks.append(run_c(jobs, places.folder))
 
 
-def two_laws(jobs: Sequence[Job], places: Places, found: WayRounds) -> None:
-    """Measure both loops while the Python task runs."""
-    measured = jobs[0].cycles * jobs[0].period_ns * 1e-9
-    with contextlib.ExitStack() as stack:
-        children = [stack.enter_context(start_law(job)) for job in jobs]
-        for child in children:
-            expect(child, GO_TIMEOUT, "here")
-        tasks = stack.enter_context(beside())
-        go(children)
-        for child in children:
-            expect(child, GO_TIMEOUT, "ready")
-        processes = {
-            f"{what}, {network}": pid
-            for what, pids in (
-                (LAW, [child.pid for child in children]),
-                ("segment", [segment.pid for segment in places.segments]),
-            )
-            for network, pid in zip(NETWORKS, pids, strict=True)
-        }
-        before = tasks["python"].statistics  # excludes the start of the loops
-        go(children)
-        took = shares(processes, LOOKED_AT * measured)
-        outputs = [expect(child, BRING_UP_SECONDS + measured, "{") for child in children]
-        statistics = tasks["python"].statistics
-    while_measured = replace(
-        statistics,
-        jobs=statistics.jobs - before.jobs,
-        misses=statistics.misses - before.misses,
-    )
-    found.task.append(while_measured)
-    found.shares.append(took)
-    found.networks.append([msgspec.json.decode(each, type=NetworkRound) for each in outputs])
-
-
-def shares(processes: Mapping[str, int], seconds: float) -> dict[str, float]:
-    """Return the share of a processor that each process uses.
-
-    Args:
-        processes: Process IDs by name.
-        seconds: Duration of the measurement [s].
-    """
-    before = {name: processor_time(pid) for name, pid in processes.items()}
-    start = time.monotonic()
-    time.sleep(seconds)
-    passed = time.monotonic() - start
-    return {
-        name: round((processor_time(pid) - before[name]) / passed, 4)
-        for name, pid in processes.items()
-    }
-
-
-def start_law(job: Job) -> Child:
-    """Start the process of a loop with a law. All its threads inherit a blocked GO signal."""
-    arguments = ["-m", "benchmarks.network_law", msgspec.json.encode(job).decode()]
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {GO})
-    try:
-        return start_python(arguments)
-    finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
-
-
-def beside() -> Tasks:
-    return Tasks(
-        Task(
-            compute_little,
-            name="python",
-            period=TASK_PERIOD,
-            priority=TASK_PRIORITY,
-            cpu=processors().masters,
-        ),
-        workers="processes",
-        session=session(best_effort=True),
-        best_effort=True,
-    )
-
-
-def go(children: Sequence[Child]) -> None:
-    for child in children:
-        os.kill(child.pid, GO)
-
-
-def expect(child: Child, seconds: float, start: str) -> str:
-    output = child.read_line(seconds)
-    if output is None or not output.startswith(start):
-        raise RoundError(f"a loop with a law failed: {output or 'no output'}")
-    return output
-
-
 # Output as text and as figures
 
 
@@ -309,6 +216,7 @@ def column(name: str, rounds: Sequence[NetworkRound]) -> Column:
         cycles=len(phases["lateness"]),
         lost=sum(each.lost for each in rounds),
         overflows=sum(each.late for each in rounds),
+        missed_triggers=sum(each.missed_triggers for each in rounds),
         # -1 ns: the phase did not occur in that cycle
         timing_us={
             phase: summarise(values if phase == "lateness" else values[values >= 0])
@@ -337,6 +245,11 @@ def as_table(rate: int, found: Mapping[str, WayRounds]) -> str:
     if task:
         jobs, missed = sum(each.jobs for each in task), sum(each.misses for each in task)
         lines.append(f"the 1 kHz Python task next to the laws: {missed} of {jobs} jobs missed")
+    lines += [
+        f"{each.name}: {each.missed_triggers} of {each.cycles} cycles without a trigger"
+        for each in columns
+        if each.name == f"{TRIGGERED}, {NETWORKS[1]}"
+    ]
     for each in (shares for way in found.values() for shares in way.shares):
         took = ", ".join(f"{name} {share:.1%}" for name, share in each.items())
         lines.append(f"processor shares: {took}")

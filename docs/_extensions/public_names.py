@@ -9,6 +9,7 @@ from typing import TypeVar
 EVENTS = "catenary.bus.event_types"  # `catenary.events`
 MODULES = (
     *("control", "drive", "esi", "realtime", "record", "remote", "sensors", "share"),
+    "teleoperation",
     "virtual",
 )
 PLAIN = ("errors", "events", "types", "virtual.faults")  # no `__all__`: what they define
@@ -25,6 +26,7 @@ RETURNED = {
     "catenary.loop": ("Law", "LawRun", "Network", "Stream"),
     "catenary.loop.timing": ("Timing",),
     "catenary.loop.watches.external_clock": ("ExternalClockWatch",),
+    "catenary.loop.watches.trigger": ("TriggerWatch",),
     "catenary.model.device": ("Identity",),
     "catenary.model.finding": ("Finding",),
     "catenary.plan.stop_reason": ("StopReason",),
@@ -40,7 +42,7 @@ RETURNED = {
             "Timing",
             "Figures",
         ),
-        *("Clocks", "ClockEntry", "Text", "LawEntry", "Parameter", "Done"),
+        *("Clocks", "ClockEntry", "Text", "LawEntry", "Parameter", "Modes", "Done"),
     ),
     "catenary.wire.al": ("AlState",),
     "catenary.wire.cia402": ("AxisState",),

@@ -42,7 +42,7 @@ def test_without_a_network_the_published_table_remains() -> None:
 
 def test_what_is_left_out_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
     ways, left_out = tocabi.ways_for(Options(ring=True))
-    assert list(ways) == [tocabi.LOOP, tocabi.LAW]
+    assert list(ways) == [tocabi.LOOP, tocabi.LAWS, tocabi.LAW, tocabi.TRIGGERED]
     assert "ring" in left_out[0]
     monkeypatch.setattr(tocabi, "has_programs", lambda: False)
     assert "gcc" in tocabi.ways_for(Options())[1][0]
@@ -57,7 +57,8 @@ def test_only_the_peers_asked_for_run_or_are_missed(monkeypatch: pytest.MonkeyPa
     ways, left_out = tocabi.ways_for(Options(peers=(tocabi.LAW,)))
     assert (list(ways), left_out) == ([tocabi.LAW], [])
     with pytest.raises(
-        ValueError, match="unknown peer 'rust' of tocabi; known peers: loop, law, c"
+        ValueError,
+        match="unknown peer 'rust' of tocabi; known peers: loop, laws, law, triggered, c",
     ):
         tocabi.ways_for(Options(peers=("rust",)))
 
@@ -87,7 +88,8 @@ def test_all_ways_run_briefly(ring: bool) -> None:
     for timing in (column["timing_us"] for column in rate["columns"]):
         assert timing["output_delay"]["min"] >= timing["lateness"]["min"]
     assert "output delay" in sheet.text
-    assert [task["name"] for task in rate["task_beside"]] == ["python"]
+    assert [task["name"] for task in rate["task_beside"]] == ["python"] * 3
+    assert "lower: " in sheet.text.partition("cycles without a trigger")[0]
     [shares] = rate["shares"][tocabi.LAW]
     assert {name for name, share in shares.items() if share > 0} == {
         f"{what}, {network}" for what in ("law", "segment") for network in tocabi.NETWORKS

@@ -15,8 +15,9 @@ from tools.rtlab.errors import LabError
 ROOT = Path(__file__).resolve().parents[2]
 
 
-def test_all_omits_quick_and_two_lengths_of_tocabi() -> None:
-    assert set(tables.choose(["all"])) == set(tables.TABLES) - {"quick", "tocabi-60", "tocabi-8k"}
+def test_all_omits_quick_two_lengths_of_tocabi_and_humanoid() -> None:
+    omitted = {"quick", "tocabi-60", "tocabi-8k", "humanoid"}
+    assert set(tables.choose(["all"])) == set(tables.TABLES) - omitted
 
 
 def test_tables_are_selected_by_name_with_or_without_commas() -> None:
