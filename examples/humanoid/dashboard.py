@@ -49,7 +49,7 @@ def operate(
         name: prefix of its shares.
         seconds: duration after the bring-up [s].
         port: port of the page; None: no page.
-        ros2: True to let the right hand follow poses of ROS 2.
+        ros2: True to let the hands follow poses of ROS 2.
     """
     scenario = Scenario("operate", "the robot balances, and an operator commands it", seconds)
     setup = Setup(scenario, folder, model, name, False, PERIOD, SILENCE, ros2)

@@ -12,7 +12,7 @@ import numpy as np
 
 from catenary import realtime
 
-JOINTS, UPPER_JOINTS, FEET = 33, 18, 2
+JOINTS, UPPER_JOINTS, FEET, HANDS = 33, 18, 2, 2
 
 
 class Mode(IntEnum):
@@ -108,8 +108,8 @@ ARMS = np.dtype(
 
 HAND = np.dtype(
     [
-        ("active", "i8"),  # 1: the right hand follows poses of an operator
-        ("torque", "f8", 8),  # [N·m] of the joints of its arm
+        ("active", "i8", HANDS),  # 1: the hand follows poses of an operator; left, right
+        ("torque", "f8", (HANDS, 8)),  # [N·m] of the joints of its arm
     ]
 )
 

@@ -39,7 +39,7 @@ def main() -> None:
     parser.add_argument("--model", type=Path, default=FOLDER / "humanoid.xml", help="MJCF file")
     parser.add_argument("--policy", type=Path, metavar="ONNX", help="balance by a policy")
     parser.add_argument(
-        "--ros2", action="store_true", help="the right hand follows geometry_msgs/PoseStamped"
+        "--ros2", action="store_true", help="the hands follow geometry_msgs/PoseStamped"
     )
     parser.add_argument("--page", action="store_true", help="serve the operator's page")
     parser.add_argument("--port", type=int, default=8710, help="port of the page")
