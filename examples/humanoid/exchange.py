@@ -44,7 +44,8 @@ class Cause(IntEnum):
     SILENT_LOOP = 4
     LOST_DRIVE = 5  # a drive does not answer, or is in fault
     LOST_IMU = 6
-    SILENT_SAFETY = 7  # found by the loop
+    SILENT_SAFETY = 7  # found by the loop, as the next one
+    NOT_READY = 8  # the drives were not enabled in time, or a task sent no values
 
     @property
     def text(self) -> str:
