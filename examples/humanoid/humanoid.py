@@ -62,9 +62,7 @@ def main() -> None:
     a = parser.parse_args()
     if a.page:
         if a.scenarios or a.realtime or a.policy:
-            parser.error(
-                "--page runs no scenario, and always on the machine's clock, with the balance"
-            )
+            parser.error("--page runs no scenario; omit SCENARIO, --realtime and --policy")
         a.out.mkdir(parents=True, exist_ok=True)
         operate(a.out, a.model, a.name, a.seconds, a.port, ros2=a.ros2)
         return

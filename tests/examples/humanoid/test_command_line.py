@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import socket
 import subprocess
 import sys
 from pathlib import Path
@@ -46,6 +47,15 @@ def test_the_model_of_another_robot_is_refused(tmp_path: Path) -> None:
     text = body.MODEL.read_text()
     model.write_text(text.replace('joint name="left_knee"', 'joint name="left_wheel"'))
     assert "is not this humanoid: missing joints" in refused(tmp_path, "--model", str(model))
+
+
+def test_a_port_that_is_in_use_is_refused(tmp_path: Path) -> None:
+    with socket.create_server(("127.0.0.1", 0)) as other:
+        port = str(other.getsockname()[1])
+        command = [sys.executable, str(PROGRAM), "--page", "--port", port, "--out", str(tmp_path)]
+        done = subprocess.run(command, capture_output=True, text=True, timeout=120)
+    assert done.returncode == 1
+    assert f"humanoid.py: port {port} of the page: Address already in use" in done.stderr
 
 
 def test_a_file_that_is_not_a_policy_is_refused(tmp_path: Path) -> None:
