@@ -29,7 +29,7 @@ def positive(text: str) -> float:
 
 def file(text: str) -> Path:
     if not Path(text).is_file():
-        raise argparse.ArgumentTypeError(f"there is no file {text}")
+        raise argparse.ArgumentTypeError(f"the file {text} does not exist")
     return Path(text)
 
 

@@ -233,7 +233,7 @@ def arm_motion(task: realtime.Running, cost: float, x: Exchange) -> None:
 
 
 def rows_of(active: np.ndarray) -> list[slice]:
-    """Return the rows of the arms whose hands are active."""
+    """Return the rows of the arms with an active hand."""
     return [rows for rows, one in zip(hand.ROWS, active, strict=True) if one]
 
 

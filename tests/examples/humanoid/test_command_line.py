@@ -33,8 +33,8 @@ def refused(folder: Path, *arguments: str) -> str:
         (["dance"], "unknown scenarios dance; known: stand"),
         (["--hertz", "0"], "--hertz: 0 is not a positive number"),
         (["--silence", "-1"], "--silence: -1 is not a positive number"),
-        (["--model", "none.xml"], "--model: there is no file none.xml"),
-        (["--policy", "none.onnx"], "--policy: there is no file none.onnx"),
+        (["--model", "none.xml"], "--model: the file none.xml does not exist"),
+        (["--policy", "none.onnx"], "--policy: the file none.onnx does not exist"),
         (["--page", "push"], "--page runs no scenario"),
     ],
 )
