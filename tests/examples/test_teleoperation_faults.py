@@ -124,13 +124,14 @@ def test_a_link_that_returns_connects_again_without_a_step_of_the_torque() -> No
         pair.run(6.45)
         assert pair.leader.peer.losses == pair.follower.peer.losses == 1
         assert pair.leader.now.position[1] - pair.follower.now.position[1] > 0.3
+        assert pair.leader.now.torque[1] < -0.05  # the hand pushes it away while it holds
         torques = []
         while pair.leader.now.time < 7.4:
             pair.run(pair.leader.now.time + 1e-4)
-            torques.append(pair.follower.now.torque[1])
+            torques.append((pair.leader.now.torque[1], pair.follower.now.torque[1]))
         assert pair.leader.connected
         assert pair.follower.connected
-        assert abs(np.diff(torques)).max() < 0.02  # [N·m]; a step would be 0.6
+        assert abs(np.diff(torques, axis=0)).max() < 0.02  # [N·m]
         assert pair.follower.now.position[1] == pytest.approx(pair.leader.now.position[1], abs=5e-3)
 
 
