@@ -163,26 +163,36 @@ def cycles(target, hand, side, peer, *, watchdog=0.02, waits=False):
                 )
 
 
-def report(peer, before, now):
-    """Print a change of the link. Return its state."""
-    if peer.state is not before:
-        print(f"{now:6.2f} s  link {peer.state.value} {peer.reason}".rstrip(), flush=True)
-    return peer.state
+class Report:
+    """Owner of the last line about the link."""
+
+    def __init__(self, peer):
+        self.peer, self.last, self.at = peer, None, -np.inf
+
+    def step(self, now):
+        """Print the state of the link if it changes, and a new reason at most once per second."""
+        state, reason = self.peer.state, self.peer.reason
+        if (state, reason) == self.last or (state is self.state and now - self.at < 1.0):
+            return
+        self.last, self.at = (state, reason), now
+        print(f"{now:6.2f} s  link {state.value} {reason}".rstrip(), flush=True)
+
+    @property
+    def state(self):
+        """State of the last line; None before the first one."""
+        return self.last and self.last[0]
 
 
 def run(target, hand, given, side, peer):
     """Run one side until the end of its time, or Ctrl-C. Write its cycles if a file is given."""
     # Virtual drives run on busy machines.
     options = {"watchdog": 0.02 if given.target else 0.2, "waits": True}
-    kept, state = deque(maxlen=KEPT), peer.state
-    print(
-        f"{given.role}: {STIFFNESS:g} N·m/rad, {side.damping:.3g} N·m·s/rad; link {state.value}",
-        flush=True,
-    )
+    kept, begun, report = deque(maxlen=KEPT), time.monotonic(), Report(peer)
+    print(f"{given.role}: {STIFFNESS:g} N·m/rad, {side.damping:.3g} N·m·s/rad", flush=True)
     try:
         with closing(cycles(target, hand, side, peer, **options)) as running:
             for cycle in running:
-                state = report(peer, state, cycle.time)
+                report.step(time.monotonic() - begun)
                 if given.out:
                     kept.append(cycle.row)
                 if given.seconds is not None and cycle.time > given.seconds:
@@ -218,7 +228,7 @@ def arguments(words=None):
         ("damping", None, "[N·m·s/rad]; default: by the delay"),
         ("added", 0.0, "largest damping of the passivity controller [N·m·s/rad]; default: 0"),
         ("feedback", None, "only of a leader: reflect this part of the follower's torque, not P+d"),
-        ("seconds", None, "duration [s]; default: until Ctrl-C"),
+        ("seconds", None, "duration [s], for a leader from the first connection; default: Ctrl-C"),
     ):
         parser.add_argument(f"--{name}", type=float, default=default, metavar="N", help=text)
     parser.add_argument("--out", type=Path, metavar="FILE", help="the newest cycles (.npy)")

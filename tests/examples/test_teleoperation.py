@@ -6,9 +6,11 @@ import json
 import subprocess
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
+from catenary.teleoperation import LinkState
 from tests.examples.two_devices import FOLDER, load
 
 pytest.importorskip("numba", reason="laws are compiled by Numba: pip install 'catenary[law]'")
@@ -129,3 +131,19 @@ def test_a_command_line_that_means_nothing_is_refused(
     with pytest.raises(SystemExit):
         load(program).arguments(words)
     assert message in capsys.readouterr().err
+
+
+def test_the_program_prints_why_the_link_does_not_connect(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    peer = SimpleNamespace(state=LinkState.WAITING, reason="no packet")
+    report = load("device").Report(peer)
+    for k in range(3000):
+        peer.reason = f"refused {k}" if k else "no packet"
+        report.step(k * 1e-3)
+    peer.state, peer.reason = LinkState.CONNECTED, ""
+    report.step(2.9995)
+    report.step(9.0)
+    lines = [line.split(maxsplit=2)[2] for line in capsys.readouterr().out.splitlines()]
+    waiting = [f"link waiting refused {k}" for k in (1000, 2000)]
+    assert lines == ["link waiting no packet", *waiting, "link connected"]
