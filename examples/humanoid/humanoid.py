@@ -88,3 +88,5 @@ if __name__ == "__main__":
         main()
     except (CatenaryError, OSError, ValueError) as error:
         sys.exit(f"humanoid.py: {error}")
+    except KeyboardInterrupt:
+        sys.exit(130)  # 128 + SIGINT
