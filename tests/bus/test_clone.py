@@ -10,7 +10,7 @@ import pytest
 import catenary as cat
 from catenary.errors import CloneError, LinkError, NoDeviceError, SegmentError
 from catenary.line import Line, read_line
-from catenary.link import Recorder
+from catenary.link import Recorder, Ring
 from catenary.virtual import MailboxQuirks, faults
 from catenary.wire.al import AlState
 from catenary.wire.datagram import Datagram
@@ -101,6 +101,40 @@ def test_two_clones_of_an_unchanged_segment_are_identical(
         assert cat.clone(segment, tmp_path / name, pre_op=pre_op).complete
     assert len(contents(tmp_path / "a")) == 1 + 2 * 4 + 2
     assert contents(tmp_path / "a") == contents(tmp_path / "b")
+
+
+def test_lost_frames_change_nothing(tmp_path: Path) -> None:
+    for name, losses in (("a", ()), ("b", (faults.lose_frames(at=0.0, every=37),))):
+        devices = [cat.virtual.Coupler(), cat.virtual.Servo(), cat.virtual.DigitalOutputs()]
+        line = cat.clone(cat.Segment(devices, faults=losses), tmp_path / name, pre_op=True)
+        assert line.complete
+    assert contents(tmp_path / "a") == contents(tmp_path / "b")
+
+
+def test_a_ring_is_cloned_in_the_order_of_its_first_end(tmp_path: Path) -> None:
+    segment = cat.Segment([cat.virtual.Coupler(), cat.virtual.Servo()], ring=True)
+    line = cat.clone(Ring(segment.first, segment.second), tmp_path / "line", pre_op=True)
+    assert [(device.parent, device.parent_port) for device in line.devices] == [
+        (None, None),
+        (0, 1),
+    ]
+    assert (line.complete, line.notes) == (True, ())
+
+
+def test_a_cut_ring_is_refused(tmp_path: Path) -> None:
+    segment = cat.Segment([cat.virtual.Coupler(), cat.virtual.Servo()], ring=True)
+    with cat.MainDevice(Ring(segment.first, segment.second)) as main:
+        main.passive_scan()
+    segment.inject(faults.cut(between=(0, 1)))
+    with pytest.raises(SegmentError, match="the ring is cut"):
+        cat.clone(Ring(segment.first, segment.second), tmp_path / "line")
+
+
+def test_an_impossible_mailbox_is_a_reason(segment: cat.Segment, tmp_path: Path) -> None:
+    bring(segment, SERVO=AlState.PRE_OP)
+    segment.core.poke(SERVO, 0x0802, b"\x03\0")
+    line = cat.clone(segment, tmp_path / "line")
+    assert line.devices[SERVO].missing["objects"].startswith("its mailbox is configured with 3")
 
 
 def test_what_is_raised_is_restored(segment: cat.Segment, tmp_path: Path) -> None:

@@ -70,9 +70,9 @@ def clone_segment(
             "the IgH kernel master does not give access to the registers of the devices",
             hint="stop it with `ethercatctl stop`, and clone the network interface: eth0",
         )
-    ring = _require_closed(main)
     main.runner.flush()
     device_count = main.converse(count()).devices
+    ring = _require_closed(main)  # the first answers show the shape of a ring
     present = main.converse(read_present(device_count))
     where = prepare(folder)
     topology = make_topology([open_ports(each.dl_status) for each in present], ring=ring)
