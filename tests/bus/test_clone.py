@@ -248,6 +248,33 @@ def test_a_device_is_read_again_if_it_does_not_fit_or_on_request(
     assert edited.read_text() == text
 
 
+def test_a_finished_device_is_not_replaced_by_less(segment: cat.Segment, tmp_path: Path) -> None:
+    folder = tmp_path / "line"
+    whole = cat.clone(segment, folder, pre_op=True)
+    before = contents(folder)
+    bring(segment, OUTPUTS=AlState.OP)  # and all devices have other addresses
+    line = cat.clone(segment, folder)
+    assert line.devices == whole.devices
+    [note] = line.notes
+    assert note.startswith("device 2 (Catenary virtual 4-channel output): kept from an earlier")
+    after = contents(folder)
+    del before["line.toml"], after["line.toml"]
+    assert after == before
+    assert not cat.clone(segment, folder, fresh=True).complete
+
+
+def test_serial_numbers_of_an_earlier_clone_are_not_kept(
+    segment: cat.Segment, tmp_path: Path
+) -> None:
+    folder = tmp_path / "line"
+    cat.clone(segment, folder, pre_op=True)
+    bring(segment, WRIST=AlState.SAFE_OP, SERVO=AlState.PRE_OP)
+    line = cat.clone(segment, folder, serials=False)
+    assert line.devices[WRIST].identity is None
+    assert line.devices[SERVO].identity.serial == 0
+    assert b"serial = 0x00000007" not in b"".join(contents(folder).values())
+
+
 def clone_of(device: cat.virtual.Servo, folder: Path, **options: float) -> Line:
     return cat.clone(cat.Segment([device]), folder, pre_op=True, **options)
 

@@ -114,18 +114,33 @@ class DeviceClone:
             earlier: The device in the folder.
             identity: Identity of this device.
         """
-        place = (self._source.parent, self._source.parent_port)
-        present = (self._present.station_address, self._present.alias)
-        withheld = any(
-            entry.reason == SERIAL_WITHHELD for each in earlier.objects for entry in each.entries
-        )
+        place = (self._source.parent, self._source.parent_port, self._present.alias)
         return (
             earlier.complete
             and earlier.identity == identity
-            and (earlier.parent, earlier.parent_port) == place
-            and (earlier.station_address, earlier.alias) == present
-            and not (withheld and self._serials)
+            and (earlier.parent, earlier.parent_port, earlier.alias) == place
+            and self._has_wanted_serials(earlier)
         )
+
+    def surpassed(self, device: ClonedDevice, earlier: ClonedDevice) -> bool:
+        """Return True if an earlier clone of the device is complete, and this one is not.
+
+        If the identity cannot be read now, the controller and the alias are compared.
+
+        Args:
+            device: The device as it was read now.
+            earlier: The device in the folder.
+        """
+        if device.complete or not earlier.complete or not self._has_wanted_serials(earlier):
+            return False
+        if device.identity is not None:
+            return device.identity == earlier.identity
+        same = (earlier.information, earlier.alias) == (device.information, device.alias)
+        return same and (self._serials or not (earlier.identity and earlier.identity.serial))
+
+    def _has_wanted_serials(self, earlier: ClonedDevice) -> bool:
+        reasons = (entry.reason for each in earlier.objects for entry in each.entries)
+        return not self._serials or SERIAL_WITHHELD not in reasons
 
     def read(self) -> ClonedDevice:
         """Read the whole device. Parts that cannot be read are missing, with a reason."""
