@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from catenary.capture.contents import ClockDifference
+from catenary.capture.spread import Slope
 from catenary.capture.transaction import Transaction
 from catenary.wire.clock import decode_difference
 from catenary.wire.datagram import EcatCommand
@@ -60,8 +61,8 @@ class ClockLevel:
 class ReferenceStatistics:
     """Distribution of the system time by FRMW or ARMW.
 
-    `drift_ppm` is the rate of the reference clock relative to the clock of the capture; None if the
-    capture is too short.
+    `drift_ppm` is the rate of the reference clock relative to the clock of the capture: the slope
+    of a least-squares line. It is None if the capture is shorter than 1 s.
     """
 
     address: int  # station address or position of the reference clock
@@ -79,6 +80,7 @@ class ReferenceClock:
         self._count = 0
         self._first_ns = self._last_ns = 0
         self._last_system = self._elapsed_system = 0
+        self._drift = Slope()
 
     def follow(self, each: Transaction) -> None:
         """Follow a datagram of any device."""
@@ -95,8 +97,11 @@ class ReferenceClock:
         step = _step(system - self._last_system, each.time_ns - self._last_ns)
         if self._count == 1 or step is None:  # the master has written the clock
             self._first_ns, self._elapsed_system = each.time_ns, 0
+            self._drift = Slope()
         else:
             self._elapsed_system += step
+        elapsed = each.time_ns - self._first_ns
+        self._drift.add(elapsed, self._elapsed_system - elapsed)
         self._last_ns, self._last_system = each.time_ns, system
 
     @property
@@ -105,11 +110,11 @@ class ReferenceClock:
         if self._address is None:
             return None
         span = self._last_ns - self._first_ns
-        drift = (self._elapsed_system - span) / span * 1e6 if span >= _SHORTEST_SPAN_NS else None
+        drift = self._drift.slope * 1e6 if span >= _SHORTEST_SPAN_NS else None
         return ReferenceStatistics(*self._address, self._count, span, drift)
 
 
-_SHORTEST_SPAN_NS = 100_000_000  # jitter of the time stamps would dominate shorter ones
+_SHORTEST_SPAN_NS = 1_000_000_000  # jitter of the time stamps would dominate shorter ones
 _LARGEST_ERROR_NS = 10_000_000
 _WRAP = 1 << 32
 

@@ -38,12 +38,17 @@ class CaptureFile:
     Iterate over it once. Times are relative to the first packet of the file.
     """
 
-    def __init__(self, read: Callable[[int], bytes]) -> None:
-        """Read a file by `read(size)`, which returns fewer bytes only at the end.
+    def __init__(self, read: Callable[[int], bytes], *, until_ns: int | None = None) -> None:
+        """Read a file.
+
+        Args:
+            read: `read(size)` returns the next bytes, fewer only at the end of the file.
+            until_ns: Stop at the first packet after this time since the first packet.
 
         Raises:
             DecodeError: The format is unknown.
         """
+        self._until_ns = until_ns
         self._packets = open_packets(read)
         self._start_ns: int | None = None
         self.counts = FileCounts()
@@ -62,9 +67,11 @@ class CaptureFile:
         counts = self.counts
         try:
             for packet in self._packets:
-                counts.packets += 1
                 if self._start_ns is None:
                     self._start_ns = packet.time_ns
+                if self._until_ns is not None and packet.time_ns - self._start_ns > self._until_ns:
+                    break
+                counts.packets += 1
                 counts.duration_ns = max(counts.duration_ns, packet.time_ns - self._start_ns)
                 frame = self._decode(packet)
                 if frame is not None:

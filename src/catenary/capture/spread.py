@@ -1,4 +1,4 @@
-"""Smallest, mean and largest of a stream of numbers, in constant memory."""
+"""Statistics of a stream of numbers, in constant memory."""
 
 from __future__ import annotations
 
@@ -41,3 +41,26 @@ class RunningSpread:
             return Spread(0, 0.0, 0.0, 0.0, 0.0)
         deviation = math.sqrt(self._squares / self._count)
         return Spread(self._count, self._minimum, self._mean, self._maximum, deviation)
+
+
+class Slope:
+    """Owner of the sums of a least-squares line through a stream of points."""
+
+    def __init__(self) -> None:
+        self._count = 0
+        self._x = self._y = 0.0  # means
+        self._xx = self._xy = 0.0
+
+    def add(self, x: float, y: float) -> None:
+        """Add a point."""
+        self._count += 1
+        before = x - self._x
+        self._x += before / self._count
+        self._y += (y - self._y) / self._count
+        self._xx += before * (x - self._x)
+        self._xy += before * (y - self._y)
+
+    @property
+    def slope(self) -> float:
+        """Slope of the line; 0 if all points have the same x."""
+        return self._xy / self._xx if self._xx else 0.0

@@ -50,14 +50,19 @@ class EventStream:
     Iterate over it once. Memory does not depend on the length of the capture.
     """
 
-    def __init__(self, read: Callable[[int], bytes]) -> None:
-        """Read a file by `read(size)`, which returns fewer bytes only at the end.
+    def __init__(self, read: Callable[[int], bytes], *, until_ns: int | None = None) -> None:
+        """Read a file.
+
+        Args:
+            read: `read(size)` returns the next bytes, fewer only at the end of the file.
+            until_ns: Stop at the first packet after this time since the first packet.
 
         Raises:
             DecodeError: The format is unknown.
         """
-        self._file = CaptureFile(read)
-        self._masters: dict[bytes, MasterFollower] = {}
+        self._file = CaptureFile(read, until_ns=until_ns)
+        self._by_source: dict[bytes, MasterFollower] = {}
+        self._masters: list[MasterFollower] = []
 
     @property
     def counts(self) -> FileCounts:
@@ -72,7 +77,13 @@ class EventStream:
     @property
     def masters(self) -> tuple[MasterSummary, ...]:
         """The masters so far."""
-        return tuple(_summary(each) for each in self._masters.values())
+        return tuple(_summary(each) for each in self._masters)
+
+    def device(self, event: Event) -> Device | None:
+        """Return the device of an event as far as it is known; None for all devices."""
+        if event.device is None:
+            return None
+        return self._masters[event.master].devices[event.device].snapshot()
 
     def __iter__(self) -> Iterator[Event]:
         """Yield the events in the order in which they became known.
@@ -82,13 +93,14 @@ class EventStream:
         """
         for pair in pair_frames(self._file):
             yield from self._master(pair).follow(pair)
-        for master in self._masters.values():
+        for master in self._masters:
             yield from master.flush(self.counts.packets)
 
     def _master(self, pair: FramePair) -> MasterFollower:
-        found = self._masters.get(pair.source)
+        found = self._by_source.get(pair.source)
         if found is None:
-            found = self._masters[pair.source] = MasterFollower(len(self._masters), pair)
+            found = self._by_source[pair.source] = MasterFollower(len(self._masters), pair)
+            self._masters.append(found)
         return found
 
 
