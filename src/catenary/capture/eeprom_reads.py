@@ -19,6 +19,8 @@ from catenary.wire.sii_categories import decode_general, decode_strings
 from catenary.wire.sii_interface import ControlStatus, SiiCommand
 
 MAXIMUM_CATEGORIES = 64
+_BUSY = ControlStatus(busy=True).word
+_EIGHT_BYTES = ControlStatus(eight_bytes=True).word
 _WRITE_DATA_SIZE = 2  # a write command writes one word
 
 
@@ -30,7 +32,7 @@ class EepromReads:
         self._address: int | None = None
         self._data = bytes(_WRITE_DATA_SIZE)
         self._reading = False
-        self._busy = False
+        self._busy = self._eight_bytes = False
 
     def follow(self, each: Transaction) -> EepromWrite | bool | None:
         """Follow a datagram of the device.
@@ -62,8 +64,11 @@ class EepromReads:
 
     def _follow_read(self, each: Transaction) -> bool:
         if (control := each.was_read(SII_CONTROL_STATUS)) is not None:
-            self._busy = bool(control[1] & 0x80)
-        data = each.was_read(SII_DATA) or each.was_read(SII_DATA_LOW)
+            word = int.from_bytes(control, "little")
+            self._busy, self._eight_bytes = bool(word & _BUSY), bool(word & _EIGHT_BYTES)
+        # Without the flag, the upper four bytes are not part of the answer.
+        data = each.was_read(SII_DATA) if self._eight_bytes else None
+        data = data or each.was_read(SII_DATA_LOW)
         if data is None or self._busy or not self._reading or self._address is None:
             return False
         new = False

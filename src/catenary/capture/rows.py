@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from catenary.capture.events import Event
 from catenary.capture.mailbox_contents import MailboxMessage
-from catenary.capture.register_contents import FmmuWrite, SyncManagerWrite
+from catenary.capture.register_contents import EepromAssigned, FmmuWrite, SyncManagerWrite
 from catenary.capture.text import duration, not_accepted
 
 
@@ -21,13 +21,12 @@ class Row:
 
     def __str__(self) -> str:
         first, last = self.first.content, self.last.content
-        if self.count == 1:
-            return str(first)
-        if isinstance(first, FmmuWrite) and isinstance(last, FmmuWrite) and first != last:
-            return f"FMMU{first.number} to FMMU{last.number} off{not_accepted(first.accepted)}"
-        managers = isinstance(first, SyncManagerWrite) and isinstance(last, SyncManagerWrite)
-        if managers and first != last:
-            return f"SM{first.number} to SM{last.number} off{not_accepted(first.accepted)}"
+        if isinstance(last, EepromAssigned) or self.count == 1:
+            return str(last)
+        if first != last and isinstance(first, FmmuWrite | SyncManagerWrite):
+            name = "FMMU" if isinstance(first, FmmuWrite) else "SM"
+            numbers = f"{name}{first.number} to {name}{first.number + self.count - 1}"
+            return f"{numbers} off{not_accepted(first.accepted)}"
         lasted = duration(self.last.time_ns - self.first.time_ns)
         return f"{first} ({self.count} times in {lasted})"
 
@@ -36,7 +35,7 @@ def merge(events: Iterable[Event]) -> Iterator[Row]:
     """Yield rows. A run of similar events becomes one row."""
     row: Row | None = None
     for event in events:
-        if row is not None and _key(row.last) == _key(event) and _follows(row.last, event):
+        if row is not None and _key(row.last) == _key(event) and _follows(row, event):
             row = Row(row.first, event, row.count + 1)
             continue
         if row is not None:
@@ -53,16 +52,20 @@ def _key(event: Event) -> Hashable:
         similar = "FMMU", content.accepted
     elif isinstance(content, SyncManagerWrite) and _is_cleared(content):
         similar = "SyncManager", content.accepted
+    elif isinstance(content, EepromAssigned):
+        similar = "EEPROM", content.accepted
     elif isinstance(content, MailboxMessage):
         similar = content.protocol, content.to_device, content.text
     return event.master, event.device, event.step, similar
 
 
-def _follows(last: Event, event: Event) -> bool:
-    """Return True if the numbers of two cleared FMMUs or SyncManagers follow each other."""
-    a, b = last.content, event.content
-    if isinstance(a, FmmuWrite | SyncManagerWrite) and isinstance(b, FmmuWrite | SyncManagerWrite):
-        return a == b or b.number == a.number + 1
+def _follows(row: Row, event: Event) -> bool:
+    """Return True if an event continues a row: equal contents, or consecutive numbers."""
+    content, first, last = event.content, row.first.content, row.last.content
+    if isinstance(content, FmmuWrite | SyncManagerWrite) and isinstance(last, type(content)):
+        if content == last:
+            return first == last
+        return content.number == last.number + 1 and (row.count == 1 or first != last)
     return True
 
 

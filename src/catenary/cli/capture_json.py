@@ -25,7 +25,7 @@ def event_object(event: Event, device: Device | None) -> dict[str, Json]:
         field.name: _plain(getattr(event.content, field.name)) for field in fields(event.content)
     }
     return {
-        "time": event.time_ns * 1e-9,
+        "time": round(event.time_ns * 1e-9, 9),
         "packet": event.packet,
         "master": event.master,
         "device": event.device,

@@ -78,9 +78,9 @@ def _master_lines(summary: MasterSummary) -> Iterator[str]:
         yield from _cycle_lines(cycle)
     for number, clock in summary.clocks.items():
         yield (
-            f"  clock of {escaped(str(summary.devices[number]))}: {clock.reads} differences, first "
-            f"{duration(clock.first_ns)}, last {duration(clock.last_ns)}, largest "
-            f"{duration(clock.largest_ns)}"
+            f"  clock of {escaped(str(summary.devices[number]))}: difference read "
+            f"{clock.reads} times, first {duration(clock.first_ns)}, last "
+            f"{duration(clock.last_ns)}, largest {duration(clock.largest_ns)}"
         )
     if summary.reference is not None:
         reference = summary.reference
