@@ -89,6 +89,17 @@ def _timeline(data: bytes) -> list[str]:
     return [*texts, *notes(stream.counts, stream.masters)]
 
 
+def _timeline_of_frames(data: bytes) -> list[str]:
+    """Return the timeline of frames, each with its length in two bytes before it."""
+    blocks, rest = [pcapng.encode_header("eth0")], data
+    while len(rest) > 2:
+        size = int.from_bytes(rest[:2], "little") % frame.MAXIMUM_SIZE
+        packet = pcapng.Packet(20_000 * len(blocks), rest[2 : 2 + size])
+        blocks.append(pcapng.encode_packet(packet))
+        rest = rest[2 + size :]
+    return _timeline(b"".join(blocks))
+
+
 def _word(name: str, decode: Callable[[int], Any], size: int, *values: int) -> Target:
     """Return the target of a register word of `size` bytes."""
 
@@ -171,6 +182,7 @@ BRING_UP = tuple(
     )
     for counter, source in ((0, b"\x10" * 6), (1, b"\x12" + b"\x10" * 5))
 )
+FRAMES = b"".join(len(each).to_bytes(2, "little") + each for each in BRING_UP)
 TIMELINE = pcapng.encode_header("eth0") + b"".join(
     pcapng.encode_packet(pcapng.Packet(20_000 * i, data)) for i, data in enumerate(BRING_UP)
 )
@@ -289,6 +301,7 @@ TARGETS = (
     Target("capture.decode_capture", capture.decode_capture, None, (CAPTURE, PCAP)),
     Target("pcap.decode_pcap", pcap.decode_pcap, None, (PCAP,)),
     Target("capture.EventStream", _timeline, None, (TIMELINE, PCAP)),
+    Target("capture.EventStream of frames", _timeline_of_frames, None, (FRAMES,)),
 )
 
 _TELLING = (0x00, 0x01, 0x07, 0x0F, 0x7F, 0x80, 0xFE, 0xFF)
