@@ -83,7 +83,7 @@ class Event:
 
 @dataclass(frozen=True, slots=True)
 class Device:
-    """A device as a master has addressed it. It has None for a value that the capture does not show."""
+    """A device as a master has addressed it. None: the capture does not show this value."""
 
     number: int  # in the order of appearance, from 0
     position: int | None = None
