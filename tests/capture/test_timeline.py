@@ -307,3 +307,20 @@ def test_wrong_times_do_not_stop_the_timeline(
     stream = EventStream(io.BytesIO(capture_of(packets)).read)
     list(stream)
     assert stream.counts.ethercat == 10
+
+
+@pytest.mark.parametrize("form", ["pcap", "nsecpcap"])
+def test_the_format_makes_no_difference(
+    shared_data: Path, tshark: str, tmp_path: Path, form: str
+) -> None:
+    path = shared_data / "pcap" / "ecrab_replay-ek1914-el3004-configure.pcapng"
+    converted = tmp_path / f"converted.{form}"
+    command = [tshark, "-r", str(path), "-F", form, "-w", str(converted)]
+    subprocess.run(command, check=True, capture_output=True)
+    expected, found = read_timeline(path), read_timeline(converted)
+    assert len(found.events) == len(expected.events)
+    for a, b in zip(found.events, expected.events, strict=True):
+        assert (a.packet, a.device, a.step, a.content.kind) == (
+            *(b.packet, b.device, b.step, b.content.kind),
+        )
+        assert abs(a.time_ns - b.time_ns) <= 2000  # times in us are cut
