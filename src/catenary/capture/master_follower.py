@@ -37,7 +37,7 @@ class MasterFollower:
         self._source = first.source
         self._name = master_name(frame.frame)
         self._started_ns = self._ended_ns = frame.time_ns
-        self._sent = self._returned = self._lost = 0
+        self._sent = self._returned = self._lost = self._collisions = 0
         self._lost_run: tuple[int, int, int] | None = None  # count, time and packet of the first
         self._by_position: dict[int, DeviceFollower] = {}
         self._by_station: dict[int, DeviceFollower] = {}
@@ -51,6 +51,7 @@ class MasterFollower:
         assert base is not None
         self._sent += pair.sent is not None
         self._returned += pair.answer is not None
+        self._collisions += pair.collides
         self._ended_ns = max(self._ended_ns, base.time_ns)
         if pair.answer is not None:
             yield from self.end_of_loss()
@@ -86,7 +87,7 @@ class MasterFollower:
         """Return the source address, the name and the numbers of frames."""
         return Master(
             *(self.number, self._source, self._name, self._sent, self._returned, self._lost),
-            *(self._started_ns, self._ended_ns),
+            *(self._started_ns, self._ended_ns, self._collisions),
         )
 
     def _note_lost(self, time_ns: int, packet: int) -> None:
