@@ -5,7 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from catenary.capture.clocks import ReferenceClock
-from catenary.capture.contents import AddressAssigned, DeviceCount, FramesLost, StateRequest
+from catenary.capture.contents import (
+    AddressAssigned,
+    CyclicStart,
+    DeviceCount,
+    FramesLost,
+    StateRequest,
+)
 from catenary.capture.cycles import Cycles
 from catenary.capture.device_follower import DeviceFollower
 from catenary.capture.events import UNKNOWN_STEP, Event, Master, Step, common_step
@@ -62,6 +68,8 @@ class MasterFollower:
                 for device, found in self._follow(each):
                     yield self._event(each.time_ns, each.packet, device, found)
         for content in self.cycles.follow(pair):
+            if isinstance(content, CyclicStart):
+                self._configure_cycles()
             yield self._event(base.time_ns, base.number, None, Found(self._step(), content))
 
     def flush(self, packet: int) -> Iterator[Event]:
@@ -212,7 +220,12 @@ class MasterFollower:
         followers = [device.states for device in self.devices] or [self._initial]
         return common_step(states.step(configures=configures) for states in followers)
 
+    def _configure_cycles(self) -> None:
+        self.cycles.configure([device.registers.enabled_fmmus() for device in self.devices])
+
     def _note_request(self, before: AlState | None, requested: AlState) -> None:
         """Forget the working counters if devices leave a state downwards."""
+        if requested is AlState.OP:
+            self._configure_cycles()
         if before is None or _ORDER.index(requested) < _ORDER.index(before):
             self.cycles.forget_expectations()
