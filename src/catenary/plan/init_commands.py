@@ -1,4 +1,4 @@
-"""Objects that an ESI requires to be written at state transitions (ETG.2000, `CoE/InitCmd`).
+"""Objects that an ESI or ENI requires to be written at state transitions (`CoE/InitCmd`).
 
 Commands of the transitions IP and PS are written in PRE-OP, in this order, before the start-up
 objects of the application. The mailbox is not available in INIT, so IP is the first step in
@@ -19,6 +19,7 @@ from catenary.plan.download import Download
 from catenary.plan.start_up_object import MAPPING_OBJECTS, StartUp
 
 PRE_OP_STEPS, SAFE_OP_STEPS = ("IP", "PS"), ("SO",)
+BY_PLAN = "the plan writes the mapping"  # reason to omit a command
 
 
 class Commands(NamedTuple):
@@ -27,6 +28,7 @@ class Commands(NamedTuple):
     in_pre_op: tuple[Download, ...] = ()
     in_safe_op: tuple[Download, ...] = ()
     omitted: tuple[str, ...] = ()  # commands that are not written, and the reason
+    origin: str = "ESI"  # or "ENI"
 
     @property
     def written(self) -> tuple[Download, ...]:
@@ -71,7 +73,8 @@ def choose_commands(
         for each in written
         if each not in late and {*SAFE_OP_STEPS}.intersection(each.transitions)
     ]
-    return Commands(in_pre_op, tuple(_downloads(late, SAFE_OP_STEPS)), tuple(omitted))
+    in_safe_op = tuple(_downloads(late, SAFE_OP_STEPS))
+    return Commands(in_pre_op, in_safe_op, tuple(omitted), device.commands_origin)
 
 
 def _reason(
@@ -83,7 +86,7 @@ def _reason(
     """Return the reason why a command is not written; empty if it is written."""
     place = (command.index, command.subindex)
     if any(command.index in objects for objects in MAPPING_OBJECTS):
-        return "the plan writes the mapping"
+        return BY_PLAN
     if _is_given(command, given) and not command.fixed:
         return "your start-up object replaces it"
     if place in own:
