@@ -4,7 +4,14 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from catenary.esi.device import DeviceKey, EsiDevice, EsiEeprom, EsiMailbox, EsiOpMode, EsiSyncManager
+from catenary.esi.device import (
+    DeviceKey,
+    EsiDevice,
+    EsiEeprom,
+    EsiMailbox,
+    EsiOpMode,
+    EsiSyncManager,
+)
 from catenary.esi.dictionary import EsiDictionary, EsiObject, EsiObjectEntry
 from catenary.esi.eni import EniDevice, EniFile
 from catenary.model.device import Direction
@@ -39,7 +46,9 @@ def esi_of(device: EniDevice) -> EsiDevice:
             ),
         ]
     for each in device.sync_managers:
-        use = SyncManagerUse.OUTPUTS if each.direction is Direction.OUTPUT else SyncManagerUse.INPUTS
+        use = (
+            SyncManagerUse.OUTPUTS if each.direction is Direction.OUTPUT else SyncManagerUse.INPUTS
+        )
         managers.append(EsiSyncManager(each.index, use, each.start, 0, control=each.control))
     return EsiDevice(
         DeviceKey(identity.vendor, identity.product, identity.revision),

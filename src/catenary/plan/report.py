@@ -111,7 +111,9 @@ def _start_up(devices: Sequence[DevicePlan]) -> Iterator[str]:
         if device.modules is not None:
             yield from (f"        {'modules':<15} {each}" for each in ident_lines(device.modules))
         old = {change.what: change.old or "(not read)" for change in device.changes}
-        yield from (_download(device.commands.origin, each, old) for each in device.commands.in_pre_op)
+        yield from (
+            _download(device.commands.origin, each, old) for each in device.commands.in_pre_op
+        )
         yield from (_download("before mapping", each, old) for each in device.before_mapping)
         for change in device.changes:
             if ":" not in change.what:  # a list of PDOs or of entries

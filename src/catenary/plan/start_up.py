@@ -211,8 +211,11 @@ def _object_download(device: DeviceDescription, requested: StartUp) -> Download:
         requested.index,
         requested.subindex,
         requested.encode(kind),
-        verify=requested.verify and (known is None or known.readable),
+        verify=requested.verify
+        and not requested.complete_access
+        and (known is None or known.readable),
         text=requested.text(kind),
+        complete_access=requested.complete_access,
     )
 
 

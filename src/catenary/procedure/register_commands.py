@@ -80,8 +80,10 @@ def _fault(command: RegisterCommand, reply: Reply) -> str:
     validation = command.validation
     if validation is None or validation.accepts(reply.data):
         return ""
-    mask = "" if validation.mask == b"\xff" * len(validation.mask) else (
-        f" under mask {validation.mask.hex(' ')}"
+    mask = (
+        ""
+        if validation.mask == b"\xff" * len(validation.mask)
+        else (f" under mask {validation.mask.hex(' ')}")
     )
     found = reply.data[: len(validation.data)].hex(" ")
     return f"expected {validation.data.hex(' ')}{mask}, read {found}"

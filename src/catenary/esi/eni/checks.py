@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from typing import Never
 
 from catenary.errors import MachineFileError
+from catenary.esi.eni.commands import DOWNLOAD
 from catenary.esi.eni.known import PROTOCOLS
 from catenary.esi.eni.own_registers import (
     BY_POSITION,
@@ -18,8 +19,6 @@ from catenary.esi.eni.own_registers import (
 from catenary.esi.eni.values import EniDevice, EniFile, MailboxCommand, RegisterCommand
 from catenary.esi.source import Source
 from catenary.wire.datagram import EcatCommand
-
-DOWNLOAD = 1  # Ccs of CoE
 
 
 def check_commands(eni: EniFile, without: Sequence[str] = ()) -> None:

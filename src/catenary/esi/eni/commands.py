@@ -14,6 +14,7 @@ from catenary.wire.datagram import EcatCommand
 LOGICAL = (EcatCommand.LRD, EcatCommand.LWR, EcatCommand.LRW)
 STATES = "IPSOB"  # letters of a transition: INIT, PRE-OP, SAFE-OP, OP, BOOT
 MILLISECOND = 1e-3
+DOWNLOAD = 1  # Ccs of CoE
 DATA_MAX = 1486  # of one datagram [bytes], ETG.1000.4
 
 
@@ -95,9 +96,7 @@ def _transitions(element: Element, fields: Fields) -> tuple[str, ...]:
     found = tuple(each.text.strip() for each in element.all("Transition"))
     for text in found:
         if len(text) != 2 or not set(text) <= set(STATES):
-            fields.refuse(
-                element, f"{text!r} is not a transition, such as PS", tag="Transition"
-            )
+            fields.refuse(element, f"{text!r} is not a transition, such as PS", tag="Transition")
     if not found:
         fields.refuse(element, f"{element.tag} has no Transition")
     return found
@@ -125,6 +124,8 @@ def _mailbox_command(protocol: str, element: Element, fields: Fields) -> Mailbox
     data = fields.data(element, "Data") or b""
     download = None
     if protocol == "CoE":
+        if not data and fields.number(element, "Ccs", bits=8, default=1) == DOWNLOAD:
+            fields.refuse(element, "a download has no Data")
         download = InitCommand(
             transitions=transitions,
             index=fields.number(element, "Index", bits=16),

@@ -85,7 +85,9 @@ class Fields:
         except ValueError as error:
             self.refuse(parent, str(error), tag=tag)
         if remark:
-            self.refuse(parent, f"{shown(text)} is not a number; hexadecimal numbers begin with #x", tag=tag)
+            self.refuse(
+                parent, f"{shown(text)} is not a number; hexadecimal numbers begin with #x", tag=tag
+            )
         if not 0 <= value < 1 << bits:
             self.refuse(parent, f"{shown(text)} does not fit into {bits} bits", tag=tag)
         return value

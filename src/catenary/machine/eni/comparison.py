@@ -19,9 +19,7 @@ ASSIGNMENTS = range(0x1C10, 0x1C30)
 AREA_END = 0x100  # bytes of all SyncManagers or FMMUs
 
 
-def compare_plan(
-    eni: EniFile, plan: Plan, devices: Sequence[DeviceDescription]
-) -> tuple[str, ...]:
+def compare_plan(eni: EniFile, plan: Plan, devices: Sequence[DeviceDescription]) -> tuple[str, ...]:
     """Return the differences between the file and the plan, with file and line.
 
     Logical addresses, station addresses and start times are not compared: each MainDevice chooses

@@ -93,4 +93,3 @@ class Variables(Mapping[str, float]):
         near = get_close_matches(name, self._values, n=1)
         guess = f'; did you mean "{near[0]}"?' if near else "; list(machine.variables) has them all"
         raise MissingName(f'there is no variable "{name}"{guess}')
-
