@@ -69,7 +69,7 @@ ENI = """\
    <InitCmds>
     <InitCmd>
      <Transition>IP</Transition><Comment>PDI watchdog</Comment><Cmd>5</Cmd><Adp>1001</Adp>
-     <Ado>1040</Ado><Data>e803</Data><Cnt>1</Cnt><Retries>3</Retries>
+     <Ado>1040</Ado><Data>ea03</Data><Cnt>1</Cnt><Retries>3</Retries>
     </InitCmd>
     <InitCmd>
      <Transition>PS</Transition><Comment>check PDI watchdog</Comment><Cmd>1</Cmd><Adp>0</Adp>

@@ -13,7 +13,7 @@ from catenary.bus.esi_source import EsiPlace, EsiSource, open_source, unchanged
 from catenary.bus.event_queue import Callback, Callbacks, Events
 from catenary.bus.external_master import Carrier
 from catenary.bus.frame_master import FrameMaster
-from catenary.bus.master import Master, MasterSource
+from catenary.bus.master import Complete, Master, MasterSource
 from catenary.bus.pending import Pending
 from catenary.bus.runner import BlockingRunner, FrameCounts, LinkLent, Runner
 from catenary.bus.sdo import Objects

@@ -37,15 +37,9 @@ def read_start_up(path: str | Path) -> list[StartUp]:
         _check(command, str(path))
     mapping = [number for number, each in enumerate(commands) if _is_mapping(each)]
     first = min(mapping, default=0)
-    kept = [
-        (number, each)
-        for number, each in enumerate(commands)
-        if number not in mapping
-        and not each.disabled
-        and not IN_PRE_OP.isdisjoint(each.transitions)
-    ]
-    _warn(path, [each for each in commands if each not in [one for _, one in kept]])
-    return [start_up(each, before_mapping=number < first) for number, each in kept]
+    kept = [number for number, each in enumerate(commands) if _is_written(each)]
+    _warn(path, [each for each in commands if not _is_written(each)])
+    return [start_up(commands[number], before_mapping=number < first) for number in kept]
 
 
 def start_up(command: MailboxCommand, *, before_mapping: bool) -> StartUp:
@@ -70,6 +64,11 @@ def start_up(command: MailboxCommand, *, before_mapping: bool) -> StartUp:
 def is_mapping_object(index: int) -> bool:
     """Return True if an object belongs to the PDO mapping."""
     return any(index in objects for objects in MAPPING_OBJECTS)
+
+
+def _is_written(command: MailboxCommand) -> bool:
+    in_pre_op = not IN_PRE_OP.isdisjoint(command.transitions)
+    return in_pre_op and not command.disabled and not _is_mapping(command)
 
 
 def _is_mapping(command: MailboxCommand) -> bool:

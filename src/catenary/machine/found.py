@@ -13,7 +13,6 @@ from catenary.errors import CatenaryError, IdentityError, SegmentError
 from catenary.loop.devices import LoopRequest
 from catenary.machine.by_name import ByName
 from catenary.machine.comparison import Comparison, expected_identity
-from catenary.machine.eni.variables import Variables
 from catenary.machine.esi_files import check_esi_files
 from catenary.machine.file import MachineFile
 from catenary.machine.requests import (
@@ -22,6 +21,7 @@ from catenary.machine.requests import (
     make_drives,
     make_process_data,
 )
+from catenary.machine.variables import Variables
 
 
 @dataclass(frozen=True, slots=True)

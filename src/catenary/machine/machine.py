@@ -17,9 +17,9 @@ from catenary.loop.devices import LoopRequest
 from catenary.loop.laws.law import Laws
 from catenary.machine.by_name import ByName
 from catenary.machine.eni.machine import EniMachine
-from catenary.machine.eni.variables import Variables
 from catenary.machine.found import MachineParts
 from catenary.machine.toml_machine import TomlMachine
+from catenary.machine.variables import Variables
 from catenary.plan.cycle import ExecutionMode
 from catenary.plan.sink import Sink
 from catenary.plan.trigger import Trigger

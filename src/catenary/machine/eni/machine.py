@@ -24,9 +24,9 @@ from catenary.machine.by_name import ByName
 from catenary.machine.comparison import Comparison, compare
 from catenary.machine.eni.comparison import compare_plan
 from catenary.machine.eni.requests import channel_names, clock, make_process_data
-from catenary.machine.eni.variables import Variables
 from catenary.machine.found import MachineParts, raise_differences
 from catenary.machine.schema import DeviceTable, IdentityTable
+from catenary.machine.variables import Variables
 from catenary.model.device import Direction
 from catenary.target import MainDevice
 
