@@ -70,7 +70,7 @@ def esi_of(device: EniDevice) -> EsiDevice:
         else None,
         has_clock=True,
         op_modes=(EsiOpMode("DC", assign_activate=0x0300, sync0_factor=1),),
-        dictionary=EsiDictionary(objects=_objects(device)) if box is not None else None,
+        dictionary=EsiDictionary(objects=_objects(device)),
         eeprom=EsiEeprom(2048, bytes.fromhex("800C8166")),
     )
 

@@ -9,7 +9,13 @@ import numpy as np
 import pytest
 
 import catenary as cat
-from catenary.errors import ConfigurationError, IdentityError, MachineFileError, SegmentError
+from catenary.errors import (
+    ConfigurationError,
+    IdentityError,
+    MachineFileError,
+    SdoAbort,
+    SegmentError,
+)
 from catenary.esi.eni import read_eni
 from catenary.virtual import Coupler, Segment
 from tests.esi.eni_file import write_eni
@@ -240,3 +246,14 @@ def test_scrambled_fmmus_of_an_encrypted_file_are_reported(shared_data: Path) ->
     assert "the content is plain" in notes
     assert "is not that of an FMMU, so it is scrambled; the plan sets the FMMUs" in notes
     assert "SyncManager" not in notes
+
+
+def test_a_refused_object_is_named_with_its_command(tmp_path: Path) -> None:
+    segment = segment_of(read_eni(write_eni(tmp_path)))
+    path = write_eni(tmp_path, ("<Index>8448</Index>", "<Index>8449</Index>"))
+    with (
+        pytest.raises(SdoAbort, match=r"0x2101:00 = 05 \(ENI .*bus\.xml:\d+ late\)"),
+        cat.Machine(path, target=segment) as machine,
+        machine.loop(),
+    ):
+        pass

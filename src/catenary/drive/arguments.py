@@ -177,7 +177,7 @@ def written_pdos(
 
 
 def _is_pdo(given: object) -> bool:
-    """Return True for a number, a name or a WrittenPdo; a number in quotes is none of these."""
+    """Return True for a number, a name or a WrittenPdo; a number in quotes is not valid."""
     if isinstance(given, WrittenPdo):
         return True
     return isinstance(given, int) or (isinstance(given, str) and not given.startswith("0x"))

@@ -55,6 +55,7 @@ def choose_commands(
     """
     if not device.init_commands or not device.coe:
         return NO_COMMANDS
+    origin = device.commands_origin
     given = {(each.index, each.subindex) for each in objects}
     mapped = {(entry.index, entry.subindex) for entry in outputs}
     reasons = {each: _reason(each, given, own, mapped) for each in device.init_commands}
@@ -65,7 +66,7 @@ def choose_commands(
         for each, reason in reasons.items()
         if reason and known.intersection(each.transitions)
     ]
-    in_pre_op = tuple(dict.fromkeys(_downloads(written, PRE_OP_STEPS)))
+    in_pre_op = tuple(dict.fromkeys(_downloads(written, PRE_OP_STEPS, origin)))
     # In SAFE-OP, a fixed command would follow the object of the application, and undo it.
     late = [each for each in written if not _is_given(each, given)]
     omitted += [
@@ -73,8 +74,8 @@ def choose_commands(
         for each in written
         if each not in late and {*SAFE_OP_STEPS}.intersection(each.transitions)
     ]
-    in_safe_op = tuple(_downloads(late, SAFE_OP_STEPS))
-    return Commands(in_pre_op, in_safe_op, tuple(omitted), device.commands_origin)
+    in_safe_op = tuple(_downloads(late, SAFE_OP_STEPS, origin))
+    return Commands(in_pre_op, in_safe_op, tuple(omitted), origin)
 
 
 def _reason(
@@ -101,7 +102,9 @@ def _is_given(command: InitCommand, given: Collection[tuple[int, int]]) -> bool:
     return (command.index, command.subindex) in given
 
 
-def _downloads(commands: Sequence[InitCommand], steps: Sequence[str]) -> Iterator[Download]:
+def _downloads(
+    commands: Sequence[InitCommand], steps: Sequence[str], origin: str
+) -> Iterator[Download]:
     for step in steps:
         for each in commands:
             if step in each.transitions:
@@ -111,6 +114,7 @@ def _downloads(commands: Sequence[InitCommand], steps: Sequence[str]) -> Iterato
                     each.data,
                     complete_access=each.complete_access,
                     source=f"{each.source} {each.comment}".strip(),
+                    origin=origin,
                 )
 
 

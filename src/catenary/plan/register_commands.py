@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 from catenary.model.register_command import RegisterCommand
 from catenary.wire.datagram import EcatCommand
 
-STEPS = ("IP", "PS", "SO")  # transitions whose commands Catenary sends
+STEPS = ("IP", "PS", "SO")  # transitions in which Catenary sends commands
 
 
 def register_lines(commands: Sequence[RegisterCommand]) -> Iterator[str]:

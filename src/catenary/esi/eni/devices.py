@@ -11,6 +11,7 @@ from catenary.model.device import Direction, Identity
 
 DIRECTIONS = {"RxPdo": Direction.OUTPUT, "TxPdo": Direction.INPUT}
 TYPES = {"Outputs": Direction.OUTPUT, "Inputs": Direction.INPUT}
+MAILBOX_TYPES = ("MBoxOut", "MBoxIn")
 SYNC_MANAGERS = 16
 NANOSECOND = 1e-9
 
@@ -131,7 +132,7 @@ def _sync_managers(
     return tuple(
         _sync_manager(index, element, pdos, fields)
         for index, element in found
-        if element is not None
+        if element is not None and fields.text(element, "Type") not in MAILBOX_TYPES
     )
 
 
