@@ -115,6 +115,7 @@ def test_only_commands_to_other_registers_are_run(tmp_path: Path) -> None:
         ("<Data>e003</Data>", "", "Validate has no Data"),
         ("<Cmd>5</Cmd>", "<Cmd>77</Cmd>", "77 is not a command of EtherCAT"),
         ("<Data>1122</Data>", "", "InitCmd 'ramp': a download has no Data"),
+        ("<Timeout>100<", "<Timeout>600001<", "Validate/Timeout: 600001 ms; at most 600000"),
         ("<AutoIncAddr>0", "<AutoIncAddr>65534", "position 2, expected 0"),
         ("<CycleTime>2000<", "<CycleTime>0<", "the cycle time is 0"),
         ("<BitSize>16", "<BitSize>1e3", "is not a number"),
@@ -225,6 +226,8 @@ def test_register_commands_of_an_encrypted_file_are_refused(tmp_path: Path) -> N
         ("PDI watchdog</Comment><Cmd>5", "PDI watchdog</Comment><Cmd>6", "FPRW is not supported"),
         ("<Adp>1001</Adp>\n     <Ado>1040", "<Adp>1002</Adp>\n     <Ado>1040",
          "Adp is 1002, but this device has 1001"),
+        ("<Ado>1040</Ado><Data>ea03</Data>", "<Ado>1052</Ado><DataLength>8</DataLength>",
+         "registers of the bring-up together with others: the plan sets the watchdog"),
         ("<Ccs>1", "<Ccs>2", "Ccs 2 is not supported"),
         ("</CoE>", "</CoE><SoE><InitCmds><InitCmd><Transition>PS</Transition><OpCode>3</OpCode>"
          "<IDN>32796</IDN><Data>01</Data></InitCmd></InitCmds></SoE>", "SoE is not supported"),

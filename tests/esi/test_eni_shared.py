@@ -163,6 +163,32 @@ def test_every_variable_is_placed_at_the_entry_with_its_name(
         assert found.variable.name.endswith(found.entry.name)
 
 
+def test_mailboxes_clocks_and_ports_are_those_of_the_xml(
+    files: tuple[EniFile, Element],
+) -> None:
+    for device, slave in devices(files):
+        box = slave.find("Mailbox")
+        assert (device.mailbox is None) == (box is None)
+        if box is not None and device.mailbox is not None:
+            assert (device.mailbox.send_start, device.mailbox.send_length) == (
+                number(box, "Send/Start"),
+                number(box, "Send/Length"),
+            )
+            assert (device.mailbox.receive_start, device.mailbox.receive_length) == (
+                number(box, "Recv/Start"),
+                number(box, "Recv/Length"),
+            )
+            protocols = [each.text for each in box.findall("Protocol")]
+            assert list(device.mailbox.protocols) == protocols
+        assert device.clock is not None
+        assert device.clock.reference == bool(number(slave, "DC/ReferenceClock"))
+        assert round(device.clock.sync0 * 1e9) == number(slave, "DC/CycleTime0")
+        assert round(device.clock.shift * 1e9) == number(slave, "DC/ShiftTime")
+        port = slave.find("PreviousPort")
+        expected = None if port is None else (number(port, "PhysAddr"), text(port, "Port"))
+        assert device.previous == expected
+
+
 def test_the_image_and_the_cycle_are_those_of_the_xml(files: tuple[EniFile, Element]) -> None:
     eni, config = files
     assert eni.image_sizes == (

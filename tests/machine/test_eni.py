@@ -257,3 +257,30 @@ def test_a_refused_object_is_named_with_its_command(tmp_path: Path) -> None:
         machine.loop(),
     ):
         pass
+
+
+def test_a_variable_has_the_place_of_its_own_pdo(tmp_path: Path) -> None:
+    """The same object is in two PDOs."""
+    pdo = (
+        '<TxPdo Sm="3"><Index>#x1a01</Index><Name>Second</Name><Entry><Index>#x6041</Index>'
+        "<SubIndex>0</SubIndex><BitLen>16</BitLen><Name>Status word</Name>"
+        "<DataType>UINT</DataType></Entry></TxPdo></ProcessData>"
+    )
+    variable = (
+        "<Variable><Name>Drive.Second.Status word</Name><DataType>UINT</DataType>"
+        "<BitSize>16</BitSize><BitOffs>64</BitOffs></Variable></Inputs>"
+    )
+    path = write_eni(
+        tmp_path,
+        ("</ProcessData>", pdo),
+        ("</Inputs>", variable),
+        ("<Pdo>6656</Pdo>", "<Pdo>6656</Pdo><Pdo>6657</Pdo>"),
+        ("<BitStart>16</BitStart><BitLength>48", "<BitStart>16</BitStart><BitLength>64"),
+    )
+    with (
+        cat.Machine(path, target=segment_of(read_eni(path))) as machine,
+        machine.loop() as loop,
+    ):
+        bits = {each.name: each.number.bit_offset for each in loop.plan.cycle.input_columns}
+        assert bits["Second.Status word"] - bits["Inputs.Status word"] == 48
+        assert machine.variables["Drive.Second.Status word"] == 0

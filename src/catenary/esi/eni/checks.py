@@ -13,6 +13,7 @@ from catenary.esi.eni.own_registers import (
     READS,
     WRITES,
     is_upward,
+    overlap,
     own_reason,
     vendor_commands,
 )
@@ -71,6 +72,14 @@ def _check_register(eni: EniFile, device: EniDevice, command: RegisterCommand) -
             command.source,
             f"{name} is not supported",
             "use APRD, APWR, FPRD or FPWR (1, 2, 4, 5)",
+        )
+    if command.command in WRITES and overlap(command):
+        _refuse(
+            eni,
+            place,
+            command.source,
+            f"it writes registers of the bring-up together with others: {overlap(command)}",
+            "write the other registers with a separate command",
         )
     by_position = command.command in BY_POSITION
     own = -device.position & 0xFFFF if by_position else device.station_address

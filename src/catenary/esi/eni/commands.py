@@ -15,6 +15,7 @@ LOGICAL = (EcatCommand.LRD, EcatCommand.LWR, EcatCommand.LRW)
 STATES = "IPSOB"  # letters of a transition: INIT, PRE-OP, SAFE-OP, OP, BOOT
 MILLISECOND = 1e-3
 DOWNLOAD = 1  # Ccs of CoE
+TIMEOUT_MAX = 600_000  # of a command [ms]
 DATA_MAX = 1486  # of one datagram [bytes], ETG.1000.4
 
 
@@ -36,7 +37,7 @@ def _register_command(element: Element, fields: Fields) -> RegisterCommand:
         data=data,
         count=_optional(element, fields, "Cnt"),
         retries=fields.number(element, "Retries", bits=16, default=0),
-        timeout=fields.number(element, "Timeout", default=0) * MILLISECOND,
+        timeout=read_timeout(element, fields),
         validation=_validation(element, fields, len(data)),
         before_slave=fields.flag(element, "BeforeSlave"),
         comment=fields.text(element, "Comment"),
@@ -88,8 +89,15 @@ def _validation(element: Element, fields: Fields, length: int) -> Validation | N
             validate,
             f"{len(data)} bytes of Data and {len(mask)} of DataMask for a datagram of {length}",
         )
-    timeout = fields.number(validate, "Timeout", default=0) * MILLISECOND
-    return Validation(data, mask, timeout)
+    return Validation(data, mask, read_timeout(validate, fields))
+
+
+def read_timeout(element: Element, fields: Fields) -> float:
+    """Return the child Timeout [s]; 0 without one. Longer ones than ten minutes are refused."""
+    time = fields.number(element, "Timeout", default=0)
+    if time > TIMEOUT_MAX:
+        fields.refuse(element, f"{time} ms; at most {TIMEOUT_MAX} ms", tag="Timeout")
+    return time * MILLISECOND
 
 
 def _transitions(element: Element, fields: Fields) -> tuple[str, ...]:
@@ -146,7 +154,7 @@ def _mailbox_command(protocol: str, element: Element, fields: Fields) -> Mailbox
         idn=fields.number(element, "IDN", bits=16) if is_soe else None,
         drive=fields.number(element, "DriveNo", bits=8, default=0) if is_soe else 0,
         disabled=fields.flag(element, "Disabled"),
-        timeout=fields.number(element, "Timeout", default=0) * MILLISECOND,
+        timeout=read_timeout(element, fields),
         comment=comment,
         source=source,
     )

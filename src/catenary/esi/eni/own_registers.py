@@ -35,6 +35,15 @@ def own_reason(command: RegisterCommand) -> str:
     return ""
 
 
+def overlap(command: RegisterCommand) -> str:
+    """Return the reason of the first register that a command shares with the bring-up."""
+    last = command.offset + len(command.data) - 1
+    for first, end, reason in OWN_REGISTERS:
+        if command.offset <= end and first <= last:
+            return reason
+    return ""
+
+
 def is_upward(transitions: Sequence[str]) -> bool:
     """Return True if Catenary makes one of the transitions with commands: IP, PS or SO."""
     return not UPWARDS.isdisjoint(transitions)
