@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 
 from catenary.machine.schema import FORMAT
@@ -186,20 +187,20 @@ def _names(devices: Sequence[DeviceDescription]) -> list[str]:
 
 def unique_names(names: Sequence[str]) -> list[str]:
     """Return the names, with numbers from 1 for those that occur more than once."""
-    repeated = _repeated(names)
+    repeated, given = _repeated(names), set(names)
     used: dict[str, int] = {}
-    made: list[str] = []
+    made: dict[str, None] = {}  # in their order
     for name in names:
         unique = name
-        while name in repeated and (unique == name or unique in made or unique in names):
+        while name in repeated and (unique == name or unique in made or unique in given):
             used[name] = used.get(name, 0) + 1
             unique = f"{name}_{used[name]}"
-        made.append(unique)
-    return made
+        made[unique] = None
+    return list(made)
 
 
 def _repeated(values: Sequence[object]) -> set[object]:
-    return {value for value in values if values.count(value) > 1}
+    return {value for value, count in Counter(values).items() if count > 1}
 
 
 def slug(text: str, default: str) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from bisect import bisect_left
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
@@ -27,6 +28,13 @@ class Variables(NamedTuple):
     placed: tuple[PlacedVariable, ...]
     left_out: dict[str, str]  # reason by name
 
+    def by_device(self) -> dict[int, list[PlacedVariable]]:
+        """Return the placed variables by the positions of their devices."""
+        found: dict[int, list[PlacedVariable]] = {}
+        for each in self.placed:
+            found.setdefault(each.device, []).append(each)
+        return found
+
 
 def place_variables(eni: EniFile) -> Variables:
     """Return the PDO entry of each variable.
@@ -44,12 +52,13 @@ def place_variables(eni: EniFile) -> Variables:
         for pdo, entry, bit in _entry_bits(device, direction)
         if entry.index and entry.bit_length
     }
+    owners = {direction: _Owners(eni, direction) for direction in Direction}
     placed: list[PlacedVariable] = []
     left_out: dict[str, str] = {}
     for each in eni.variables:
         found = entries.get((each.direction, each.bit_offset, each.bit_length))
         if found is None:
-            left_out[each.name] = _reason(eni, each)
+            left_out[each.name] = owners[each.direction].reason(each)
         elif each.bit_length > NUMBER_BITS:
             left_out[each.name] = f"it has {each.bit_length} bits; a number has at most 64"
         else:
@@ -81,13 +90,25 @@ def _starts(managers: Sequence[EniSyncManager], parts: Sequence[ImagePart]) -> l
     return starts
 
 
-def _reason(eni: EniFile, variable: Variable) -> str:
-    first, end = variable.bit_offset, variable.bit_offset + variable.bit_length
-    for device in eni.devices:
-        for part in device.image(variable.direction):
-            if part.bit_start < end and first < part.bit_start + part.bit_length:
-                return (
-                    f"it covers bits {first} to {end - 1} of the image, where {device.name!r} has "
-                    "no PDO entry of this length"
-                )
-    return "it is a state of the configurator's MainDevice, not process data of a device"
+class _Owners:
+    """Devices by their bits in the image of a direction."""
+
+    def __init__(self, eni: EniFile, direction: Direction) -> None:
+        parts = [
+            (part.bit_start, part.bit_start + part.bit_length, device.name)
+            for device in eni.devices
+            for part in device.image(direction)
+        ]
+        self._parts = sorted(parts)
+        self._starts = [start for start, _, _ in self._parts]
+
+    def reason(self, variable: Variable) -> str:
+        """Return the reason why a variable has no PDO entry."""
+        first, end = variable.bit_offset, variable.bit_offset + variable.bit_length
+        last = bisect_left(self._starts, end) - 1
+        if last >= 0 and first < self._parts[last][1]:
+            return (
+                f"it covers bits {first} to {end - 1} of the image, where "
+                f"{self._parts[last][2]!r} has no PDO entry of this length"
+            )
+        return "it is a state of the configurator's MainDevice, not process data of a device"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import partial
@@ -114,6 +115,7 @@ class EniMachine:
 
     def _parts(self, subs: Mapping[str, SubDevice]) -> MachineParts:
         placed = place_variables(self._eni)
+        by_device = placed.by_device()
         data: dict[str, ProcessData] = {}
         values: dict[str, tuple[ProcessData, str]] = {}
         left = dict(placed.left_out)
@@ -121,8 +123,7 @@ class EniMachine:
             name = self._names[device.position]
             if not any(device.managers(direction) for direction in Direction):
                 continue
-            own = [each for each in placed.placed if each.device == device.position]
-            named = channel_names(device.name, own)
+            named = channel_names(device.name, by_device.get(device.position, ()))
             data[name] = made = make_process_data(device, subs[name], named)
             for short, each in named.items():
                 full = each.variable.name
@@ -151,10 +152,10 @@ class EniMachine:
 
 def device_names(eni: EniFile) -> list[str]:
     """Return a unique name for each device: that of the file, with its position if needed."""
-    names = [device.name for device in eni.devices]
+    names = Counter(device.name for device in eni.devices)
     return [
-        name if names.count(name) == 1 else f"{name} {position}"
-        for position, name in enumerate(names)
+        device.name if names[device.name] == 1 else f"{device.name} {device.position}"
+        for device in eni.devices
     ]
 
 

@@ -9,7 +9,7 @@ from catenary.esi.eni.places import PlacedVariable, place_variables
 from catenary.esi.eni.values import EniDevice, EniFile, MailboxCommand
 from catenary.machine.eni.machine import DEFAULT_PERIOD, device_tables
 from catenary.machine.eni.requests import clock, number_type
-from catenary.machine.schema import FORMAT
+from catenary.machine.schema import FORMAT, DeviceTable
 from catenary.machine.text import (
     DRIVES,
     FILL_IN,
@@ -42,14 +42,14 @@ def eni_text(eni: EniFile) -> tuple[str, tuple[str, ...]]:
     head, devices, rest = head.partition("# Devices, ")
     parts = [head.replace('period = "1 ms"', f'period = "{period}"')]
     parts += [*_reference(eni, names), devices, rest]
-    for name, device in zip(names, eni.devices, strict=True):
-        parts += _device(eni, name, device, notes)
+    for name, device, table in zip(names, eni.devices, device_tables(eni), strict=True):
+        parts += _device(name, device, table, notes)
     parts += _drives(names, eni.devices)
     placed = place_variables(eni)
+    by_device = placed.by_device()
     for name, device in zip(names, eni.devices, strict=True):
         if not slots_of(device):
-            own = [each for each in placed.placed if each.device == device.position]
-            parts += _process_data(name, device, own)
+            parts += _process_data(name, device, by_device.get(device.position, ()))
     notes += [f"{eni.path}: variable {name!r}: {why}" for name, why in placed.left_out.items()]
     return "".join(parts), tuple(notes)
 
@@ -85,8 +85,7 @@ def _reference(eni: EniFile, names: Sequence[str]) -> Iterator[str]:
             yield f'[clocks]\nreference = "{name}"\n\n'
 
 
-def _device(eni: EniFile, name: str, device: EniDevice, notes: list[str]) -> Iterator[str]:
-    table = device_tables(eni)[device.position]
+def _device(name: str, device: EniDevice, table: DeviceTable, notes: list[str]) -> Iterator[str]:
     numbers = {
         "vendor": device.identity.vendor,
         "product": device.identity.product,
