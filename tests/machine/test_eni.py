@@ -119,6 +119,19 @@ def test_notes_name_what_differs_from_the_plan(tmp_path: Path) -> None:
         assert "clock" not in notes
 
 
+def test_the_watchdog_is_that_of_the_file(tmp_path: Path) -> None:
+    command = (
+        "<InitCmd><Transition>IP</Transition><Cmd>5</Cmd><Adp>1001</Adp><Ado>1056</Ado>"
+        "<Data>1027</Data></InitCmd>"
+    )
+    path = write_eni(tmp_path, ("</Mailbox>\n   <InitCmds>", f"</Mailbox>\n   <InitCmds>{command}"))
+    with cat.Machine(path, target=segment_of(read_eni(path))) as machine:
+        plan = machine.main.plan(*machine.requests, period=2e-3)
+        assert plan.devices[0].watchdog_ns == 1_000_000_000
+        assert "watchdog 1000 ms (ENI)" in str(plan)
+        assert not any("watchdog:" in note for note in machine.notes)
+
+
 def test_another_device_is_named_with_both_identities(tmp_path: Path) -> None:
     path = write_eni(tmp_path)
     segment = segment_of(read_eni(path))

@@ -46,7 +46,7 @@ def run_command(station: Station, command: RegisterCommand, transition: str) -> 
     """
     reads = EcatCommand(command.command).reads
     kind = EcatCommand.FPRD if reads else EcatCommand.FPWR
-    request = Request(kind, physical(station.address, command.offset), command.data, False)
+    request = Request(kind, physical(station.address, command.offset), command.data, reads)
     validation = command.validation
     seconds = validation.timeout if validation is not None else command.timeout
     deadline, pace, tries = Deadline(seconds or DEFAULT_TIMEOUT), Pace(), 0
@@ -66,8 +66,9 @@ def _answered(command: RegisterCommand, reply: Reply) -> bool:
     """Return True if the working counter is right."""
     if reply.lost:
         return False
-    least = command.validation is not None and reply.working_counter == 0
-    return not least if command.count is None else reply.working_counter == command.count
+    if command.count is not None:
+        return reply.working_counter == command.count
+    return command.validation is None or reply.working_counter > 0
 
 
 def _fault(command: RegisterCommand, reply: Reply) -> str:
@@ -80,11 +81,8 @@ def _fault(command: RegisterCommand, reply: Reply) -> str:
     validation = command.validation
     if validation is None or validation.accepts(reply.data):
         return ""
-    mask = (
-        ""
-        if validation.mask == b"\xff" * len(validation.mask)
-        else (f" under mask {validation.mask.hex(' ')}")
-    )
+    everything = validation.mask == b"\xff" * len(validation.mask)
+    mask = "" if everything else f" under mask {validation.mask.hex(' ')}"
     found = reply.data[: len(validation.data)].hex(" ")
     return f"expected {validation.data.hex(' ')}{mask}, read {found}"
 
