@@ -52,6 +52,8 @@ def _difference(a: Setting | None, b: Setting | None) -> Difference | None:
         subject, effect, note = parts[0]
         effect = any(part[1] for part in parts)
         note = note if len(parts) == 1 else ""
+    elif _is_reset_value(present):
+        return None  # the register has this value without a write
     else:
         subject, effect, note = _alone(present)
     topic = Topic.WATCHDOG if subject.endswith("watchdog trigger") else present.topic
@@ -124,11 +126,14 @@ def _alone(setting: Setting) -> tuple[str, bool, str]:
     value = setting.value
     if isinstance(value, MappedArea) and value.is_status:
         return _name(setting), False, "status of a mailbox"
-    if isinstance(value, RegisterWrite):
-        reset = _RESET_VALUES.get(value.address)
-        if reset == int.from_bytes(value.data, "little"):
-            return _name(setting), False, "the value after reset"
     return _name(setting), True, ""
+
+
+def _is_reset_value(setting: Setting) -> bool:
+    value = setting.value
+    if not isinstance(value, RegisterWrite):
+        return False
+    return _RESET_VALUES.get(value.address) == int.from_bytes(value.data, "little")
 
 
 def _name(setting: Setting) -> str:
