@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import pathlib
+import pytest
 
 import catenary as cat
-import pytest
 from tests.peers.sniffer import sniffing
-from tests.peers.test_pysoem import opened, to_operational, again
+from tests.peers.test_pysoem import opened, to_operational
 
 pysoem = pytest.importorskip("pysoem", reason="PySOEM is not installed (extra `peers`)")
 

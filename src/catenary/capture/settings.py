@@ -27,8 +27,6 @@ from catenary.wire.register import (
     GENERAL_PURPOSE_OUTPUTS,
     LATCH0_CONTROL,
     LATCH1_CONTROL,
-    SYNC0_CYCLE_TIME,
-    SYNC1_CYCLE_TIME,
     SYNC_CYCLE_TIMES,
     SYNC_PULSE_LENGTH,
     WATCHDOG_DIVIDER,
@@ -107,9 +105,8 @@ class _Registers:
             if known is None or known[0] != content.fmmu:
                 self._fmmus[content.number] = content.fmmu, event
         elif isinstance(content, SyncUnitWrite):
-            self._times[:] = SYNC0_CYCLE_TIME.pack(content.sync0_ns) + SYNC1_CYCLE_TIME.pack(
-                content.sync1_ns
-            )
+            for offset, ns in ((0, content.sync0_ns), (4, content.sync1_ns)):
+                self._times[offset : offset + 4] = (ns & 0xFFFFFFFF).to_bytes(4, "little")
             if self._active is None or self._active[0] != content.assign_activate:
                 self._active = content.assign_activate, event
         elif isinstance(content, RegisterWrite):

@@ -6,6 +6,8 @@ from collections.abc import Iterator
 
 from catenary.capture.start_up_list import MappedEntry, StartUpEntry, StartUpList
 
+# Objects that Catenary writes for drives and clocks: mode, interpolation time, synchronisation
+_OWN = (0x6060, 0x60C2, 0x1C32, 0x1C33)
 _TYPES = {1: "USINT", 2: "UINT", 4: "UDINT", 8: "ULINT"}  # by length [bytes]
 
 
@@ -38,6 +40,10 @@ def _head(found: StartUpList, source: str) -> Iterator[str]:
         for number, mapped in found.pdos.items():
             if mapped is not None:
                 yield f"#   0x{number:04X}: {_mapped_text(mapped)}"
+    own = sorted({entry.index for entry in found.entries} & set(_OWN))
+    if own:
+        names = ", ".join(f"0x{index:04X}" for index in own)
+        yield f"# Catenary writes {names} for drives and clocks: remove these lines for them."
     for each in found.omitted:
         yield f"# omitted: {_printable(each)}"
 
