@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
 
@@ -26,7 +26,7 @@ def record(
     clock: cat.DistributedClock | bool = False,
     quirks: ServoQuirks | None = None,
     outputs: int = 1,
-    pdos: Sequence[int] | None = None,
+    pdos: Mapping[int, list[tuple[int, int, int]]] | None = None,
 ) -> None:
     """Record a bring-up of a coupler, a servo and digital outputs. An error ends it early.
 
@@ -39,9 +39,8 @@ def record(
         pdos: PDOs of the servo; None lets Catenary choose.
     """
     terminals = [DigitalOutputs(bits=8) for _ in range(outputs)]
-    segment = Segment(
-        [Coupler(), Servo(quirks=quirks or ServoQuirks()), *terminals], clock="virtual"
-    )
+    servo = Servo(quirks=quirks or ServoQuirks())
+    segment = Segment([Coupler(), servo, *terminals], clock="virtual")
     with Recorder(segment, path) as link, suppress(CatenaryError), cat.MainDevice(link) as main:
         subs = main.scan()
         axes = cat.Drives(

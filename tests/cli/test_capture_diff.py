@@ -38,7 +38,7 @@ def test_equal_captures(a: Path, b: Path, capsys: pytest.CaptureFixture[str]) ->
     assert head.startswith("A a.pcapng  Catenary (source 10:10:10:10:10:10)  3 devices  start-up ")
     assert lines[-1] == "No differences."
     assert "0  CVK100  same (0 register writes, 0 SDO)" in lines
-    assert "same (5 register writes, 6 SDO)" in "\n".join(lines)
+    assert "same (9 register writes, 4 SDO)" in "\n".join(lines)
 
 
 def test_a_missing_sdo_is_named_first(a: Path, b: Path, capsys: pytest.CaptureFixture[str]) -> None:

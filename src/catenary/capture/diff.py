@@ -165,12 +165,19 @@ def _results(a: Sequence[Outcome], b: Sequence[Outcome]) -> Iterator[Difference]
         ]
         yield Difference(
             *(Mark.RESULT, Topic.STATE, str(left.step.after), left.step, str(left), str(right)),
-            note=f"{stops[0]} stops here" if len(stops) == 1 else "",
+            note=_note(left, right, stops),
             packet_a=_packet(left),
             packet_b=_packet(right),
         )
         if left.reached is None or right.reached is None:
             return
+
+
+def _note(a: Outcome, b: Outcome, stops: Sequence[str]) -> str:
+    if len(stops) != 1:
+        return ""
+    outcome = a if stops[0] == "A" else b
+    return f"{stops[0]} stops here" if outcome.is_known else f"not requested in {stops[0]}"
 
 
 def _ends(outcome: Outcome, outcomes: Sequence[Outcome]) -> bool:

@@ -38,6 +38,7 @@ class Topic(Enum):
     MAILBOX = "mailbox"
     MAPPING = "mapping"  # PDO mapping and assignment
     OBJECT = "object"
+    SYNC_OBJECT = "synchronisation object"  # 0x1C32 and 0x1C33
     SYNC_MANAGER = "SyncManager"
     FMMU = "FMMU"
     CLOCK = "clock"

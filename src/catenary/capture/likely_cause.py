@@ -9,8 +9,8 @@ from catenary.capture.contents import StateRefused
 from catenary.capture.difference import DeviceComparison, Difference, Mark, Topic
 from catenary.capture.events import Event
 
-_CLOCK = (Topic.CLOCK,)
-_LAYOUT = (Topic.SYNC_MANAGER, Topic.MAPPING, Topic.FMMU)
+_CLOCK = (Topic.CLOCK, Topic.SYNC_OBJECT)
+_LAYOUT = (Topic.MAPPING, Topic.SYNC_MANAGER, Topic.FMMU)
 _WATCHDOG = (Topic.WATCHDOG,)
 # AL status codes, ETG.1000.6 table 11 and ETG.1020: the settings that a device checks before them
 _TOPICS: Mapping[int, tuple[Topic, ...]] = {
@@ -112,6 +112,10 @@ def _first_row(rows: Sequence[Difference], code: int | None) -> Difference | Non
     candidates = [each for each in rows if each.mark is not Mark.RESULT]
     return min(
         candidates,
-        key=lambda each: (not each.effect, each.topic not in related),
+        key=lambda each: (not each.effect, _rank(related, each.topic)),
         default=None,
     )
+
+
+def _rank(related: Sequence[Topic], topic: Topic) -> int:
+    return related.index(topic) if topic in related else len(related)

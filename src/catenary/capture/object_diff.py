@@ -11,7 +11,8 @@ from typing import NamedTuple
 from catenary.capture.device_pairs import out_of_place
 from catenary.capture.difference import Difference, Mark, Topic, level, mark_of
 from catenary.capture.events import Step
-from catenary.capture.object_writes import Objects, ObjectWrite, Place
+from catenary.capture.object_writes import Objects, ObjectWrite, Place, value_of
+from catenary.wire.abort import abort_code
 from catenary.wire.al import AlState
 
 _MAXIMUM_ALIGNED = 200  # writes of one object; more are compared in their order
@@ -27,7 +28,8 @@ class _Pair(NamedTuple):
 def compare_objects(a: Objects, b: Objects) -> Iterator[Difference]:
     """Yield a row for each write that differs, in the order of A, and one for the order.
 
-    A write of only one capture has no effect if the other one wrote or read the same last value.
+    A write of only one capture has no effect if the other one wrote or read the same last value,
+    or if the same capture overwrites it later.
 
     Args:
         a: Objects of A.
@@ -102,12 +104,10 @@ def _difference(
             if _is_late(a) is _is_late(b):
                 return None
             note = f"not before SAFE-OP in {'A' if _is_late(a) else 'B'}"
-        elif a.data == b.data:
-            note = "refused in A only" if b.succeeded else "refused in B only"
-            if not (a.succeeded or b.succeeded):
-                note = "refused in both, for other reasons"
+        elif a.succeeded is not b.succeeded:
+            note = _refusal(a, "A") if b.succeeded else _refusal(b, "B")
     else:
-        effect, note = _alone(present, in_b if a else in_a, "B" if a else "A")
+        effect, note = _alone(present, in_a, in_b, "B") if a else _alone(present, in_b, in_a, "A")
     return Difference(
         mark_of(a, b),
         present.topic,
@@ -122,17 +122,32 @@ def _difference(
     )
 
 
-def _alone(write: ObjectWrite, other: Objects, name: str) -> tuple[bool, str]:
-    """Return the effect and the note of a write that the other capture does not have."""
+def _refusal(write: ObjectWrite, name: str) -> str:
+    if write.abort is None:
+        return f"not answered in {name}"
+    return f"refused in {name}: {abort_code(write.abort).text}"
+
+
+def _alone(write: ObjectWrite, own: Objects, other: Objects, name: str) -> tuple[bool, str]:
+    """Return the effect and the note of a write that the other capture does not have.
+
+    Args:
+        write: The write.
+        own: Objects of its capture.
+        other: Objects of the other capture.
+        name: "A" or "B", the other capture.
+    """
     if not write.succeeded:
         return False, "refused"
-    found = other.known.get(write.place)
-    if found is not None and found == write.data:
-        written = any(each.place == write.place for each in other.writes)
-        return False, f"{name} {'wrote' if written else 'read'} this value"
-    if any(each.place == write.place and each.succeeded for each in other.writes):
-        return False, f"{name} wrote another value later"
-    return True, ""
+    last, found = own.known.get(write.place), other.known.get(write.place)
+    if write.data != last:
+        return False, "overwritten later"
+    if found is None:
+        return True, ""
+    verb = "wrote" if any(each.place == write.place for each in other.writes) else "read"
+    if found == last:
+        return False, f"{name} {verb} this value"
+    return True, f"{name} {verb} {value_of(found)}"
 
 
 def _order(pairs: Sequence[_Pair], a: Objects, b: Objects) -> Difference | None:

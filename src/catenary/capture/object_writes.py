@@ -12,7 +12,6 @@ from catenary.capture.events import Step
 from catenary.capture.mailbox_contents import MailboxMessage, SdoTransfer
 from catenary.capture.mapping_objects import entries, is_mapping
 from catenary.capture.text import value_text
-from catenary.wire.abort import abort_code
 from catenary.wire.al import AlState
 from catenary.wire.mailbox import Type
 
@@ -62,7 +61,7 @@ class ObjectWrite:
         """The part of the configuration to which the object belongs."""
         if is_mapping(self.index):
             return Topic.MAPPING
-        return Topic.CLOCK if self.index in _SYNC_OBJECTS else Topic.OBJECT
+        return Topic.SYNC_OBJECT if self.index in _SYNC_OBJECTS else Topic.OBJECT
 
     @property
     def name(self) -> str:
@@ -80,9 +79,9 @@ class ObjectWrite:
     def __str__(self) -> str:
         if self.text:
             return self.text
-        text = f"{self.name} = {_number(self.data)}"
+        text = f"{self.name} = {value_of(self.data)}"
         if self.abort is not None:
-            text += f" aborted 0x{self.abort:08X} {abort_code(self.abort).text}"
+            text += f" aborted 0x{self.abort:08X}"
         return text if self.answered else f"{text} not answered"
 
 
@@ -142,5 +141,6 @@ def _step(step: Step) -> Step:
     return step
 
 
-def _number(data: bytes) -> str:
+def value_of(data: bytes) -> str:
+    """Return a value as text: decimal for one byte."""
     return str(data[0]) if len(data) == 1 else value_text(data)
