@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from catenary.capture.contents import DeviceCount, FramesLost, StateRequest
 from catenary.capture.direction import LOST_NS
+from catenary.capture.notes import notes
 from catenary.wire.al import AlState
 from catenary.wire.datagram import Datagram, EcatCommand
 from tests.capture.made import Conversation, address
@@ -78,3 +81,21 @@ def test_a_virtual_interface_has_the_bit_in_its_own_address() -> None:
     list(stream)
     master = stream.masters[0].master
     assert (master.sent, master.returned, master.lost) == (2, 2, 0)
+
+
+def test_two_programs_with_one_source_address() -> None:
+    """A master uses an index again only after the answer, or after some ms."""
+    made = Conversation()
+    for _ in range(3):
+        made.exchange(COUNT, answers=[(None, 2)])
+    single = made.stream()
+    list(single)
+    assert not list(notes(single.counts, single.masters))
+    for sent, back in zip(made.packets[::2], made.packets[1::2], strict=True):
+        made.packets += [replace(sent, time_ns=sent.time_ns + 5_000)]
+        made.packets += [replace(back, time_ns=back.time_ns + 5_000)]
+    made.packets.sort(key=lambda packet: packet.time_ns)
+    stream = made.stream()
+    list(stream)
+    assert stream.masters[0].master.collisions == 3
+    assert "two programs" in "".join(notes(stream.counts, stream.masters))

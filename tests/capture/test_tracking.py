@@ -197,6 +197,21 @@ def test_working_counter_drops() -> None:
     assert statistics.latencies.maximum == 20_000
 
 
+def test_working_counters_of_the_fmmus() -> None:
+    """LRW counts 1 for inputs and 2 for outputs; another device has its FMMU elsewhere."""
+    made = Conversation()
+    made.write(0x0600, bits(0x10000 * 8, 0x1100 * 8, 16, writes=True).encode())
+    made.write(0x0610, bits(0x10002 * 8, 0x1180 * 8, 16, reads=True).encode())
+    made.write(0x0600, bits(0x10002 * 8, 0x1180 * 8, 8, reads=True).encode(), station=0x1002)
+    made.write(0x0600, bits(0x10004 * 8, 0x1180 * 8, 8, reads=True).encode(), station=0x1003)
+    request(made, OP)
+    cycle(made, 3)
+    stream = made.stream()
+    list(stream)
+    [statistics] = stream.masters[0].cycles
+    assert (statistics.configured, statistics.working_counters) == ((4,), (3,))
+
+
 def test_a_requested_lower_state_is_no_drop() -> None:
     made = Conversation()
     report(made, OP)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -10,6 +10,7 @@ from catenary.capture.contents import Content, CyclicStart, WorkingCounterBack, 
 from catenary.capture.pairing import FramePair
 from catenary.capture.spread import RunningSpread, Spread
 from catenary.wire.datagram import Datagram, EcatCommand
+from catenary.wire.fmmu import Fmmu
 
 MAXIMUM_LAYOUTS = 64
 
@@ -31,6 +32,7 @@ class CycleStatistics:
 
     `periods` are the times between sent frames. `latencies` are the times from a sent frame to its
     answer, on the clock of the capture. `working_counters` are the largest ones of the datagrams.
+    `configured` are those that result from the FMMUs of the devices, when OP was last requested.
     """
 
     layout: tuple[LogicalDatagram, ...]
@@ -42,6 +44,7 @@ class CycleStatistics:
     latencies: Spread
     working_counters: tuple[int, ...]
     drops: int  # frames with a smaller working counter than expected
+    configured: tuple[int, ...] = ()
 
 
 class _Expectation:
@@ -79,6 +82,7 @@ class _Layout:
         self.started_ns = started_ns
         self.last_ns: int | None = None
         self.frames = self.lost = self.drops = 0
+        self.configured: tuple[int, ...] = ()
         self.periods, self.latencies = RunningSpread(), RunningSpread()
 
     def statistics(self) -> CycleStatistics:
@@ -88,6 +92,7 @@ class _Layout:
             *(self.periods.spread, self.latencies.spread),
             tuple(each.largest for each in self.expectations),
             self.drops,
+            self.configured,
         )
 
 
@@ -125,10 +130,31 @@ class Cycles:
             for each in layout.expectations:
                 each.forget()
 
+    def configure(self, devices: Sequence[Sequence[Fmmu]]) -> None:
+        """Compute the working counters that result from the enabled FMMUs of the devices."""
+        for layout in self._layouts.values():
+            layout.configured = tuple(
+                sum(_contribution(datagram, fmmus) for fmmus in devices)
+                for datagram in layout.layout
+            )
+
     @property
     def statistics(self) -> tuple[CycleStatistics, ...]:
         """Statistics of the layouts, in the order of their first frames."""
         return tuple(each.statistics() for each in self._layouts.values())
+
+
+def _contribution(datagram: LogicalDatagram, fmmus: Sequence[Fmmu]) -> int:
+    """Return the increment of a working counter by one device, ETG.1000.4 §5.4.1.3."""
+    command, start, end = datagram.command, datagram.address, datagram.address + datagram.length
+    overlapping = [
+        fmmu
+        for fmmu in fmmus
+        if fmmu.logical_address < end and fmmu.logical_address + fmmu.length > start
+    ]
+    reads = command.reads and any(fmmu.reads for fmmu in overlapping)
+    writes = command.writes and any(fmmu.writes for fmmu in overlapping)
+    return reads + writes * (2 if command is EcatCommand.LRW else 1)
 
 
 def _logical(datagram: Datagram) -> LogicalDatagram:

@@ -116,6 +116,7 @@ class Master:
     lost: int = 0  # sent frames without an answer
     started_ns: int = 0
     ended_ns: int = 0
+    collisions: int = 0  # answered frames with the index of another frame on its way
 
     def __str__(self) -> str:
         source = self.source.hex(":")

@@ -5,7 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from catenary.capture.clocks import ReferenceClock
-from catenary.capture.contents import AddressAssigned, DeviceCount, FramesLost, StateRequest
+from catenary.capture.contents import (
+    AddressAssigned,
+    CyclicStart,
+    DeviceCount,
+    FramesLost,
+    StateRequest,
+)
 from catenary.capture.cycles import Cycles
 from catenary.capture.device_follower import DeviceFollower
 from catenary.capture.events import UNKNOWN_STEP, Event, Master, Step, common_step
@@ -37,7 +43,7 @@ class MasterFollower:
         self._source = first.source
         self._name = master_name(frame.frame)
         self._started_ns = self._ended_ns = frame.time_ns
-        self._sent = self._returned = self._lost = 0
+        self._sent = self._returned = self._lost = self._collisions = 0
         self._lost_run: tuple[int, int, int] | None = None  # count, time and packet of the first
         self._by_position: dict[int, DeviceFollower] = {}
         self._by_station: dict[int, DeviceFollower] = {}
@@ -51,6 +57,7 @@ class MasterFollower:
         assert base is not None
         self._sent += pair.sent is not None
         self._returned += pair.answer is not None
+        self._collisions += pair.collides
         self._ended_ns = max(self._ended_ns, base.time_ns)
         if pair.answer is not None:
             yield from self.end_of_loss()
@@ -61,6 +68,8 @@ class MasterFollower:
                 for device, found in self._follow(each):
                     yield self._event(each.time_ns, each.packet, device, found)
         for content in self.cycles.follow(pair):
+            if isinstance(content, CyclicStart):
+                self._configure_cycles()
             yield self._event(base.time_ns, base.number, None, Found(self._step(), content))
 
     def flush(self, packet: int) -> Iterator[Event]:
@@ -86,7 +95,7 @@ class MasterFollower:
         """Return the source address, the name and the numbers of frames."""
         return Master(
             *(self.number, self._source, self._name, self._sent, self._returned, self._lost),
-            *(self._started_ns, self._ended_ns),
+            *(self._started_ns, self._ended_ns, self._collisions),
         )
 
     def _note_lost(self, time_ns: int, packet: int) -> None:
@@ -211,7 +220,12 @@ class MasterFollower:
         followers = [device.states for device in self.devices] or [self._initial]
         return common_step(states.step(configures=configures) for states in followers)
 
+    def _configure_cycles(self) -> None:
+        self.cycles.configure([device.registers.enabled_fmmus() for device in self.devices])
+
     def _note_request(self, before: AlState | None, requested: AlState) -> None:
         """Forget the working counters if devices leave a state downwards."""
+        if requested is AlState.OP:
+            self._configure_cycles()
         if before is None or _ORDER.index(requested) < _ORDER.index(before):
             self.cycles.forget_expectations()

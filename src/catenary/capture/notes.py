@@ -69,5 +69,10 @@ def _master_notes(summary: MasterSummary) -> Iterator[str]:
         )
     elif master.returned and not master.sent:
         yield f"{name}: the capture contains only returned frames, so latencies are unknown"
-    elif master.lost:
+    if master.collisions:
+        yield (
+            f"{name}: {master.collisions} frames had the same index as another frame on its way: "
+            "two programs may use this source address on one segment"
+        )
+    if master.sent and master.returned and master.lost:
         yield f"{name}: {master.lost} of {master.sent} frames did not return"

@@ -6,7 +6,7 @@ from collections import deque
 from collections.abc import Iterable, Iterator
 from typing import NamedTuple
 
-from catenary.capture.direction import LOST_NS, CapturedFrame, is_outbound, shape_of
+from catenary.capture.direction import AT_ONCE_NS, LOST_NS, CapturedFrame, is_outbound, shape_of
 
 LOOK_AHEAD = 512  # frames that decide whether the source address shows the direction
 MAXIMUM_WAITING = 256  # frames of one source on their way
@@ -20,6 +20,7 @@ class FramePair(NamedTuple):
     sent: CapturedFrame | None
     answer: CapturedFrame | None
     under_way: bool = False  # the capture ends before the answer
+    collides: bool = False  # an equal frame of the same source was on its way: two programs?
 
 
 class _Source:
@@ -28,6 +29,7 @@ class _Source:
     def __init__(self) -> None:
         self.bits: set[bool] = set()
         self.waiting: deque[CapturedFrame] = deque()
+        self.colliding: set[int] = set()  # numbers of waiting frames
 
     def oldest_like(self, each: CapturedFrame) -> CapturedFrame | None:
         """Return the oldest waiting frame with the same commands, indices and lengths."""
@@ -39,7 +41,9 @@ class _Source:
         while self.waiting and (
             now_ns - self.waiting[0].time_ns > LOST_NS or len(self.waiting) > MAXIMUM_WAITING
         ):
-            yield self.waiting.popleft()
+            lost = self.waiting.popleft()
+            self.colliding.discard(lost.number)
+            yield lost
 
 
 def pair_frames(frames: Iterable[CapturedFrame]) -> Iterator[FramePair]:
@@ -82,9 +86,15 @@ def _pair(each: CapturedFrame, sources: dict[bytes, _Source]) -> Iterator[FrameP
     for lost in source.expired(each.time_ns):
         yield FramePair(address, lost, None)
     waiting = source.oldest_like(each)
-    if is_outbound(each, waiting, conclusive=len(source.bits) == 2):
+    conclusive = len(source.bits) == 2
+    if is_outbound(each, waiting, conclusive=conclusive):
+        if conclusive and waiting and each.time_ns - waiting.time_ns < AT_ONCE_NS:
+            source.colliding.add(each.number)
         source.waiting.append(each)
         return
+    collides = False
     if waiting is not None:
         source.waiting.remove(waiting)
-    yield FramePair(address, waiting, each)
+        collides = waiting.number in source.colliding
+        source.colliding.discard(waiting.number)
+    yield FramePair(address, waiting, each, collides=collides)

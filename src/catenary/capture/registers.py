@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from typing import NamedTuple
 
 from catenary.capture.register_contents import FmmuWrite, SyncManagerWrite, SyncUnitWrite
-from catenary.wire.fmmu import decode_fmmu
+from catenary.wire.fmmu import Fmmu, decode_fmmu
 from catenary.wire.register import (
     ASSIGN_ACTIVATE,
     FMMU_COUNT,
@@ -81,6 +81,11 @@ class WrittenRegisters:
         for number, register in enumerate(_FMMUS):
             if address < register.address + register.size and address + size > register.address:
                 yield FmmuWrite(number, decode_fmmu(self._at(register)))
+
+    def enabled_fmmus(self) -> list[Fmmu]:
+        """Return the enabled FMMUs."""
+        every = self.fmmus(_FMMUS[0].address, FMMU_COUNT * _FMMUS[0].size)
+        return [each.fmmu for each in every if each.fmmu.enabled]
 
     def sync_unit(self) -> SyncUnitWrite:
         """Return the content of the SYNC unit."""

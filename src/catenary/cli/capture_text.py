@@ -111,7 +111,11 @@ def _cycle_lines(cycle: CycleStatistics) -> Iterator[str]:
     yield f"    period {_spread(cycle.periods)}"
     yield f"    answer after {_spread(cycle.latencies)}"
     counters = ", ".join(map(str, cycle.working_counters))
-    yield f"    working counter {counters}, {cycle.drops} times smaller, {cycle.lost} frames lost"
+    configured = ", ".join(map(str, cycle.configured))
+    yield (
+        f"    working counter {counters} (FMMUs: {configured or 'unknown'}), "
+        f"{cycle.drops} times smaller, {cycle.lost} frames lost"
+    )
 
 
 def _spread(spread: Spread) -> str:
