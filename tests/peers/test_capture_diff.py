@@ -14,7 +14,7 @@ from catenary.capture.difference import Mark
 from catenary.cli.main import main
 from catenary.errors import CatenaryError
 from catenary.link import Interface, Recorder
-from tests.peers.sniffer import sniffing
+from tests.peers.test_capture_of_pysoem import recording
 from tests.peers.test_pysoem import STALLED, opened, to_operational
 
 pysoem = pytest.importorskip("pysoem", reason="PySOEM is not installed (extra `peers`)")
@@ -26,7 +26,7 @@ MAILBOX_STATUS = "FMMU in 0x080D:3 len 1 bits"
 
 
 def bring_up_with_pysoem(interface: str, path: Path) -> None:
-    with sniffing(interface, path), opened(6, interface) as master:
+    with recording(interface, path), opened(6, interface) as master:
         to_operational(master)
 
 

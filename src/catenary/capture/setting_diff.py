@@ -10,6 +10,7 @@ from catenary.capture.register_contents import RegisterWrite, SyncManagerWrite
 from catenary.capture.settings import Setting, SyncUnit
 from catenary.capture.text import duration
 from catenary.wire.al import AlState
+from catenary.wire.clock import Activation
 from catenary.wire.register import (
     WATCHDOG_DIVIDER,
     WATCHDOG_TIME_PDI,
@@ -159,7 +160,7 @@ def _text(setting: Setting | None) -> str:
     if not isinstance(value, SyncUnit):
         return str(value)
     times = f"SYNC0 {duration(value.sync0_ns)}"
-    if value.sync1_ns:
+    if Activation.SYNC1 in Activation(value.assign_activate >> 8):
         times += f"  SYNC1 {duration(value.sync1_ns)}"
     return f"{times}  {_LABEL}0x{value.assign_activate:04X}"
 
