@@ -26,7 +26,7 @@ _FOR_ALL = (  # broadcasts that configure every device
 
 @dataclass(frozen=True, slots=True)
 class Side:
-    """One of the two captures. `start_up_ns` is None if no device reached a state."""
+    """One of the two captures. Without a reached state, `start_up_ns` is None."""
 
     summary: MasterSummary | None
     masters: int

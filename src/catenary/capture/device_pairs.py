@@ -32,7 +32,7 @@ def pair_devices(a: Iterable[Device], b: Iterable[Device]) -> tuple[DevicePair, 
 
 
 def out_of_place(order: Sequence[int]) -> frozenset[int]:
-    """Return the places whose rank differs from the ascending order.
+    """Return the places with another rank than in the ascending order.
 
     Args:
         order: Different numbers, in the order of A, with their places in B.

@@ -44,7 +44,7 @@ class CaptureComparison:
 
     @property
     def equal(self) -> bool:
-        """True if there is no row."""
+        """True if the comparison has 0 rows."""
         return not any(each.rows for each in self.devices)
 
     def count(self, mark: Mark, *, effect: bool | None = None) -> int:

@@ -88,7 +88,7 @@ def mark_of(a: object, b: object) -> Mark:
 
 @dataclass(frozen=True, slots=True)
 class DevicePair:
-    """A device in both captures. One of them is None if the device has no counterpart."""
+    """A device in both captures. Without a counterpart, `a` or `b` is None."""
 
     a: Device | None
     b: Device | None

@@ -73,7 +73,7 @@ class ObjectWrite:
 
     @property
     def value(self) -> tuple[bytes, int | None, bool]:
-        """What is compared: the data and the answer."""
+        """Data and answer, which are compared."""
         return self.data, self.abort, self.answered
 
     def __str__(self) -> str:

@@ -10,7 +10,6 @@ from catenary.capture.register_contents import RegisterWrite, SyncManagerWrite
 from catenary.capture.settings import Setting, SyncUnit
 from catenary.capture.text import duration
 from catenary.wire.al import AlState
-from catenary.wire.clock import Activation
 from catenary.wire.register import (
     WATCHDOG_DIVIDER,
     WATCHDOG_TIME_PDI,
@@ -31,7 +30,7 @@ _LABEL = "AssignActivate "
 def compare_settings(
     a: Mapping[tuple[str, int], Setting], b: Mapping[tuple[str, int], Setting]
 ) -> Iterator[Difference]:
-    """Yield a row for each register block whose last values differ.
+    """Yield a row for each register block with different last values.
 
     Args:
         a: Settings of A by their keys.
@@ -160,7 +159,7 @@ def _text(setting: Setting | None) -> str:
     if not isinstance(value, SyncUnit):
         return str(value)
     times = f"SYNC0 {duration(value.sync0_ns)}"
-    if Activation.SYNC1 in Activation(value.assign_activate >> 8):
+    if value.sync1_ns:
         times += f"  SYNC1 {duration(value.sync1_ns)}"
     return f"{times}  {_LABEL}0x{value.assign_activate:04X}"
 

@@ -1,7 +1,7 @@
 """Registers that a bring-up leaves in a device, as values that can be compared.
 
 Only the last value counts: masters clear SyncManagers and FMMUs at different moments. Logical
-addresses, numbers of FMMUs and start times are choices of the master, so they are no part of it.
+addresses, numbers of FMMUs and start times are choices of the master, so they are left out.
 """
 
 from __future__ import annotations

@@ -43,7 +43,7 @@ class MappedEntry:
 
 @dataclass(frozen=True, slots=True)
 class StartUpList:
-    """What a master wrote to a device until OP.
+    """Objects and PDOs that a master wrote to a device until OP.
 
     `pdos` has the assigned PDOs with their entries, None if the capture does not show them. It is
     empty if the master wrote no mapping. `omitted` explains writes that a list cannot contain.
