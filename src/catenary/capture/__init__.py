@@ -1,10 +1,12 @@
 """Captures of EtherCAT traffic: what a master did, as a timeline of events.
 
 The stages are: `file` (frames of a file), `pairing` (sent and returned frames), `transaction`
-(datagrams), `master_follower` and `device_follower` (state), `timeline` (events).
+(datagrams), `master_follower` and `device_follower` (state), `timeline` (events). `diff` compares
+two timelines, and `start_up_list` exports the objects that a master wrote.
 """
 
 from catenary.capture.clocks import ClockStatistics, ReferenceStatistics
+from catenary.capture.compared_master import Side
 from catenary.capture.contents import (
     AddressAssigned,
     ClockDifference,
@@ -21,8 +23,11 @@ from catenary.capture.contents import (
     WorkingCounterDrop,
 )
 from catenary.capture.cycles import CycleStatistics, LogicalDatagram
+from catenary.capture.diff import CaptureComparison, compare
+from catenary.capture.difference import DeviceComparison, DevicePair, Difference, Mark, Topic
 from catenary.capture.events import Device, Event, Master, Step
 from catenary.capture.file import FileCounts
+from catenary.capture.likely_cause import FirstDifference
 from catenary.capture.mailbox_contents import (
     EmergencyReceived,
     MailboxFault,
@@ -43,25 +48,31 @@ from catenary.capture.timeline import EventStream, MasterSummary, Timeline, read
 
 __all__ = [
     "AddressAssigned",
+    "CaptureComparison",
     "ClockDifference",
     "ClockStatistics",
     "CycleStatistics",
     "CyclicStart",
     "Device",
+    "DeviceComparison",
     "DeviceCount",
+    "DevicePair",
     "DeviceSilent",
+    "Difference",
     "EepromAssigned",
     "EepromWrite",
     "EmergencyReceived",
     "Event",
     "EventStream",
     "FileCounts",
+    "FirstDifference",
     "FmmuWrite",
     "FramesLost",
     "IdentityRead",
     "LogicalDatagram",
     "MailboxFault",
     "MailboxMessage",
+    "Mark",
     "Master",
     "MasterSummary",
     "NameRead",
@@ -69,6 +80,7 @@ __all__ = [
     "RegisterWrite",
     "SdoInformationRead",
     "SdoTransfer",
+    "Side",
     "Spread",
     "StateReached",
     "StateRefused",
@@ -77,7 +89,9 @@ __all__ = [
     "SyncManagerWrite",
     "SyncUnitWrite",
     "Timeline",
+    "Topic",
     "WorkingCounterBack",
     "WorkingCounterDrop",
+    "compare",
     "read_timeline",
 ]
