@@ -32,7 +32,7 @@ class MachineParts:
     requests: tuple[LoopRequest, ...] = ()
 
 
-def raise_differences(file: MachineFile, found: Sequence[Comparison]) -> None:
+def raise_differences(file: MachineFile, found: Sequence[Comparison[SubDevice]]) -> None:
     """Raise an error for the first difference between file and segment, if there is one.
 
     The other differences are notes of the error. Unknown and absent devices are not differences.
@@ -52,7 +52,7 @@ def raise_differences(file: MachineFile, found: Sequence[Comparison]) -> None:
         raise errors[0]
 
 
-def _error(file: MachineFile, found: Comparison) -> CatenaryError:
+def _error(file: MachineFile, found: Comparison[SubDevice]) -> CatenaryError:
     text = f'{file.path}: device "{found.name}": {found.fault}'
     if found.found is None or found.expected is None:
         return SegmentError(text, hint=found.cause)
@@ -65,7 +65,7 @@ def _error(file: MachineFile, found: Comparison) -> CatenaryError:
     )
 
 
-def make_found(file: MachineFile, found: Sequence[Comparison]) -> MachineParts:
+def make_found(file: MachineFile, found: Sequence[Comparison[SubDevice]]) -> MachineParts:
     """Make the drives, process data and requests of the devices that were found.
 
     Args:
