@@ -56,12 +56,13 @@ class ChangedDevice:
 
 @dataclass(frozen=True, slots=True)
 class Entry:
-    """One entry of a dictionary. `old` is the earlier value that a program can write back."""
+    """The entry of a dictionary whose value changed."""
 
     index: int
     subindex: int
     type: str
-    old: bytes | None = None
+    old: bytes | None  # the earlier value
+    writable: bool  # in PRE-OP
 
 
 @dataclass(frozen=True, slots=True)

@@ -135,7 +135,8 @@ def _value(
         severity = Severity.INFO if severity is Severity.VARIABLE else severity
         texts = _outcome(old), _outcome(new)
     place = Place.SERIAL if of.index == MANUFACTURER_SERIAL else Place.OBJECT
-    entry = Entry(new.index, new.subindex, type_name(new.data_type), old.value)
+    writable = bool(new.access & Access.WRITE_PRE_OP)
+    entry = Entry(new.index, new.subindex, type_name(new.data_type), old.value, writable)
     yield sides.change(place, _name(of, new), texts, severity, _note(severity), entry)
 
 
