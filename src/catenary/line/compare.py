@@ -53,7 +53,7 @@ def _device(sides: Sides) -> Iterator[Change]:
         if old.revision != new.revision:
             texts = f"0x{old.revision:08X}", f"0x{new.revision:08X}"
             yield sides.change(Place.REVISION, "", texts)
-        if sides.serials and old.serial != new.serial:
+        if sides.exchanged:
             texts = str(old.serial), str(new.serial)
             yield sides.change(Place.SERIAL, "", texts, note="the device was exchanged")
     if sides.old.sii is not None and sides.new.sii is not None:

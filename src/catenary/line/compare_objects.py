@@ -161,7 +161,7 @@ def _explained(sides: Sides, entry: ClonedEntry) -> bool:
     if old is None or new is None:
         return False
     if entry.index == MANUFACTURER_SERIAL or (entry.index, entry.subindex) == (IDENTITY, 4):
-        return not sides.serials or old.serial != new.serial
+        return not sides.serials or sides.exchanged
     field = _IDENTITY_FIELDS.get(entry.subindex) if entry.index == IDENTITY else None
     return field is not None and getattr(old, field) != getattr(new, field)
 

@@ -1,7 +1,8 @@
 """Comparison of the registers of a device: state, controller, clocks and error counters.
 
 Registers that a MainDevice writes are compared only if the device is in the same state in both
-clones. System time, its offset, delays and receive times are not compared.
+clones. In INIT they are left from an earlier start-up, and `VARIABLE`. System time, its offset,
+delays and receive times are not compared.
 """
 
 from __future__ import annotations
@@ -118,11 +119,16 @@ def _register(sides: Sides, address: int) -> Iterator[Change]:
     found = at_address(address, size)
     what = str(found) if found is not None else f"0x{address:04X}"
     place = Place.CLOCK if address >= _CLOCKS else Place.REGISTER
-    loaded = address in FROM_EEPROM
-    effect = loaded or _state_of(sides.new) in RUNNING
-    severity = Severity.EFFECT if effect else Severity.INFO
-    note = "" if effect else _CONFIGURED
+    severity = _severity(address, _state_of(sides.new))
+    note = "" if severity is Severity.EFFECT else _CONFIGURED
     yield sides.change(place, what, _texts(address, old, new), severity, note)
+
+
+def _severity(address: int, state: int) -> Severity:
+    """Return the severity of a changed register. In INIT, it is left from an earlier start-up."""
+    if address in FROM_EEPROM or state in RUNNING:
+        return Severity.EFFECT
+    return Severity.VARIABLE if state == AlState.INIT else Severity.INFO
 
 
 def _content(device: ClonedDevice, address: int) -> bytes | None:
@@ -149,7 +155,7 @@ def _text(address: int, data: bytes | None) -> str:
 
 def _counters(sides: Sides) -> Iterator[Change]:
     data = [each.registers.get(register.ERROR_COUNTERS.address) for each in (sides.old, sides.new)]
-    if data[0] is None or data[1] is None:
+    if data[0] is None or data[1] is None or sides.exchanged:
         return
     old, new = decode_error_counters(data[0]), decode_error_counters(data[1])
     if new.restarted(old):

@@ -98,7 +98,10 @@ def _words(image: bytes, first: int, count: int) -> bytes:
 
 
 def _split(image: bytes) -> tuple[dict[_Key, bytes], bytes]:
-    """Return the categories and the other bytes after the header. A damaged image is no error."""
+    """Return the categories, and the bytes after them without padding.
+
+    A damaged image is not an error.
+    """
     found: dict[_Key, bytes] = {}
     numbers: Counter[int] = Counter()
     offset = HEADER_SIZE
@@ -110,7 +113,7 @@ def _split(image: bytes) -> tuple[dict[_Key, bytes], bytes]:
         found[kind, numbers[kind]] = image[start : start + size]
         numbers[kind] += 1
         offset = start + size
-    return found, image[offset:]
+    return found, image[offset:].rstrip(b"\xff")
 
 
 def _category(

@@ -28,6 +28,12 @@ class Sides:
         """Name and positions."""
         return ChangedDevice(self.new.name, self.old.position, self.new.position)
 
+    @property
+    def exchanged(self) -> bool:
+        """True if the serial number shows another device."""
+        old, new = self.old.identity, self.new.identity
+        return self.serials and old is not None and new is not None and old.serial != new.serial
+
     def change(
         self,
         place: Place,
