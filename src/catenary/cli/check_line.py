@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import argparse
 import json
+import sys
+from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from catenary.cli.failure import UsageError
+from catenary.cli.failure import UsageError, one_line
 
 if TYPE_CHECKING:
     from catenary.line import Line
@@ -23,9 +25,20 @@ def run(arguments: argparse.Namespace) -> int:
     from catenary.line.compare import compare
 
     old = read_line(arguments.against)  # first, because the devices of a segment take minutes
-    found = compare(old, _present(arguments))
+    new = _present(arguments)
+    found = compare(old, new)
     print(as_json(found, arguments) if arguments.json else as_text(found, arguments))
+    for note in _notes(old, new):
+        print(f"note: {one_line(note)}", file=sys.stderr)
     return status_of(found)
+
+
+def _notes(old: Line, new: Line) -> Iterator[str]:
+    """Yield the new contradictions of the wiring, and what the reading could not restore."""
+    yield from (note for note in new.notes if note not in old.notes)
+    for device in new.devices:
+        if "state" in device.missing:
+            yield f"device {device.position} ({device.name}): {device.missing['state']}"
 
 
 def status_of(found: Comparison) -> int:
