@@ -110,7 +110,7 @@ def test_two_clones(line: Path, capsys: pytest.CaptureFixture[str]) -> None:
     [change] = found["changes"]
     assert change == {
         "device": {"name": "Catenary virtual servo", "old_position": 1, "position": 1},
-        "place": "object",
+        "part": "object",
         "what": "0x6065:00 Following error window",
         "index": 0x6065,
         "subindex": 0,

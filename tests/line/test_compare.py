@@ -17,8 +17,8 @@ from catenary.line import (
     Line,
     MappedEntry,
 )
-from catenary.line.change import Change, Place, Severity
-from catenary.line.compare import compare
+from catenary.line.change import Change, Part, Severity
+from catenary.line.compare import compare_lines
 from catenary.line.values import SERIAL_WITHHELD
 from catenary.model.device import Identity
 from catenary.types import DINT, UDINT, UINT, VISIBLE_STRING
@@ -51,7 +51,7 @@ def clone(*devices: ClonedDevice) -> Line:
 
 def changed(old: ClonedDevice, new: ClonedDevice) -> list[Change]:
     """Return the changes of one device."""
-    return list(compare(clone(old), clone(new)).changes)
+    return list(compare_lines(clone(old), clone(new)).changes)
 
 
 def only(old: ClonedDevice, new: ClonedDevice) -> Change:
@@ -60,7 +60,7 @@ def only(old: ClonedDevice, new: ClonedDevice) -> Change:
 
 
 def seen(change: Change) -> tuple[str, str, str, str, str]:
-    return change.place, change.what, change.old, change.new, change.severity
+    return change.part, change.what, change.old, change.new, change.severity
 
 
 def with_registers(*values: tuple[register.Register[bytes], bytes]) -> ClonedDevice:
@@ -73,7 +73,7 @@ def with_registers(*values: tuple[register.Register[bytes], bytes]) -> ClonedDev
 @given(lines())
 @settings(suppress_health_check=[HealthCheck.too_slow], deadline=None)
 def test_a_clone_does_not_differ_from_itself(line: Line) -> None:
-    found = compare(line, line)
+    found = compare_lines(line, line)
     assert found.changes == ()
     assert (found.different, found.unread) == (False, False)
     assert found.compared == len(line.devices)
@@ -82,7 +82,7 @@ def test_a_clone_does_not_differ_from_itself(line: Line) -> None:
 @given(lines(), lines())
 @settings(suppress_health_check=[HealthCheck.too_slow], deadline=None, max_examples=50)
 def test_any_two_clones_can_be_compared(old: Line, new: Line) -> None:
-    for change in compare(old, new).changes:
+    for change in compare_lines(old, new).changes:
         assert change.old != change.new, change
 
 
@@ -105,20 +105,20 @@ A, B, C, D = (Identity(2, product, 1, 0) for product in range(4))
 
 
 def test_a_missing_device_is_the_only_change() -> None:
-    [change] = compare(chain(A, B, C), chain(A, C)).changes
+    [change] = compare_lines(chain(A, B, C), chain(A, C)).changes
     assert (change.device.old, change.device.new) == (1, None)
-    assert (change.place, change.new) == (Place.DEVICE, "missing")
+    assert (change.part, change.new) == (Part.DEVICE, "missing")
     assert change.note == "it was behind device 0 (A) port 1"
 
 
 def test_an_added_device_is_the_only_change() -> None:
-    [change] = compare(chain(A, C), chain(A, B, C)).changes
+    [change] = compare_lines(chain(A, C), chain(A, B, C)).changes
     assert (change.device.old, change.device.new, change.old) == (None, 1, "-")
     assert change.new.startswith("B, vendor 0x00000002 product 0x00000001")
 
 
 def test_a_device_at_another_place_in_the_order() -> None:
-    [change] = compare(chain(A, B, C, D), chain(A, C, D, B)).changes
+    [change] = compare_lines(chain(A, B, C, D), chain(A, C, D, B)).changes
     assert seen(change) == (
         *("topology", "order"),
         *("position 1, behind device 0 (A) port 1", "position 3, behind device 2 (D) port 1"),
@@ -130,14 +130,14 @@ def test_a_branch_moves_with_its_devices() -> None:
     serials = [each._replace(serial=n + 1) for n, each in enumerate((A, B, C, D))]
     old = Line(chain(*serials, parents=(None, 0, 1, 0)).devices)
     new = Line(chain(*(serials[n] for n in (0, 3, 1, 2)), parents=(None, 0, 0, 2)).devices)
-    [change] = compare(old, new).changes
-    assert (change.place, change.what, change.device.name) == ("topology", "order", "D")
+    [change] = compare_lines(old, new).changes
+    assert (change.part, change.what, change.device.name) == ("topology", "order", "D")
 
 
 def test_a_cable_at_another_port_is_the_only_change() -> None:
     old = chain(A, B, C)
     moved = replace(old.devices[1], parent_port=3)
-    [change] = compare(old, Line((old.devices[0], moved, old.devices[2]))).changes
+    [change] = compare_lines(old, Line((old.devices[0], moved, old.devices[2]))).changes
     assert seen(change) == (
         *("topology", "cable", "behind device 0 (A) port 1", "behind device 0 (A) port 3"),
         "effect",
@@ -147,7 +147,7 @@ def test_a_cable_at_another_port_is_the_only_change() -> None:
 def test_another_product_is_not_compared_further() -> None:
     new = one_device(identity=Identity(9, 9, 9, 9), name="other", sii=b"", objects=())
     change = only(one_device(), new)
-    assert (change.place, change.what) == (Place.DEVICE, "exchanged")
+    assert (change.part, change.what) == (Part.DEVICE, "exchanged")
     assert change.new.startswith("other, vendor 0x00000009")
 
 
@@ -240,12 +240,12 @@ def test_one_fact_of_the_eeprom(new: ClonedDevice, expected: tuple[str, ...]) ->
 
 def test_the_identity_in_the_eeprom_is_one_change() -> None:
     new = replace(header(revision=7), identity=Identity(2, 3, 7, 5))
-    assert only(image(), new).place is Place.REVISION
+    assert only(image(), new).part is Part.REVISION
 
 
 def test_a_damaged_eeprom_is_compared_as_bytes() -> None:
     broken = one_device(sii=image().sii[:140])
-    assert all(each.place is Place.SII for each in changed(image(), broken))
+    assert all(each.part is Part.SII for each in changed(image(), broken))
     assert changed(image(), broken)
 
 
@@ -280,7 +280,7 @@ def test_restarted_counters_are_no_fault() -> None:
 
 def test_the_counters_of_an_exchanged_device_are_not_compared() -> None:
     new = replace(counters(PortErrors(3)), identity=Identity(2, 3, 4, 6))
-    assert only(counters(), new).place is Place.SERIAL
+    assert only(counters(), new).part is Part.SERIAL
 
 
 def test_registers_of_the_eeprom_are_always_compared() -> None:
@@ -300,15 +300,15 @@ def test_registers_of_a_start_up_depend_on_the_state(state: int, severity: str) 
     old = with_registers((register.SYNC_CYCLE_TIMES, bytes(8)))
     new = with_registers((register.SYNC_CYCLE_TIMES, b"\1" + bytes(7)))
     change = only(replace(old, al_status=state), replace(new, al_status=state))
-    assert (change.place, change.severity) == ("clock", severity)
+    assert (change.part, change.severity) == ("clock", severity)
     [change] = changed(replace(old, al_status=3), replace(new, al_status=state))
-    assert change.place == "state"
+    assert change.part == "state"
 
 
 def test_an_error_of_the_device_is_a_fault() -> None:
     change = only(one_device(), one_device(al_status=0x12, al_status_code=0x001E))
     assert change.new.startswith("PRE-OP with error 0x001E (")
-    assert (change.place, change.severity) == ("state", "fault")
+    assert (change.part, change.severity) == ("state", "fault")
     assert change.note
 
 
@@ -416,7 +416,7 @@ def test_objects_that_only_one_device_has() -> None:
     change = only(assigned(values=two), assigned(values=one))
     assert seen(change) == ("object", "0x2001 Window", "present", "-", "effect")
     partial = replace(assigned(values=one), missing={"objects": "reading ended"})
-    found = compare(clone(assigned(values=two)), clone(partial))
+    found = compare_lines(clone(assigned(values=two)), clone(partial))
     assert found.changes == ()
     assert found.unread
     assert "objects: reading ended" in str(found.uncompared[0])
@@ -437,7 +437,7 @@ def test_a_refused_value() -> None:
     refused = assigned(values=objects(entry(0x2000, None, abort=0x0602_0000)))
     assert seen(only(old, refused))[2:4] == ("0", "refused with 0x06020000")
     silent = assigned(values=objects(entry(0x2000, None, reason="no answer")))
-    found = compare(clone(old), clone(silent))
+    found = compare_lines(clone(old), clone(silent))
     assert (found.changes, found.unread) == ((), True)
     assert str(found.uncompared[0]).endswith("1 values: not read: 0x2000:00: no answer")
 
@@ -449,7 +449,7 @@ def test_withheld_serial_numbers_are_not_compared() -> None:
     old = Line((one_device(objects=(whole,)),))
     new = Line((one_device(objects=(withheld,), identity=Identity(2, 3, 4, 0)),), serials=False)
     for one, other in ((old, new), (new, old)):
-        found = compare(one, other)
+        found = compare_lines(one, other)
         assert (found.changes, found.uncompared) == ((), ())
 
 

@@ -12,7 +12,7 @@ import catenary as cat
 from catenary.bus.clone import CloneOptions, read_segment
 from catenary.line import Line
 from catenary.line.change import Change, Comparison, Severity
-from catenary.line.compare import compare
+from catenary.line.compare import compare_lines
 from catenary.procedure.cable_traffic import exercise
 from catenary.virtual import (
     Coupler,
@@ -43,25 +43,30 @@ def shown(found: Comparison) -> list[Change]:
 
 
 def seen(found: Comparison) -> list[Change_]:
-    return [(each.device.new, each.place, each.what, each.old, each.new) for each in shown(found)]
+    return [(each.device.new, each.part, each.what, each.old, each.new) for each in shown(found)]
 
 
 def changes(old: Segment, new: Segment) -> list[Change_]:
-    found = compare(read(old), read(new))
+    found = compare_lines(read(old), read(new))
     assert not found.unread
     return seen(found)
+
+
+@pytest.fixture(scope="module")
+def first() -> Line:
+    """Return the clone of a usual segment, to which the others are compared."""
+    return read(usual())
 
 
 def usual(*, servo: Device | None = None) -> Segment:
     return Segment([Coupler(), servo or Servo(), DigitalOutputs(), Servo(serial=7)])
 
 
-def test_the_same_segment_again() -> None:
+def test_the_same_segment_again(first: Line) -> None:
     segment = usual()
-    first = read(segment)
-    again = compare(first, read(segment))
-    assert (again.changes, again.uncompared, again.compared) == ((), (), 4)
-    assert not compare(first, read(usual())).different
+    for _ in range(2):  # reading changes nothing
+        again = compare_lines(first, read(segment))
+        assert (again.changes, again.uncompared, again.compared) == ((), (), 4)
 
 
 def test_a_device_of_another_revision(tmp_path: Path) -> None:
@@ -69,53 +74,49 @@ def test_a_device_of_another_revision(tmp_path: Path) -> None:
     assert changes(old, new) == [(1, "revision", "", "0x00000005", "0x00000006")]
 
 
-def test_a_device_with_another_serial_number() -> None:
-    [change] = changes(usual(), usual(servo=Servo(serial=12)))
+def test_a_device_with_another_serial_number(first: Line) -> None:
+    [change] = seen(compare_lines(first, read(usual(servo=Servo(serial=12)))))
     assert change == (1, "serial", "", "0", "12")
 
 
-def test_another_alias() -> None:
-    [change] = changes(usual(), usual(servo=Servo(alias=12)))
+def test_another_alias(first: Line) -> None:
+    [change] = seen(compare_lines(first, read(usual(servo=Servo(alias=12)))))
     assert change == (1, "alias", "", "0", "12")
 
 
-def test_a_missing_device() -> None:
+def test_a_missing_device(first: Line) -> None:
     old = usual()
-    first = read(old)
     old.plug(3)
-    lost, change = compare(first, read(old)).changes
+    lost, change = compare_lines(first, read(old)).changes
     assert (lost.device.new, lost.what, lost.note) == (2, "port 1 lost links", "1 more")
     assert (change.device.old, change.device.new, change.new) == (3, None, "missing")
     assert change.note == "it was behind device 2 (Catenary virtual 4-channel output) port 1"
 
 
-def test_another_value_of_an_object() -> None:
+def test_another_value_of_an_object(first: Line) -> None:
     segment = usual()
-    first = read(segment)
     with cat.MainDevice(segment) as main:
         main.scan()[1].sdo.write(0x6065, 0, (777).to_bytes(4, "little"))
-    found = compare(first, read(segment))
+    found = compare_lines(first, read(segment))
     assert seen(found) == [(1, "object", "0x6065:00 Following error window", "262144", "777")]
     assert shown(found)[0].severity == "effect"
     assert found.different
 
 
-def test_another_assignment() -> None:
+def test_another_assignment(first: Line) -> None:
     segment = usual()
-    first = read(segment)
     with cat.MainDevice(segment) as main:
         sdo = main.scan()[1].sdo
         assigned = sdo.read(0x1C13, 1)
         sdo.write(0x1C13, 0, b"\0")
-    found = compare(first, read(segment))
+    found = compare_lines(first, read(segment))
     [change] = seen(found)
     index = int.from_bytes(assigned, "little")
     assert change == (1, "assignment", "SyncManager 3", f"0x{index:04X}", "-")
 
 
-def test_another_mapping() -> None:
+def test_another_mapping(first: Line) -> None:
     segment = usual()
-    first = read(segment)
     with cat.MainDevice(segment) as main:
         sdo = main.scan()[1].sdo
         pdo = int.from_bytes(sdo.read(0x1C13, 1), "little")
@@ -123,8 +124,8 @@ def test_another_mapping() -> None:
         sdo.write(0x1C13, 0, b"\0")
         sdo.write(pdo, 0, bytes((count - 1,)))
         sdo.write(0x1C13, 0, b"\1")
-    [change] = shown(compare(first, read(segment)))
-    assert (change.place, change.what, change.severity) == ("mapping", f"0x{pdo:04X}", "effect")
+    [change] = shown(compare_lines(first, read(segment)))
+    assert (change.part, change.what, change.severity) == ("mapping", f"0x{pdo:04X}", "effect")
     assert change.old.startswith(change.new)
     assert len(change.old.split(", ")) == count
 
@@ -155,15 +156,14 @@ def test_a_branch_at_another_device() -> None:
     ]
 
 
-def test_grown_error_counters_name_the_port() -> None:
+def test_grown_error_counters_name_the_port(first: Line) -> None:
     segment = usual()
-    first = read(segment)
     with cat.MainDevice(segment) as main:
         main.passive_scan()
         segment.inject(faults.corrupt(20, every=4, between=(1, 2)))
         main.converse(exercise(1.0))
-    found = compare(first, read(segment))
-    assert {each.place for each in found.changes} == {"error counters"}
+    found = compare_lines(first, read(segment))
+    assert {each.part for each in found.changes} == {"error counters"}
     assert {each.severity for each in found.changes} == {"fault"}
     named = [(each.device.new, each.what) for each in found.changes]
     assert (2, "port 0 broken frames") in named  # the cable between devices 1 and 2
@@ -173,14 +173,13 @@ def test_grown_error_counters_name_the_port() -> None:
     assert int(change.new) == 20
 
 
-def test_a_segment_in_op_is_not_written_to() -> None:
+def test_a_segment_in_op_is_not_written_to(first: Line) -> None:
     segment = usual()
-    first = read(segment)
     with cat.MainDevice(segment) as main:
         subs = main.passive_scan()
         main.request_states(subs, [2], AlState.OP)
     before = segment.core.peek(2, 0x0500, 16)
-    found = compare(first, read(segment))
+    found = compare_lines(first, read(segment))
     assert segment.core.peek(2, 0x0500, 16) == before  # the interface of the EEPROM
     assert seen(found) == [(2, "state", "", "INIT", "OP")]
     assert (found.different, found.unread) == (False, True)
@@ -193,7 +192,7 @@ def test_a_segment_in_op_is_not_written_to() -> None:
 def test_objects_need_pre_op(make: Callable[[], Segment]) -> None:
     segment = make()
     first = read(segment)
-    found = compare(first, read(segment, CloneOptions()))
+    found = compare_lines(first, read(segment, CloneOptions()))
     assert found.changes == ()
     assert found.unread
     assert {each.part for each in found.uncompared} == {"objects"}

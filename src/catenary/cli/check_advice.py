@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from catenary.errors import DecodeError
-from catenary.line.change import Change, Comparison, Entry, Place, Severity
+from catenary.line.change import Change, ChangedEntry, Comparison, Part, Severity
 from catenary.types import by_name
 
 SHOWN = 3  # commands of one kind
@@ -24,21 +24,21 @@ def next_steps(found: Comparison, arguments: argparse.Namespace) -> Iterator[str
     relevant = [
         each for each in found.changes if each.severity in (Severity.EFFECT, Severity.FAULT)
     ]
-    places = {each.place for each in relevant}
-    if any(each.place is Place.DEVICE and each.device.new is None for each in relevant):
+    parts = {each.part for each in relevant}
+    if any(each.part is Part.DEVICE and each.device.new is None for each in relevant):
         yield "check cable and power of the missing devices, from the named port on"
-    if Place.TOPOLOGY in places:
+    if Part.TOPOLOGY in parts:
         yield "put the cables back, or clone again if the wiring was changed on purpose"
     yield from _restored(relevant, target)
-    if places & {Place.ASSIGNMENT, Place.MAPPING}:
+    if parts & {Part.ASSIGNMENT, Part.MAPPING}:
         yield "a program writes assignment and mapping at start-up: start it, then compare again"
-    if Place.ERRORS in places:
+    if Part.ERRORS in parts:
         yield f"find the cable or device at fault: catenary diag {target} --seconds 10"
-    if Place.STATE in places:
+    if Part.STATE in parts:
         yield f"read the reason of the error: catenary state {target}"
     if found.unread and not arguments.pre_op and not Path(arguments.file).is_dir():
         yield "to compare the objects of devices in INIT, add --pre-op"
-    if places - {Place.ERRORS, Place.STATE}:
+    if parts - {Part.ERRORS, Part.STATE}:
         folder = arguments.against
         yield (
             "if everything is as intended, replace the clone: "
@@ -66,12 +66,12 @@ def _command(change: Change, target: str) -> str:
     position = change.device.new
     if position is None:
         return ""
-    if change.place is Place.ALIAS:
+    if change.part is Part.ALIAS:
         return f"catenary alias {target} {position} {change.old}"
     return _sdo_write(change.entry, f"{target} {position}") if change.entry is not None else ""
 
 
-def _sdo_write(entry: Entry, device: str) -> str:
+def _sdo_write(entry: ChangedEntry, device: str) -> str:
     """Return the command that writes a number; empty for other values."""
     if entry.old is None or not entry.writable:
         return ""

@@ -22,11 +22,11 @@ def run(arguments: argparse.Namespace) -> int:
     """Compare a segment or a clone with a clone, and print the changes."""
     from catenary.cli.check_line_text import as_text
     from catenary.line import read_line
-    from catenary.line.compare import compare
+    from catenary.line.compare import compare_lines
 
     old = read_line(arguments.against)  # first, because the devices of a segment take minutes
     new = _present(arguments)
-    found = compare(old, new)
+    found = compare_lines(old, new)
     print(as_json(found, arguments) if arguments.json else as_text(found, arguments))
     for note in _notes(old, new):
         print(f"note: {one_line(note)}", file=sys.stderr)
@@ -98,7 +98,7 @@ def as_json(found: Comparison, arguments: argparse.Namespace) -> str:
 def _change(change: Change) -> dict[str, object]:
     return {
         "device": _device(change.device),
-        "place": change.place,
+        "part": change.part,
         "what": change.what,
         "index": None if change.entry is None else change.entry.index,
         "subindex": None if change.entry is None else change.entry.subindex,

@@ -54,7 +54,7 @@ def _headline(device: ChangedDevice) -> str:
 
 def _lines(change: Change) -> Iterator[str]:
     """Yield a change on one line, or on three if its values are long."""
-    what = one_line(f"{change.place} {change.what}")
+    what = one_line(f"{change.part} {change.what}")
     head = f"  {change.severity:{_SEVERITY_WIDTH}}  {what:{WHAT_WIDTH}}"
     old, new = one_line(change.old), one_line(change.new)
     indent = " " * (_SEVERITY_WIDTH + 4)

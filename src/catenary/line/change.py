@@ -17,7 +17,7 @@ class Severity(StrEnum):
     VARIABLE = "variable"  # value that changes by itself, such as a process value
 
 
-class Place(StrEnum):
+class Part(StrEnum):
     """Part of a device that changed."""
 
     DEVICE = "device"  # the device itself: missing, added or exchanged
@@ -55,14 +55,14 @@ class ChangedDevice:
 
 
 @dataclass(frozen=True, slots=True)
-class Entry:
+class ChangedEntry:
     """The entry of a dictionary whose value changed."""
 
     index: int
     subindex: int
     type: str
-    old: bytes | None  # the earlier value
-    writable: bool  # in PRE-OP
+    old: bytes | None  # the earlier value; None if it was not readable
+    writable: bool  # True if it can be written in PRE-OP
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,17 +70,17 @@ class Change:
     """One difference: `old` is the earlier value as text, `new` the present one."""
 
     device: ChangedDevice
-    place: Place
+    part: Part
     what: str  # such as "0x6065 Following error window" or "port 1: invalid frames"
     old: str
     new: str
     severity: Severity
     note: str = ""  # meaning of the change, or what to do
-    entry: Entry | None = None  # for values of objects
+    entry: ChangedEntry | None = None  # for values of objects
 
     def __str__(self) -> str:
         what = f" {self.what}" if self.what else ""
-        return f"{self.device}: {self.place}{what}: {self.old} → {self.new}"
+        return f"{self.device}: {self.part}{what}: {self.old} → {self.new}"
 
 
 @dataclass(frozen=True, slots=True)
@@ -98,7 +98,7 @@ class Uncompared:
 
 @dataclass(frozen=True, slots=True)
 class Comparison:
-    """Result of `compare`, in the order of the devices."""
+    """Result of `compare_lines`, in the order of the devices."""
 
     changes: tuple[Change, ...]
     uncompared: tuple[Uncompared, ...]

@@ -1,6 +1,6 @@
 """Comparison of two clones of a segment: what has changed since the earlier one.
 
-    found = compare(read_line("line/"), read_line("now/"))
+    found = compare_lines(read_line("line/"), read_line("now/"))
     for change in found.changes:
         print(change)  # device 2 (AX5101): object 0x6065:00 Following error window: 5000 → 100
 
@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from catenary.line.change import Change, Comparison, Place, Uncompared
+from catenary.line.change import Change, Comparison, Part, Uncompared
 from catenary.line.compare_mapping import compare_mapping
 from catenary.line.compare_objects import compare_objects, missing_values
 from catenary.line.compare_registers import compare_registers
@@ -24,7 +24,7 @@ from catenary.line.values import Line
 _PARTS = {"sii": "EEPROM", "objects": "objects"}
 
 
-def compare(old: Line, new: Line) -> Comparison:
+def compare_lines(old: Line, new: Line) -> Comparison:
     """Return the differences between two clones.
 
     Args:
@@ -48,18 +48,18 @@ def _device(sides: Sides) -> Iterator[Change]:
     if old is not None and new is not None:
         if not old.same_kind(new):
             texts = identity_text(sides.old), identity_text(sides.new)
-            yield sides.change(Place.DEVICE, "exchanged", texts)
+            yield sides.change(Part.DEVICE, "exchanged", texts)
             return  # another product: every part differs
         if old.revision != new.revision:
             texts = f"0x{old.revision:08X}", f"0x{new.revision:08X}"
-            yield sides.change(Place.REVISION, "", texts)
+            yield sides.change(Part.REVISION, "", texts)
         if sides.exchanged:
             texts = str(old.serial), str(new.serial)
-            yield sides.change(Place.SERIAL, "", texts, note="the device was exchanged")
+            yield sides.change(Part.SERIAL, "", texts, note="the device was exchanged")
     if sides.old.sii is not None and sides.new.sii is not None:
         yield from compare_sii(sides)
     elif sides.old.alias != sides.new.alias:
-        yield sides.change(Place.ALIAS, "", (str(sides.old.alias), str(sides.new.alias)))
+        yield sides.change(Part.ALIAS, "", (str(sides.old.alias), str(sides.new.alias)))
     yield from compare_registers(sides)
     yield from compare_mapping(sides)
     yield from compare_objects(sides)

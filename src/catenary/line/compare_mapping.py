@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
-from catenary.line.change import ABSENT, Change, Place, Severity
+from catenary.line.change import ABSENT, Change, Part, Severity
 from catenary.line.mapping import listed_numbers
 from catenary.line.sides import Sides
 from catenary.line.values import ClonedDevice, ClonedObject, MappedEntry
@@ -30,10 +30,10 @@ def compare_mapping(sides: Sides) -> Iterator[Change]:
         if old[index] != new[index]:
             texts = _entries(old[index]), _entries(new[index])
             if index in assigned:
-                yield sides.change(Place.MAPPING, f"0x{index:04X}", texts)
+                yield sides.change(Part.MAPPING, f"0x{index:04X}", texts)
             else:
                 yield sides.change(
-                    *(Place.MAPPING, f"0x{index:04X}", texts, Severity.INFO, _UNASSIGNED)
+                    *(Part.MAPPING, f"0x{index:04X}", texts, Severity.INFO, _UNASSIGNED)
                 )
 
 
@@ -53,7 +53,7 @@ def _assignments(sides: Sides) -> Iterator[Change]:
     for manager in sorted({*old, *new}):
         texts = _numbers(old.get(manager, ())), _numbers(new.get(manager, ()))
         if texts[0] != texts[1]:
-            yield sides.change(Place.ASSIGNMENT, f"SyncManager {manager}", texts)
+            yield sides.change(Part.ASSIGNMENT, f"SyncManager {manager}", texts)
 
 
 def _from_sii(device: ClonedDevice) -> bool:

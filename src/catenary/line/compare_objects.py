@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from catenary.line.change import ABSENT, Change, Entry, Place, Severity
+from catenary.line.change import ABSENT, Change, ChangedEntry, Part, Severity
 from catenary.line.compare_mapping import ASSIGNMENTS, MAPPINGS, mapped_places
 from catenary.line.sides import Sides
 from catenary.line.value_text import type_name, value_text, value_texts
@@ -51,7 +51,7 @@ def _presence(sides: Sides, old: ClonedObject | None, new: ClonedObject | None) 
     other = sides.old if old is None else sides.new
     if found is not None and "objects" not in other.missing:
         texts = (ABSENT, "present") if old is None else ("present", ABSENT)
-        yield sides.change(Place.OBJECT, f"0x{found.index:04X} {found.name}".rstrip(), texts)
+        yield sides.change(Part.OBJECT, f"0x{found.index:04X} {found.name}".rstrip(), texts)
 
 
 def _object(
@@ -61,7 +61,7 @@ def _object(
     before, now = next(entries), next(entries)
     if old.name != new.name:
         texts = f'"{old.name}"', f'"{new.name}"'
-        yield sides.change(Place.OBJECT, f"0x{new.index:04X} name", texts, Severity.INFO)
+        yield sides.change(Part.OBJECT, f"0x{new.index:04X} name", texts, Severity.INFO)
     listing = new.index in ASSIGNMENTS or new.index in MAPPINGS  # see compare_mapping
     for subindex in sorted({*before, *now}):
         one, other = before.get(subindex), now.get(subindex)
@@ -83,7 +83,7 @@ def _entry_presence(
         return
     severity = Severity.VARIABLE if of.index in CHANGING else Severity.EFFECT
     texts = (ABSENT, "present") if old is None else ("present", ABSENT)
-    yield sides.change(Place.OBJECT, _name(of, found), texts, severity)
+    yield sides.change(Part.OBJECT, _name(of, found), texts, severity)
 
 
 def _name(of: ClonedObject, entry: ClonedEntry) -> str:
@@ -102,10 +102,10 @@ def _description(
     name = _name(of, new)
     types = _type_text(old), _type_text(new)
     if types[0] != types[1]:
-        yield sides.change(Place.OBJECT, f"{name}, type", types)
+        yield sides.change(Part.OBJECT, f"{name}, type", types)
     if old.access != new.access:
         texts = _access_text(old.access), _access_text(new.access)
-        yield sides.change(Place.OBJECT, f"{name}, access", texts)
+        yield sides.change(Part.OBJECT, f"{name}, access", texts)
 
 
 def _type_text(entry: ClonedEntry) -> str:
@@ -134,10 +134,10 @@ def _value(
     else:
         severity = Severity.INFO if severity is Severity.VARIABLE else severity
         texts = _outcome(old), _outcome(new)
-    place = Place.SERIAL if of.index == MANUFACTURER_SERIAL else Place.OBJECT
+    part = Part.SERIAL if of.index == MANUFACTURER_SERIAL else Part.OBJECT
     writable = bool(new.access & Access.WRITE_PRE_OP)
-    entry = Entry(new.index, new.subindex, type_name(new.data_type), old.value, writable)
-    yield sides.change(place, _name(of, new), texts, severity, _note(severity), entry)
+    entry = ChangedEntry(new.index, new.subindex, type_name(new.data_type), old.value, writable)
+    yield sides.change(part, _name(of, new), texts, severity, _note(severity), entry)
 
 
 def _note(severity: Severity) -> str:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from catenary.line.change import ABSENT, Change, Place, Severity
+from catenary.line.change import ABSENT, Change, Part, Severity
 from catenary.line.sides import Sides
 from catenary.line.value_text import bytes_text, bytes_texts
 from catenary.line.values import ClonedDevice
@@ -75,10 +75,10 @@ def _state(sides: Sides) -> Iterator[Change]:
     before = (bool(old.al_status & ERROR_FLAG), old.al_status_code)
     if failed and before != (True, new.al_status_code):
         note = status_code(new.al_status_code).cause
-        yield sides.change(Place.STATE, "", _states(sides), Severity.FAULT, note)
+        yield sides.change(Part.STATE, "", _states(sides), Severity.FAULT, note)
     elif _state_of(old) != _state_of(new):
         note = "registers that a MainDevice writes are not compared"
-        yield sides.change(Place.STATE, "", _states(sides), Severity.INFO, note)
+        yield sides.change(Part.STATE, "", _states(sides), Severity.INFO, note)
 
 
 def _states(sides: Sides) -> tuple[str, str]:
@@ -104,7 +104,7 @@ def _eeprom_loaded(sides: Sides) -> Iterator[Change]:
     if old != new:
         texts = _loaded(old), _loaded(new)
         severity = Severity.INFO if new else Severity.FAULT
-        yield sides.change(Place.STATE, "EEPROM", texts, severity)
+        yield sides.change(Part.STATE, "EEPROM", texts, severity)
 
 
 def _loaded(operational: bool) -> str:
@@ -118,10 +118,10 @@ def _register(sides: Sides, address: int) -> Iterator[Change]:
     size = len(old if old is not None else new or b"")
     found = at_address(address, size)
     what = str(found) if found is not None else f"0x{address:04X}"
-    place = Place.CLOCK if address >= _CLOCKS else Place.REGISTER
+    part = Part.CLOCK if address >= _CLOCKS else Part.REGISTER
     severity = _severity(address, _state_of(sides.new))
     note = "" if severity is Severity.EFFECT else _CONFIGURED
-    yield sides.change(place, what, _texts(address, old, new), severity, note)
+    yield sides.change(part, what, _texts(address, old, new), severity, note)
 
 
 def _severity(address: int, state: int) -> Severity:
@@ -161,14 +161,14 @@ def _counters(sides: Sides) -> Iterator[Change]:
     if new.restarted(old):
         texts = _total(old), _total(new)
         note = "the counters restarted: the device was switched off, or they were cleared"
-        yield sides.change(Place.ERRORS, "", texts, Severity.INFO, note)
+        yield sides.change(Part.ERRORS, "", texts, Severity.INFO, note)
         return
     for name, before, now in _pairs(old, new):
         if now > before:
             full = "; the counter is full" if now == FULL else ""
             texts = str(before), str(now)
             yield sides.change(
-                Place.ERRORS, name, texts, Severity.FAULT, f"{now - before} more{full}"
+                Part.ERRORS, name, texts, Severity.FAULT, f"{now - before} more{full}"
             )
 
 

@@ -9,7 +9,7 @@ from collections import Counter
 from collections.abc import Iterator, Mapping
 
 from catenary.errors import DecodeError
-from catenary.line.change import ABSENT, Change, Place, Severity
+from catenary.line.change import ABSENT, Change, Part, Severity
 from catenary.line.sides import Sides
 from catenary.line.value_text import bytes_texts
 from catenary.wire.sii import (
@@ -72,7 +72,7 @@ def compare_sii(sides: Sides) -> Iterator[Change]:
         yield from _category(sides, key, categories, present)
     if rest != present_rest:
         texts = bytes_texts(rest, present_rest)
-        yield sides.change(Place.SII, "bytes after the categories", texts, Severity.INFO)
+        yield sides.change(Part.SII, "bytes after the categories", texts, Severity.INFO)
 
 
 def _header(sides: Sides, old: bytes, new: bytes) -> Iterator[Change]:
@@ -84,13 +84,13 @@ def _header(sides: Sides, old: bytes, new: bytes) -> Iterator[Change]:
         found.append(first)
         if first == _ALIAS[0]:
             numbers = (str(int.from_bytes(each, "little")) for each in (before, now))
-            yield sides.change(Place.ALIAS, "", (next(numbers), next(numbers)))
+            yield sides.change(Part.ALIAS, "", (next(numbers), next(numbers)))
         else:
             what = f"word 0x{first:04X} {name}"
-            yield sides.change(Place.SII, what, bytes_texts(before, now))
+            yield sides.change(Part.SII, what, bytes_texts(before, now))
     before, now = _words(old, *_CHECKSUM[:2]), _words(new, *_CHECKSUM[:2])
     if before != now and not any(first < _CHECKSUM_END for first in found):
-        yield sides.change(Place.SII, "word 0x0007 checksum", bytes_texts(before, now))
+        yield sides.change(Part.SII, "word 0x0007 checksum", bytes_texts(before, now))
 
 
 def _words(image: bytes, first: int, count: int) -> bytes:
@@ -128,12 +128,12 @@ def _category(
     severity = Severity.INFO if kind == CategoryType.STRINGS else Severity.EFFECT
     if before is None or now is None:
         texts = _size(before), _size(now)
-        yield sides.change(Place.SII, what, texts, severity)
+        yield sides.change(Part.SII, what, texts, severity)
         return
     try:
         yield from _decoded(sides, kind, before, now)
     except DecodeError:
-        yield sides.change(Place.SII, what, bytes_texts(before, now), severity)
+        yield sides.change(Part.SII, what, bytes_texts(before, now), severity)
 
 
 def _size(data: bytes | None) -> str:
@@ -157,7 +157,7 @@ def _decoded(sides: Sides, kind: int, old: bytes, new: bytes) -> Iterator[Change
         before, now = old[word : word + 2], new[word : word + 2]
         if before != now:
             texts = _word(before), _word(now)
-            yield sides.change(Place.SII, f"category {name}, word {word // 2}", texts, severity)
+            yield sides.change(Part.SII, f"category {name}, word {word // 2}", texts, severity)
 
 
 def _word(data: bytes) -> str:
@@ -172,7 +172,7 @@ def _strings(sides: Sides, old: bytes, new: bytes) -> Iterator[Change]:
         )
         if texts[0] != texts[1]:
             what = f"string {number + 1}"
-            yield sides.change(Place.SII, what, (texts[0], texts[1]), Severity.INFO)
+            yield sides.change(Part.SII, what, (texts[0], texts[1]), Severity.INFO)
 
 
 def _pdos(sides: Sides, name: str, old: bytes, new: bytes) -> Iterator[Change]:
@@ -180,7 +180,7 @@ def _pdos(sides: Sides, name: str, old: bytes, new: bytes) -> Iterator[Change]:
     for index in sorted({*before, *now}):
         texts = _pdo_text(before.get(index)), _pdo_text(now.get(index))
         if texts[0] != texts[1]:
-            yield sides.change(Place.SII, f"{name} 0x{index:04X}", texts)
+            yield sides.change(Part.SII, f"{name} 0x{index:04X}", texts)
 
 
 def _pdo_text(pdo: Pdo | None) -> str:

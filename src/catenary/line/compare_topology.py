@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Sequence
 
-from catenary.line.change import ABSENT, Change, ChangedDevice, Place, Severity
+from catenary.line.change import ABSENT, Change, ChangedDevice, Part, Severity
 from catenary.line.pairing import Pairing
 from catenary.line.sides import Sides
 from catenary.line.values import ClonedDevice, Line
@@ -28,16 +28,16 @@ def compare_topology(old: Line, new: Line, pairing: Pairing) -> Iterator[Change]
     """
     for position in pairing.missing:
         device = old.devices[position]
-        place = ChangedDevice(device.name, position, None)
+        missing = ChangedDevice(device.name, position, None)
         note = f"it was {_behind(old, device.parent, device.parent_port)}"
         yield Change(
-            place, Place.DEVICE, "", identity_text(device), "missing", Severity.EFFECT, note
+            missing, Part.DEVICE, "", identity_text(device), "missing", Severity.EFFECT, note
         )
     for position in pairing.added:
         device = new.devices[position]
-        place = ChangedDevice(device.name, None, position)
+        added = ChangedDevice(device.name, None, position)
         note = f"it is {_behind(new, device.parent, device.parent_port)}"
-        yield Change(place, Place.DEVICE, "", ABSENT, identity_text(device), Severity.EFFECT, note)
+        yield Change(added, Part.DEVICE, "", ABSENT, identity_text(device), Severity.EFFECT, note)
     yield from _places(old, new, pairing)
     yield from _open_ports(old, new, pairing)
 
@@ -62,7 +62,7 @@ def _places(old: Line, new: Line, pairing: Pairing) -> Iterator[Change]:
         expected = None if parent is None else new_of[parent]
         if (expected, port) != present:
             texts = _behind(old, parent, port), _behind(new, *present)
-            yield sides.change(Place.TOPOLOGY, "cable", texts)
+            yield sides.change(Part.TOPOLOGY, "cable", texts)
 
 
 def _parent(
@@ -91,7 +91,7 @@ def _moved(old: Line, new: Line, sides: Sides) -> Change:
         f"position {device.position}, {_behind(line, device.parent, device.parent_port)}"
         for line, device in ((old, sides.old), (new, sides.new))
     )
-    return sides.change(Place.TOPOLOGY, "order", (before, now), note="moved, or cables swapped")
+    return sides.change(Part.TOPOLOGY, "order", (before, now), note="moved, or cables swapped")
 
 
 def _behind(line: Line, parent: int | None, port: int | None) -> str:
@@ -112,7 +112,7 @@ def _open_ports(old: Line, new: Line, pairing: Pairing) -> Iterator[Change]:
             explained = ((before, port) in taken) != ((now, port) in taken_now)
             if ports[port] != present[port] and not explained:
                 texts = _open_text(ports[port]), _open_text(present[port])
-                yield sides.change(Place.TOPOLOGY, f"port {port}", texts)
+                yield sides.change(Part.TOPOLOGY, f"port {port}", texts)
 
 
 def _taken(line: Line) -> set[tuple[int | None, int | None]]:

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from catenary.line.change import (
     Change,
     ChangedDevice,
-    Entry,
-    Place,
+    ChangedEntry,
+    Part,
     Severity,
     Uncompared,
 )
@@ -36,24 +36,24 @@ class Sides:
 
     def change(
         self,
-        place: Place,
+        part: Part,
         what: str,
         values: tuple[str, str],
         severity: Severity = Severity.EFFECT,
         note: str = "",
-        entry: Entry | None = None,
+        entry: ChangedEntry | None = None,
     ) -> Change:
         """Return a change of this device.
 
         Args:
-            place: Part of the device.
+            part: Part of the device.
             what: Name of the value.
             values: The earlier and the present value as text.
             severity: Effect of the change.
             note: Meaning of the change.
             entry: Entry of the dictionary, for values of objects.
         """
-        return Change(self.device, place, what, *values, severity, note, entry)
+        return Change(self.device, part, what, *values, severity, note, entry)
 
     def uncompared(self, part: str, reason: str, *, expected: bool) -> Uncompared:
         """Return a part that was not compared.
