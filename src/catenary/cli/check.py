@@ -11,6 +11,31 @@ from catenary.cli.failure import UsageError
 from catenary.cli.parsers import Commands, add_command, add_json
 
 UNREADABLE = 2
+DESCRIPTION = (
+    "Compares the addresses and identities of the devices with a machine file, "
+    "and changes no device.\n"
+    "With --against line/, compares the devices with a clone, and reports what has changed "
+    "since it was made: devices, wiring, EEPROMs, registers, mappings, objects and error "
+    "counters. The devices are read as by `catenary clone`: devices in SAFE-OP and OP are not "
+    "written to, and devices in INIT are brought to PRE-OP only with --pre-op. FILE can be a "
+    "clone, too.\n"
+    "With --against machine.toml, compares with a machine file, and names the drives and "
+    "process data that a difference affects.\n"
+    "With --against drive.xml, compares each device with its ESI: identity, EEPROM, mailbox, "
+    "SyncManagers, FMMUs, PDOs, clocks and objects. A device in INIT or PRE-OP is brought to "
+    "PRE-OP to read its objects, and back; a device in another state keeps it, and only its "
+    "EEPROM is compared. Nothing is written to an object.\n"
+    "Exit status: 0 if they match, 1 if they differ, 2 if a file or a part of the segment "
+    "cannot be read. Differences that are only warnings or info do not change the exit status."
+)
+EXAMPLE = (
+    "catenary check machine.toml\ncatenary check machine.toml eth1 --json\n"
+    "catenary check eth0 --against line/ --pre-op\n"
+    "catenary check line/ --against other/\n"
+    "catenary check eth0 --against machine.toml\n"
+    "catenary check eth0 --against drive.xml --position 2\n"
+    "catenary check eth0 --against"
+)
 
 
 class Reference(Enum):
@@ -27,27 +52,8 @@ def add_parser(commands: Commands) -> None:
         commands,
         "check",
         help="compare a segment with a machine file, a clone or ESI files",
-        description="Compares the addresses and identities of the devices with a machine file, "
-        "and changes no device.\n"
-        "With --against line/, compares the devices with a clone, and reports what has changed "
-        "since it was made: devices, wiring, EEPROMs, registers, mappings, objects and error "
-        "counters. The devices are read as by `catenary clone`: devices in SAFE-OP and OP are not "
-        "written to, and devices in INIT are brought to PRE-OP only with --pre-op. FILE can be a "
-        "clone, too.\n"
-        "With --against machine.toml, compares with a machine file, and names the drives and "
-        "process data that a difference affects.\n"
-        "With --against drive.xml, compares each device with its ESI: identity, EEPROM, mailbox, "
-        "SyncManagers, FMMUs, PDOs, clocks and objects. A device in INIT or PRE-OP is brought to "
-        "PRE-OP to read its objects, and back; a device in another state keeps it, and only its "
-        "EEPROM is compared. Nothing is written to an object.\n"
-        "Exit status: 0 if they match, 1 if they differ, 2 if a file or a part of the segment "
-        "cannot be read. Differences that are only warnings or info do not change the exit status.",
-        example="catenary check machine.toml\ncatenary check machine.toml eth1 --json\n"
-        "catenary check eth0 --against line/ --pre-op\n"
-        "catenary check line/ --against other/\n"
-        "catenary check eth0 --against machine.toml\n"
-        "catenary check eth0 --against drive.xml --position 2\n"
-        "catenary check eth0 --against",
+        description=DESCRIPTION,
+        example=EXAMPLE,
     )
     parser.add_argument(
         "file",

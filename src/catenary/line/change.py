@@ -56,7 +56,7 @@ class ChangedDevice:
 
 @dataclass(frozen=True, slots=True)
 class ChangedEntry:
-    """The entry of a dictionary whose value changed."""
+    """Entry of a dictionary with a changed value."""
 
     index: int
     subindex: int

@@ -22,7 +22,7 @@ CHANGING = frozenset((0x1001, 0x1003, 0x10F3, 0x10F8, 0x10F9))
 # Constant texts and numbers that identify hardware and software, although they cannot be written
 IDENTIFYING = frozenset((0x1000, 0x1009, 0x100A, IDENTITY, MANUFACTURER_SERIAL))
 NAME = 0x1008
-TEXTS = frozenset((0x0009, 0x000A, 0x000B, 0x000F))  # types whose length is that of the value
+TEXTS = frozenset((0x0009, 0x000A, 0x000B, 0x000F))  # types of variable length
 _ANY_WRITE = Access.WRITE_PRE_OP | Access.WRITE_SAFE_OP | Access.WRITE_OP
 _IDENTITY_FIELDS = {1: "vendor", 2: "product", 3: "revision", 4: "serial"}
 
@@ -188,10 +188,17 @@ def missing_values(old: ClonedDevice, new: ClonedDevice) -> tuple[int, str]:
         old: The device in the earlier clone.
         new: The device in the present clone.
     """
-    reasons = []
-    for each in new.objects:
-        for entry in each.entries:
-            unread = _unread(entry) and bool(entry.reason) and entry.reason != SERIAL_WITHHELD
-            if unread and old.value(entry.index, entry.subindex) is not None:
-                reasons.append(f"0x{entry.index:04X}:{entry.subindex:02X}: {entry.reason}")
+    known = {
+        (entry.index, entry.subindex)
+        for each in old.objects
+        for entry in each.entries
+        if entry.value is not None
+    }
+    reasons = [
+        f"0x{entry.index:04X}:{entry.subindex:02X}: {entry.reason}"
+        for each in new.objects
+        for entry in each.entries
+        if _unread(entry) and entry.reason not in ("", SERIAL_WITHHELD)
+        if (entry.index, entry.subindex) in known
+    ]
     return len(reasons), reasons[0] if reasons else ""
