@@ -64,6 +64,28 @@ def clone_segment(
         CloneError: The folder contains other files than a clone.
         OSError: A file cannot be written.
     """
+    return _read(main, Path(folder), options, progress)
+
+
+def read_segment(
+    main: MainDevice, options: CloneOptions = CloneOptions(), progress: Progress = silent
+) -> Line:
+    """Read all devices of a segment as `clone_segment` does, without a folder.
+
+    Args:
+        main: MainDevice of the segment, without a loop.
+        options: What is read.
+        progress: Function to call with (text, done, total).
+
+    Raises:
+        NoDeviceError: No device answers.
+        SegmentError: The number of devices changed while they were read.
+        ConfigurationError: The MainDevice has no frames of its own (IgH).
+    """
+    return _read(main, None, options, progress)
+
+
+def _read(main: MainDevice, folder: Path | None, options: CloneOptions, progress: Progress) -> Line:
     main.require_no_loop()
     if main.carrier is not None:
         raise ConfigurationError(
@@ -74,7 +96,7 @@ def clone_segment(
     device_count = main.converse(count()).devices
     ring = _require_closed(main)  # the first answers show the shape of a ring
     present = main.converse(read_present(device_count))
-    where = prepare(folder)
+    where = None if folder is None else prepare(folder)
     topology = make_topology([open_ports(each.dl_status) for each in present], ring=ring)
     notes = list(topology.contradictions)
     with _addressed(main, present, notes) as addresses:
@@ -84,7 +106,8 @@ def clone_segment(
         ]
         _require_unchanged(main, present)
     line = Line(tuple(devices), options.serials, tuple(notes))
-    finish(line, where)
+    if where is not None:
+        finish(line, where)
     return line
 
 
@@ -131,7 +154,7 @@ def _addressed(
 
 def _device(
     main: MainDevice,
-    folder: Path,
+    folder: Path | None,
     source: Source,
     options: CloneOptions,
     progress: Progress,
@@ -149,6 +172,8 @@ def _device(
         objects_timeout=options.objects_timeout,
         progress=progress,
     )
+    if folder is None:
+        return reading.read()
     earlier = None if options.fresh else _earlier(folder, source.present.rank)
     identity = None if earlier is None else reading.identity()
     if earlier is not None and identity is not None and reading.fits(earlier, identity):

@@ -13,6 +13,7 @@ from catenary.cli.parsers import note_other_masters
 if TYPE_CHECKING:
     from catenary.link import LinkSource
     from catenary.machine import Comparison
+    from catenary.machine.comparison import FoundDevice
     from catenary.machine.file import MachineFile
 
 SAME, DIFFERENT = 0, 1
@@ -25,7 +26,7 @@ def run(arguments: argparse.Namespace) -> int:
     return status_of(found)
 
 
-def status_of(found: Sequence[Comparison]) -> int:
+def status_of(found: Sequence[Comparison[FoundDevice]]) -> int:
     """Return the exit status of a comparison with a machine file."""
     from catenary.machine import HARMLESS
 
@@ -48,7 +49,7 @@ def source_and_machine(file: str, target: str | None) -> tuple[LinkSource, Machi
     return (expected.source() if target is None else source_of(target)), expected
 
 
-def compare_with_segment(file: str, target: str | None) -> Sequence[Comparison]:
+def compare_with_segment(file: str, target: str | None) -> Sequence[Comparison[FoundDevice]]:
     """Compare a machine file with its segment, or with the segment of another target.
 
     Args:
@@ -65,7 +66,7 @@ def compare_with_segment(file: str, target: str | None) -> Sequence[Comparison]:
         return compare(expected.tables.device, main.passive_scan())
 
 
-def as_table(found: Sequence[Comparison]) -> str:
+def as_table(found: Sequence[Comparison[FoundDevice]]) -> str:
     """Return the comparisons as a table with one line per device."""
     from catenary.cli.tables import table
     from catenary.machine import address
@@ -79,12 +80,12 @@ def as_table(found: Sequence[Comparison]) -> str:
     return table(rows)
 
 
-def as_json(found: Sequence[Comparison]) -> str:
+def as_json(found: Sequence[Comparison[FoundDevice]]) -> str:
     """Return the comparisons as JSON."""
     return json.dumps(as_values(found), indent=2)
 
 
-def as_values(found: Sequence[Comparison]) -> list[dict[str, object]]:
+def as_values(found: Sequence[Comparison[FoundDevice]]) -> list[dict[str, object]]:
     """Return the comparisons as values for JSON."""
     from catenary.machine import address, expected_identity
 

@@ -8,6 +8,16 @@
 
 from __future__ import annotations
 
+from catenary.line.change import (
+    Change,
+    ChangedDevice,
+    ChangedEntry,
+    Comparison,
+    Part,
+    Severity,
+    Uncompared,
+)
+from catenary.line.compare import compare_lines
 from catenary.line.reader import read_device, read_line
 from catenary.line.values import (
     ClonedAssignment,
@@ -21,13 +31,21 @@ from catenary.line.values import (
 from catenary.line.writer import write_line
 
 __all__ = [
+    "Change",
+    "ChangedDevice",
+    "ChangedEntry",
     "ClonedAssignment",
     "ClonedDevice",
     "ClonedEntry",
     "ClonedObject",
     "ClonedPdo",
+    "Comparison",
     "Line",
     "MappedEntry",
+    "Part",
+    "Severity",
+    "Uncompared",
+    "compare_lines",
     "read_device",
     "read_line",
     "write_line",

@@ -22,7 +22,7 @@ def mapping_of_objects(objects: Sequence[ClonedObject]) -> tuple[ClonedAssignmen
         assigned = known.get(ASSIGNMENT_BASE + channel)
         if assigned is None:
             continue
-        indices = [number & 0xFFFF for number in _listed(assigned)]
+        indices = [number & 0xFFFF for number in listed_numbers(assigned)]
         pdos = tuple(_pdo(index, known.get(index)) for index in indices)
         found += [ClonedAssignment(channel, pdos)] if pdos else []
     return tuple(found)
@@ -47,12 +47,12 @@ def mapping_of_sii(assignments: Sequence[Assignment]) -> tuple[ClonedAssignment,
 
 
 def _pdo(index: int, mapping: ClonedObject | None) -> ClonedPdo:
-    numbers = [] if mapping is None else _listed(mapping)
+    numbers = [] if mapping is None else listed_numbers(mapping)
     entries = tuple(MappedEntry(n >> 16, n >> 8 & 0xFF, n & 0xFF) for n in numbers)
     return ClonedPdo(index, entries)
 
 
-def _listed(array: ClonedObject) -> list[int]:
+def listed_numbers(array: ClonedObject) -> list[int]:
     """Return the numbers of an array, as many as its subindex 0 states."""
     count = array.entry(0)
     if count is None or not count.value:

@@ -48,6 +48,24 @@ def read_line(folder: str | Path) -> Line:
     return Line(tuple(devices), content.serials, content.notes)
 
 
+def is_clone(folder: str | Path) -> bool:
+    """Return True for a folder with the files of a clone, whole or interrupted.
+
+    Args:
+        folder: Any path.
+    """
+    where = Path(folder)
+    if not where.is_dir():
+        return False
+    if (where / LINE_FILE).is_file():
+        return True
+    return any(FOLDER.fullmatch(each.name) and _is_device(each) for each in where.iterdir())
+
+
+def _is_device(folder: Path) -> bool:
+    return (folder / DEVICE_FILE).is_file()
+
+
 def _member(folder: Path, position: int, entry: DeviceEntry) -> ClonedDevice:
     device = read_device(folder / entry.folder)
     file = str(folder / entry.folder / DEVICE_FILE)

@@ -3,19 +3,41 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Literal, NamedTuple
+from typing import Generic, Literal, NamedTuple, Protocol, TypeVar
 
 from msgspec import UNSET
 
-from catenary.bus import SubDevice
 from catenary.machine.schema import DeviceTable, IdentityTable
-from catenary.model.device import Identity
+from catenary.model.device import DeviceDescription, Identity
 
 Verdict = Literal["same", "absent", "different", "missing", "unknown"]
 HARMLESS: tuple[Verdict, ...] = ("same", "absent")
 
 
-class Comparison(NamedTuple):
+class FoundDevice(Protocol):
+    """A device that was found: a `SubDevice`, or a device of a clone."""
+
+    @property
+    def position(self) -> int: ...
+
+    @property
+    def name(self) -> str: ...
+
+    @property
+    def alias(self) -> int: ...
+
+    @property
+    def identity(self) -> Identity: ...
+
+    @property
+    def description(self) -> DeviceDescription: ...
+
+
+Found = TypeVar("Found", bound=FoundDevice)
+FoundHere = TypeVar("FoundHere", bound=FoundDevice, covariant=True)
+
+
+class Comparison(NamedTuple, Generic[FoundHere]):
     """Comparison of one device of the file with the device found.
 
     The verdicts are:
@@ -29,7 +51,7 @@ class Comparison(NamedTuple):
 
     verdict: Verdict
     expected: DeviceTable | None = None
-    found: SubDevice | None = None
+    found: FoundHere | None = None
     fault: str = ""  # description of the difference
     cause: str = ""  # likely cause and next step
 
@@ -41,7 +63,9 @@ class Comparison(NamedTuple):
         return self.found.name if self.found is not None else ""
 
 
-def compare(expected: Sequence[DeviceTable], subs: Sequence[SubDevice]) -> tuple[Comparison, ...]:
+def compare(
+    expected: Sequence[DeviceTable], subs: Sequence[Found]
+) -> tuple[Comparison[Found], ...]:
     """Compare the devices of a file with those of a segment.
 
     Args:
@@ -98,7 +122,7 @@ def differences(expected: IdentityTable, found: Identity) -> list[str]:
     return [n for n, value in numbers.items() if value is not UNSET and value != getattr(found, n)]
 
 
-def _candidates(device: DeviceTable, subs: Sequence[SubDevice]) -> list[SubDevice]:
+def _candidates(device: DeviceTable, subs: Sequence[Found]) -> list[Found]:
     if device.alias is UNSET:
         return [sub for sub in subs if sub.position == device.position]
     return [sub for sub in subs if sub.alias == device.alias]
@@ -106,11 +130,11 @@ def _candidates(device: DeviceTable, subs: Sequence[SubDevice]) -> list[SubDevic
 
 def _compare(
     device: DeviceTable,
-    mine: Sequence[SubDevice],
+    mine: Sequence[Found],
     expected: Sequence[DeviceTable],
-    subs: Sequence[SubDevice],
+    subs: Sequence[Found],
     taken: set[int],
-) -> Comparison:
+) -> Comparison[Found]:
     if len(mine) > 1:
         positions = ", ".join(str(sub.position) for sub in mine)
         fault = f"devices at positions {positions} have the same {address(device)}"
@@ -130,7 +154,7 @@ def _compare(
     )
 
 
-def _cause_of_absence(device: DeviceTable, subs: Sequence[SubDevice], taken: set[int]) -> str:
+def _cause_of_absence(device: DeviceTable, subs: Sequence[FoundDevice], taken: set[int]) -> str:
     free = [s for s in subs if agrees(device.identity, s.identity) and s.position not in taken]
     if device.alias is UNSET:
         return f"the segment has {len(subs)} devices; check cables and power, or the file"
@@ -146,9 +170,9 @@ def _cause_of_absence(device: DeviceTable, subs: Sequence[SubDevice], taken: set
 
 def _cause_of_another(
     device: DeviceTable,
-    sub: SubDevice,
+    sub: FoundDevice,
     expected: Sequence[DeviceTable],
-    subs: Sequence[SubDevice],
+    subs: Sequence[FoundDevice],
 ) -> str:
     """Return the likely cause of a wrong identity at an address, and the next step."""
     if not any(sub.identity):
@@ -182,7 +206,7 @@ def _cause_of_another(
     return "check the order of the devices on the cable, or correct the file"
 
 
-def _shift(expected: Sequence[DeviceTable], subs: Sequence[SubDevice]) -> int:
+def _shift(expected: Sequence[DeviceTable], subs: Sequence[FoundDevice]) -> int:
     """Return the number of additional devices before the first wrong one.
 
     The number is negative if devices are missing, and 0 if no shift explains the order.
@@ -207,7 +231,7 @@ def _devices(shift: int) -> str:
     return "device" if abs(shift) == 1 else "devices"
 
 
-def _fits(device: DeviceTable, subs: Sequence[SubDevice], shift: int) -> bool:
+def _fits(device: DeviceTable, subs: Sequence[FoundDevice], shift: int) -> bool:
     at = _position(device) + shift
     return 0 <= at < len(subs) and agrees(device.identity, subs[at].identity)
 
@@ -216,7 +240,7 @@ def _position(device: DeviceTable) -> int:
     return -1 if device.position is UNSET else device.position
 
 
-def _place(sub: SubDevice) -> str:
+def _place(sub: FoundDevice) -> str:
     return f"position {sub.position} ({sub.name})" if sub.name else f"position {sub.position}"
 
 

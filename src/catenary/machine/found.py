@@ -36,7 +36,7 @@ class MachineParts:
     notes: tuple[str, ...] = ()  # warnings about an ENI, and its differences from the plan
 
 
-def raise_differences(path: Path, found: Sequence[Comparison]) -> None:
+def raise_differences(path: Path, found: Sequence[Comparison[SubDevice]]) -> None:
     """Raise an error for the first difference between file and segment, if there is one.
 
     The other differences are notes of the error. Unknown and absent devices are not differences.
@@ -56,7 +56,7 @@ def raise_differences(path: Path, found: Sequence[Comparison]) -> None:
         raise errors[0]
 
 
-def _error(path: Path, found: Comparison) -> CatenaryError:
+def _error(path: Path, found: Comparison[SubDevice]) -> CatenaryError:
     text = f'{path}: device "{found.name}": {found.fault}'
     if found.found is None or found.expected is None:
         return SegmentError(text, hint=found.cause)
@@ -69,7 +69,7 @@ def _error(path: Path, found: Comparison) -> CatenaryError:
     )
 
 
-def make_found(file: MachineFile, found: Sequence[Comparison]) -> MachineParts:
+def make_found(file: MachineFile, found: Sequence[Comparison[SubDevice]]) -> MachineParts:
     """Make the drives, process data and requests of the devices that were found.
 
     Args:

@@ -184,7 +184,7 @@ def device_tables(eni: EniFile) -> list[DeviceTable]:
     return tables
 
 
-def _identity_notes(eni: EniFile, found: Sequence[Comparison]) -> list[str]:
+def _identity_notes(eni: EniFile, found: Sequence[Comparison[SubDevice]]) -> list[str]:
     """Return notes on additional devices, and on other revisions."""
     notes = [f"{eni.path}: {each.fault}" for each in found if each.verdict == "unknown"]
     for device, each in zip(eni.devices, found, strict=False):
