@@ -18,6 +18,7 @@ from catenary.virtual.devices.junction import Junction
 from catenary.virtual.devices.model_sensor import ModelSensor
 from catenary.virtual.devices.servo import Servo
 from catenary.virtual.devices.servo_quirks import NO_QUIRKS, ServoQuirks
+from catenary.virtual.devices.twin import TwinOptions
 from catenary.virtual.mapping_quirks import NO_MAPPING_QUIRKS, MappingQuirks
 from catenary.virtual.sii_quirks import NO_SII_QUIRKS, SiiQuirks
 
@@ -215,11 +216,13 @@ class EsiTable(_ClockedTable, tag="esi", frozen=True, kw_only=True):
             name=self.name,
             alias=self.alias,
             serial=self.serial,
-            mailbox_delay=self.mailbox_delay,
-            crystal=self.crystal.crystal(),
-            clock_bits=self.clock_bits,
-            mailbox_quirks=self.mailbox_quirks,
-            modules=self.modules,
+            options=TwinOptions(
+                modules=self.modules,
+                mailbox_delay=self.mailbox_delay,
+                crystal=self.crystal.crystal(),
+                clock_bits=self.clock_bits,
+                mailbox_quirks=self.mailbox_quirks,
+            ),
         )
 
 

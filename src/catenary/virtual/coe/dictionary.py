@@ -61,6 +61,13 @@ class Entry:
     read: Callable[[], bytes]
     write: Callable[[bytes], None] | None = None
     slot: int = -1  # slot of the process data; -1: none
+    signed: bool = False  # True if the slot has a sign
+    unlisted: int = 0  # mapping flags that the description of the entry does not show
+
+    @property
+    def mappable(self) -> int:
+        """Access flags with those for PDOs that the description does not show."""
+        return self.access | self.unlisted
 
 
 @dataclass(slots=True)

@@ -8,6 +8,8 @@ mille of the rated torque.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from catenary.virtual import _segment
 from catenary.virtual.coe.dictionary import (
     ARRAY,
@@ -295,6 +297,4 @@ class Servo(MotorDevice):
             if write is not None:
                 write(data)
 
-        return Entry(
-            entry.name, entry.data_type, entry.bits, entry.access, entry.read, checked, entry.slot
-        )
+        return replace(entry, write=checked)
