@@ -58,6 +58,21 @@ class MachineFileError(ConfigurationError):
         self.key = key
 
 
+class CloneError(ConfigurationError):
+    """A clone folder that cannot be read. `file` and `line` locate the mistake, `reason` describes
+    it without the place.
+
+    `line` is None if it concerns the whole file.
+    """
+
+    def __init__(self, message: str, *, file: str, line: int | None = None, hint: str = "") -> None:
+        place = ":".join(str(part) for part in (file, line) if part is not None)
+        super().__init__(f"{place}: {message}", hint=hint)
+        self.reason = message
+        self.file = file
+        self.line = line
+
+
 class EsiError(CatenaryError):
     """An ESI file that cannot be used. `file` and `line` locate the fault, `reason` describes
     it without the place.

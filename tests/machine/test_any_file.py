@@ -11,9 +11,9 @@ from hypothesis import strategies as st
 
 from catenary.errors import MachineFileError
 from catenary.machine import read_machine
-from catenary.machine.lines import key_lines
+from catenary.toml_lines import key_lines
+from tests.line.test_toml_lines import paths
 from tests.machine.files import SMALL
-from tests.machine.test_lines import paths
 
 LINES = SMALL.splitlines()
 WORDS = ["0", "-1", "1e400", "nan", "inf", "true", '""', '"deg"', "[]", "{}", "[[]]", "1979-05-27"]

@@ -11,10 +11,10 @@ from msgspec import UNSET
 from catenary.drive.arguments import named_columns
 from catenary.drive.channel import Channel, NumberType, channel_of
 from catenary.machine.file import MachineFile
-from catenary.machine.lines import KeyPath
 from catenary.machine.references import data_type, nearest, object_of
 from catenary.machine.schema import ChannelTable, ColumnTable
 from catenary.model.device import DeviceDescription, Direction, Entry
+from catenary.toml_lines import KeyPath
 
 UNTYPED = Entry(1, 0, 1)  # placeholder where the type of the entry is not used
 Given = Mapping[str, str | ChannelTable]

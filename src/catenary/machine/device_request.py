@@ -11,12 +11,12 @@ from catenary.bus import SubDevice
 from catenary.drive.modules import chosen_modules
 from catenary.errors import ConfigurationError
 from catenary.machine.file import MachineFile
-from catenary.machine.lines import KeyPath
 from catenary.machine.references import data_type, object_of
 from catenary.machine.schema import StartUpTable
 from catenary.model.module import ConfiguredModule
 from catenary.plan.request import DeviceRequest, ImageLayout, RequestTables, Views
 from catenary.plan.start_up_object import StartUp
+from catenary.toml_lines import KeyPath
 from catenary.types import Octets
 
 

@@ -10,7 +10,7 @@ from msgspec import UNSET
 
 from catenary.bus import SubDevice
 from catenary.machine.file import MachineFile
-from catenary.machine.lines import KeyPath
+from catenary.toml_lines import KeyPath
 
 
 def esi_places(file: MachineFile) -> list[Path] | None:

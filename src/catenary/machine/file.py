@@ -14,10 +14,10 @@ from msgspec import UNSET
 from catenary.errors import ConfigurationError, MachineFileError
 from catenary.link import LinkSource
 from catenary.machine.explanation import explain, quantities
-from catenary.machine.lines import KeyPath, key_lines, line_of
 from catenary.machine.schema import FORMAT, MachineTables, Table
 from catenary.machine.units import Dimension, to_si
 from catenary.target import TomlFile, parse, read_toml, target_of
+from catenary.toml_lines import KeyPath, key_lines, line_of
 
 
 class MachineFile:

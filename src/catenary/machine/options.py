@@ -16,10 +16,10 @@ from catenary.drive.units import AxisUnits
 from catenary.loop.options import ClockOptions, Scheduling, StopPolicy
 from catenary.machine.channels import make_columns
 from catenary.machine.file import MachineFile
-from catenary.machine.lines import KeyPath
 from catenary.machine.references import WHOLE_LISTS, axis_addresses, pdo_index
 from catenary.machine.schema import ClockTable, DrivesTable, HomingTable, Optional
 from catenary.plan.options import period_in_ns
+from catenary.toml_lines import KeyPath
 
 T = TypeVar("T")
 

@@ -10,8 +10,8 @@ from typing import NamedTuple
 from msgspec import UNSET
 
 from catenary.machine.file import MachineFile
-from catenary.machine.lines import KeyPath
 from catenary.machine.schema import DrivesTable, ProcessDataTable
+from catenary.toml_lines import KeyPath
 from catenary.types import ALL, DataType, Value, by_name
 
 SLOTS_END = 8  # ETG.6010 §5.1: 0x6000 + 0x800 · slot, at most 0x9FFF

@@ -13,9 +13,9 @@ from catenary.drive.process_data import ProcessData
 from catenary.machine.channels import make_channels
 from catenary.machine.device_request import StartUpRequest, device_modules, start_up_objects
 from catenary.machine.file import MachineFile
-from catenary.machine.lines import KeyPath
 from catenary.machine.options import drives_options, process_data_options
 from catenary.machine.references import AxisAddress, axis_addresses
+from catenary.toml_lines import KeyPath
 
 Subs = Mapping[str, SubDevice]  # present devices, by their names in the file
 

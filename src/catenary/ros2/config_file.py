@@ -11,8 +11,8 @@ from typing import Any, get_args, get_type_hints
 import msgspec
 
 from catenary.errors import ConfigurationError
-from catenary.machine.lines import KeyPath, key_lines, line_of
 from catenary.ros2.config import PROFILES, Config, Table
+from catenary.toml_lines import KeyPath, key_lines, line_of
 
 _PLACE = re.compile(r"(?P<what>.*?)(?: - at `\$(?P<path>.*)`)?", re.DOTALL)
 _STEP = re.compile(r"\.([^.\[]+)|\[(\d+)\]|\[(\.\.\.)\]")

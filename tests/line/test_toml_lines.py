@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from catenary.machine.lines import KeyPath, key_lines, line_of
+from catenary.toml_lines import KeyPath, key_lines, line_of
 
 TEXT = '''\
 # a comment with [brackets] = "and quotes"
