@@ -72,5 +72,5 @@ def test_a_fault_reaches_the_axis_of_an_esi(shared_data: Path) -> None:
 
 def test_a_device_without_axes_refuses_faults_of_drives(shared_data: Path) -> None:
     segment = Segment([Device.from_esi(shared_data / "esi" / "hpm_ECAT_IO.xml")])
-    with pytest.raises(ValueError, match="device 0 .esi. is not a servo"):
+    with pytest.raises(ValueError, match=r"device 0 \(esi\) is not a servo"):
         segment.inject(faults.DriveFault(device=0, code=0x7300))

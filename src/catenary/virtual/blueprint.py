@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from catenary.virtual.coe.object_facts import ObjectFacts
+from catenary.virtual.crystal import ClockBits
 from catenary.virtual.description import Description
 
 RAM_START, RAM_LEAST, RAM_MAX = 0x1000, 0x2000, 61440  # [bytes]
@@ -24,6 +25,8 @@ class Blueprint:
     exact: bool = False  # True if `objects` are all objects of a real device, with its rights
     serves_coe: bool = True  # False: its mailbox refuses CoE
     information: bytes = b""  # registers 0x0000 to 0x0009; empty: those of the virtual controller
+    clock_bits: ClockBits | None = None  # width of the clock; None: that of the options
+    alias: int | None = None  # register 0x0012, if a switch sets it; None: that of the image
 
 
 def ram_for(buffers: list[tuple[int, int]], least: int = RAM_LEAST) -> int:

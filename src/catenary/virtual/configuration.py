@@ -98,6 +98,15 @@ def _device_in_fault(folder: Path, kind: type, given: Any) -> Any:
         raise ValueError(str(error)) from error  # msgspec names the place
 
 
+def _read_clone(path: str | Path, *, clock: ClockKind, ring: bool) -> Segment:
+    if ring:
+        raise ConfigurationError(
+            f"{path}: a clone cannot be a ring", hint="serve it without the second interface"
+        )
+    with _named(str(path)):
+        return Segment.from_clone(path, clock=clock)
+
+
 def _read(path: str | Path) -> SegmentFile:
     try:
         content = Path(path).read_bytes()
@@ -114,10 +123,10 @@ def _read(path: str | Path) -> SegmentFile:
 
 
 def read_segment(path: str | Path, *, clock: ClockKind = "virtual", ring: bool = False) -> Segment:
-    """Read a segment and its faults from a TOML file.
+    """Read a segment and its faults from a TOML file, or the twins of a clone folder.
 
     Args:
-        path: Path of the file.
+        path: Path of the file, or of a folder that `catenary clone` has written.
         clock: See `Segment`.
         ring: True makes the segment a ring, regardless of the file.
 
@@ -125,6 +134,8 @@ def read_segment(path: str | Path, *, clock: ClockKind = "virtual", ring: bool =
         ConfigurationError: The file cannot be read or is invalid, or its plant cannot be simulated.
             The message names the file.
     """
+    if Path(path).is_dir():
+        return _read_clone(path, clock=clock, ring=ring)
     file = _read(path)
     devices = []
     for position, table in enumerate(file.device):

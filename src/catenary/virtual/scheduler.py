@@ -24,6 +24,7 @@ class Agenda:
         self._clock = clock
         self._heap: list[tuple[int, int, Callable[[], None]]] = []
         self._order = count()
+        self.attended = False  # True while a link is open: the service then runs the actions
 
     @property
     def now(self) -> int:
@@ -39,6 +40,16 @@ class Agenda:
 
     def after(self, delay_ns: int, action: Callable[[], None]) -> None:
         self.at(self._clock.now + delay_ns, action)
+
+    def soon(self, action: Callable[[], None]) -> None:
+        """Run an action as the next one of the service, which may run a device now.
+
+        Without a link, run it at once.
+        """
+        if self.attended:
+            self.after(0, action)
+        else:
+            action()
 
     def run_due(self) -> None:
         """Run all actions that are due."""

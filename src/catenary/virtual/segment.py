@@ -4,15 +4,18 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
+from os import PathLike
 from typing import Literal, NamedTuple, Protocol, runtime_checkable
 
 from catenary.virtual._segment import Core
 from catenary.virtual._segment_link import SegmentLink
 from catenary.virtual._wires import Wires
+from catenary.virtual.cloned_line import cloned_line
 from catenary.virtual.devices.coupler import Coupler
 from catenary.virtual.devices.device import Device
 from catenary.virtual.devices.digital_outputs import DigitalOutputs
 from catenary.virtual.devices.servo import Servo
+from catenary.virtual.devices.twin import TwinOptions
 from catenary.virtual.fault_player import FaultEvent, FaultPlayer, Loss
 from catenary.virtual.faults import Fault
 from catenary.virtual.plant import Plant, PlantPart
@@ -21,6 +24,7 @@ from catenary.virtual.wiring import Place, Wiring
 
 SECOND = 1e9
 LONGEST_PUSH = 10.0  # [s]
+STATION_ADDRESS = 0x0010
 ClockKind = Literal["virtual", "monotonic"]
 # Time from the loss of light until the loop is closed [s], with enhanced link detection of the
 # ET1100 (about 15 us: datasheet, section I, chapter 6) and with an ordinary PHY.
@@ -65,7 +69,8 @@ class SegmentEnd:
 
 
 class Segment:
-    """Virtual devices and their cables. `segment[i]` is the device at position i.
+    """Virtual devices and their cables. `segment[i]` is the device at position i, `segment["j2"]`
+    that with this name.
 
     Args:
         devices: Devices, in the order in which they process frames.
@@ -127,14 +132,74 @@ class Segment:
         )
         self._service.at_first_frame(self._faults.start)
         self._links: dict[bool, SegmentLink] = {}
+        self._given_names: dict[str, int] = {}  # positions by the names of a machine file
         for fault in faults:
             self.inject(fault)
+
+    @classmethod
+    def from_clone(
+        cls,
+        folder: str | PathLike[str],
+        *,
+        clock: ClockKind | SharedClock = "virtual",
+        plant: Plant | PlantPart | None = None,
+        faults: Sequence[Fault] = (),
+        options: Mapping[str, TwinOptions] | None = None,
+    ) -> Segment:
+        """Return a segment with twins of the devices of a clone (docs/how_to/test_your_machine.md).
+
+        Args:
+            folder: Folder that `catenary clone` has written.
+            clock: See `Segment`.
+            plant: See `Segment`.
+            faults: See `Segment`.
+            options: Motors and quirks of devices, by name; None: the standard ones.
+
+        Raises:
+            CloneError: A file of the folder is missing or not valid.
+            ConfigurationError: The SII of a device was not read, the devices cannot be connected,
+                or the plant does not fit them.
+            ValueError: An option is out of range.
+        """
+        devices, behind = cloned_line(folder, options)
+        return cls(devices, clock=clock, plant=plant, faults=faults, behind=behind)
 
     def __len__(self) -> int:
         return len(self._devices)
 
-    def __getitem__(self, position: int) -> Device:
-        return self._devices[position]
+    def __getitem__(self, key: int | str) -> Device:
+        """Return the device at a position, or with a name. Names of a machine file come first."""
+        return self._devices[key if isinstance(key, int) else self.position_of(key)]
+
+    def position_of(self, name: str) -> int:
+        """Return the position of the device with a name.
+
+        Raises:
+            KeyError: No device has the name, or several have it.
+        """
+        if name in self._given_names:
+            return self._given_names[name]
+        names = [device.name for device in self._devices]
+        if names.count(name) == 1:
+            return names.index(name)
+        many = ", ".join(str(n) for n, each in enumerate(names) if each == name)
+        known = ", ".join(map(repr, dict.fromkeys([*self._given_names, *names])))
+        what = f"devices {many} are named {name!r}" if many else f"no device is named {name!r}"
+        raise KeyError(f"{what}; the names are {known}")
+
+    def name_devices(self, names: Mapping[str, int]) -> None:
+        """Give devices the names of a machine file, for `segment["j2"]`.
+
+        Args:
+            names: Station address of each device, as the last scan set it.
+        """
+        stations = {
+            int.from_bytes(self._core.peek(n, STATION_ADDRESS, 2), "little"): n
+            for n in range(len(self._devices))
+        }
+        self._given_names = {
+            name: stations[station] for name, station in names.items() if station in stations
+        }
 
     def __iter__(self) -> Iterator[Device]:
         return iter(self._devices)
@@ -198,12 +263,14 @@ class Segment:
         if self.clock == "monotonic" and not self._links:
             self._service.start()
         self._links[second] = link
+        self._service.agenda.attended = True
         if second:
             self._wires.raise_end(1, True)
         return link
 
     def _link_closed(self, second: bool) -> None:
         del self._links[second]
+        self._service.agenda.attended = bool(self._links)
         if second:
             self._wires.raise_end(1, False)
         if self.clock == "monotonic" and not self._links:
@@ -318,11 +385,10 @@ class Segment:
         if not 0 <= device < len(self._devices):
             raise ValueError(f"there is no device {device}; it has {len(self._devices)} devices")
         chosen = self._devices[device]
-        action = chosen.switch_on if on else chosen.switch_off
-        if self._links:
-            self._service.agenda.after(0, action)  # the service may be running the device now
+        if on:
+            chosen.power_on()
         else:
-            action()
+            chosen.power_off()
 
     def _plug_first(self, devices: int) -> None:
         for number in range(len(self._devices)):

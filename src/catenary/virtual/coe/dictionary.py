@@ -77,10 +77,13 @@ class Object:
     code: int
     data_type: int
     entries: dict[int, Entry] = field(default_factory=dict)
+    maximum: int | None = None  # highest subindex in the description; None: that of the entries
 
     @property
     def highest(self) -> int:
-        return max(self.entries)
+        if self.maximum is not None:
+            return self.maximum
+        return 0 if self.code == VARIABLE else max(self.entries)
 
 
 def constant(name: str, data_type: int, value: bytes, access: int = READ_ANY) -> Entry:

@@ -102,8 +102,7 @@ class InformationServer:
         found = self._dictionary.objects.get(index)
         if found is None:
             return self._error(NO_OBJECT)
-        highest = 0 if found.code == 7 else found.highest
-        head = struct.pack("<HHBB", index, found.data_type, highest, found.code)
+        head = struct.pack("<HHBB", index, found.data_type, found.highest, found.code)
         return self._described(OBJECT, head, found.name)
 
     def _entry(self, index: int, subindex: int, information: int) -> bytes:

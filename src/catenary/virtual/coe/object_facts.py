@@ -30,6 +30,7 @@ class ObjectFacts:
     entries: tuple[EntryFacts, ...]
     code: int = 0  # 7 variable, 8 array, 9 record; 0: derived from the entries
     data_type: int | None = None  # of the object; None: derived from the entries
+    maximum: int | None = None  # highest subindex that the object description gives; None: derived
 
 
 def by_place(objects: Iterable[ObjectFacts]) -> dict[Place, EntryFacts]:

@@ -45,6 +45,7 @@ def add_described(
         dictionary.add(index, facts.name, entries, code=code)
         if facts.data_type is not None:
             dictionary.objects[index].data_type = facts.data_type
+        dictionary.objects[index].maximum = facts.maximum
     if exact and objects:
         for index in own - set(objects):
             del dictionary.objects[index]

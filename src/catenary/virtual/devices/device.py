@@ -6,6 +6,7 @@ Devices with a microcontroller add an `Application`.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from os import PathLike
 from typing import TYPE_CHECKING, ClassVar
@@ -172,8 +173,8 @@ class Device:
             sii=self.sii_image(),
             slots=description.slots,
             axes=description.axes,
-            fmmus=8,
-            sync_managers=8,
+            fmmus=description.fmmu_count,
+            sync_managers=description.sync_manager_count,
             clock_bits=self.clock_bits if description.clock else 0,
             lrw=description.lrw,
             identification=description.identification,
@@ -209,6 +210,24 @@ class Device:
         self._scheduler.end()
         self._scheduler = None
         self.core.switch_power(self.position, False)
+
+    def power_on(self) -> None:
+        """Switch the power on. Any thread may call it.
+
+        While a MainDevice is connected, the device switches at once in real time, and when the time
+        advances in virtual time.
+        """
+        self._soon(self.switch_on)
+
+    def power_off(self) -> None:
+        """Switch the power off, at the same time as `power_on`. The neighbours lose the link."""
+        self._soon(self.switch_off)
+
+    def _soon(self, action: Callable[[], None]) -> None:
+        if self._agenda is None:
+            action()
+        else:
+            self._agenda.soon(action)
 
     def reset(self) -> None:
         """Schedule a power cycle for the time when the requesting frame has left the device.

@@ -103,7 +103,7 @@ class Twin(MotorDevice):
             serial=found.serial,
             lrw=found.lrw,
             crystal=options.crystal,
-            clock_bits=options.clock_bits,
+            clock_bits=blueprint.clock_bits or options.clock_bits,
             sii_quirks=NO_SII_QUIRKS,
             mailbox=MailboxOptions(
                 delay=options.mailbox_delay,
@@ -138,13 +138,18 @@ class Twin(MotorDevice):
         super().started(scheduler)
         if self._layout.count and not self.axes:
             self.core.run_model(self.position, UPDATE_NS)
-        if self._blueprint.information:
-            self.core.poke(self.position, 0, self._blueprint.information)
+        self._restore_registers()
         if self._blueprint.description.emulation:
             self.application.map_process_data()
         if self._is_new:  # shafts keep their positions without power
             self._is_new = False
             self._place_shafts()
+
+    def _restore_registers(self) -> None:
+        if self._blueprint.information:
+            self.core.poke(self.position, 0, self._blueprint.information)
+        if self._blueprint.alias is not None:
+            self.write_alias(self._blueprint.alias)
 
     def _place_shafts(self) -> None:
         for axis, offset in enumerate(self.offsets):
