@@ -23,6 +23,7 @@ if TYPE_CHECKING:
         drive,
         errors,
         esi,
+        line,
         realtime,
         record,
         remote,
@@ -60,7 +61,7 @@ if TYPE_CHECKING:
     from catenary.remote import connect, connect_async
     from catenary.remote.share import Share
     from catenary.share import attach
-    from catenary.target import MainDevice
+    from catenary.target import MainDevice, clone
     from catenary.virtual import Segment
 
 __version__ = "0.1.0"
@@ -94,6 +95,7 @@ __all__ = [
     "SubDevice",
     "WorkingCounterError",
     "attach",
+    "clone",
     "connect",
     "connect_async",
     "control",
@@ -103,6 +105,7 @@ __all__ = [
     "events",
     "interfaces",
     "law",
+    "line",
     "realtime",
     "record",
     "remote",
@@ -117,6 +120,7 @@ _MODULES = (
     "drive",
     "errors",
     "esi",
+    "line",
     "realtime",
     "record",
     "remote",
@@ -159,6 +163,7 @@ _HOMES = {
     "Share": "catenary.remote.share",
     "SubDevice": "catenary.bus",
     "attach": "catenary.share",
+    "clone": "catenary.target",
     "connect": "catenary.remote",
     "connect_async": "catenary.remote",
     "interfaces": "catenary.link.interfaces",

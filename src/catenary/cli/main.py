@@ -11,6 +11,7 @@ from catenary.cli import (
     alias,
     bench,
     check,
+    clone,
     dashboard,
     demo,
     diag,
@@ -40,7 +41,7 @@ PROGRAM = "catenary"
 DESCRIPTION = "Real-time EtherCAT for Python."
 COMMANDS = (
     *(scan, state, graph, diag, sdo, reg, alias, sii, esi),
-    *(init, check),
+    *(init, check, clone),
     *(demo, dashboard, top, doctor, bench, virtual, realtime),
     *(record, merge, plot, foxglove, ros2, include),
 )

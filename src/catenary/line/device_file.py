@@ -14,7 +14,7 @@ from catenary.wire.register_names import at_address
 from catenary.wire.register_text import explain
 from catenary.wire.sii import MailboxProtocol
 
-PARTS = ("sii", "objects", "registers")
+PARTS = ("sii", "objects", "state")
 PORTS_MAX, REGISTERS_END, BLOCK_MAX = 3, 0x1000, 64
 SOURCES = ("", "CoE", "SII")
 POSITION_MAX = 0xFFFF

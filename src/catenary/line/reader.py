@@ -17,7 +17,7 @@ from catenary.line.files import (
     read_bytes,
     read_text,
 )
-from catenary.line.line_file import DeviceEntry, disagreement, folder_name, parse_line
+from catenary.line.line_file import FOLDER, DeviceEntry, disagreement, folder_name, parse_line
 from catenary.line.object_file import parse_objects
 from catenary.line.values import ClonedDevice, Line
 
@@ -95,3 +95,21 @@ def _check_parts(device: ClonedDevice, path: Path) -> None:
 
 def _is_there(path: Path) -> bool:
     return path.exists() or path.is_symlink()
+
+
+def kept_device(folder: Path, position: int) -> ClonedDevice | None:
+    """Return a finished device of an interrupted clone; None if the folder does not have it.
+
+    Args:
+        folder: The folder of the clone.
+        position: Position of the device.
+
+    Raises:
+        CloneError: A file of the device is not valid.
+    """
+    for each in sorted(folder.glob(f"{position + 1:02d}-*")):
+        if FOLDER.fullmatch(each.name):
+            device = read_device(each)
+            if folder_name(position, device.name) == each.name and device.position == position:
+                return device
+    return None

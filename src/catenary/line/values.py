@@ -99,8 +99,9 @@ class ClonedAssignment:
 class ClonedDevice:
     """One device of a clone.
 
-    `missing` maps the parts that could not be read ("sii", "objects", "registers") to the reason.
-    A part that the device does not have is not missing: `objects` is () for a device without CoE.
+    `missing` maps the parts that could not be read ("sii", "objects") to the reason, and "state" if
+    a raised device could not be brought back. A part that the device does not have is not missing:
+    `objects` is () for a device without CoE.
     """
 
     position: int

@@ -1,0 +1,173 @@
+"""Clone of a segment: everything that can be read from its devices, in a folder.
+
+    registers of all devices ─► for each device: SII, objects ─► line/ (one folder per device)
+
+Devices in SAFE-OP, OP and BOOT are not written to: only their registers are read. Addresses and
+states that are changed for the reading are restored.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+from catenary.bus.clone_device import DeviceClone, Progress, Source, silent
+from catenary.bus.main_device import MainDevice
+from catenary.bus.ring import check_direction
+from catenary.errors import CloneError, ConfigurationError, SegmentError
+from catenary.line.reader import kept_device
+from catenary.line.values import ClonedDevice, Line
+from catenary.line.writer import finish, prepare, write_device
+from catenary.link import RingLink
+from catenary.link.ring_state import Shape
+from catenary.model.topology import Topology, make_topology, open_ports
+from catenary.procedure.clone_access import unambiguous, write_address
+from catenary.procedure.clone_registers import Present, read_present
+from catenary.procedure.stations import count
+
+OBJECTS_TIMEOUT = 600.0  # [s] per device
+
+
+@dataclass(frozen=True, slots=True)
+class CloneOptions:
+    """Options of `clone_segment`."""
+
+    pre_op: bool = False  # raise devices in INIT to PRE-OP, and bring them back
+    serials: bool = True  # False leaves serial numbers out
+    fresh: bool = False  # read devices again that the folder has
+    objects_timeout: float = OBJECTS_TIMEOUT  # [s] for the object dictionary of each device
+
+
+def clone_segment(
+    main: MainDevice,
+    folder: str | Path,
+    options: CloneOptions = CloneOptions(),
+    progress: Progress = silent,
+) -> Line:
+    """Read all devices of a segment, and write the clone folder.
+
+    The clone of each device is written when it is complete. A device that cannot be read completely
+    does not affect the others; `ClonedDevice.missing` has the reasons.
+
+    Args:
+        main: MainDevice of the segment, without a loop.
+        folder: Folder of the clone. Finished devices of an interrupted clone are kept.
+        options: What is read.
+        progress: Function to call with (text, done, total).
+
+    Raises:
+        NoDeviceError: No device answers.
+        SegmentError: The number of devices changed while they were read.
+        ConfigurationError: The MainDevice has no frames of its own (IgH).
+        CloneError: The folder contains other files than a clone.
+        OSError: A file cannot be written.
+    """
+    main.require_no_loop()
+    if main.carrier is not None:
+        raise ConfigurationError(
+            "the IgH kernel master does not give access to the registers of the devices",
+            hint="stop it with `ethercatctl stop`, and clone the network interface: eth0",
+        )
+    ring = _require_closed(main)
+    main.runner.flush()
+    device_count = main.converse(count()).devices
+    present = main.converse(read_present(device_count))
+    where = prepare(folder)
+    topology = make_topology([open_ports(each.dl_status) for each in present], ring=ring)
+    with _addressed(main, present) as addresses:
+        devices = [
+            _device(main, where, _source(each, address, topology), options, progress)
+            for each, address in zip(present, addresses, strict=True)
+        ]
+        _require_unchanged(main, present)
+    line = Line(tuple(devices), options.serials, topology.contradictions)
+    finish(line, where)
+    return line
+
+
+def _require_closed(main: MainDevice) -> bool:
+    """Return True for a ring. Raise SegmentError if it is cut: positions then have two origins."""
+    link = main.link
+    if not isinstance(link, RingLink):
+        return False
+    check_direction(link.state)
+    if link.state.shape in (Shape.CUT, Shape.SECOND_ONLY):
+        raise SegmentError(
+            "the ring is cut: a clone reads the devices in the order of the whole ring",
+            hint="close the ring, or clone from one of its two interfaces",
+        )
+    return True
+
+
+def _source(present: Present, address: int | None, topology: Topology) -> Source:
+    place = topology.places[present.rank]
+    return Source(present, address, place.parent, place.parent_port)
+
+
+@contextmanager
+def _addressed(main: MainDevice, devices: Sequence[Present]) -> Iterator[tuple[int | None, ...]]:
+    """Yield an address per device, None for one that is not written to. Restore them at the end."""
+    addresses = unambiguous(devices)
+    changed: list[Present] = []
+    try:
+        for device, address in zip(devices, addresses, strict=True):
+            if address is not None and address != device.station_address:
+                main.converse(write_address(device.rank, address))
+                changed.append(device)
+        yield addresses
+    finally:
+        for device in changed:
+            main.converse(write_address(device.rank, device.station_address))
+
+
+def _device(
+    main: MainDevice, folder: Path, source: Source, options: CloneOptions, progress: Progress
+) -> ClonedDevice:
+    """Read and write one device, or keep its folder of an earlier clone."""
+    reading = DeviceClone(
+        main,
+        source,
+        pre_op=options.pre_op,
+        serials=options.serials,
+        objects_timeout=options.objects_timeout,
+        progress=progress,
+    )
+    identity = reading.identity()
+    if identity is not None and not options.fresh:
+        earlier = _earlier(folder, source.present.rank)
+        if earlier is not None and reading.fits(earlier, identity):
+            return earlier
+    device = reading.read()
+    write_device(device, folder)
+    return device
+
+
+def _earlier(folder: Path, position: int) -> ClonedDevice | None:
+    """Return a finished device of an earlier clone; None if there is none that can be read."""
+    try:
+        return kept_device(folder, position)
+    except CloneError:  # half written, or edited: read it again
+        return None
+
+
+def _require_unchanged(main: MainDevice, before: Sequence[Present]) -> None:
+    """Count the devices again, because a hot-plugged device changes all positions behind it.
+
+    Raises:
+        SegmentError: The number has changed.
+    """
+    now = main.converse(count()).devices
+    if now != len(before):
+        raise SegmentError(
+            f"{len(before)} devices were found, and {now} after the reading",
+            hint="check the cables, then clone again: finished devices are kept",
+        )
+
+
+def reasons(line: Line) -> Iterator[str]:
+    """Yield one text for each missing part of a clone, such as "device 1 (AX5101): sii: ..."."""
+    for device in line.devices:
+        for part, reason in device.missing.items():
+            yield f"device {device.position} ({device.name}): {part}: {reason}"

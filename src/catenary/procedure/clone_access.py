@@ -1,0 +1,228 @@
+"""Access to devices for a clone: which ones may be written to, addresses, states and mailboxes.
+
+Reading an EEPROM or an object needs writes to the device. They are allowed in INIT and PRE-OP only.
+What is changed is restored.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass, replace
+
+from catenary.errors import DecodeError, MailboxError, StateError
+from catenary.model.device import DeviceDescription, MailboxLayout
+from catenary.procedure.al_state import read_state, request_state
+from catenary.procedure.clone_registers import Present
+from catenary.procedure.exchange import Procedure, read, write
+from catenary.procedure.mailbox import IN, OUT, MailboxChannel
+from catenary.procedure.state_path import climb
+from catenary.procedure.station import Station, answered, station_of
+from catenary.procedure.stations import STATION_BASE
+from catenary.wire.al import STATE_MASK, AlState
+from catenary.wire.datagram import EcatCommand
+from catenary.wire.register import (
+    AL_STATUS,
+    SII_CONFIGURATION,
+    STATION_ADDRESS,
+    sync_manager,
+    sync_manager_activation,
+)
+from catenary.wire.sync_manager import (
+    Activation,
+    Buffering,
+    Direction,
+    SyncManager,
+    decode_sync_manager,
+)
+
+WRITABLE = (AlState.INIT, AlState.PRE_OP)
+MAILBOX = (OUT, IN)
+
+
+def is_writable(device: Present) -> bool:
+    """Return True if a clone may write to the registers of a device."""
+    return device.state in WRITABLE
+
+
+def unambiguous(devices: Sequence[Present]) -> tuple[int | None, ...]:
+    """Return an address for each device to which only this device answers.
+
+    Devices in INIT and PRE-OP keep their address if it is unique, else get a free one. Other
+    devices have None, because their address cannot be changed.
+    """
+    answering = [each.station_address for each in devices]
+    aliases = [each.alias if each.answers_to_alias else 0 for each in devices]
+    taken = {*answering, *aliases, *(each.alias for each in devices)}
+    found: list[int | None] = []
+    for rank, device in enumerate(devices):
+        address = device.station_address
+        if not is_writable(device):
+            found.append(None)
+            continue
+        others = (*answering[:rank], *answering[rank + 1 :], *aliases[:rank], *aliases[rank + 1 :])
+        if address == 0 or address in others:
+            address = _free(STATION_BASE + rank, taken)
+            taken.add(address)
+        found.append(address)
+    return tuple(found)
+
+
+def _free(first: int, taken: Collection[int]) -> int:
+    """Return the first address from `first` on that no device has; 0 is not an address."""
+    return next(n for n in (*range(first, 0x10000), *range(1, first)) if n not in taken)
+
+
+def write_address(rank: int, address: int) -> Procedure[None]:
+    """Write a station address by position, if the device there is in INIT or PRE-OP.
+
+    Args:
+        rank: Position of the device.
+        address: The station address.
+
+    Raises:
+        StateError: The device is in another state.
+    """
+    station = Station(rank, address)
+    [reply] = yield [read(EcatCommand.APRD, -rank, AL_STATUS)]
+    word = AL_STATUS.unpack(answered(reply, station, "AL status"))
+    if word & STATE_MASK not in WRITABLE:
+        raise _left(station, word & STATE_MASK, 0)
+    [reply] = yield [write(EcatCommand.APWR, -rank, STATION_ADDRESS, address)]
+    answered(reply, station, "station address")
+
+
+def require_writable(station: Station, *states: AlState) -> Procedure[None]:
+    """Check that a device is still in INIT or PRE-OP, or in one of `states`.
+
+    Args:
+        station: The device.
+        states: The allowed states.
+
+    Raises:
+        StateError: It is in another state.
+    """
+    found = yield from read_state(station)
+    if found.state not in (states or WRITABLE):
+        raise _left(station, found.word & STATE_MASK, found.code)
+
+
+def _left(station: Station, state: int, code: int) -> StateError:
+    return StateError(
+        f"{station} is in state {state} now; it is not written to",
+        position=station.position,
+        requested=int(AlState.PRE_OP),
+        actual=state,
+        code=code,
+        hint="another master changed its state: end that program, then clone again",
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class Before:
+    """Registers of a device before it was raised from INIT to PRE-OP."""
+
+    station: Station
+    sync_managers: tuple[bytes, bytes]
+    owner: int  # of the EEPROM
+
+
+def remember(station: Station) -> Procedure[Before]:
+    """Read the registers that a change from INIT to PRE-OP writes."""
+    out, back, owner = yield [
+        *(read(EcatCommand.FPRD, station.address, sync_manager(k)) for k in MAILBOX),
+        read(EcatCommand.FPRD, station.address, SII_CONFIGURATION),
+    ]
+    managers = (
+        answered(out, station, "SyncManager 0"),
+        answered(back, station, "SyncManager 1"),
+    )
+    owned = SII_CONFIGURATION.unpack(answered(owner, station, "EEPROM owner"))
+    return Before(station, managers, owned)
+
+
+def raise_to_pre_op(device: DeviceDescription) -> Procedure[MailboxChannel | None]:
+    """Bring a device from INIT to PRE-OP, with the mailbox of its SII.
+
+    Args:
+        device: Description of the device.
+
+    Raises:
+        StateError: The device is not in INIT, or does not reach PRE-OP.
+    """
+    station = station_of(device)
+    yield from require_writable(station, AlState.INIT)
+    return (yield from climb(station, device, AlState.PRE_OP))
+
+
+def lower(before: Before) -> Procedure[None]:
+    """Bring a device back to INIT, and restore its mailbox and the owner of its EEPROM.
+
+    Args:
+        before: Registers before the device was raised.
+
+    Raises:
+        StateError: The device is no longer in INIT or PRE-OP, or does not reach INIT.
+    """
+    station = before.station
+    yield from require_writable(station)
+    yield from request_state(station, AlState.INIT)
+    off = [write(EcatCommand.FPWR, station.address, sync_manager_activation(k), 0) for k in MAILBOX]
+    blocks = [
+        write(EcatCommand.FPWR, station.address, sync_manager(k), data)
+        for k, data in zip(MAILBOX, before.sync_managers, strict=True)
+    ]
+    owner = write(EcatCommand.FPWR, station.address, SII_CONFIGURATION, before.owner & 1)
+    for reply in (yield [*off, *blocks, owner]):
+        answered(reply, station, "its registers")
+
+
+def join_mailbox(device: DeviceDescription, registers: Present) -> MailboxChannel:
+    """Return the channel of a mailbox that is already configured, for a device in PRE-OP.
+
+    Args:
+        device: Description of the device, with a mailbox.
+        registers: Its registers.
+
+    Raises:
+        MailboxError: The SyncManagers of the mailbox are not configured.
+    """
+    assert device.mailbox is not None
+    out, back = (_manager(registers, k) for k in MAILBOX)
+    if not (_is_mailbox(out, Direction.WRITE) and _is_mailbox(back, Direction.READ)):
+        raise MailboxError(
+            f"{device}: SyncManagers 0 and 1 are not configured as a mailbox",
+            hint="bring it to INIT with `catenary state`, then clone with --pre-op",
+        )
+    assert out is not None
+    assert back is not None
+    layout = _at(device.mailbox, out, back)
+    channel = MailboxChannel(station_of(device), layout)
+    channel.repeat_requested = bool(back.activation & Activation.REPEAT_REQUEST)
+    return channel
+
+
+def _manager(registers: Present, number: int) -> SyncManager | None:
+    data = registers.blocks.get(sync_manager(number).address)
+    try:
+        return None if data is None else decode_sync_manager(data)
+    except DecodeError:
+        return None
+
+
+def _is_mailbox(manager: SyncManager | None, direction: Direction) -> bool:
+    return (
+        manager is not None
+        and bool(manager.activation & Activation.ENABLE)
+        and manager.control.buffering is Buffering.MAILBOX
+        and manager.control.direction is direction
+    )
+
+
+def _at(layout: MailboxLayout, out: SyncManager, back: SyncManager) -> MailboxLayout:
+    return replace(
+        layout,
+        receive_offset=out.address,
+        receive_size=out.length,
+        send_offset=back.address,
+        send_size=back.length,
+    )
