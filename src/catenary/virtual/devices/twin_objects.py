@@ -49,6 +49,9 @@ def layout_of(objects: Iterable[ObjectFacts], pdos: Sequence[Pdo], *, moves: boo
         sizes[place] = max(sizes.get(place, 0), entry.bits)
     known = {(each.index, entry.subindex): entry.bits for each in objects for entry in each.entries}
     present = {place: bits for place, bits in (sizes | known).items() if 0 < bits <= SLOT_BITS_MAX}
+    records = {index for index, subindex in present if subindex}
+    for index in records:  # subindex 0 is the number of entries
+        present.pop((index, 0), None)
     offsets = axis_offsets(present) if moves else ()
     slots = {place: slot for place, slot in axis_slots(offsets).items() if place in present}
     first = _segment.SLOTS_PER_AXIS * len(offsets)
