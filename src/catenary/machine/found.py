@@ -78,6 +78,8 @@ def make_found(file: MachineFile, found: Sequence[Comparison]) -> MachineParts:
             option is not valid, or the ESI file of a device does not describe it.
     """
     subs = {each.name: each.found for each in found if each.verdict == "same" and each.found}
+    for name, sub in subs.items():
+        sub.give_name(name)
     for sub in subs.values():
         if sub.error is not None:
             raise sub.error

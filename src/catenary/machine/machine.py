@@ -46,7 +46,8 @@ class Machine:
 
     Args:
         path: the machine file.
-        target: "eth0", "virtual:line.toml" or a `Segment`; None for the `target` of the file.
+        target: "eth0", "virtual:line.toml", "virtual:line/" (a clone) or a `Segment`; None for the
+            `target` of the file.
         force: open the link even if another master is active on the interface.
 
     Raises:
@@ -101,7 +102,7 @@ class Machine:
 
     @property
     def segment(self) -> Segment:
-        """Virtual segment of the target.
+        """Virtual segment of the target. `segment["j2"]` is the device that the file names so.
 
         Raises:
             RuntimeError: The target is not a virtual segment.
@@ -210,7 +211,11 @@ class Machine:
             raise_differences(file, compare(file.tables.device, self._main.passive_scan()))
         found = compare(file.tables.device, self._main.scan(strict=False, esi=places))
         raise_differences(file, found)
-        return make_found(file, found)
+        parts = make_found(file, found)
+        if self._segment is not None:
+            stations = {name: sub.description.station_address for name, sub in parts.subs.items()}
+            self._segment.name_devices(stations)
+        return parts
 
     def __repr__(self) -> str:
         return f"<Machine {self._file.tables.name or self._file.path} on {self._main!r}>"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import heapq
+import threading
 from collections.abc import Callable
 from itertools import count
 from typing import Protocol
@@ -24,7 +25,8 @@ class Agenda:
         self._clock = clock
         self._heap: list[tuple[int, int, Callable[[], None]]] = []
         self._order = count()
-        self.attended = False  # True while a link is open: the service then runs the actions
+        self.deferred = False  # True while a thread runs the service in real time
+        self.lock = threading.RLock()  # held while the service runs
 
     @property
     def now(self) -> int:
@@ -42,13 +44,14 @@ class Agenda:
         self.at(self._clock.now + delay_ns, action)
 
     def soon(self, action: Callable[[], None]) -> None:
-        """Run an action as the next one of the service, which may run a device now.
+        """Run an action that changes a device. Any thread may call it.
 
-        Without a link, run it at once.
+        In real time, the thread of the service runs it. In virtual time, it runs at once.
         """
-        if self.attended:
+        if self.deferred:
             self.after(0, action)
-        else:
+            return
+        with self.lock:
             action()
 
     def run_due(self) -> None:

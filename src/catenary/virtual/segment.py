@@ -263,18 +263,18 @@ class Segment:
         if self.clock == "monotonic" and not self._links:
             self._service.start()
         self._links[second] = link
-        self._service.agenda.attended = True
+        self._service.agenda.deferred = self.clock == "monotonic"
         if second:
             self._wires.raise_end(1, True)
         return link
 
     def _link_closed(self, second: bool) -> None:
         del self._links[second]
-        self._service.agenda.attended = bool(self._links)
         if second:
             self._wires.raise_end(1, False)
         if self.clock == "monotonic" and not self._links:
             self._service.stop()
+            self._service.agenda.deferred = False
 
     # -- faults --------------------------------------------------------------------------------
 
@@ -372,8 +372,7 @@ class Segment:
     def switch_power(self, device: int, on: bool) -> None:
         """Switch a device on or off. Any thread may call it.
 
-        While a link is open, the service of the segment does it: at once in real time, and when the
-        time advances in virtual time.
+        In real time, while a link is open, the thread of the service does it.
 
         Args:
             device: Position of the device.

@@ -212,15 +212,11 @@ class Device:
         self.core.switch_power(self.position, False)
 
     def power_on(self) -> None:
-        """Switch the power on. Any thread may call it.
-
-        While a MainDevice is connected, the device switches at once in real time, and when the time
-        advances in virtual time.
-        """
+        """Switch the power on. Any thread may call it."""
         self._soon(self.switch_on)
 
     def power_off(self) -> None:
-        """Switch the power off, at the same time as `power_on`. The neighbours lose the link."""
+        """Switch the power off. Its neighbours lose the link. Any thread may call it."""
         self._soon(self.switch_off)
 
     def _soon(self, action: Callable[[], None]) -> None:
