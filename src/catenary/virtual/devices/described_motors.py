@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
+
+from msgspec.structs import replace
 
 from catenary.virtual.coe.object_facts import EntryFacts, Place
 from catenary.virtual.devices.motor import Motor

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+
+import msgspec
 
 from catenary.virtual import _segment
 from catenary.virtual.devices.servo_homing import homing_presets
@@ -13,8 +14,7 @@ POSITIVE = ("counts_per_turn", "inertia", "rated_torque", "max_torque_ratio", "m
 QUICK_DECELERATION = 1000  # rad/s²
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Motor:
+class Motor(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """Motor of an axis with its encoder and limits. ValueError if a value is out of range.
 
     Args:
