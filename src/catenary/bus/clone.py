@@ -16,14 +16,14 @@ from pathlib import Path
 from catenary.bus.clone_device import DeviceClone, Progress, Source, silent
 from catenary.bus.main_device import MainDevice
 from catenary.bus.ring import check_direction
-from catenary.errors import CloneError, ConfigurationError, SegmentError
+from catenary.errors import CatenaryError, CloneError, ConfigurationError, SegmentError
 from catenary.line.reader import kept_device
 from catenary.line.values import ClonedDevice, Line
 from catenary.line.writer import finish, prepare, write_device
 from catenary.link import RingLink
 from catenary.link.ring_state import Shape
 from catenary.model.topology import Topology, make_topology, open_ports
-from catenary.procedure.clone_access import unambiguous, write_address
+from catenary.procedure.clone_access import give_address, return_address, unambiguous
 from catenary.procedure.clone_registers import Present, read_present
 from catenary.procedure.stations import count
 
@@ -76,13 +76,14 @@ def clone_segment(
     present = main.converse(read_present(device_count))
     where = prepare(folder)
     topology = make_topology([open_ports(each.dl_status) for each in present], ring=ring)
-    with _addressed(main, present) as addresses:
+    notes = list(topology.contradictions)
+    with _addressed(main, present, notes) as addresses:
         devices = [
             _device(main, where, _source(each, address, topology), options, progress)
             for each, address in zip(present, addresses, strict=True)
         ]
         _require_unchanged(main, present)
-    line = Line(tuple(devices), options.serials, topology.contradictions)
+    line = Line(tuple(devices), options.serials, tuple(notes))
     finish(line, where)
     return line
 
@@ -107,19 +108,25 @@ def _source(present: Present, address: int | None, topology: Topology) -> Source
 
 
 @contextmanager
-def _addressed(main: MainDevice, devices: Sequence[Present]) -> Iterator[tuple[int | None, ...]]:
+def _addressed(
+    main: MainDevice, devices: Sequence[Present], notes: list[str]
+) -> Iterator[tuple[int | None, ...]]:
     """Yield an address per device, None for one that is not written to. Restore them at the end."""
     addresses = unambiguous(devices)
-    changed: list[Present] = []
+    changed: list[tuple[Present, int]] = []
     try:
         for device, address in zip(devices, addresses, strict=True):
             if address is not None and address != device.station_address:
-                main.converse(write_address(device.rank, address))
-                changed.append(device)
+                main.converse(give_address(device, address))
+                changed.append((device, address))
         yield addresses
     finally:
-        for device in changed:
-            main.converse(write_address(device.rank, device.station_address))
+        for device, address in changed:
+            try:
+                main.converse(return_address(device, address))
+            except CatenaryError as error:
+                text = f"device {device.rank} keeps the station address 0x{address:04X}"
+                notes.append(f"{text}: {error.message}")
 
 
 def _device(
@@ -164,10 +171,3 @@ def _require_unchanged(main: MainDevice, before: Sequence[Present]) -> None:
             f"{len(before)} devices were found, and {now} after the reading",
             hint="check the cables, then clone again: finished devices are kept",
         )
-
-
-def reasons(line: Line) -> Iterator[str]:
-    """Yield one text for each missing part of a clone, such as "device 1 (AX5101): sii: ..."."""
-    for device in line.devices:
-        for part, reason in device.missing.items():
-            yield f"device {device.position} ({device.name}): {part}: {reason}"

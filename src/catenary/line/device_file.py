@@ -210,10 +210,11 @@ def _assignment(table: Fields) -> ClonedAssignment:
 def _pdo(table: Fields) -> ClonedPdo:
     table.only(("index", "entries"))
     entries = []
-    for text in table.texts("entries"):
+    for number, text in enumerate(table.texts("entries")):
         found = _MAPPED.fullmatch(text)
         if found is None or int(found[3]) > 0xFFFF:
-            raise table.error("entries", f'"{text}" is not an entry; example: "0x6040:00 16"')
+            message = f'"{text}" is not an entry; example: "0x6040:00 16"'
+            raise table.error("entries", message, element=number)
         entries.append(MappedEntry(int(found[1], 16), int(found[2], 16), int(found[3])))
     return ClonedPdo(table.number("index", 0, 0xFFFF), tuple(entries))
 

@@ -84,15 +84,19 @@ class Fields:
             if key not in known:
                 raise self.error(key, f"unknown key {key!r}; known keys: {', '.join(known)}")
 
-    def error(self, key: str, message: str, *, hint: str = EDITED) -> CloneError:
+    def error(
+        self, key: str, message: str, *, element: int | None = None, hint: str = EDITED
+    ) -> CloneError:
         """Return the error for a key of this table.
 
         Args:
             key: The key.
             message: Text of the error.
+            element: Element of the list at the key; None for the key itself.
             hint: What to do next.
         """
-        return self._document.error((*self._path, key), message, hint)
+        place = (key,) if element is None else (key, element)
+        return self._document.error((*self._path, *place), message, hint)
 
     def number(self, key: str, lowest: int, highest: int) -> int:
         """Return an integer.

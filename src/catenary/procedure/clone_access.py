@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 
-from catenary.errors import DecodeError, MailboxError, StateError
+from catenary.errors import DecodeError, MailboxError, SegmentError, StateError
 from catenary.model.device import DeviceDescription, MailboxLayout
 from catenary.procedure.al_state import read_state, request_state
 from catenary.procedure.clone_registers import Present
@@ -72,23 +72,53 @@ def _free(first: int, taken: Collection[int]) -> int:
     return next(n for n in (*range(first, 0x10000), *range(1, first)) if n not in taken)
 
 
-def write_address(rank: int, address: int) -> Procedure[None]:
-    """Write a station address by position, if the device there is in INIT or PRE-OP.
+def give_address(device: Present, address: int) -> Procedure[None]:
+    """Write a station address by position, if the same device is there in INIT or PRE-OP.
 
     Args:
-        rank: Position of the device.
-        address: The station address.
+        device: Registers of the device.
+        address: The new station address.
 
     Raises:
         StateError: The device is in another state.
+        SegmentError: Another device is at its position.
     """
-    station = Station(rank, address)
-    [reply] = yield [read(EcatCommand.APRD, -rank, AL_STATUS)]
-    word = AL_STATUS.unpack(answered(reply, station, "AL status"))
+    station = Station(device.rank, address)
+    state, now = yield [
+        read(EcatCommand.APRD, -device.rank, AL_STATUS),
+        read(EcatCommand.APRD, -device.rank, STATION_ADDRESS),
+    ]
+    word = AL_STATUS.unpack(answered(state, station, "AL status"))
     if word & STATE_MASK not in WRITABLE:
         raise _left(station, word & STATE_MASK, 0)
-    [reply] = yield [write(EcatCommand.APWR, -rank, STATION_ADDRESS, address)]
+    found = STATION_ADDRESS.unpack(answered(now, station, "station address"))
+    if found != device.station_address:
+        raise SegmentError(
+            f"{station} has the station address 0x{found:04X}, and had "
+            f"0x{device.station_address:04X} before",
+            hint="a device was plugged in or unplugged: check the cables, then clone again",
+        )
+    [reply] = yield [write(EcatCommand.APWR, -device.rank, STATION_ADDRESS, address)]
     answered(reply, station, "station address")
+
+
+def return_address(device: Present, address: int) -> Procedure[None]:
+    """Write back the station address of a device that has another one.
+
+    Args:
+        device: Registers of the device before its address was changed.
+        address: Its present address, to which no other device answers.
+
+    Raises:
+        StateError: The device is neither in INIT nor in PRE-OP.
+    """
+    station = Station(device.rank, address)
+    yield from require_writable(station)
+    request = write(EcatCommand.FPWR, address, STATION_ADDRESS, device.station_address)
+    # Not repeated: after a lost answer, the device has its old address already.
+    [reply] = yield [request._replace(repeatable=False)]
+    if not reply.lost:
+        answered(reply, station, "station address")
 
 
 def require_writable(station: Station, *states: AlState) -> Procedure[None]:

@@ -42,6 +42,7 @@ OWN = (
     *(register.STATION_ADDRESS, register.STATION_ALIAS),
     *(register.AL_STATUS, register.AL_STATUS_CODE),
 )
+PDI_WATCHDOG = 0x02  # bit of DL status: the watchdog of the processor has not expired
 _STATUS = 5  # offset of a SyncManager's status, which depends on the last transfer
 REQUESTS_MAX = 512  # per step, so that a long segment does not need thousands of buffers
 
@@ -133,6 +134,8 @@ def _read_all(wanted: Sequence[Sequence[AnyRegister]]) -> Procedure[list[Blocks]
 
 def _present(rank: int, blocks: Blocks) -> Present:
     own = [int.from_bytes(blocks.pop(each.address, b"\0\0"), "little") for each in OWN]
+    links = blocks[register.DL_STATUS.address]
+    blocks[register.DL_STATUS.address] = bytes((links[0] & ~PDI_WATCHDOG, *links[1:]))
     for k in range(register.SYNC_MANAGER_COUNT):
         address = register.sync_manager(k).address
         if address in blocks:
