@@ -76,6 +76,8 @@ HINT = (
     "docs/how_to/faults.md those of faults"
 )
 
+AGAIN = "clone the segment again, without loose cables"
+
 
 @contextmanager
 def _named(where: str) -> Iterator[None]:
@@ -103,8 +105,10 @@ def _read_clone(path: str | Path, *, clock: ClockKind, ring: bool) -> Segment:
         raise ConfigurationError(
             f"{path}: a clone cannot be a ring", hint="serve it without the second interface"
         )
-    with _named(str(path)):
+    try:
         return Segment.from_clone(path, clock=clock)
+    except OUT_OF_RANGE as error:  # of the wiring
+        raise ConfigurationError(f"{path}: {error}", hint=AGAIN) from error
 
 
 def _read(path: str | Path) -> SegmentFile:

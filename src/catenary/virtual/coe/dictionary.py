@@ -78,6 +78,7 @@ class Object:
     data_type: int
     entries: dict[int, Entry] = field(default_factory=dict)
     maximum: int | None = None  # highest subindex in the description; None: that of the entries
+    described: bool = True  # False: requests for its descriptions are refused
 
     @property
     def highest(self) -> int:

@@ -46,6 +46,7 @@ def add_described(
         if facts.data_type is not None:
             dictionary.objects[index].data_type = facts.data_type
         dictionary.objects[index].maximum = facts.maximum
+        dictionary.objects[index].described = bool(facts.code) or not exact
     if exact and objects:
         for index in own - set(objects):
             del dictionary.objects[index]
