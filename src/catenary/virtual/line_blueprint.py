@@ -52,7 +52,7 @@ def cloned_blueprint(device: ClonedDevice, folder: str) -> Blueprint:
         description,
         image + bytes(len(image) % 2),
         _ports(device, information, sii),
-        tuple(object_facts(each) for each in device.objects if each.entries),
+        tuple(object_facts(each) for each in device.objects),
         exact=bool(device.objects),
         serves_coe=coe,
         information=_information(information),
@@ -130,8 +130,15 @@ def _described(
         lrw=information.supports_lrw,
         ram=min(max(description.ram, 1024 * information.ram_size), RAM_MAX),
         fmmu_count=min(max(information.fmmu_count, 1), FMMUS_MAX),
-        sync_manager_count=min(max(information.sync_manager_count, 1), SYNC_MANAGERS_MAX),
+        sync_manager_count=_sync_managers(information, description),
     )
+
+
+def _sync_managers(information: Information, description: Description) -> int:
+    """Return the number of SyncManagers: at least those of the SII, and those of the mailbox."""
+    named = len(description.sync_managers)
+    needed = max(information.sync_manager_count, named, 2 if description.mailbox else 1)
+    return min(needed, SYNC_MANAGERS_MAX)
 
 
 def _device_type(device: ClonedDevice, facts: FileFacts) -> int:

@@ -172,6 +172,11 @@ class Dictionary:
             raise Abort(NO_SUBINDEX)
         return self.objects[index].entries[subindex]
 
+    def known_entry(self, index: int, subindex: int) -> Entry | None:
+        """Return an entry; None if it does not exist."""
+        found = self.objects.get(index)
+        return None if found is None else found.entries.get(subindex)
+
     def _state_bit(self) -> int:
         return {2: 1, 4: 2, 8: 4}.get(self._state(), 0)
 
@@ -232,7 +237,8 @@ class Dictionary:
         if index not in self.objects:
             raise Abort(NO_OBJECT)
         entries = self.objects[index].entries
-        if self.objects[index].code == VARIABLE or any(e.bits % 8 for e in entries.values()):
+        is_record = self.objects[index].code != VARIABLE and 0 in entries
+        if not is_record or any(e.bits % 8 for e in entries.values()):
             raise Abort(NO_COMPLETE_ACCESS)
         count = data[:1] if first == 0 else b""
         at = 2 if first == 0 else 0

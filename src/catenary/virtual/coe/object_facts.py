@@ -29,7 +29,7 @@ class ObjectFacts:
     name: str
     entries: tuple[EntryFacts, ...]
     code: int = 0  # 7 variable, 8 array, 9 record; 0: derived from the entries
-    data_type: int | None = None  # of the object; None: derived from the entries
+    data_type: int = 0  # of the object
     maximum: int | None = None  # highest subindex that the object description gives; None: derived
 
 

@@ -403,7 +403,9 @@ class Application:
                 continue
             entries: list[tuple[int, int, int, bool]] = []
             for placed in self.pdos.placed(channel.assignment):
-                entry = self.dictionary.entry(placed.index, placed.subindex)
+                entry = self.dictionary.known_entry(placed.index, placed.subindex)
+                if entry is None:  # a clone may have PDOs with objects that it does not list
+                    continue
                 if entry.slot >= 0 and entry.mappable & (MAP_RX if channel.outputs else MAP_TX):
                     entries.append((placed.bit, placed.bits, entry.slot, entry.signed))
             n = channel.sync_manager if entries else -1

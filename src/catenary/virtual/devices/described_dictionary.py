@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 
-from catenary.virtual.coe.dictionary import RECORD, VARIABLE, Abort, Entry
+from catenary.virtual.coe.dictionary import RECORD, VARIABLE, Abort, Entry, Object
 from catenary.virtual.coe.object_facts import EntryFacts, ObjectFacts
 from catenary.virtual.devices.application import Application
 
@@ -41,15 +41,28 @@ def add_described(
             continue
         if index in live:
             entries = _dressed(facts, entries, dictionary.objects[index].entries)
-        code = facts.code or (VARIABLE if set(entries) == {0} else RECORD)
-        dictionary.add(index, facts.name, entries, code=code)
-        if facts.data_type is not None:
-            dictionary.objects[index].data_type = facts.data_type
-        dictionary.objects[index].maximum = facts.maximum
-        dictionary.objects[index].described = bool(facts.code) or not exact
+        if exact:
+            dictionary.objects[index] = _as_recorded(facts, entries)
+        else:
+            code = VARIABLE if set(entries) == {0} else RECORD
+            dictionary.add(index, facts.name, entries, code=code)
     if exact and objects:
         for index in own - set(objects):
             del dictionary.objects[index]
+
+
+def _as_recorded(facts: ObjectFacts, entries: dict[int, Entry]) -> Object:
+    """Return an object with the description of the file; code 0 means that there is none."""
+    code = facts.code or (VARIABLE if set(entries) == {0} else RECORD)
+    return Object(
+        facts.index,
+        facts.name,
+        code,
+        facts.data_type,
+        entries,
+        maximum=facts.maximum,
+        described=bool(facts.code),
+    )
 
 
 def _has_value(facts: ObjectFacts) -> bool:
