@@ -152,7 +152,7 @@ def _device(
 
 
 def _earlier(folder: Path, position: int) -> ClonedDevice | None:
-    """Return a finished device of an earlier clone; None if there is none that can be read."""
+    """Return a finished device of an earlier clone; None if it cannot be read."""
     try:
         return kept_device(folder, position)
     except CloneError:  # half written, or edited: read it again

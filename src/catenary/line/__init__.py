@@ -8,7 +8,6 @@
 
 from __future__ import annotations
 
-from catenary.errors import CloneError
 from catenary.line.reader import read_device, read_line
 from catenary.line.values import (
     ClonedAssignment,
@@ -22,7 +21,6 @@ from catenary.line.values import (
 from catenary.line.writer import write_line
 
 __all__ = [
-    "CloneError",
     "ClonedAssignment",
     "ClonedDevice",
     "ClonedEntry",

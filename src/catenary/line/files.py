@@ -26,7 +26,7 @@ AGAIN = "clone the segment again: catenary clone TARGET -o FOLDER"
 
 
 def read_bytes(path: Path) -> bytes:
-    """Read a file of a clone folder, whose name determines its largest size.
+    """Read a file of a clone folder. Its name determines the largest size.
 
     Raises:
         CloneError: The file is missing, too large, not a regular file, or a symbolic link.

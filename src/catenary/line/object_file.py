@@ -27,6 +27,7 @@ from catenary.line.values import ClonedEntry, ClonedObject
 
 HEADINGS = ("index", "subindex", "type", "bits", "access", "name", "value", "reason")
 FIELDS = len(HEADINGS)
+EMPTY = "empty"  # a value of 0 bytes
 
 
 def objects_text(objects: Sequence[ClonedObject]) -> str:
@@ -52,9 +53,13 @@ def _entry_line(of: ClonedEntry) -> str:
         (
             *(f"0x{of.index:04X}", f"0x{of.subindex:02X}", type_text(of.data_type)),
             *(str(of.bit_length), access_text(of.access), escaped(of.name)),
-            *("" if of.value is None else of.value.hex() or "empty", reason),
+            *(_value_text(of.value), reason),
         )
     )
+
+
+def _value_text(value: bytes | None) -> str:
+    return "" if value is None else value.hex() or EMPTY
 
 
 def parse_objects(text: str, file: str) -> tuple[ClonedObject, ...]:
@@ -135,7 +140,7 @@ def _entry(
             f"entry 0x{index:04X}:{subindex:02X} after subindex 0x{before[-1].subindex:02X}: "
             "not ascending"
         )
-    value = None if not fields[6] else b"" if fields[6] == "empty" else _bytes(fields[6])
+    value = None if not fields[6] else b"" if fields[6] == EMPTY else _bytes(fields[6])
     abort = abort_of(fields[7])
     return ClonedEntry(
         *(index, subindex, type_of(fields[2]), number_of("bits", fields[3], 0xFFFF)),

@@ -23,7 +23,7 @@ from catenary.wire.register import (
 from catenary.wire.sdo_information import Access
 from catenary.wire.sync_manager import SyncManager, decode_sync_manager
 
-SERIAL_WITHHELD = "withheld"  # reason of an entry whose value was left out by request
+SERIAL_WITHHELD = "withheld"  # reason for a value that was left out on request
 
 
 @dataclass(frozen=True, slots=True)
@@ -138,7 +138,7 @@ class ClonedDevice:
 
     @property
     def dl_status(self) -> int:
-        """DL status (0x0110), whose bits are the open ports; 0 if not read."""
+        """DL status (0x0110), which contains the open ports; 0 if not read."""
         return int.from_bytes(self.registers.get(DL_STATUS.address, b""), "little")
 
     @property

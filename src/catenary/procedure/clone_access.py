@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
+from itertools import chain
 
 from catenary.errors import DecodeError, MailboxError, SegmentError, StateError
 from catenary.model.device import DeviceDescription, MailboxLayout
@@ -69,7 +70,8 @@ def unambiguous(devices: Sequence[Present]) -> tuple[int | None, ...]:
 
 def _free(first: int, taken: Collection[int]) -> int:
     """Return the first address from `first` on that no device has; 0 is not an address."""
-    return next(n for n in (*range(first, 0x10000), *range(1, first)) if n not in taken)
+    free = (n for n in chain(range(first, 0x10000), range(1, first)) if n not in taken)
+    return next(free)
 
 
 def give_address(device: Present, address: int) -> Procedure[None]:

@@ -55,7 +55,7 @@ class Dictionary(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Question:
-    """What to read, and for how long."""
+    """Objects and values to read, and the time limit."""
 
     pdos: tuple[int, ...] = ()  # mappings to read if the device does not list its objects
     serials: bool = True  # False leaves serial numbers out

@@ -133,12 +133,14 @@ def _read_all(wanted: Sequence[Sequence[AnyRegister]]) -> Procedure[list[Blocks]
 
 
 def _present(rank: int, blocks: Blocks) -> Present:
-    own = [int.from_bytes(blocks.pop(each.address, b"\0\0"), "little") for each in OWN]
+    address, alias, al_status, code = (
+        int.from_bytes(blocks.pop(each.address, b"\0\0"), "little") for each in OWN
+    )
     links = blocks[register.DL_STATUS.address]
     blocks[register.DL_STATUS.address] = bytes((links[0] & ~PDI_WATCHDOG, *links[1:]))
     for k in range(register.SYNC_MANAGER_COUNT):
-        address = register.sync_manager(k).address
-        if address in blocks:
-            data = blocks[address]
-            blocks[address] = data[:_STATUS] + b"\0" + data[_STATUS + 1 :]
-    return Present(rank, *own, dict(sorted(blocks.items())))
+        place = register.sync_manager(k).address
+        if place in blocks:
+            data = blocks[place]
+            blocks[place] = data[:_STATUS] + b"\0" + data[_STATUS + 1 :]
+    return Present(rank, address, alias, al_status, code, dict(sorted(blocks.items())))

@@ -1,6 +1,6 @@
 """MainDevice by the name of a segment, such as "eth0" or "virtual:cell.toml"."""
 
-from catenary.target.clone import clone
+from catenary.target.clone_target import clone
 from catenary.target.main_device import MainDevice, source_of
 from catenary.target.parse import named_target, parse, segment_of
 from catenary.target.toml_file import TomlFile, is_machine_file, read_toml, target_of
