@@ -251,7 +251,7 @@ def edited(line: Path, folder: Path, change: Callable[[ClonedDevice], ClonedDevi
 
 
 def test_the_rights_of_the_clone_are_kept(line: Path, tmp_path: Path) -> None:
-    """An entry that can be written in PRE-OP only, and one whose upload the device refuses."""
+    """One entry is writable in PRE-OP only. The device refuses to upload another one."""
     rights = Access.READ_PRE_OP | Access.READ_SAFE_OP | Access.READ_OP | Access.WRITE_PRE_OP
 
     def change(device: ClonedDevice) -> ClonedDevice:

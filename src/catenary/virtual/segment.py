@@ -11,6 +11,7 @@ from catenary.virtual._segment import Core
 from catenary.virtual._segment_link import SegmentLink
 from catenary.virtual._wires import Wires
 from catenary.virtual.cloned_line import cloned_line
+from catenary.virtual.device_names import DeviceNames
 from catenary.virtual.devices.coupler import Coupler
 from catenary.virtual.devices.device import Device
 from catenary.virtual.devices.digital_outputs import DigitalOutputs
@@ -24,7 +25,6 @@ from catenary.virtual.wiring import Place, Wiring
 
 SECOND = 1e9
 LONGEST_PUSH = 10.0  # [s]
-STATION_ADDRESS = 0x0010
 ClockKind = Literal["virtual", "monotonic"]
 # Time from the loss of light until the loop is closed [s], with enhanced link detection of the
 # ET1100 (about 15 us: datasheet, section I, chapter 6) and with an ordinary PHY.
@@ -132,7 +132,7 @@ class Segment:
         )
         self._service.at_first_frame(self._faults.start)
         self._links: dict[bool, SegmentLink] = {}
-        self._given_names: dict[str, int] = {}  # positions by the names of a machine file
+        self._names = DeviceNames(self._core, self._devices)
         for fault in faults:
             self.inject(fault)
 
@@ -168,38 +168,21 @@ class Segment:
         return len(self._devices)
 
     def __getitem__(self, key: int | str) -> Device:
-        """Return the device at a position, or with a name. Names of a machine file come first."""
-        return self._devices[key if isinstance(key, int) else self.position_of(key)]
-
-    def position_of(self, name: str) -> int:
-        """Return the position of the device with a name.
+        """Return the device at a position, or with a name.
 
         Raises:
+            IndexError: There is no such position.
             KeyError: No device has the name, or several have it.
         """
-        if name in self._given_names:
-            return self._given_names[name]
-        names = [device.name for device in self._devices]
-        if names.count(name) == 1:
-            return names.index(name)
-        many = ", ".join(str(n) for n, each in enumerate(names) if each == name)
-        known = ", ".join(map(repr, dict.fromkeys([*self._given_names, *names])))
-        what = f"devices {many} are named {name!r}" if many else f"no device is named {name!r}"
-        raise KeyError(f"{what}; the names are {known}")
+        return self._devices[key if isinstance(key, int) else self._names.find(key)]
 
-    def name_devices(self, names: Mapping[str, int]) -> None:
+    def name_devices(self, stations: Mapping[str, int]) -> None:
         """Give devices the names of a machine file, for `segment["j2"]`.
 
         Args:
-            names: Station address of each device, as the last scan set it.
+            stations: Station address of each device, by its name, as the last scan set it.
         """
-        stations = {
-            int.from_bytes(self._core.peek(n, STATION_ADDRESS, 2), "little"): n
-            for n in range(len(self._devices))
-        }
-        self._given_names = {
-            name: stations[station] for name, station in names.items() if station in stations
-        }
+        self._names.give(stations)
 
     def __iter__(self) -> Iterator[Device]:
         return iter(self._devices)

@@ -44,7 +44,7 @@ class DescribedDevice(Twin):
             name: Name in messages; empty: that of the ESI. The SII has the name of the ESI.
             alias: Station alias.
             serial: Serial number.
-            options: What the ESI does not tell, and the modules in the slots.
+            options: Properties that the ESI does not give, and the modules in the slots.
 
         Raises:
             ValueError: A value is out of range.

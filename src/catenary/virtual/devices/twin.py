@@ -38,7 +38,7 @@ REFUSES_COE = MailboxQuirks(error_reply="unsupported")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TwinOptions:
-    """What a file does not tell about a device. The constructor raises ValueError.
+    """Properties of a twin that its file does not give.
 
     Args:
         motor: Motor of each CiA 402 axis, except for what the objects of the device tell; None: the
@@ -83,7 +83,7 @@ class Twin(MotorDevice):
         Args:
             blueprint: Facts of the device.
             name: Name in messages; empty: that of the SII or ESI.
-            options: What the file does not tell.
+            options: Properties that the file does not give.
 
         Raises:
             ValueError: A value is out of range.
