@@ -2,73 +2,34 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
 import catenary as cat
-from catenary.errors import CloneError, LinkError, NoDeviceError, SegmentError
-from catenary.line import Line, read_line
-from catenary.link import Recorder
-from catenary.virtual import MailboxQuirks, faults
+from catenary.errors import CloneError
+from catenary.line import read_line
+from catenary.link import Recorder, Ring
 from catenary.wire.al import AlState
-from catenary.wire.datagram import Datagram
-from catenary.wire.frame import decode_frame, is_alien
-from catenary.wire.pcapng import decode_pcapng
 from catenary.wire.register import PROCESS_RAM, STATION_ADDRESS
 from catenary.wire.sii import IDENTITY_WORD
-
-COUPLER, SERVO, OUTPUTS, WRIST = range(4)
+from tests.bus.cloned_segment import (
+    COUPLER,
+    OUTPUTS,
+    SERVO,
+    WRIST,
+    bring,
+    contents,
+    make_segment,
+    memory,
+    sent,
+    written,
+)
 
 
 @pytest.fixture
 def segment() -> cat.Segment:
-    return cat.Segment(
-        [
-            cat.virtual.Coupler(),
-            cat.virtual.Servo(alias=10, serial=5),
-            cat.virtual.DigitalOutputs(),
-            cat.virtual.Servo(name="wrist", serial=7),
-        ]
-    )
-
-
-def bring(segment: cat.Segment, **states: AlState) -> None:
-    """Bring devices to states, named by their constants. They stay in them."""
-    with cat.MainDevice(segment) as main:
-        for name, state in states.items():
-            found = main.request_states(main.passive_scan(), [globals()[name]], state)
-            for outcome in found.values():
-                assert not isinstance(outcome, Exception), outcome
-
-
-def contents(folder: Path) -> dict[str, bytes]:
-    return {
-        str(path.relative_to(folder)): path.read_bytes()
-        for path in sorted(folder.rglob("*"))
-        if path.is_file()
-    }
-
-
-def memory(segment: cat.Segment, position: int) -> dict[int, bytes]:
-    """Return the registers of a device that do not change by themselves, by 16 bytes."""
-    core = segment.core
-    found = {start: core.peek(position, start, 16) for start in range(0, 0x900, 16)}
-    del found[0x0500]  # data and status of the SII interface
-    found[0x0500] = core.peek(position, 0x0500, 1)
-    return found
-
-
-def sent(path: Path) -> Iterator[Datagram]:
-    """Yield the datagrams that a recorder saw."""
-    for packet in decode_pcapng(path.read_bytes()).packets:
-        if not is_alien(packet.data):
-            yield from decode_frame(packet.data).datagrams
-
-
-def written(path: Path) -> Iterator[Datagram]:
-    return (each for each in sent(path) if each.command.writes)
+    return make_segment()
 
 
 def test_a_clone_has_everything_of_a_device(segment: cat.Segment, tmp_path: Path) -> None:
@@ -101,6 +62,16 @@ def test_two_clones_of_an_unchanged_segment_are_identical(
         assert cat.clone(segment, tmp_path / name, pre_op=pre_op).complete
     assert len(contents(tmp_path / "a")) == 1 + 2 * 4 + 2
     assert contents(tmp_path / "a") == contents(tmp_path / "b")
+
+
+def test_a_ring_is_cloned_in_the_order_of_its_first_end(tmp_path: Path) -> None:
+    segment = cat.Segment([cat.virtual.Coupler(), cat.virtual.Servo()], ring=True)
+    line = cat.clone(Ring(segment.first, segment.second), tmp_path / "line", pre_op=True)
+    assert [(device.parent, device.parent_port) for device in line.devices] == [
+        (None, None),
+        (0, 1),
+    ]
+    assert (line.complete, line.notes) == (True, ())
 
 
 def test_what_is_raised_is_restored(segment: cat.Segment, tmp_path: Path) -> None:
@@ -214,106 +185,28 @@ def test_a_device_is_read_again_if_it_does_not_fit_or_on_request(
     assert edited.read_text() == text
 
 
-def clone_of(device: cat.virtual.Servo, folder: Path, **options: float) -> Line:
-    return cat.clone(cat.Segment([device]), folder, pre_op=True, **options)
-
-
-@pytest.mark.parametrize("kind", ["missing", "promised"])
-def test_a_list_without_an_end_is_a_reason_and_the_rest_is_kept(tmp_path: Path, kind: str) -> None:
-    quirks = MailboxQuirks(object_list=kind)
-    [device] = clone_of(cat.virtual.Servo(mailbox_quirks=quirks), tmp_path / "line").devices
-    assert "list of objects is truncated" in device.missing["objects"]
-    assert device.value(0x1000, 0) is not None
-
-
-def test_a_dictionary_that_takes_too_long_is_bounded(tmp_path: Path) -> None:
-    servo = cat.virtual.Servo(mailbox_delay=0.02)
-    [device] = clone_of(servo, tmp_path / "line", objects_timeout=2.0).devices
-    assert "reading ended after 2 s" in device.missing["objects"]
-    assert 0 < len(device.objects) < 70
-    assert read_line(tmp_path / "line").devices == (device,)
-
-
-def test_a_device_that_becomes_silent_in_the_middle(tmp_path: Path) -> None:
-    segment = cat.Segment([cat.virtual.Servo(mailbox_delay=0.001), cat.virtual.DigitalOutputs()])
-
-    def stop(text: str, done: int, total: int) -> None:
-        if "objects" in text and done == 5:
-            segment.inject(faults.mailbox_silent(0))
-
-    line = cat.clone(segment, tmp_path / "line", pre_op=True, progress=stop)
-    servo, outputs = line.devices
-    assert "3 failures in a row" in servo.missing["objects"]
-    assert len(servo.objects) >= 5
-    assert outputs.complete
-
-
-def test_single_objects_without_a_description_are_explained(tmp_path: Path) -> None:
-    quirks = MailboxQuirks(malformed_descriptions=(0x1018,))
-    [device] = clone_of(cat.virtual.Servo(mailbox_quirks=quirks), tmp_path / "line").devices
-    found = device.object(0x1018)
-    assert found.code == 0
-    assert "invalid SDO information answer" in found.reason
-    assert found.entry(2).value == b"\x01\0\x05\0"  # values are read without a description
-
-
-def test_a_mailbox_that_refuses_everything_is_a_reason(tmp_path: Path) -> None:
-    quirks = MailboxQuirks(error_reply="unsupported")
-    [device] = clone_of(cat.virtual.Servo(mailbox_quirks=quirks), tmp_path / "line").devices
-    assert "protocol is not supported" in device.missing["objects"]
-    assert (device.objects, device.complete) == ((), False)
-
-
-def test_a_refused_state_is_a_reason(segment: cat.Segment, tmp_path: Path) -> None:
-    segment.inject(faults.refuse_state(SERVO, AlState.PRE_OP, 0x0012))
-    line = cat.clone(segment, tmp_path / "line", pre_op=True)
-    assert "0x0012" in line.devices[SERVO].missing["objects"]
-    assert line.devices[WRIST].complete
-
-
-def test_a_state_that_changes_meanwhile_ends_the_writing(
-    segment: cat.Segment, tmp_path: Path
-) -> None:
-    bring(segment, SERVO=AlState.PRE_OP)
-    path = tmp_path / "run.pcapng"
-
-    def change(text: str, done: int, total: int) -> None:
-        if "objects" in text and done == 10:
-            segment.inject(faults.leave_state(SERVO, AlState.INIT, 0x001B))
-
-    with Recorder(segment, path) as link:
-        line = cat.clone(link, tmp_path / "line", progress=change)
-    assert "it is not written to" in line.devices[SERVO].missing["objects"]
-    assert len(line.devices[SERVO].objects) == 10
-
-
-def test_a_device_that_disappears_is_an_error_and_not_a_clone(
-    segment: cat.Segment, tmp_path: Path
-) -> None:
-    def unplug(text: str, done: int, total: int) -> None:
-        segment.inject(faults.unplug(WRIST))
-
-    with pytest.raises(SegmentError, match="4 devices were found, and 3 after"):
-        cat.clone(segment, tmp_path / "line", progress=unplug)
-    assert not (tmp_path / "line" / "line.toml").exists()
-
-
-def test_an_earlier_clone_survives_an_empty_segment(segment: cat.Segment, tmp_path: Path) -> None:
+def test_a_finished_device_is_not_replaced_by_less(segment: cat.Segment, tmp_path: Path) -> None:
     folder = tmp_path / "line"
-    cat.clone(segment, folder)
-    segment.unplug()
-    with pytest.raises(NoDeviceError):
-        cat.clone(segment, folder)
-    assert len(read_line(folder).devices) == 4
+    whole = cat.clone(segment, folder, pre_op=True)
+    before = contents(folder)
+    bring(segment, OUTPUTS=AlState.OP)  # and all devices have other addresses
+    line = cat.clone(segment, folder)
+    assert line.devices == whole.devices
+    [note] = line.notes
+    assert note.startswith("device 2 (Catenary virtual 4-channel output): kept from an earlier")
+    after = contents(folder)
+    del before["line.toml"], after["line.toml"]
+    assert after == before
+    assert not cat.clone(segment, folder, fresh=True).complete
 
 
-def test_options_are_checked(segment: cat.Segment, tmp_path: Path) -> None:
-    with pytest.raises(ValueError, match="objects_timeout"):
-        cat.clone(segment, tmp_path, objects_timeout=0)
-
-
-@pytest.mark.wire
-def test_the_lock_of_the_interface_is_respected(tmp_path: Path, veth: tuple[str, str]) -> None:
-    near, _ = veth
-    with cat.MainDevice(near), pytest.raises(LinkError, match="another EtherCAT master is live"):
-        cat.clone(near, tmp_path / "line")
+def test_serial_numbers_of_an_earlier_clone_are_not_kept(
+    segment: cat.Segment, tmp_path: Path
+) -> None:
+    folder = tmp_path / "line"
+    cat.clone(segment, folder, pre_op=True)
+    bring(segment, WRIST=AlState.SAFE_OP, SERVO=AlState.PRE_OP)
+    line = cat.clone(segment, folder, serials=False)
+    assert line.devices[WRIST].identity is None
+    assert line.devices[SERVO].identity.serial == 0
+    assert b"serial = 0x00000007" not in b"".join(contents(folder).values())

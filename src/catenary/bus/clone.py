@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from catenary.bus.clone_device import DeviceClone, Progress, Source, silent
@@ -70,16 +70,16 @@ def clone_segment(
             "the IgH kernel master does not give access to the registers of the devices",
             hint="stop it with `ethercatctl stop`, and clone the network interface: eth0",
         )
-    ring = _require_closed(main)
     main.runner.flush()
     device_count = main.converse(count()).devices
+    ring = _require_closed(main)  # the first answers show the shape of a ring
     present = main.converse(read_present(device_count))
     where = prepare(folder)
     topology = make_topology([open_ports(each.dl_status) for each in present], ring=ring)
     notes = list(topology.contradictions)
     with _addressed(main, present, notes) as addresses:
         devices = [
-            _device(main, where, _source(each, address, topology), options, progress)
+            _device(main, where, _source(each, address, topology), options, progress, notes)
             for each, address in zip(present, addresses, strict=True)
         ]
         _require_unchanged(main, present)
@@ -130,9 +130,17 @@ def _addressed(
 
 
 def _device(
-    main: MainDevice, folder: Path, source: Source, options: CloneOptions, progress: Progress
+    main: MainDevice,
+    folder: Path,
+    source: Source,
+    options: CloneOptions,
+    progress: Progress,
+    notes: list[str],
 ) -> ClonedDevice:
-    """Read and write one device, or keep its folder of an earlier clone."""
+    """Read and write one device, or keep its folder of an earlier clone.
+
+    A finished device is not replaced by the same device with missing parts.
+    """
     reading = DeviceClone(
         main,
         source,
@@ -141,14 +149,21 @@ def _device(
         objects_timeout=options.objects_timeout,
         progress=progress,
     )
-    identity = reading.identity()
-    if identity is not None and not options.fresh:
-        earlier = _earlier(folder, source.present.rank)
-        if earlier is not None and reading.fits(earlier, identity):
-            return earlier
+    earlier = None if options.fresh else _earlier(folder, source.present.rank)
+    identity = None if earlier is None else reading.identity()
+    if earlier is not None and identity is not None and reading.fits(earlier, identity):
+        return earlier
     device = reading.read()
+    if earlier is not None and reading.surpassed(device, earlier):
+        name = f"device {device.position} ({earlier.name})"
+        notes.append(f"{name}: kept from an earlier clone: {_why(device)}")
+        device = replace(earlier, parent=source.parent, parent_port=source.parent_port)
     write_device(device, folder)
     return device
+
+
+def _why(device: ClonedDevice) -> str:
+    return "; ".join(dict.fromkeys(device.missing.values()))
 
 
 def _earlier(folder: Path, position: int) -> ClonedDevice | None:

@@ -91,6 +91,7 @@ class DeviceClone:
         self._report = progress
         self._missing: dict[str, str] = {}
         self._notes: list[str] = []
+        self._names = [str(self._station)]  # of the device, in errors
 
     @property
     def _station(self) -> Station:
@@ -113,18 +114,33 @@ class DeviceClone:
             earlier: The device in the folder.
             identity: Identity of this device.
         """
-        place = (self._source.parent, self._source.parent_port)
-        present = (self._present.station_address, self._present.alias)
-        withheld = any(
-            entry.reason == SERIAL_WITHHELD for each in earlier.objects for entry in each.entries
-        )
+        place = (self._source.parent, self._source.parent_port, self._present.alias)
         return (
             earlier.complete
             and earlier.identity == identity
-            and (earlier.parent, earlier.parent_port) == place
-            and (earlier.station_address, earlier.alias) == present
-            and not (withheld and self._serials)
+            and (earlier.parent, earlier.parent_port, earlier.alias) == place
+            and self._has_wanted_serials(earlier)
         )
+
+    def surpassed(self, device: ClonedDevice, earlier: ClonedDevice) -> bool:
+        """Return True if an earlier clone of the device is complete, and this one is not.
+
+        If the identity cannot be read now, the controller and the alias are compared.
+
+        Args:
+            device: The device as it was read now.
+            earlier: The device in the folder.
+        """
+        if device.complete or not earlier.complete or not self._has_wanted_serials(earlier):
+            return False
+        if device.identity is not None:
+            return device.identity == earlier.identity
+        same = (earlier.information, earlier.alias) == (device.information, device.alias)
+        return same and (self._serials or not (earlier.identity and earlier.identity.serial))
+
+    def _has_wanted_serials(self, earlier: ClonedDevice) -> bool:
+        reasons = (entry.reason for each in earlier.objects for entry in each.entries)
+        return not self._serials or SERIAL_WITHHELD not in reasons
 
     def read(self) -> ClonedDevice:
         """Read the whole device. Parts that cannot be read are missing, with a reason."""
@@ -189,6 +205,7 @@ class DeviceClone:
             image=image,
         )
         self._notes += found.notes
+        self._names.insert(0, str(found))  # the longer one first
         return found
 
     def _image(self) -> bytes | None:
@@ -201,7 +218,7 @@ class DeviceClone:
             extent = self._main.converse(self._guarded(read_extent(self._station)))
             image = b"".join(self._parts(extent))
         except CatenaryError as error:
-            self._missing["sii"] = reason(error)
+            self._missing["sii"] = self._reason(error)
             self._missing["objects"] = "not read: its SII, which describes its mailbox, is missing"
             return None
         self._notes += [extent.note] if extent.note else []
@@ -222,6 +239,13 @@ class DeviceClone:
         bounded = within(SII_TIMEOUT, self._station, procedure, "its EEPROM was")
         return (yield from with_eeprom(self._station, bounded))
 
+    def _reason(self, error: CatenaryError) -> str:
+        """Return the message of an error on one line, without the device at its start."""
+        text = " ".join(error.message.split())
+        for name in self._names:
+            text = text.removeprefix(name).lstrip(": ")
+        return text
+
     def _not_written(self) -> str:
         state = self._present.state
         number = f"state {self._present.al_status & 0x0F}"
@@ -241,7 +265,7 @@ class DeviceClone:
             with self._mailbox(description) as channel:
                 found = self._main.converse(read_dictionary(channel, question, report))
         except CatenaryError as error:
-            self._missing["objects"] = reason(error)
+            self._missing["objects"] = self._reason(error)
             return device
         if found.missing:
             self._missing["objects"] = found.missing
@@ -268,9 +292,4 @@ class DeviceClone:
         try:
             self._main.converse(lower(before))
         except CatenaryError as error:
-            self._missing["state"] = f"not brought back to INIT: {reason(error)}"
-
-
-def reason(error: CatenaryError) -> str:
-    """Return the reason for a missing part on one line."""
-    return " ".join(error.message.split())
+            self._missing["state"] = f"not brought back to INIT: {self._reason(error)}"

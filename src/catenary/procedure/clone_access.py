@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 from itertools import chain
 
 from catenary.errors import DecodeError, MailboxError, SegmentError, StateError
+from catenary.model.describe import MAILBOX_MIN
 from catenary.model.device import DeviceDescription, MailboxLayout
 from catenary.procedure.al_state import read_state, request_state
 from catenary.procedure.clone_registers import Present
@@ -21,6 +22,7 @@ from catenary.procedure.station import Station, answered, station_of
 from catenary.procedure.stations import STATION_BASE
 from catenary.wire.al import STATE_MASK, AlState
 from catenary.wire.datagram import EcatCommand
+from catenary.wire.frame import MAXIMUM_DATA
 from catenary.wire.register import (
     AL_STATUS,
     SII_CONFIGURATION,
@@ -216,17 +218,24 @@ def join_mailbox(device: DeviceDescription, registers: Present) -> MailboxChanne
         registers: Its registers.
 
     Raises:
-        MailboxError: The SyncManagers of the mailbox are not configured.
+        MailboxError: The SyncManagers of the mailbox are not configured, or not possible.
     """
     assert device.mailbox is not None
     out, back = (_manager(registers, k) for k in MAILBOX)
     if not (_is_mailbox(out, Direction.WRITE) and _is_mailbox(back, Direction.READ)):
         raise MailboxError(
-            f"{device}: SyncManagers 0 and 1 are not configured as a mailbox",
+            f"{device}: its SyncManagers 0 and 1 are not configured as a mailbox",
             hint="bring it to INIT with `catenary state`, then clone with --pre-op",
         )
     assert out is not None
     assert back is not None
+    for length in (out.length, back.length):
+        if not MAILBOX_MIN <= length <= MAXIMUM_DATA:
+            raise MailboxError(
+                f"{device}: its mailbox is configured with {length} bytes, "
+                f"which is not possible ({MAILBOX_MIN} to {MAXIMUM_DATA})",
+                hint="bring it to INIT with `catenary state`, then clone with --pre-op",
+            )
     layout = _at(device.mailbox, out, back)
     channel = MailboxChannel(station_of(device), layout)
     channel.repeat_requested = bool(back.activation & Activation.REPEAT_REQUEST)
