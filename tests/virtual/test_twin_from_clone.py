@@ -331,3 +331,47 @@ def test_a_damaged_file_is_named(line: Path, tmp_path: Path) -> None:
     (tmp_path / "line" / "line.toml").write_text("format = 2\n")
     with pytest.raises(CloneError, match=r"line\.toml"):
         read_segment(tmp_path / "line")
+
+
+@pytest.mark.parametrize(("option", "shown"), [(6, b"\6\0"), ("absent", None), (2, b"\x05\0")])
+def test_a_quirk_has_priority_over_an_option_code_of_the_clone(
+    line: Path, tmp_path: Path, option: int | str, shown: bytes | None
+) -> None:
+    def change(device: ClonedDevice) -> ClonedDevice:
+        return with_entry(device, 0x605A, 0, value=b"\x05\0")
+
+    edited(line, tmp_path / "line", change)
+    quirks = ServoQuirks(quick_stop_option=option)  # type: ignore[arg-type]
+    segment = Segment.from_clone(tmp_path / "line", options={"elbow": TwinOptions(quirks=quirks)})
+    with cat.MainDevice(segment) as main:
+        sub = main.scan()[1]
+        if shown is not None:
+            assert sub.sdo.read(0x605A) == shown
+            return
+        with pytest.raises(SdoAbort) as caught:
+            sub.sdo.read(0x605A)
+        assert caught.value.code == 0x0602_0000
+
+
+def test_a_quirk_of_the_sii_contradicts_a_file() -> None:
+    with pytest.raises(ValueError, match="quirk watchdog_trigger: a twin has what its file gives"):
+        TwinOptions(quirks=ServoQuirks(watchdog_trigger=False))
+
+
+def test_an_object_that_no_pdo_carries_can_be_mapped(tmp_path: Path) -> None:
+    """0x2102 is mappable in the edited clone. A program maps it, and writes it cyclically."""
+    rights = Access(0x3F) | Access.RXPDO_MAPPABLE
+    source = Segment([Coupler(), Servo(serial=1)])
+    cat.clone(source, tmp_path / "first", pre_op=True)
+    edited(
+        tmp_path / "first",
+        tmp_path / "line",
+        lambda device: with_entry(device, 0x2102, 0, access=rights),
+    )
+    segment = Segment.from_clone(tmp_path / "line")
+    with cat.MainDevice(segment) as main:
+        data = cat.ProcessData(main.scan()[1], outputs={"word": (0x2102, 0, cat.types.UINT)})
+        with cat.Loop(data, period=2e-3) as loop:
+            data["word"] = 0x1234
+            loop.run_for(0.02)
+            assert twin_of(segment, 1).read_object(0x2102) == b"\x34\x12"

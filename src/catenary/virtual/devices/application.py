@@ -414,6 +414,10 @@ class Application:
             if entries:
                 mapped.add(channel.outputs)
 
+    def put_slot(self, slot: int, value: int) -> None:
+        """Set a slot of the model."""
+        self._core.put_slot(self._position, slot, value)
+
     def slot_entry(
         self,
         name: str,

@@ -1,14 +1,17 @@
-"""Motors of the axes of a described device, from the values of its objects."""
+"""Motors and option codes of the axes of a described device, from the values of its objects."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 from msgspec.structs import replace
 
 from catenary.virtual.coe.object_facts import EntryFacts, Place
+from catenary.virtual.devices.application import Application
 from catenary.virtual.devices.motor import Motor
+from catenary.virtual.devices.servo_quirks import NO_QUIRKS, ServoQuirks
 
+ABORT_CONNECTION_OPTION, QUICK_STOP_OPTION = 0x6007, 0x605A
 POSITION_ACTUAL, RATED_TORQUE = 0x6064, 0x6076
 ENCODER_RESOLUTION, VELOCITY_RESOLUTION = 0x608F, 0x6090
 COUNTS_MAX = 1 << 31
@@ -42,6 +45,32 @@ def motor_of(facts: Mapping[Place, EntryFacts], offset: int, motor: Motor) -> Mo
         viscous_friction=motor.viscous_friction * scale,
         coulomb_friction=motor.coulomb_friction * scale,
     )
+
+
+def apply_option_quirks(
+    application: Application, offsets: Sequence[int], quirks: ServoQuirks
+) -> None:
+    """Set the option codes that a quirk determines, instead of those of the file.
+
+    Args:
+        application: Application of the device, with its dictionary.
+        offsets: Offset of the objects of each axis.
+        quirks: Differences of the axes from the profile.
+    """
+    for offset in offsets:
+        place = QUICK_STOP_OPTION + offset
+        if quirks.quick_stop_option == "absent":
+            application.dictionary.objects.pop(place, None)
+        elif quirks.quick_stop_option != NO_QUIRKS.quick_stop_option:
+            _set(application, place, quirks.quick_stop_option)
+        if quirks.abort_connection_option != NO_QUIRKS.abort_connection_option:
+            _set(application, ABORT_CONNECTION_OPTION + offset, quirks.abort_connection_option)
+
+
+def _set(application: Application, index: int, value: int) -> None:
+    entry = application.dictionary.known_entry(index, 0)
+    if entry is not None and entry.slot >= 0:
+        application.put_slot(entry.slot, value)
 
 
 def start_position(facts: Mapping[Place, EntryFacts], offset: int) -> int:

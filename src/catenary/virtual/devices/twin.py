@@ -19,7 +19,11 @@ from catenary.virtual.description import Description
 from catenary.virtual.devices.application import Application
 from catenary.virtual.devices.applied import MailboxOptions
 from catenary.virtual.devices.described_dictionary import add_described
-from catenary.virtual.devices.described_motors import motor_of, start_position
+from catenary.virtual.devices.described_motors import (
+    apply_option_quirks,
+    motor_of,
+    start_position,
+)
 from catenary.virtual.devices.motor import Motor
 from catenary.virtual.devices.motor_device import STEP_NS, MotorDevice
 from catenary.virtual.devices.servo_quirks import NO_QUIRKS, ServoQuirks
@@ -33,12 +37,13 @@ UPDATE_NS = 1_000_000  # interval between updates of the inputs of a device with
 MINIMUM_CYCLE_NS = 10_000  # shortest cycle of SYNC pulses
 MISSED_LIMIT = 3  # pulses without new outputs that are an error
 STANDARD_MOTOR = Motor()
+OF_THE_FILE = ("op_modes", "sync_signal", "watchdog_trigger")  # quirks that the SII determines
 REFUSES_COE = MailboxQuirks(error_reply="unsupported")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TwinOptions:
-    """Properties of a twin that its file does not give.
+    """Properties of a twin that its file does not give. ValueError if one contradicts the file.
 
     Args:
         motor: Motor of each CiA 402 axis, except for what the objects of the device tell; None: the
@@ -47,7 +52,7 @@ class TwinOptions:
         mailbox_delay: Time until a request is answered [s].
         crystal: Frequency error and jitter of the clock.
         clock_bits: Width of the clock, 32 or 64.
-        quirks: Differences of the axes from the profile.
+        quirks: Differences of the axes from the profile. They have priority over the objects.
         mapping_quirks: Quirks of the PDOs, instead of what the file permits; None: as the file
             permits.
         mailbox_quirks: Quirks of the mailbox.
@@ -61,6 +66,11 @@ class TwinOptions:
     quirks: ServoQuirks = NO_QUIRKS
     mapping_quirks: MappingQuirks | None = None
     mailbox_quirks: MailboxQuirks = NO_MAILBOX_QUIRKS
+
+    def __post_init__(self) -> None:
+        for name in OF_THE_FILE:
+            if getattr(self.quirks, name) != getattr(NO_QUIRKS, name):
+                raise ValueError(f"quirk {name}: a twin has what its file gives; leave it out")
 
 
 NO_OPTIONS = TwinOptions()
@@ -132,6 +142,7 @@ class Twin(MotorDevice):
             slots=self._layout.count,
             axes=self.axes,
             mapping_quirks=self.mapping_quirks,
+            loop_control=self.quirks.closes_ports,
         )
 
     def started(self, scheduler: Scheduler) -> None:
@@ -175,6 +186,8 @@ class Twin(MotorDevice):
         add_described(application, objects.make(), exact=exact)
         for slot, value in objects.values.items():
             self.core.put_slot(self.position, slot, value)
+        apply_option_quirks(application, self.offsets, self.quirks)
+        application.checks_watchdog = self.quirks.checks_watchdog
         if description.clock and not description.emulation:
             application.synchronisation = self._synchronisation(application)
 

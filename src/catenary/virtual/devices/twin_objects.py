@@ -23,20 +23,21 @@ from catenary.virtual.description import MappedEntry, Pdo
 from catenary.virtual.devices.axis_places import WRITTEN, axis_offsets, axis_slots, has_sign
 
 SLOT_BITS_MAX = 64
+SLOTS_MAX = 0xFFFF  # of a device
 TEXTS = (types.VISIBLE_STRING.index, types.OCTET_STRING.index, types.UNICODE_STRING.index)
 BY_SIZE = {1: 0x01, 8: 0x05, 16: 0x06, 32: 0x07, 64: 0x1B}  # types of objects without a type
 
 
 @dataclass(frozen=True, slots=True)
 class Layout:
-    """Slots of the model: first those of the axes, then the other objects in PDOs."""
+    """Slots of the model: first those of the axes, then the other objects that PDOs can carry."""
 
     slots: Mapping[Place, int]
     offsets: tuple[int, ...]  # of the objects of each axis
     count: int
 
 
-def layout_of(objects: Iterable[ObjectFacts], pdos: Sequence[Pdo], *, moves: bool) -> Layout:
+def layout_of(objects: Sequence[ObjectFacts], pdos: Sequence[Pdo], *, moves: bool) -> Layout:
     """Return the slots of a device.
 
     Args:
@@ -55,9 +56,13 @@ def layout_of(objects: Iterable[ObjectFacts], pdos: Sequence[Pdo], *, moves: boo
     offsets = axis_offsets(present) if moves else ()
     slots = {place: slot for place, slot in axis_slots(offsets).items() if place in present}
     first = _segment.SLOTS_PER_AXIS * len(offsets)
+    carried = dict.fromkeys([*sizes, *_mappable(objects)])
     others = [
-        place for place, bits in sizes.items() if 0 < bits <= SLOT_BITS_MAX and place not in slots
+        place
+        for place in carried
+        if 0 < sizes.get(place, known.get(place, 0)) <= SLOT_BITS_MAX and place not in slots
     ]
+    others = others[: SLOTS_MAX - first]
     slots |= {place: slot for slot, place in enumerate(others, start=first)}
     return Layout(slots, offsets, first + len(others))
 
@@ -169,6 +174,14 @@ class TwinObjects:
         size = (entry.bits + 7) // 8
         value = entry.value or b""
         return value if self._exact and value else value[:size].ljust(size, b"\0")
+
+
+def _mappable(objects: Iterable[ObjectFacts]) -> Iterator[Place]:
+    """Yield the objects that a MainDevice can map to a PDO."""
+    for each in objects:
+        for entry in each.entries:
+            if entry.access & (MAP_RX | MAP_TX) and entry.data_type not in TEXTS:
+                yield each.index, entry.subindex
 
 
 def _mapped(pdos: Iterable[Pdo]) -> Iterator[tuple[Place, MappedEntry]]:
