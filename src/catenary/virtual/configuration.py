@@ -115,7 +115,9 @@ def _read(path: str | Path) -> SegmentFile:
     try:
         content = Path(path).read_bytes()
     except OSError as error:
-        raise ConfigurationError(f"{path}: {error.strerror}") from error
+        clone = str(path).endswith("/")
+        hint = f"make a clone: catenary clone TARGET -o {path}" if clone else ""
+        raise ConfigurationError(f"{path}: {error.strerror}", hint=hint) from error
     try:
         hook = partial(_device_in_fault, Path(path).parent)
         file = msgspec.toml.decode(content, type=SegmentFile, dec_hook=hook)
