@@ -123,12 +123,7 @@ class Segment:
         self.plant = None if part is None else part.plant
         self._service = Service(self._core, self._devices, part)
         self._faults = FaultPlayer(
-            self._core,
-            self._wires,
-            self._devices,
-            wiring,
-            self._service.agenda,
-            part,
+            self._core, self._wires, self._devices, wiring, self._service.agenda, part
         )
         self._service.at_first_frame(self._faults.start)
         self._links: dict[bool, SegmentLink] = {}

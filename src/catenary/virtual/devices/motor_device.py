@@ -12,12 +12,10 @@ from typing import NamedTuple
 
 from catenary.virtual import _segment
 from catenary.virtual._motors import Motors
-from catenary.virtual.crystal import ClockBits, Crystal
-from catenary.virtual.devices.applied import AppliedDevice, MailboxOptions
+from catenary.virtual.devices.applied import AppliedDevice
 from catenary.virtual.devices.motor import Motor
 from catenary.virtual.devices.servo_quirks import NO_QUIRKS, ServoQuirks
 from catenary.virtual.scheduler import Scheduler
-from catenary.virtual.sii_quirks import SiiQuirks
 
 STEP_NS = 250_000  # internal cycle
 BOOT_SECONDS = 0.02
@@ -55,30 +53,19 @@ RECEIVED_SLOTS = (
 class MotorDevice(AppliedDevice):
     """A virtual device with 0 to 8 CiA 402 axes and their motors."""
 
-    def __init__(
-        self,
-        *,
-        name: str,
-        alias: int,
-        serial: int,
-        lrw: bool,
-        crystal: Crystal,
-        clock_bits: ClockBits,
-        sii_quirks: SiiQuirks,
-        mailbox: MailboxOptions,
-        motors: Sequence[Motor],
-        quirks: ServoQuirks = NO_QUIRKS,
-    ) -> None:
-        super().__init__(
-            name=name,
-            alias=alias,
-            serial=serial,
-            lrw=lrw,
-            crystal=crystal,
-            clock_bits=clock_bits,
-            sii_quirks=sii_quirks,
-            mailbox=mailbox,
-        )
+    motors: tuple[Motor, ...] = ()
+    quirks: ServoQuirks = NO_QUIRKS
+
+    def install_motors(self, motors: Sequence[Motor], quirks: ServoQuirks = NO_QUIRKS) -> None:
+        """Set the motors of the axes, before the device is added to a segment.
+
+        Args:
+            motors: Motor of each axis, at most 8.
+            quirks: Differences of the axes from the profile.
+
+        Raises:
+            ValueError: There are too many axes.
+        """
         if len(motors) > _segment.AXES_MAX:
             raise ValueError(f"axes must be 1 to {_segment.AXES_MAX}, not {len(motors)}")
         self.motors = tuple(motors)

@@ -158,9 +158,8 @@ class Servo(MotorDevice):
             clock_bits=clock_bits,
             sii_quirks=sii_quirks,
             mailbox=MailboxOptions(mailbox_bytes, mailbox_delay, mailbox_quirks),
-            motors=[motor] * axes,
-            quirks=quirks,
         )
+        self.install_motors([motor] * axes, quirks)
         self.counts_per_turn = counts_per_turn
         self.velocity_counts_per_turn = motor.velocity_counts
         self.inertia = inertia

@@ -119,9 +119,8 @@ class Twin(MotorDevice):
                 delay=options.mailbox_delay,
                 quirks=options.mailbox_quirks if blueprint.serves_coe else REFUSES_COE,
             ),
-            motors=motors,
-            quirks=options.quirks,
         )
+        self.install_motors(motors, options.quirks)
         self.mapping_quirks = options.mapping_quirks or found.mapping_quirks
         self.ports = blueprint.ports
         self._is_new = True
