@@ -16,6 +16,7 @@ from dataclasses import asdict, dataclass
 from functools import partial
 from importlib.util import find_spec
 from shutil import which
+from subprocess import TimeoutExpired
 
 import msgspec
 import numpy as np
@@ -35,6 +36,7 @@ from catenary.bench.loop import show_progress
 from catenary.bench.rounds import BRING_UP_SECONDS, RoundError, run_with_retries
 from catenary.bench.segment import PRIORITY, Served, processors, served
 from catenary.bench.statistics import summarise
+from catenary.errors import CatenaryError
 from catenary.realtime.child import start_program, start_python
 
 IDLE, LOADED = "idle", "loaded"
@@ -113,7 +115,12 @@ def run_experiments() -> tuple[dict[str, object], str]:
     from benchmarks import gripper_experiments
 
     reason = gripper_experiments.why_not()
-    return ({}, reason) if reason else (asdict(gripper_experiments.run()), "")
+    if reason:
+        return {}, reason
+    try:
+        return asdict(gripper_experiments.run()), ""
+    except (CatenaryError, TimeoutExpired) as error:  # the rows of the loop remain
+        return {}, str(error)
 
 
 def run_all(rate: int, cycles: int, failed: list[str]) -> list[Row]:

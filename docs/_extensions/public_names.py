@@ -8,7 +8,8 @@ from typing import TypeVar
 
 EVENTS = "catenary.bus.event_types"  # `catenary.events`
 MODULES = (
-    *("control", "drive", "esi", "line", "realtime", "record", "remote", "sensors", "share"),
+    *("capture", "control", "drive", "esi", "line", "realtime", "record", "remote", "sensors"),
+    "share",
     "teleoperation",
     "virtual",
 )
@@ -21,12 +22,14 @@ RETURNED = {
     "catenary.bus.diagnosis": ("Diagnosis",),
     "catenary.bus.event_queue": ("Events",),
     "catenary.drive.values": ("AxisValues",),
+    "catenary.esi.eni": ("Variable",),
     "catenary.link.interfaces": ("NetworkInterface",),
     "catenary.log": ("Log",),
     "catenary.loop": ("Law", "LawRun", "Network", "Stream"),
     "catenary.loop.timing": ("Timing",),
     "catenary.loop.watches.external_clock": ("ExternalClockWatch",),
     "catenary.loop.watches.trigger": ("TriggerWatch",),
+    "catenary.machine.variables": ("Variables",),
     "catenary.model.device": ("Identity",),
     "catenary.model.finding": ("Finding",),
     "catenary.plan.stop_reason": ("StopReason",),

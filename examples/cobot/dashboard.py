@@ -118,7 +118,11 @@ def page(name, port):
         yield server
     finally:
         server.terminate()
-        server.wait()
+        try:
+            server.wait(5.0)
+        except subprocess.TimeoutExpired:
+            server.kill()
+            server.wait()
 
 
 def run(name, seconds, server):

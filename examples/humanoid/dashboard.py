@@ -11,6 +11,7 @@ After a fall, the joints brake, the drives stop, and the program ends.
 
 from __future__ import annotations
 
+import socket
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -21,12 +22,19 @@ from program import run
 from run import Outcome, Setup
 from scenarios import Scenario
 
+from catenary.errors import ConfigurationError
+
+CLOSING = 10.0  # [s] for the server to end, at most
 PERIOD, SILENCE = 1e-3, 0.5  # [s]: for any machine, also without a real-time kernel
 
 
 @contextmanager
 def page(setup: Setup, port: int) -> Iterator[subprocess.Popen[bytes]]:
-    """Serve the page during the block, and yield its process. It prints the links."""
+    """Serve the page during the block, and yield its process. It prints the links.
+
+    Raises ConfigurationError if another program uses the port.
+    """
+    check_port(port)
     upper, lower = setup.shares
     command = [sys.executable, "-m", "catenary.cli", "dashboard", upper, "--also", lower]
     command += ["--base", setup.base, "--model", str(setup.model), "--port", str(port)]
@@ -35,7 +43,21 @@ def page(setup: Setup, port: int) -> Iterator[subprocess.Popen[bytes]]:
         yield server
     finally:
         server.terminate()
-        server.wait()
+        try:
+            server.wait(CLOSING)
+        except subprocess.TimeoutExpired:
+            server.kill()
+            server.wait()
+
+
+def check_port(port: int) -> None:
+    try:
+        socket.create_server(("127.0.0.1", port)).close()
+    except OSError as error:
+        raise ConfigurationError(
+            f"port {port} of the page: {error.strerror}",
+            hint="end the program that uses it, or choose another one: --port 8711",
+        ) from error
 
 
 def operate(
@@ -49,7 +71,7 @@ def operate(
         name: prefix of its shares.
         seconds: duration after the bring-up [s].
         port: port of the page; None: no page.
-        ros2: True to let the right hand follow poses of ROS 2.
+        ros2: True to let the hands follow poses of ROS 2.
     """
     scenario = Scenario("operate", "the robot balances, and an operator commands it", seconds)
     setup = Setup(scenario, folder, model, name, False, PERIOD, SILENCE, ros2)

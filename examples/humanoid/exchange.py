@@ -12,7 +12,7 @@ import numpy as np
 
 from catenary import realtime
 
-JOINTS, UPPER_JOINTS, FEET = 33, 18, 2
+JOINTS, UPPER_JOINTS, FEET, HANDS = 33, 18, 2, 2
 
 
 class Mode(IntEnum):
@@ -44,7 +44,8 @@ class Cause(IntEnum):
     SILENT_LOOP = 4
     LOST_DRIVE = 5  # a drive does not answer, or is in fault
     LOST_IMU = 6
-    SILENT_SAFETY = 7  # found by the loop
+    SILENT_SAFETY = 7  # found by the loop, as the next one
+    NOT_READY = 8  # the drives were not enabled in time, or a task sent no values
 
     @property
     def text(self) -> str:
@@ -108,8 +109,8 @@ ARMS = np.dtype(
 
 HAND = np.dtype(
     [
-        ("active", "i8"),  # 1: the right hand follows poses of an operator
-        ("torque", "f8", 8),  # [N·m] of the joints of its arm
+        ("active", "i8", HANDS),  # 1: the hand follows poses of an operator; left, right
+        ("torque", "f8", (HANDS, 8)),  # [N·m] of the joints of its arm
     ]
 )
 

@@ -1,4 +1,4 @@
-"""The right hand follows poses of an operator, with Cartesian impedance: τ = Jᵀ (K Δx + B Δẋ).
+"""A hand follows poses of an operator, with Cartesian impedance: τ = Jᵀ (K Δx + B Δẋ).
 
 Poses are relative to the pelvis. The goal moves to a new pose with limited speed, so that a distant
 pose does not jerk the arm. A pose that is not finite, in another frame or too far from the shoulder
@@ -19,12 +19,14 @@ from catenary.control.cartesian import cartesian_impedance
 
 Row = npt.NDArray[np.float64]
 
-JOINTS = tuple(joint.name for joint in body.UPPER if joint.name.startswith("right_"))
-ROWS = slice(body.INDEX[JOINTS[0]], body.INDEX[JOINTS[-1]] + 1)
+JOINTS = 8  # of an arm
+ROWS = tuple(
+    slice(first, first + JOINTS) for first in (body.INDEX[f"{s}_clavicle"] for s in body.SIDES)
+)  # of the left and the right arm
 FRAME = "pelvis"
 SPEED, TURN = 0.3, 1.0  # [m/s], [rad/s] of the goal
 REACH = 0.75  # [m] from the shoulder
-SHOULDER = np.array([0.0, -0.18, 0.53])  # [m] in the frame
+SHOULDERS = np.array([[0.0, 0.18, 0.53], [0.0, -0.18, 0.53]])  # [m] in the frame
 STIFFNESS = (400.0, 400.0, 400.0, 20.0, 20.0, 20.0)  # [N/m], [N·m/rad]
 DAMPING = (40.0, 40.0, 40.0, 2.0, 2.0, 2.0)  # [N·s/m], [N·m·s/rad]
 IMPEDANCE = control.CartesianImpedance(
@@ -32,36 +34,45 @@ IMPEDANCE = control.CartesianImpedance(
 )
 
 
-def refusal(frame: str, pose: Row) -> str | None:
-    """Return the reason why a pose (7,) is refused; None if the hand may follow it."""
+def refusal(side: int, frame: str, pose: Row) -> str | None:
+    """Return the reason why a pose (7,) is refused; None if the hand may follow it.
+
+    Args:
+        side: 0 for the left hand, 1 for the right hand.
+        frame: frame of the pose.
+        pose: x, y, z [m], quaternion w, x, y, z.
+    """
     if frame != FRAME:
         return f"the pose is in the frame {frame!r}; use {FRAME!r}"
     if not np.isfinite(pose).all():
         return "the pose is not finite"
     if not math.isclose(float(np.linalg.norm(pose[3:])), 1.0, abs_tol=0.01):
         return "the orientation is not a unit quaternion"
-    distance = float(np.linalg.norm(pose[:3] - SHOULDER))
+    distance = float(np.linalg.norm(pose[:3] - SHOULDERS[side]))
     if distance > REACH:
         return f"the pose is {distance:.2f} m from the shoulder; at most {REACH} m are possible"
     return None
 
 
 class Hand:
-    """Owner of the goal of the right hand.
+    """Owner of the goal of a hand.
 
     Args:
+        side: 0 for the left hand, 1 for the right hand.
         model: MJCF file of the body.
         position: present positions of all joints (33,) [rad], at which the goal begins.
     """
 
-    def __init__(self, model: str | Path, position: Row) -> None:
-        point = control.Kinematics(model, "right_hand", frame=FRAME, joints=body.NAMES)
+    def __init__(self, side: int, model: str | Path, position: Row) -> None:
+        name = f"{body.SIDES[side]}_hand"
+        point = control.Kinematics(model, name, frame=FRAME, joints=body.NAMES)
+        self._rows = ROWS[side]
         self._memory, self._parameters = point.memory, IMPEDANCE.parameters
         self.goal = point.pose(position)
         self._torque = np.zeros(len(body.JOINTS))
 
     def step(self, pose: Row, position: Row, velocity: Row, dt: float) -> Row:
-        """Return the torques of the joints of the right arm (8,) [N·m].
+        """Return the torques of the joints of the arm (8,) [N·m].
 
         Args:
             pose: pose (7,) of the operator.
@@ -73,7 +84,7 @@ class Hand:
         cartesian_impedance(
             self._memory, self._parameters, self.goal, rate, position, velocity, self._torque
         )
-        return self._torque[ROWS]
+        return self._torque[self._rows]
 
     def _move(self, pose: Row, dt: float) -> Row:
         """Move the goal towards the pose. Return its velocity (6,)."""

@@ -1,48 +1,54 @@
-"""Poses of an operator for the right hand, from ROS 2 (`geometry_msgs/PoseStamped`)."""
+"""Poses of an operator for the hands, from ROS 2 (`geometry_msgs/PoseStamped`)."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import closing, contextmanager
+from functools import partial
 
+import body
 import hand
 import numpy as np
 
 import catenary as cat
 from catenary.ros2 import backend, messages
 
-TOPIC = "right_hand_pose"
+TOPICS = tuple(f"{side}_hand_pose" for side in body.SIDES)
 
 
 class PoseSource:
-    """Owner of the newest accepted pose (7,): x, y, z [m], quaternion w, x, y, z.
+    """Owner of the newest accepted pose (7,) of each hand: x, y, z [m], quaternion w, x, y, z.
 
     Args:
         node: node of ROS 2, which receives the poses.
     """
 
     def __init__(self, node: backend.Backend) -> None:
-        self.pose: np.ndarray | None = None
+        self._poses: list[np.ndarray | None] = [None for _ in TOPICS]
+        self._refused = [False for _ in TOPICS]  # reported until the next accepted pose
         self._node = node
-        node.subscription(TOPIC, messages.PoseStamped, backend.COMMAND, self._take)
+        for side, topic in enumerate(TOPICS):
+            take = partial(self._take, side)
+            node.subscription(topic, messages.PoseStamped, backend.COMMAND, take)
 
-    def step(self) -> np.ndarray | None:
-        """Receive all messages. Return the newest accepted pose; None if there is none."""
+    def step(self) -> Sequence[np.ndarray | None]:
+        """Receive messages. Return the newest accepted pose of each hand; None if there is none."""
         self._node.spin_once(0.0)
-        return self.pose
+        return self._poses
 
     def drop(self) -> None:
-        """Forget the pose, until the next message."""
-        self.pose = None
+        """Forget the poses, until the next messages."""
+        self._poses = [None for _ in TOPICS]
 
-    def _take(self, message: messages.PoseStamped) -> None:
+    def _take(self, side: int, message: messages.PoseStamped) -> None:
         at, turn = message.pose.position, message.pose.orientation
         pose = np.array([at.x, at.y, at.z, turn.w, turn.x, turn.y, turn.z])
-        reason = hand.refusal(message.header.frame_id, pose)
+        reason = hand.refusal(side, message.header.frame_id, pose)
         if reason is None:
-            self.pose = pose
-        else:
-            print(f"{TOPIC}: refused: {reason}", flush=True)
+            self._poses[side] = pose
+        elif not self._refused[side]:
+            print(f"{TOPICS[side]}: refused: {reason}", flush=True)
+        self._refused[side] = reason is not None
 
 
 @contextmanager
@@ -51,7 +57,7 @@ def pose_source(namespace: str) -> Iterator[PoseSource | None]:
     try:
         node = backend.open_backend("hand", namespace=namespace)
     except cat.errors.ConfigurationError as error:
-        print(f"ROS 2: the hand follows no poses: {error}")
+        print(f"ROS 2: the hands follow no poses: {error}")
         yield None
         return
     with closing(node):

@@ -13,6 +13,7 @@ from contextlib import ExitStack
 
 import body
 import laws
+import policy
 import tasks as jobs
 from exchange import Exchange
 from networks import Network, Sensors, make_plant, segments
@@ -21,7 +22,7 @@ from run import Outcome, Setup
 from world import History, Meter, Script, World
 
 import catenary as cat
-from catenary import realtime
+from catenary import control, realtime
 from catenary.demo.wires import on_wires
 
 LOOP_COST = 100e-6  # [s] declared execution time of the loop's body, in virtual time
@@ -118,8 +119,16 @@ def iterate(loop: cat.Loop, setup: Setup, world: World, x: Exchange) -> Outcome:
 
 
 def run(setup: Setup) -> Outcome:
-    """Run a scenario with all tasks. Raise ValueError if the model is that of another robot."""
+    """Run a scenario with all tasks.
+
+    Raises:
+        ValueError: The model is that of another robot.
+        ConfigurationError: The policy cannot be used.
+        TaskError: A task failed too often.
+    """
     body.load_model(setup.model)
+    if setup.policy is not None:  # raises an error for an invalid model
+        control.Policy(setup.policy, inputs=policy.OBSERVATION, rule=jobs.RULE)
     x = Exchange()
     with ExitStack() as stack:
         clock = stack.enter_context(realtime.VirtualClock()) if setup.virtual else None

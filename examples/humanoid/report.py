@@ -56,13 +56,13 @@ def result(outcome: Outcome) -> Result:
     com = rows["com"][:, :2] - rows["com"][0, :2]
     counters = [timing.counters for timing in outcome.timing]
     stands = outcome.verdict == Verdict.GO
-    braking = [event for event in outcome.events if event.text.endswith(": damping")]
+    ends = [each for each in outcome.events if each.text.endswith((": damping", ": stop"))]
     return Result(
         name=outcome.setup.scenario.name,
         mode=outcome.setup.scenario.mode,
         stands=stands,
         ended_by="" if stands else outcome.cause.text,
-        ended_at=np.nan if stands else braking[0].time - outcome.began,
+        ended_at=np.nan if stands else ends[0].time - outcome.began,
         sway=float(np.hypot(*com.T).max()),
         tilt=float(rows["tilt"].max()),
         cycles=tuple(each["cycles"] for each in counters),

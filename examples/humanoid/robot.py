@@ -14,6 +14,7 @@ import catenary as cat
 from catenary import realtime
 
 BRAKE = 1.2  # [s] from a decision to brake to the stop, at most
+BRING_UP = 10.0  # [s] until all drives are enabled and all tasks send values, at most
 
 
 class Robot:
@@ -111,7 +112,12 @@ class Robot:
             )
         operation.decide(Verdict(int(decision["verdict"])), Cause(int(decision["cause"])))
         for cause, silence in self._silences.items():
-            if silence.look() > self._silence and operation.mode != Mode.DAMPING:
+            is_watched = operation.mode != Mode.DAMPING
+            if cause == Cause.SILENT_SAFETY:
+                is_watched = operation.ready  # also while the joints brake
+            if silence.look() > self._silence and is_watched:
                 operation.decide(Verdict.DAMP, cause)
+        if not operation.ready and operation.now > BRING_UP:
+            operation.decide(Verdict.STOP, Cause.NOT_READY)
         if operation.braking > BRAKE:  # also without the safety task
             operation.decide(Verdict.STOP, operation.cause)

@@ -30,7 +30,7 @@ class Setup:
         virtual: True for virtual time, False for the clock of the machine.
         period: period of the loop [s].
         silence: age of a command or estimate at which the joints brake [s].
-        ros2: True to let the right hand follow poses of ROS 2.
+        ros2: True to let the hands follow poses of ROS 2.
         policy: ONNX file or function that balances instead of `balance.py`.
     """
 

@@ -35,7 +35,7 @@ from simulation import Control, Noise, Plain, Push, Result, Simulation
 FORCE, SLOPE, LOST_FORCE = 60.0, np.radians(4.0), 30.0  # [N], [rad], [N]
 DIRECTIONS = {"forward": (1, 0), "backward": (-1, 0), "left": (0, 1), "right": (0, -1)}
 PUSH_TIME, SWAY_TIME, SETTLING, RECOVERY = 4.5, 6.0, 1.0, 2.6  # [s]
-IMPULSE_LENGTH, IMPULSES, RESOLUTION = 0.1, (12.0, 60.0), 1.5  # [s], [N·s], [N·s]
+IMPULSE_LENGTH, IMPULSES, RESOLUTION = 0.1, (0.0, 60.0), 1.5  # [s], [N·s], [N·s]
 FEET = ("left_foot_force", "right_foot_force")
 
 

@@ -18,7 +18,17 @@ import mujoco
 import numpy as np
 import policy
 import pose_source
-from exchange import ARMS, COMMAND, ESTIMATE, HAND, SAFETY, UPPER_JOINTS, Cause, Exchange, Mode
+from exchange import (
+    COMMAND,
+    ESTIMATE,
+    HAND,
+    HANDS,
+    SAFETY,
+    UPPER_JOINTS,
+    Cause,
+    Exchange,
+    Mode,
+)
 from safety import Rules, Safety
 
 import catenary as cat
@@ -28,6 +38,7 @@ POSE = (sensors.Channel("position", "m", (3,)), sensors.Channel("quaternion", ""
 RULE = control.ActionRule(  # without a good action for 30 ms, it decays to zero in 0.1 s
     policy.ACTION, low=-policy.LIMIT, high=policy.LIMIT, rate=2.0, hold=0.03, decay=0.1
 )
+SILENCE = 0.1  # [s] age of the torques of a hand at which the springs of its arm return
 FIELDS = [name for name in ESTIMATE.names if name in estimate.Estimate.__slots__]
 
 
@@ -83,7 +94,8 @@ def dynamics(task: realtime.Running, cost: float, x: Exchange, model: str) -> No
 def balancing(task: realtime.Running, cost: float, x: Exchange, model: str) -> None:
     """Compute goals and torques of all joints: the legs balance, the arms follow their motion."""
     feedback, plain = balance.Balance(model), balance.Balance(model, feedback=False)
-    actions, out = control.ActionReader(x.policy, RULE), np.zeros((), COMMAND)
+    actions, hands = control.ActionReader(x.policy, RULE), Hands(x, task.period)
+    out = np.zeros((), COMMAND)
     for job in fresh(task, x.estimate):
         mode, found = x.state.read()["mode"], of_record(x.estimate.read())
         action = actions.read(job.time)
@@ -102,25 +114,43 @@ def balancing(task: realtime.Running, cost: float, x: Exchange, model: str) -> N
             out["velocity"][:UPPER_JOINTS] = motion["velocity"]
         if x.gravity.number:
             out["torque"][:UPPER_JOINTS] = x.gravity.read()[:UPPER_JOINTS]
-        add_hand(out, x)
+        hands.add(out)
         x.command.write(out)
         task.spend(cost)
 
 
-def add_hand(command: np.ndarray, x: Exchange) -> None:
-    """Replace the springs of the right arm by its Cartesian impedance, while that is active."""
-    command["scale"] = 1.0
-    found = x.hand.read()
-    if found["active"]:
-        command["scale"][hand.ROWS] = 0.0
-        command["velocity"][hand.ROWS] = 0.0
-        command["torque"][hand.ROWS] += found["torque"]
+class Hands:
+    """Reader of the torques of `operator_hand`. They end when this task is silent.
+
+    Args:
+        x: the Values.
+        period: time between two calls [s].
+    """
+
+    def __init__(self, x: Exchange, period: float) -> None:
+        self._value, self._silence = x.hand, realtime.Silence(x.hand)
+        self._most = SILENCE / period
+
+    def read(self) -> np.ndarray:
+        """Return the newest `HAND`; zeros if it is too old. Call it once per job."""
+        is_silent = self._silence.look() > self._most
+        return np.zeros((), HAND) if is_silent else self._value.read()
+
+    def add(self, command: np.ndarray) -> None:
+        """Replace the springs of an arm by its Cartesian impedance, while that is active."""
+        command["scale"] = 1.0
+        found = self.read()
+        for rows, active, torque in zip(hand.ROWS, found["active"], found["torque"], strict=True):
+            if active:
+                command["scale"][rows] = 0.0
+                command["velocity"][rows] = 0.0
+                command["torque"][rows] += torque
 
 
 def operator_hand(
     task: realtime.Running, cost: float, x: Exchange, model: str, namespace: str
 ) -> None:
-    """Let the right hand follow poses of ROS 2. A preset ends it, until the next pose."""
+    """Let the hands follow poses of ROS 2. A preset ends it, until the next pose."""
     with pose_source.pose_source(namespace) as source:
         if source is not None:
             follow(task, cost, x, model, source)
@@ -129,21 +159,22 @@ def operator_hand(
 def follow(
     task: realtime.Running, cost: float, x: Exchange, model: str, source: pose_source.PoseSource
 ) -> None:
-    follower, served, out = None, 0, np.zeros((), HAND)
+    followers: list[hand.Hand | None] = [None] * HANDS
+    served, out = 0, np.zeros((), HAND)
     for _ in fresh(task, x.state):
         state, serial = x.state.read(), int(x.preset.read()[0])
         if serial != served or state["mode"] == Mode.DAMPING:
             served = serial
             source.drop()
-        pose = source.step()
-        if pose is None:
-            follower = None
-        elif follower is None:
-            follower = hand.Hand(model, state["position"])
-        out["active"] = follower is not None
-        if follower is not None:
-            q, v = state["position"], state["velocity"]
-            out["torque"] = follower.step(pose, q, v, task.period)
+        q, v = state["position"], state["velocity"]
+        for side, pose in enumerate(source.step()):
+            out["active"][side] = pose is not None
+            if pose is None:
+                followers[side] = None
+                continue
+            follower = followers[side] or hand.Hand(side, model, q)
+            out["torque"][side] = follower.step(pose, q, v, task.period)
+            followers[side] = follower
         x.hand.write(out)
         task.spend(cost)
 
@@ -170,28 +201,40 @@ def of_record(found: np.ndarray) -> estimate.Estimate:
 
 
 def arm_motion(task: realtime.Running, cost: float, x: Exchange) -> None:
-    """Move the arms to the poses of the requested preset."""
-    motion, out, served = None, np.zeros((), ARMS), 0
+    """Move the arms to the poses of the requested preset.
+
+    The reference of an arm without springs follows the arm, so that its springs start without a
+    jump. After a restart, the task continues from its last reference, at home.
+    """
+    motion, out, served = None, x.arms.read(), int(x.preset.read()[0])
+    hands = Hands(x, task.period)
     for _ in fresh(task, x.state):
         state, (serial, preset) = x.state.read(), x.preset.read()
-        if state["mode"] == Mode.DAMPING:  # follows the arms
-            motion, served = None, serial
-            continue
-        if x.hand.read()["active"]:  # continues from where the operator leaves the arm
-            motion = None
-            continue
-        if motion is None:
-            position = np.clip(state["position"], body.LOW, body.HIGH)[:UPPER_JOINTS]
-            motion = arms.Arms(position, task.period)
-            motion.run("home")
-        if serial != served:
-            motion.run(arms.NAMES[preset])
-            served = serial
-        reference = motion.step()
-        out["position"], out["velocity"] = reference.position, reference.velocity
-        out["moving"] = motion.moving
+        position = np.clip(state["position"], body.LOW, body.HIGH)[:UPPER_JOINTS]
+        is_damped, active = state["mode"] == Mode.DAMPING, hands.read()["active"]
+        if is_damped or active.any():
+            motion, served = None, serial if is_damped else served
+            for rows in (slice(None),) if is_damped else rows_of(active):
+                out["position"][rows] = position[rows]
+            out["velocity"], out["moving"] = 0.0, 0
+        else:
+            if motion is None:
+                start = out["position"] if x.arms.number else position
+                motion = arms.Arms(start, task.period)
+                motion.run("home")
+            if serial != served:
+                motion.run(arms.NAMES[preset])
+                served = serial
+            reference = motion.step()
+            out["position"], out["velocity"] = reference.position, reference.velocity
+            out["moving"] = motion.moving
         x.arms.write(out)
         task.spend(cost)
+
+
+def rows_of(active: np.ndarray) -> list[slice]:
+    """Return the rows of the arms with an active hand."""
+    return [rows for rows, one in zip(hand.ROWS, active, strict=True) if one]
 
 
 def safety(task: realtime.Running, cost: float, x: Exchange, silence: float) -> None:

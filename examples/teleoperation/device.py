@@ -1,97 +1,73 @@
 """One of two coupled devices of two axes, over UDP: a leader that is moved, or its follower.
 
     python -m catenary.teleoperation.key arm.key        once; copy it to the other machine
-    python device.py follower --bind 0.0.0.0:7002 --remote 192.168.1.10:7001 --key arm.key eth0
-    python device.py leader --bind 0.0.0.0:7001 --remote 192.168.1.20:7002 --key arm.key eth0
+    python device.py follower eth0 --bind 0.0.0.0:7002 --remote 192.168.1.10:7001 --key arm.key
+    python device.py leader eth0 --bind 0.0.0.0:7001 --remote 192.168.1.20:7002 --key arm.key
 
 Without a network interface, the drives are virtual, and a simulated hand moves the leader. Both
 sides send their positions. Each feels the other through a spring and a damper, without a force
-sensor. Without a link, a side holds its position compliantly; see docs/how_to/teleoperation.md.
+sensor. With `--feedback`, the leader feels a part of the follower's torque instead. Without a
+link, a side holds its position compliantly; see docs/how_to/teleoperation.md.
 """
 
 import argparse
 import logging
 import sys
 import time
-from contextlib import contextmanager, nullcontext
+from collections import deque
+from contextlib import closing, contextmanager, nullcontext
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
+from coupling_laws import AXES, COUNTS, INERTIA, PERIOD, STIFFNESS, controller
 
 import catenary as cat
 from catenary import control, realtime, teleoperation
+from catenary.teleoperation.key import VARIABLE
 from catenary.virtual import Joint, Plant, Segment, Servo
 
 HERE = Path(__file__).parent
-PERIOD, AXES = 1e-3, 2  # [s]
-STIFFNESS = 2.0  # [N·m/rad] of the coupling, and of holding without a link
-INERTIA = 1.5e-3  # [kg·m²], of an axis with its motor
-FASTEST = 5.0  # [rad/s]
-COUNTS = 2**20
-# The condition counts the delay from a measurement to the end of its effect. The link measures from
-# sending to reception. A position waits up to one cycle before, and one cycle until the law starts.
-WAITING = 4 * PERIOD  # of both directions
-REACTION = 4 * PERIOD  # twice the reaction of a loop, see control.Coupling
-SILENCE = 0.02  # [s] without a new cycle of this program, after which the law holds
-MARGIN = 1.1  # of the damping
-
-
-@cat.law
-def couple(actual, target, memory, parameters):
-    spring, port, seen = control.part(memory, 0), control.part(memory, 1), control.part(memory, 2)
-    gains, watch = control.part(parameters, 0), control.part(parameters, 1)
-    link = control.part(parameters, 2)  # connected, cycle, positions, energies of the other side
-    seen[1] = seen[1] + actual.dt if link[1] == seen[0] else 0.0
-    seen[0] = link[1]
-    connected = link[0] if seen[1] < SILENCE else 0.0
-    for i in range(actual.n):
-        q, v, dt = actual.position[i], actual.velocity[i], actual.dt
-        pull = control.coupling(spring, gains, i, link[2 + i], connected, q, v, dt)
-        target.torque[i] = control.passivity(port, watch, i, pull, link[4 + i], q, v, dt)
-
-
-def damping_for(max_delay):
-    """Return a damping [N·m·s/rad] that permits a delay [s] of both directions together."""
-    return MARGIN * STIFFNESS * ((max_delay + WAITING) / 2 + REACTION)
-
-
-def gains_for(max_delay, damping=None):
-    """Return the coupling of one side, the same on both. Raises ValueError if it is not stable."""
-    damping = damping_for(max_delay) if damping is None else damping
-    return control.Coupling(
-        AXES, STIFFNESS, damping, max_delay + WAITING, PERIOD, align=0.5, inertia=INERTIA
-    )
+KEPT = 600_000  # newest cycles that --out keeps: 10 minutes
 
 
 class Link:
     """Exchange of positions and energies with the other side, once per cycle.
 
-    A packet has four axes. The first two hold positions, velocities and torques. The others hold
-    the energies of the port: taken, returned, and the newest received value of returned.
+    A packet has four axes. The first two hold positions, velocities and torques of the springs. The
+    others hold the energies of the port: taken, returned, and the newest received value of
+    returned. Energies count from the start of the other program, and are divided by `weight`.
     """
 
-    def __init__(self, peer):
-        self.peer = peer
-        self.newest = teleoperation.PeerSample(*[(0.0,) * 2 * AXES] * 3)
-        self.stopped = False  # by the other side
+    nothing = teleoperation.PeerSample(*[(0.0,) * 2 * AXES] * 3, holding=True)
 
-    def receive(self):
-        """Return `connected`, the positions, and the energies for `control.passivity`."""
+    def __init__(self, peer, weight):
+        self.peer, self.weight = peer, weight
+        self.newest, self.session = self.nothing, 0
+        self.taken = self.returned = np.zeros(AXES)  # when the other program began
+
+    def receive(self, energies):
+        """Return `connected`, positions, energies for `control.passivity`, and spring torques."""
         sample = self.peer.receive()
-        if sample is not None:
-            self.newest, self.stopped = sample, sample.wants_stop
-        connected = self.peer.state is teleoperation.LinkState.CONNECTED and not self.stopped
+        if self.peer.other_session != self.session:
+            self.newest, self.session = self.nothing, self.peer.other_session
+            self.taken, self.returned = energies.taken, energies.returned
+        self.newest = sample or self.newest
+        holds = self.newest.holding or self.newest.wants_stop
+        connected = self.peer.state is teleoperation.LinkState.CONNECTED and not holds
         taken, their, echo = (np.array(row[AXES:]) for row in self.newest[:3])
-        return connected, self.newest.position[:AXES], taken - their - echo
+        remote = self.weight * (taken - their - echo) - self.taken
+        return connected, self.newest.position[:AXES], remote, self.newest.force[:AXES]
 
-    def send(self, arm, energies):
+    def send(self, arm, energies, springs):
         """Send the state of this side."""
+        taken = (energies.taken - self.taken) / self.weight
+        returned = (energies.returned - self.returned) / self.weight
         self.peer.send(
             teleoperation.PeerSample(
-                (*arm.actual.position, *energies.taken),
-                (*arm.actual.velocity, *energies.returned),
-                (*arm.actual.torque, *self.newest.velocity[AXES:]),
+                (*arm.actual.position, *taken),
+                (*arm.actual.velocity, *returned),
+                (*springs, *self.newest.velocity[AXES:]),
             )
         )
 
@@ -149,32 +125,27 @@ def virtual_device(role, *, clock="virtual"):
     yield Segment([servo], plant=plant, clock=clock), Hand(servo) if role == "leader" else None
 
 
-def cycles(target, hand, gains, peer, *, watchdog=0.02, added=0.0, waits=False):
-    """Run one side. Yield a `Cycle` after each cycle.
+def cycles(target, hand, side, peer, *, watchdog=0.02, waits=False):
+    """Run one side with a `Controller`. Yield a `Cycle` after each cycle.
 
-    `watchdog` [s] is that of the drives. `added` [N·m·s/rad] is the largest damping that the
-    passivity controller adds. If `waits`, the hand begins with the first connection.
+    `watchdog` [s] is that of the drives. If `waits`, the hand begins with the first connection.
     """
-    quantum = 2 * np.pi / COUNTS
-    watch = control.Passivity(AXES, STIFFNESS, FASTEST, PERIOD, quantum, damping=added)
-    link, number, before = Link(peer), 0, 0.0
+    link, number, before = Link(peer, side.weight), 0, 0.0
     with cat.MainDevice(target) as main:
         drives = main.scan().drives
         arm = cat.Drives(drives, mode="cst", counts_per_turn=COUNTS, velocity_limit=50.0)
         options = {"period": PERIOD, "execution": "inline", "watchdog": watchdog}
-        with cat.Loop(arm, laws=[couple], **options) as loop:
-            memory = control.join(gains.memory, watch.memory, [0.0, 0.0])
-            silent = [0.0, 0.0, *arm.actual.position, *[0.0] * AXES]
-            run = loop.start(
-                couple, memory, control.join(gains.parameters, watch.parameters, silent)
-            )
+        with cat.Loop(arm, laws=[side.law], **options) as loop:
+            zeros = [0.0] * AXES
+            silent = side.parameters(0, 0, arm.actual.position, zeros, zeros)
+            run = loop.start(side.law, side.memory, silent)
             for cycle in loop:
                 number += 1
-                energies = control.energies(control.part(run.memory, 1))
-                connected, positions, remote = link.receive()
-                values = [float(connected), float(number), *positions, *remote]
-                run.parameters = control.join(gains.parameters, watch.parameters, values)
-                link.send(arm, energies)
+                memory = run.memory
+                energies = control.energies(control.part(memory, 1))
+                connected, *received = link.receive(energies)
+                run.parameters = side.parameters(connected, number, *received)
+                link.send(arm, energies, control.part(memory, 2)[-AXES:])
                 if hand is not None:
                     waits = waits and not connected
                     hand.time += 0.0 if waits else cycle.time - before
@@ -192,72 +163,97 @@ def cycles(target, hand, gains, peer, *, watchdog=0.02, added=0.0, waits=False):
                 )
 
 
-def report(peer, before, now):
-    """Print a change of the link. Return its state."""
-    if peer.state is not before:
-        print(f"{now:6.2f} s  link {peer.state.value} {peer.reason}".rstrip(), flush=True)
-    return peer.state
+class Report:
+    """Owner of the last line about the link."""
+
+    def __init__(self, peer):
+        self.peer, self.last, self.at = peer, None, -np.inf
+
+    def step(self, now):
+        """Print the state of the link if it changes, and a new reason at most once per second."""
+        state, reason = self.peer.state, self.peer.reason
+        if (state, reason) == self.last or (state is self.state and now - self.at < 1.0):
+            return
+        self.last, self.at = (state, reason), now
+        print(f"{now:6.2f} s  link {state.value} {reason}".rstrip(), flush=True)
+
+    @property
+    def state(self):
+        """State of the last line; None before the first one."""
+        return self.last and self.last[0]
 
 
-def run(role, target, hand, given):
+def run(target, hand, given, side, peer):
     """Run one side until the end of its time, or Ctrl-C. Write its cycles if a file is given."""
     # Virtual drives run on busy machines.
-    options = {"watchdog": 0.02 if given.target else 0.2, "added": given.added, "waits": True}
-    gains = gains_for(given.max_delay, given.damping)
-    transport = teleoperation.UdpTransport(given.bind, given.remote)
-    key, kept = teleoperation.read_key(given.key), []
-    with teleoperation.Peer(transport, key=key, axes=2 * AXES, max_delay=given.max_delay) as peer:
-        state = peer.state
-        print(
-            f"{role}: {STIFFNESS:g} N·m/rad, {gains.damping:.3g} N·m·s/rad; link {state.value}",
-            flush=True,
-        )
-        try:
-            for cycle in cycles(target, hand, gains, peer, **options):
-                state = report(peer, state, cycle.time)
-                kept.append(cycle.row)
+    options = {"watchdog": 0.02 if given.target else 0.2, "waits": True}
+    kept, begun, report = deque(maxlen=KEPT), time.monotonic(), Report(peer)
+    print(f"{given.role}: {STIFFNESS:g} N·m/rad, {side.damping:.3g} N·m·s/rad", flush=True)
+    try:
+        with closing(cycles(target, hand, side, peer, **options)) as running:
+            for cycle in running:
+                report.step(time.monotonic() - begun)
+                if given.out:
+                    kept.append(cycle.row)
                 if given.seconds is not None and cycle.time > given.seconds:
                     break
-        except KeyboardInterrupt:
-            pass
-        print(
-            f"{role}: {peer.losses} losses of the link; packets:",
-            {name: count for name, count in peer.counters.items() if count},
-            flush=True,
-        )
+    except KeyboardInterrupt:
+        pass
+    counted = {name: count for name, count in peer.counters.items() if count}
+    print(f"{given.role}: {peer.losses} losses of the link; packets: {counted}", flush=True)
     if given.out:
         np.save(given.out, np.array(kept))
 
 
-def arguments():
+def arguments(words=None):
+    """Return the arguments of the command line. The target may follow the options."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("role", choices=["leader", "follower"])
     parser.add_argument("target", nargs="?", help="network interface; default: virtual drives")
-    parser.add_argument("--bind", required=True, help="address of this side, HOST:PORT")
-    parser.add_argument("--remote", required=True, help="address of the other side, HOST:PORT")
-    parser.add_argument("--key", type=Path, help="key file; default: the environment")
-    parser.add_argument("--max-delay", type=float, default=0.05, help="both directions [s]")
-    parser.add_argument("--damping", type=float, help="[N·m·s/rad]; default: by the delay")
     parser.add_argument(
-        "--added", type=float, default=0.0, help="damping of the passivity controller"
+        "--bind",
+        required=True,
+        metavar="HOST:PORT",
+        help="this side, such as 0.0.0.0:7001",
     )
-    parser.add_argument("--seconds", type=float, help="duration; default: until Ctrl-C")
-    parser.add_argument("--out", type=Path, help="file of the cycles (.npy)")
-    return parser.parse_args()
+    parser.add_argument("--remote", required=True, metavar="HOST:PORT", help="the other side")
+    parser.add_argument(
+        "--key",
+        type=Path,
+        metavar="FILE",
+        help=f"key file; default: the environment, {VARIABLE}",
+    )
+    for name, default, text in (
+        ("max-delay", 0.05, "bound of the delay of both directions together [s]; default: 0.05"),
+        ("damping", None, "[N·m·s/rad]; default: by the delay"),
+        ("added", 0.0, "largest damping of the passivity controller [N·m·s/rad]; default: 0"),
+        ("feedback", None, "only of a leader: reflect this part of the follower's torque, not P+d"),
+        ("seconds", None, "duration [s], for a leader from the first connection; default: Ctrl-C"),
+    ):
+        parser.add_argument(f"--{name}", type=float, default=default, metavar="N", help=text)
+    parser.add_argument("--out", type=Path, metavar="FILE", help="the newest cycles (.npy)")
+    given = parser.parse_intermixed_args(words)
+    if given.role == "follower" and given.feedback is not None:
+        parser.error("--feedback is an option of the leader; the follower needs none")
+    return given
 
 
 def main():
     logging.basicConfig(level=logging.WARNING, format="%(message)s")
     given = arguments()
+    side = controller(given.max_delay, given.damping, feedback=given.feedback, added=given.added)
+    key = teleoperation.read_key(given.key)
+    transport = teleoperation.UdpTransport(given.bind, given.remote)
+    peer = teleoperation.Peer(transport, key=key, axes=2 * AXES, max_delay=given.max_delay)
     device = nullcontext((given.target, None))
     if not given.target:
         device = virtual_device(given.role, clock="monotonic")
-    with device as (target, hand), realtime.session(best_effort=True):
-        run(given.role, target, hand, given)
+    with peer, device as (target, hand), realtime.session(best_effort=True):
+        run(target, hand, given, side, peer)
 
 
 if __name__ == "__main__":
     try:
         main()
-    except (ValueError, cat.CatenaryError) as error:
+    except (ValueError, OSError, cat.CatenaryError) as error:
         sys.exit(f"error: {error}")

@@ -4,9 +4,8 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from device import AXES, COUNTS, FASTEST, PERIOD, STIFFNESS, hand_path
-
-from catenary import control
+from coupling_laws import AXES, Controller
+from device import hand_path
 
 LEFT, RIGHT = 0, 1  # the left axis meets the block
 TIME, STAMP, POSITION, TORQUE, ENERGY, HAND, DELAY = 0, 1, 2, 4, 6, 8, 10  # first columns of a row
@@ -31,18 +30,18 @@ class Result:
     """Rows of both sides at the same times, and the state of the link at the end."""
 
     name: str
-    gains: control.Coupling
+    side: Controller  # of the leader
     leader: np.ndarray
     follower: np.ndarray
     losses: int
 
     @classmethod
-    def aligned(cls, name, gains, leader, follower):
+    def aligned(cls, name, side, leader, follower):
         """Return the result of two programs, with the follower's rows at the leader's times."""
         columns = [np.interp(leader[:, STAMP], follower[:, STAMP], each) for each in follower.T]
         columns[TIME] = leader[:, TIME]
         losses = int((np.diff(leader[:, -1]) < 0).sum())
-        return cls(name, gains, leader, np.column_stack(columns), losses)
+        return cls(name, side, leader, np.column_stack(columns), losses)
 
     def rest(self, rows, column, number):
         """Return the mean of a column during the rest `number`."""
@@ -63,11 +62,10 @@ class Result:
         torque = [self.rest(self.leader, HAND + LEFT, number) for number in (1, 2)]
         place = [self.rest(self.leader, POSITION + LEFT, number) for number in (1, 2)]
         applied = self.rest(self.follower, TORQUE + LEFT, 2)
-        watch = control.Passivity(AXES, STIFFNESS, FASTEST, PERIOD, 2 * np.pi / COUNTS)
         energies = [rows[:, ENERGY : ENERGY + AXES] for rows in (self.leader, self.follower)]
         return {
             "network": self.name,
-            "damping": float(self.gains.damping),
+            "damping": float(self.side.damping),
             "bound": 1e3 * float(np.nanmax(self.leader[:, DELAY])),
             "moving": 1e3 * float(abs(apart).max()),
             "resting": 1e3 * max(map(abs, errors)),
@@ -75,7 +73,7 @@ class Result:
             "stiffness": (torque[1] - torque[0]) / (place[1] - place[0]),
             "felt": torque[1] / applied if applied else float("nan"),
             "energy": 1e3 * min(float(rows.min()) for rows in energies),
-            "tolerance": -1e3 * float(watch.tolerance.max()),
+            "tolerance": -1e3 * float(self.side.watch.tolerance.max()),
             "losses": self.losses,
         }
 

@@ -3,6 +3,7 @@
     python teleoperation.py                 all networks, in virtual time
     python teleoperation.py --realtime      two programs over UDP, with a relay, in real time
     python teleoperation.py --only 20       networks whose name begins with "20"
+    python teleoperation.py --feedback 0.5  the leader feels half of the follower's torque, not P+d
 
 A simulated hand moves the left and right axis of the leader. The left axis of the follower meets
 a block. The table and the plot are in the output folder.
@@ -17,10 +18,12 @@ import signal
 import subprocess
 import sys
 import tempfile
+import time
 from pathlib import Path
 
 import numpy as np
-from device import AXES, HERE, PERIOD, cycles, gains_for, virtual_device
+from coupling_laws import AXES, PERIOD, controller
+from device import HERE, cycles, virtual_device
 from results import Result, plot, table
 
 from catenary import teleoperation
@@ -67,11 +70,20 @@ class Clock:
     now_ns = 0
 
 
-def simulate(case):
+def controllers(case, feedback):
+    """Return the controllers of the leader and of the follower."""
+    delay = case.gains_delay or case.max_delay
+    follower = controller(delay, added=case.added)
+    if feedback is None:
+        return follower, follower
+    return controller(delay, feedback=feedback, added=case.added), follower
+
+
+def simulate(case, feedback):
     """Run both sides over a network in virtual time. Return the result."""
     path = teleoperation.VirtualNetwork(case.model)
     clock, key = Clock(), secrets.token_bytes(32)
-    gains = gains_for(case.gains_delay or case.max_delay)
+    made = controllers(case, feedback)
     rows = [], []
     with contextlib.ExitStack() as stack:
         sides, peers = [], []
@@ -80,7 +92,7 @@ def simulate(case):
             options = {"key": key, "axes": 2 * AXES, "max_delay": case.max_delay}
             peers.append(stack.enter_context(teleoperation.Peer(transport, **options)))
             segment, hand = stack.enter_context(virtual_device(role))
-            side = cycles(segment, hand, gains, peers[-1], added=case.added)
+            side = cycles(segment, hand, made[number], peers[-1])
             sides.append(stack.enter_context(contextlib.closing(side)))
         for leader, follower in zip(*sides, strict=True):
             clock.now_ns += round(PERIOD * 1e9)
@@ -89,10 +101,10 @@ def simulate(case):
             if leader.time > DURATION:
                 break
         losses = max(peer.losses for peer in peers)
-    return Result(case.name, gains, np.array(rows[0]), np.array(rows[1]), losses)
+    return Result(case.name, made[0], np.array(rows[0]), np.array(rows[1]), losses)
 
 
-def in_real_time(case, folder):
+def in_real_time(case, feedback, folder):
     """Run two programs and the relay over UDP on this machine. Return the result.
 
     Raises CatenaryError if a program fails, or does not end in time.
@@ -109,54 +121,96 @@ def in_real_time(case, folder):
         for role, bind, remote in zip(ROLES, (leader, follower), relay, strict=True):
             options = ["--bind", bind, "--remote", remote, "--key", key, "--out", folder / role]
             options += ["--max-delay", case.max_delay]
-            options += ["--seconds", DURATION] if role == "leader" else []
+            if role == "leader":
+                options += ["--seconds", DURATION]
+                options += [] if feedback is None else ["--feedback", feedback]
             programs.append(start(HERE / "device.py", role, *options))
-        if programs[1].wait(timeout=DURATION + PATIENCE):
-            raise CatenaryError("the leader has failed; see its message above")
+        wait(programs, "leader", DURATION + PATIENCE)
         programs[2].send_signal(signal.SIGINT)
-        if programs[2].wait(timeout=PATIENCE):
-            raise CatenaryError("the follower has failed; see its message above")
+        wait(programs, "follower", PATIENCE)
     rows = [np.load(folder / f"{role}.npy") for role in ROLES]
-    return Result.aligned(case.name, gains_for(case.max_delay), *rows)
+    return Result.aligned(case.name, controllers(case, feedback)[0], *rows)
 
 
 def start(*words):
     return subprocess.Popen([sys.executable, *map(str, words)])
 
 
+def wait(programs, role, seconds):
+    """Wait for the end of a side. Raises CatenaryError if a program fails, or it takes longer."""
+    until = time.monotonic() + seconds
+    one = programs[1 + ROLES.index(role)]
+    while one.poll() is None:
+        for name, program in zip(("relay", *ROLES), programs, strict=True):
+            if program.poll():
+                raise CatenaryError(f"the {name} has failed; see its message above")
+        if time.monotonic() > until:
+            raise CatenaryError(
+                f"the {role} has not ended within {seconds:g} s",
+                hint="if its link did not connect, give this machine less other work",
+            )
+        time.sleep(0.1)
+    if one.returncode:
+        raise CatenaryError(f"the {role} has failed; see its message above")
+
+
 def end(programs):
     for program in programs:
         program.terminate()
-        program.wait(timeout=10.0)
+        try:
+            program.wait(timeout=10.0)
+        except subprocess.TimeoutExpired:
+            program.kill()
+            program.wait()
 
 
-def run(case, realtime):
-    """Run a network, and print its row. Return the result."""
+def run(case, given):
+    """Run a network. Return the result."""
     print(f"{case.name} ...", flush=True)
-    if not realtime:
-        return simulate(case)
+    if not given.realtime:
+        return simulate(case, given.feedback)
     with tempfile.TemporaryDirectory() as folder:
-        return in_real_time(case, Path(folder))
+        return in_real_time(case, given.feedback, Path(folder))
 
 
-def arguments():
+def arguments(words=None):
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--realtime", action="store_true", help="two programs over UDP")
-    parser.add_argument("--only", default="", help="first letters of the networks to run")
+    parser.add_argument("--only", default="", metavar="NAME", help="first letters of the networks")
+    parser.add_argument(
+        "--feedback",
+        type=float,
+        metavar="N",
+        help="the leader feels this part of the follower's torque, instead of P+d",
+    )
     parser.add_argument("--headless", action="store_true", help="write no plot")
     parser.add_argument("--out", type=Path, default=Path("out"), help="output folder")
-    return parser.parse_args()
+    given = parser.parse_args(words)
+    given.networks = chosen(given)
+    if not given.networks:
+        names = ", ".join(repr(case.name) for case in NETWORKS)
+        parser.error(f"no network of this mode begins with {given.only!r}: {names}")
+    return given
+
+
+def chosen(given):
+    """Return the networks to run."""
+    found = [case for case in NETWORKS if case.name.startswith(given.only)]
+    if given.realtime or given.feedback is not None:  # unstable gains need no second proof
+        found = [case for case in found if case.gains_delay is None]
+    if given.realtime:  # the relay has no outages
+        found = [case for case in found if not case.model.outages]
+        found = [dataclasses.replace(each, max_delay=each.max_delay + SLACK) for each in found]
+    return found
 
 
 def main():
     given = arguments()
-    chosen = [case for case in NETWORKS if case.name.startswith(given.only)]
-    if given.realtime:  # the relay has no outages, and unstable gains need no second proof
-        chosen = [case for case in chosen if not case.model.outages and case.gains_delay is None]
-        chosen = [dataclasses.replace(each, max_delay=each.max_delay + SLACK) for each in chosen]
-    results = [run(case, given.realtime) for case in chosen]
+    for case in given.networks:
+        controllers(case, given.feedback)  # refuses gains before the first run
+    given.out.mkdir(parents=True, exist_ok=True)
+    results = [run(case, given) for case in given.networks]
     print(table(results))
-    given.out.mkdir(exist_ok=True)
     rows = [result.summary for result in results]
     (given.out / "teleoperation.json").write_text(json.dumps(rows, indent=1))
     if not given.headless:
@@ -164,4 +218,7 @@ def main():
 
 
 if __name__ == "__main__":
-    main()
+    try:
+        main()
+    except (ValueError, OSError, CatenaryError) as error:
+        sys.exit(f"error: {error}")

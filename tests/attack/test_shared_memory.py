@@ -78,10 +78,9 @@ def test_operators_share_a_robot_without_a_common_folder(machine: Machine) -> No
     """Bob's only group is Alice's: the folder lets him pass, but neither list nor lock."""
     with machine.started(ALICE, LOOP, "660") as loop:
         assert loop.line() == "running"
-        become = f"import os; os.setgroups([]); os.setgid({ALICE}); os.setuid({BOB})\n"
-        assert machine.run(0, become + COMMAND) == ["True", "moved"]
+        assert machine.run(BOB, COMMAND, gid=ALICE) == ["True", "moved"]
         look = f"{SAY}import os\nsaid(lambda: os.open('/dev/shm/catenary-{ALICE}', os.O_RDONLY))"
-        [line] = machine.run(0, become + look)
+        [line] = machine.run(BOB, look, gid=ALICE)
         assert line.startswith("PermissionError")
 
 

@@ -34,17 +34,34 @@ class Machine:
 
     holder: int  # the process that keeps the mounts
 
-    def command(self, uid: int, program: str, arguments: Sequence[str], group: bool) -> list[str]:
-        gid = 0 if uid == 0 else uid
+    def command(
+        self, uid: int, program: str, arguments: Sequence[str], group: bool, gid: int | None = None
+    ) -> list[str]:
+        gid = uid if gid is None else gid
         groups = f"--groups={operators().gr_gid}" if group else "--clear-groups"
         become = ["setpriv", f"--reuid={uid}", f"--regid={gid}", groups]
         enter = ["nsenter", f"--target={self.holder}", "--mount", "--", *become]
         return [*enter, "env", "HOME=/tmp", sys.executable, "-c", program, *arguments]
 
-    def run(self, uid: int, program: str, *arguments: str, group: bool = False) -> list[str]:
-        """Run a program to its end, as a member of `operators` if `group`. Returns its lines."""
+    def run(
+        self,
+        uid: int,
+        program: str,
+        *arguments: str,
+        group: bool = False,
+        gid: int | None = None,
+    ) -> list[str]:
+        """Run a program to its end, and return its lines.
+
+        Args:
+            uid: user of the program.
+            program: text of the program.
+            arguments: its arguments.
+            group: True: the user is a member of `operators`.
+            gid: primary group of the user; None: the group with the user's number.
+        """
         done = subprocess.run(
-            self.command(uid, program, arguments, group),
+            self.command(uid, program, arguments, group, gid),
             capture_output=True,
             text=True,
             timeout=TIMEOUT,

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 from importlib.util import find_spec
+from subprocess import TimeoutExpired
 
 import numpy as np
 import pytest
@@ -84,6 +85,17 @@ def test_without_a_network_the_published_row_remains(monkeypatch: pytest.MonkeyP
     assert "left out: the loop: no private network (not here)" in text
     assert "left out: the experiments: not today" in text
     assert "ours: -" in text
+
+
+@pytest.mark.parametrize("error", [CatenaryError("it failed"), TimeoutExpired(["gripper"], 1.0)])
+def test_failed_experiments_are_left_out(error: Exception, monkeypatch: pytest.MonkeyPatch) -> None:
+    def fail() -> None:
+        raise error
+
+    monkeypatch.setattr(gripper_experiments, "run", fail)
+    monkeypatch.setattr(gripper_experiments, "why_not", lambda: "")
+    text = show(rdda.measure(Options(refused="not here")))
+    assert f"left out: the experiments: {error}" in text
 
 
 @pytest.mark.skipif(find_spec("numba") is None, reason="laws need Numba")

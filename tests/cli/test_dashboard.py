@@ -80,6 +80,7 @@ def test_a_moving_base_needs_a_model() -> None:
     ("words", "said"),
     [
         (["upper", "--also", "a/b"], "--also: invalid name 'a/b'"),
+        (["upper", "--base", "upper", "--model", __file__], "--base upper: this share has axes"),
         (["upper", "--also", ""], "--also: invalid name ''"),
         (["share:a/b"], "SHARE: invalid name 'a/b'"),
         (["upper", "--also", "lower", "--also", "lower"], "--also lower: the page already"),

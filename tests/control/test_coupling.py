@@ -174,6 +174,18 @@ def test_a_link_that_returns_pulls_with_the_speed_of_alignment() -> None:
     assert torques[-1] == pytest.approx(K * 1.0)
 
 
+@pytest.mark.parametrize("held", [2.0, 5.0])
+def test_a_link_that_returns_keeps_the_torque_of_an_axis_that_is_pushed(held: float) -> None:
+    block = made(hold=held, align=0.5, deflection=0.3)
+    memory = block.memory
+    for q in (0.3, 0.5):
+        pushed = one(memory, block, 0.0, q, on=0.0)
+    assert pushed == pytest.approx(max(-held * 0.2, -K * 0.3))
+    torques = [pushed, *(one(memory, block, 0.9, 0.5) for _ in range(3000))]
+    assert abs(np.diff(torques)).max() == pytest.approx(K * 0.5 * PERIOD)
+    assert torques[-1] == pytest.approx(K * 0.3)  # limited
+
+
 @pytest.mark.parametrize("peer", [math.nan, math.inf])
 def test_a_position_that_is_not_finite_counts_as_a_lost_link(peer: float) -> None:
     block = made()

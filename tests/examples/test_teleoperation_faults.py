@@ -19,7 +19,7 @@ pytest.importorskip("mujoco", reason="the devices move in MuJoCo: pip install 'c
 
 from catenary.teleoperation import LinkState, NetworkModel, make_key
 from catenary.teleoperation.packet import DIGEST_BYTES, HEADER, PERSON
-from tests.examples.two_devices import FOLDER, KEY, Pair, devices, load
+from tests.examples.two_devices import FOLDER, KEY, Pair, Side, devices, load
 from tests.share.processes import Program
 
 MOVED = 2.9  # [s], when the hand has moved to 0.2 rad
@@ -27,10 +27,15 @@ MOVED = 2.9  # [s], when the hand has moved to 0.2 rad
 
 def assert_separate(pair: Pair) -> None:
     """Check that the leader holds at 0 against the hand, and that the follower has not moved."""
-    device = load("device")
     assert pair.leader.peer.losses == pair.follower.peer.losses == 0
     assert not pair.leader.connected
+    assert_separate_positions(pair)
+
+
+def assert_separate_positions(pair: Pair) -> None:
+    device = load("device")
     assert not pair.follower.connected
+    assert not pair.leader.now.connected
     assert pair.follower.now.position == pytest.approx((0, 0), abs=1e-6)
     hand, held = device.Hand.stiffness, device.STIFFNESS
     wanted = hand * 0.2 / (hand + held)
@@ -124,13 +129,14 @@ def test_a_link_that_returns_connects_again_without_a_step_of_the_torque() -> No
         pair.run(6.45)
         assert pair.leader.peer.losses == pair.follower.peer.losses == 1
         assert pair.leader.now.position[1] - pair.follower.now.position[1] > 0.3
+        assert pair.leader.now.torque[1] < -0.05  # the hand pushes it away while it holds
         torques = []
         while pair.leader.now.time < 7.4:
             pair.run(pair.leader.now.time + 1e-4)
-            torques.append(pair.follower.now.torque[1])
+            torques.append((pair.leader.now.torque[1], pair.follower.now.torque[1]))
         assert pair.leader.connected
         assert pair.follower.connected
-        assert abs(np.diff(torques)).max() < 0.02  # [N·m]; a step would be 0.6
+        assert abs(np.diff(torques, axis=0)).max() < 0.02  # [N·m]
         assert pair.follower.now.position[1] == pytest.approx(pair.leader.now.position[1], abs=5e-3)
 
 
@@ -147,24 +153,44 @@ def test_a_request_to_stop_lets_the_other_side_hold() -> None:
         assert_holds(pair)
 
 
+def test_a_side_holds_while_the_other_side_holds() -> None:
+    """The follower never connects, because its bound is smaller. The leader would connect."""
+    with devices(follower={"max_delay": 0.018}) as pair:
+        pair.run(MOVED)
+        assert pair.leader.connected
+        assert_separate_positions(pair)
+
+
+def test_the_energies_begin_again_with_a_restarted_program() -> None:
+    """Otherwise, energy that the ended program has taken would hide an active coupling."""
+    with devices() as pair:
+        pair.run(4.5)
+        leader = pair.leader
+        before = leader.peer.other_session
+        assert min(leader.now.observed) > 5e-3  # [J]
+        pair.follower = Side("follower", pair.follower.peer._transport, pair.controller)
+        with pair.follower.stack:
+            while leader.peer.losses == 0 or not leader.connected:
+                pair.run(leader.now.time + 1e-4)
+                assert leader.now.time < 4.9
+            assert leader.peer.other_session != before
+            assert leader.now.observed == pytest.approx((0, 0), abs=2e-3)
+
+
 def test_a_program_that_stands_still_lets_its_law_hold() -> None:
     """The law counts the time since the program has written a new cycle."""
     device = load("device")
     import catenary as cat
     from catenary import control
 
-    gains = device.gains_for(0.05)
-    watch = control.Passivity(2, device.STIFFNESS, device.FASTEST, device.PERIOD)
+    side = device.controller(0.05)
     with device.virtual_device("follower") as (segment, _), cat.MainDevice(segment) as main:
         arm = cat.Drives(
             main.scan().drives, mode="cst", counts_per_turn=device.COUNTS, velocity_limit=50.0
         )
-        with cat.Loop(arm, period=device.PERIOD, laws=[device.couple], execution="inline") as loop:
-            memory = control.join(gains.memory, watch.memory, [0.0, 0.0])
-            link = [1.0, 1.0, 0.1, 0.1, 0.0, 0.0]  # a position of the other side, sent once
-            run = loop.start(
-                device.couple, memory, control.join(gains.parameters, watch.parameters, link)
-            )
+        with cat.Loop(arm, period=device.PERIOD, laws=[side.law], execution="inline") as loop:
+            sent_once = side.parameters(1, 1, [0.1, 0.1], [0.0, 0.0], [0.0, 0.0])
+            run = loop.start(side.law, side.memory, sent_once)
             for cycle in loop:
                 if cycle.time > 1.0:
                     break

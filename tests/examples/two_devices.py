@@ -23,6 +23,8 @@ Change = Callable[[bytes], list[bytes]]
 def load(name: str) -> Any:
     """Return a module of the example."""
     unique = f"teleoperation_example_{name}"
+    if str(FOLDER) not in sys.path:
+        sys.path.append(str(FOLDER))  # for the imports between its modules
     if unique not in sys.modules:
         spec = importlib.util.spec_from_file_location(unique, FOLDER / f"{name}.py")
         assert spec is not None
@@ -65,12 +67,12 @@ class Tampered:
 class Side:
     """One device, its peer, and its newest cycle."""
 
-    def __init__(self, role: str, transport: Transport, gains: Any, **options: Any) -> None:
+    def __init__(self, role: str, transport: Transport, controller: Any, **options: Any) -> None:
         self.device = load("device")
         self.peer = Peer(transport, **{"key": KEY, "axes": 4, "max_delay": 0.05} | options)
         self.stack = ExitStack()
         self.segment, self.hand = self.stack.enter_context(self.device.virtual_device(role))
-        self.cycles = self.device.cycles(self.segment, self.hand, gains, self.peer)
+        self.cycles = self.device.cycles(self.segment, self.hand, controller, self.peer)
         self.stack.enter_context(closing(self.cycles))
         self.now: Any = None
 
@@ -85,8 +87,9 @@ class Side:
 class Pair:
     """Leader and follower in lockstep."""
 
-    def __init__(self, leader: Side, follower: Side, clock: Clock) -> None:
+    def __init__(self, leader: Side, follower: Side, clock: Clock, controller: Any) -> None:
         self.leader, self.follower, self.clock = leader, follower, clock
+        self.controller = controller
 
     def run(self, until: float, *, alone: bool = False) -> None:
         """Advance to a time [s]; with `alone`, only the leader."""
@@ -111,11 +114,11 @@ def devices(
 ) -> Iterator[Pair]:
     """Yield both devices. `change` tampers with the packets that the leader receives."""
     network, clock = VirtualNetwork(model or NetworkModel(delay=0.01)), Clock()
-    gains = load("device").gains_for(0.05)
-    near = Side("leader", Tampered(network.side(0, clock), change), gains, **leader or {})
-    far = Side("follower", network.side(1, clock), gains, **follower or {})
+    controller = load("device").controller(0.05)
+    near = Side("leader", Tampered(network.side(0, clock), change), controller, **leader or {})
+    far = Side("follower", network.side(1, clock), controller, **follower or {})
     with near.stack, far.stack:
-        yield Pair(near, far, clock)
+        yield Pair(near, far, clock, controller)
 
 
 __all__ = ["FOLDER", "KEY", "Pair", "devices", "load", "teleoperation"]

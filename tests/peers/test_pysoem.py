@@ -51,6 +51,8 @@ OBJECT_DOES_NOT_EXIST = 0x06020000
 T = TypeVar("T")
 P = ParamSpec("P")
 ENABLING = {0x40: 0x06, 0x21: 0x07, 0x23: 0x0F, 0x27: 0x0F}
+STALLED = (pysoem.WkcError, pysoem.PacketError, pysoem.MailboxError, pysoem.SdoError)
+"""Errors of PySOEM for a missing or late answer, which a busy machine causes."""
 
 
 def again(devices: int, count: int = 5) -> Callable[[Callable[P, None]], Callable[P, None]]:
@@ -60,7 +62,7 @@ def again(devices: int, count: int = 5) -> Callable[[Callable[P, None]], Callabl
         @functools.wraps(test)
         def repeated(*args: P.args, **named: P.kwargs) -> None:
             for _ in range(count - 1):
-                with contextlib.suppress(AssertionError, pysoem.WkcError):
+                with contextlib.suppress(AssertionError, *STALLED):
                     return test(*args, **named)
                 find(next(iter(named.values())), devices)
             return test(*args, **named)
@@ -282,7 +284,7 @@ def tries(ask: Callable[[], T], count: int = 10) -> Iterator[T | None]:
     for number in range(count):
         try:
             yield ask()
-        except (pysoem.WkcError, pysoem.PacketError, pysoem.MailboxError, pytest.fail.Exception):
+        except (*STALLED, pytest.fail.Exception):
             if number == count - 1:
                 raise
 

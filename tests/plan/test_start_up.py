@@ -158,3 +158,10 @@ def test_an_entry_too_long_for_a_mapping_object_is_not_written() -> None:
     assigned = replace(demo()[3].inputs[0], pdos=(long,))
     with pytest.raises(MappingError, match=r"0x6000:01 \(384 bits\) is longer than 255 bits"):
         mapping_downloads(Mapping((assigned,), rewritten=(long,)))
+
+
+def test_complete_access_needs_the_bytes_from_subindex_0_or_1_on() -> None:
+    with pytest.raises(ValueError, match="begins at subindex 0 or 1"):
+        StartUp(0x2000, 2, b"\x01", complete_access=True)
+    with pytest.raises(TypeError, match="needs the bytes of all subindices"):
+        StartUp(0x2000, 0, 1, complete_access=True)

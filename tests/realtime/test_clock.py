@@ -96,6 +96,29 @@ def test_a_signal_to_another_thread_is_handled():
     assert not rescued.is_set()
 
 
+def test_execution_time_continues_after_signals():
+    """The handler runs while time stands still, and lets it advance at its third call."""
+    calls = []
+
+    def count(number, frame):
+        calls.append(clock.now_ns)
+        if len(calls) == 3:
+            signal.setitimer(signal.ITIMER_REAL, 0)
+            absent.leave()
+
+    before = signal.signal(signal.SIGALRM, count)
+    with VirtualClock() as clock:
+        absent = clock.participate()  # time stands still
+        rescue = threading.Timer(20.0, absent.leave)
+        rescue.start()
+        signal.setitimer(signal.ITIMER_REAL, 0.01, 0.01)
+        clock.spend(5e-3)
+        rescue.cancel()
+        assert calls == [0, 0, 0]
+        assert clock.now_ns == 5 * MS
+    signal.signal(signal.SIGALRM, before)
+
+
 def test_a_higher_priority_preempts():
     """Low spends 10 ms from 0, and high spends 3 ms from 4, so low ends at 13."""
     seen = []

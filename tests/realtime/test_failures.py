@@ -185,6 +185,40 @@ def test_tasks_end_with_their_parent(tmp_path):
     assert trace.read_text() == "cleaned up"
 
 
+SPENDING = """
+import sys, time
+from catenary.realtime import Task, Tasks, VirtualClock
+from tests.realtime.bodies import spend
+if __name__ == "__main__":
+    task = Task(spend, (1.0,), period=2.0)
+    with VirtualClock() as clock, Tasks(task, clock=clock) as tasks:
+        tasks.join(0.5)
+        print(tasks["spend"].process, flush=True)
+        time.sleep(60.0)
+"""
+
+
+def test_a_task_that_spends_virtual_time_ends_with_its_parent(tmp_path):
+    """The parent has the turn when it is killed: virtual time stands still from then on."""
+    script = tmp_path / "parent.py"
+    script.write_text(SPENDING)
+    parent = subprocess.Popen(
+        [sys.executable, str(script)],
+        stdout=subprocess.PIPE,
+        env=os.environ | {"PYTHONPATH": str(Path(__file__).resolve().parents[2])},
+    )
+    assert parent.stdout is not None
+    process = int(parent.stdout.readline())
+    watched = os.pidfd_open(process)
+    parent.kill()
+    parent.communicate()
+    ended = select.select([watched], [], [], 20.0)[0]
+    if not ended:
+        signal.pidfd_send_signal(watched, signal.SIGKILL)
+    os.close(watched)
+    assert ended == [watched]
+
+
 def test_arguments_that_cannot_be_pickled_are_an_error():
     task = Task(bodies.spend, (lambda: 1,), name="a", period=1e-3)
     with pytest.raises(TaskError, match=r"task 'a'.*could not be started"):

@@ -83,3 +83,9 @@ def test_a_main_device_accepts_a_name_or_a_source() -> None:
         assert len(main.scan()) == 6
     with MainDevice(Segment([Coupler()])) as main:
         assert len(main.scan()) == 1
+
+
+def test_an_xml_file_is_not_a_segment() -> None:
+    with pytest.raises(ConfigurationError, match=r"'bus\.xml' is an XML file") as caught:
+        parse("bus.xml")
+    assert "cat.Machine" in caught.value.hint

@@ -65,6 +65,20 @@ def test_what_is_not_a_file_is_refused_at_once(
     assert "is not a file" in done.stderr
 
 
+def test_a_device_is_refused() -> None:
+    with pytest.raises(ConfigurationError, match="/dev/zero is not a file"):
+        read_key("/dev/zero")
+
+
+def test_a_file_that_is_too_large_is_refused(tmp_path: Path) -> None:
+    """The digits at its begin are a key, but the file is another one."""
+    path = tmp_path / "key"
+    path.write_text("ab" * 32 + " " * 4096 + "zz")
+    path.chmod(0o600)
+    with pytest.raises(ConfigurationError, match="has 4162 bytes, and a key file 65"):
+        read_key(path)
+
+
 @pytest.mark.parametrize("text", ["", "zz", "00" * 31, "00" * 33, "geheim\xe4"])
 def test_an_invalid_key_is_refused(tmp_path: Path, text: str) -> None:
     path = tmp_path / "key"

@@ -135,6 +135,22 @@ def test_a_restarted_program_connects_after_the_loss() -> None:
     assert one.losses == 1
 
 
+def test_delays_of_another_program_do_not_remain() -> None:
+    one, other, now = connected()
+    one.update(now + 100 * MS)
+    now += 101 * MS
+    other.accept(one.packet(SAMPLE, now), now)
+    assert one.accept(other.packet(SAMPLE, now), now) is None  # in time, before the next update
+    assert one.delays.sum_ns(now) == 0
+    new = link(4)
+    assert one.accept(new.packet(SAMPLE, now), now) is Refusal.UNPROVEN
+    assert one.delays.sum_ns(now) is None
+    assert one.proven == other.session
+    exchange(one, new, now, 10)
+    assert one.state is new.state is LinkState.CONNECTED
+    assert one.proven == new.session
+
+
 def test_packets_of_the_last_connection_do_not_connect_a_restarted_program() -> None:
     recorded: list[Packet] = []
     one, other, now = connected()

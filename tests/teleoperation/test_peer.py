@@ -159,10 +159,13 @@ def test_a_restarted_program_connects_again(caplog: pytest.LogCaptureFixture) ->
     sides = Sides()
     sides.connect()
     sides.restart(1)
+    before = sides.peers[0].other_session
     sides.run(10)
     assert sides.peers[1].state is LinkState.WAITING
+    assert sides.peers[1].other_session == 0
     sides.connect()
     assert sides.peers[0].losses == 1
+    assert 0 != sides.peers[0].other_session != before
     assert "teleoperation link lost: " in caplog.text
 
 

@@ -94,13 +94,23 @@ def test_peers_over_udp(pair) -> None:
 
 
 def test_a_port_in_use(pair) -> None:
-    with pytest.raises(LinkError, match="Address already in use"):
+    with pytest.raises(LinkError, match=r"Address already in use(.|\n)*ss -ulpn"):
         UdpTransport(pair[0].address, pair[1].address)
 
 
 def test_an_unknown_host() -> None:
-    with pytest.raises(LinkError, match="cannot send from"):
+    with pytest.raises(LinkError, match=r"cannot send from(.|\n)*check the host names"):
         UdpTransport("127.0.0.1:0", "no-such-host.invalid:7001")
+
+
+def test_an_address_of_another_machine() -> None:
+    with pytest.raises(LinkError, match=r"Cannot assign(.|\n)*bind an address of this machine"):
+        UdpTransport("192.0.2.1:0", "127.0.0.1:7001")
+
+
+def test_the_other_side_needs_a_port() -> None:
+    with pytest.raises(ValueError, match="give the port of the other side"):
+        UdpTransport("127.0.0.1:0", "127.0.0.1:0")
 
 
 def test_addresses_of_two_families() -> None:

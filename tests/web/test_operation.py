@@ -230,6 +230,23 @@ def test_no_request_while_the_loop_stands_still(opened: Opened) -> None:
     expect(choice(page, "stand")).to_be_disabled()
 
 
+def test_after_a_reconnection_the_mode_is_that_of_the_program(opened: Opened) -> None:
+    page, server = opened
+    hold(page, "stand")
+    expect(result(page)).to_contain_text("accepted Mode stand")
+    page.clock.resume()
+    server.accepts = False
+    server.drop()
+    expect(page.get_by_text("disconnected")).to_be_visible()
+    expect(page.get_by_role("banner")).to_contain_text("no mode")
+    expect(choice(page, "damping")).to_have_attribute("aria-pressed", "false")
+    expect(choice(page, "stand")).to_be_disabled()
+    server.accepts, server.run, server.mode = True, "run-2", "balance"
+    expect(choice(page, "balance")).to_have_attribute("aria-pressed", "true", timeout=15_000)
+    expect(page.get_by_role("banner")).to_contain_text("balance")
+    expect(result(page)).to_contain_text("Hold a button for 0.6 s")  # nothing of the former run
+
+
 def test_a_touch_is_held_on_a_phone(browser: Browser) -> None:
     context = browser.new_context(viewport={"width": 390, "height": 844}, has_touch=True)
     page = context.new_page()

@@ -70,6 +70,10 @@ export class Connection {
   readonly role = computed(() => this.hello.value?.role ?? this.session.value?.role ?? null);
   readonly fresh = signal(true); // false: no status for STATUS_SILENCE
   readonly running = computed(() => this.status.value?.state !== "stalled");
+  /** Operating mode; null: the program has set none, or the page does not know it now. */
+  readonly mode = computed(() =>
+    this.state.value === "open" && this.fresh.value ? (this.status.value?.mode ?? null) : null,
+  );
   readonly losing = computed(() => (this.status.value?.lost_in_row ?? 0) > 0);
   readonly delay = signal<number | null>(null); // round trip to the server [ms]
 
@@ -256,9 +260,9 @@ export class Connection {
   private receiveHello(message: Hello): void {
     if (this.hello.value?.run !== message.run) {
       this.events.value = [];
-      this.status.value = null;
       this.timing.value = null;
     }
+    this.status.value = null; // that of the former connection is old
     this.backoff = BACKOFF_FIRST;
     this.statusTime = performance.now();
     this.fresh.value = true;

@@ -103,7 +103,7 @@ function ModeFact({ connection }: { connection: Connection }) {
     <div class="mode">
       <dt>{text.header.mode}</dt>
       <dd class="cut">
-        <LiveText of={() => connection.status.value?.mode ?? text.operation.unknown} />
+        <LiveText of={() => connection.mode.value ?? text.operation.unknown} />
       </dd>
     </div>
   );

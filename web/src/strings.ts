@@ -245,6 +245,7 @@ export const text = {
       unanswered: "not answered",
       failed: "failed",
     },
+    interrupted: "the connection was lost; the mode shows whether the program has accepted it",
     question: (what: string) => `Request ${what}?`,
     request: "Request",
   },

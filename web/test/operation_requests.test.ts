@@ -27,6 +27,28 @@ test("a mode and a preset call their methods", async () => {
   assert.deepEqual(calls, [["set_mode", { mode: "stand" }], ["run_preset", { preset: "wave" }]]);
 });
 
+test("an answer after the loss of the connection is ignored", async () => {
+  const { requests, answers } = bench();
+  const asked = requests.request({ kind: "mode", name: "balance" });
+  requests.interrupt();
+  assert.equal(requests.report.value?.outcome, "unanswered");
+  assert.equal(requests.waits, false);
+  answers[0]?.resolve();
+  await asked;
+  assert.equal(requests.report.value?.outcome, "unanswered");
+});
+
+test("an interruption leaves an answered request", async () => {
+  const { requests, answers } = bench();
+  const asked = requests.request({ kind: "mode", name: "balance" });
+  answers[0]?.resolve();
+  await asked;
+  requests.interrupt();
+  assert.equal(requests.report.value?.outcome, "accepted");
+  requests.forget();
+  assert.equal(requests.report.value, null);
+});
+
 test("a second request while one waits has no effect", async () => {
   const { requests, calls } = bench();
   void requests.request({ kind: "mode", name: "stand" });

@@ -42,6 +42,7 @@ from catenary.procedure.pdo import (
 )
 from catenary.procedure.pdo_offers import read_offers, read_values
 from catenary.procedure.profile import read_object
+from catenary.procedure.register_commands import run_commands
 from catenary.procedure.station import within
 from catenary.procedure.sync import bring_together, read_types, stop, write_types
 from catenary.wire.al import AlState
@@ -127,7 +128,7 @@ def bring_to_safe_op(
         )
     runner.run_all([request_state(sub.station, AlState.SAFE_OP) for sub in subs])
     planned = zip(subs, plan.devices, strict=True)
-    runner.run_all([_finish(sub, device) for sub, device in planned if device.commands.in_safe_op])
+    runner.run_all([_finish(sub, device) for sub, device in planned])
     for sub in subs:
         sub.state = AlState.SAFE_OP
     return measured
@@ -211,11 +212,14 @@ def _prepare(sub: SubDevice, plan: DevicePlan) -> Procedure[None]:
         writing = _write(_channel(sub), device, plan)
         yield from within(WRITE_TIMEOUT, sub.station, writing, "its configuration was")
     yield from configure_process_data(sub.station, device, plan)
+    yield from run_commands(sub.station, plan.registers, "PS")
 
 
 def _finish(sub: SubDevice, plan: DevicePlan) -> Procedure[None]:
-    writing = write_in_safe_op(_channel(sub), plan)
-    yield from within(WRITE_TIMEOUT, sub.station, writing, "its configuration was")
+    if plan.commands.in_safe_op:
+        writing = write_in_safe_op(_channel(sub), plan)
+        yield from within(WRITE_TIMEOUT, sub.station, writing, "its configuration was")
+    yield from run_commands(sub.station, plan.registers, "SO")
 
 
 def _write(channel: MailboxChannel, device: DeviceDescription, plan: DevicePlan) -> Procedure[None]:

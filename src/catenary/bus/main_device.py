@@ -13,7 +13,7 @@ from catenary.bus.esi_source import EsiPlace, EsiSource, open_source, unchanged
 from catenary.bus.event_queue import Callback, Callbacks, Events
 from catenary.bus.external_master import Carrier
 from catenary.bus.frame_master import FrameMaster
-from catenary.bus.master import Master, MasterSource
+from catenary.bus.master import Complete, Master, MasterSource
 from catenary.bus.pending import Pending
 from catenary.bus.runner import BlockingRunner, FrameCounts, LinkLent, Runner
 from catenary.bus.sdo import Objects
@@ -235,6 +235,7 @@ class MainDevice:
         expected: Sequence[Identity | tuple[int, int] | None] | None = None,
         strict: bool = True,
         esi: EsiPlace = None,
+        settings: Complete = unchanged,
     ) -> SubDevices:
         """Find all devices, bring them to PRE-OP, and update `subs` and `notes`.
 
@@ -250,6 +251,8 @@ class MainDevice:
             esi: ESI file, folder of ESI files, `Library`, or a list of these, the preferred one
                 first. None: the user's library (`catenary esi`), if it exists. False: no ESI files.
                 `SubDevice.esi` has the description of each device; `notes` has contradictions.
+            settings: Function that changes the description of each device before PRE-OP, after its
+                ESI was used. `cat.Machine` adds the commands of an ENI with it.
 
         Returns:
             All devices, by position.
@@ -264,7 +267,8 @@ class MainDevice:
         """
         self.require_no_loop()
         source = open_source(esi)
-        subs, self.notes = self.master.scan(unchanged if source is None else source.complete)
+        complete = unchanged if source is None else source.complete
+        subs, self.notes = self.master.scan(lambda device: settings(complete(device)))
         self.subs = SubDevices(subs)
         self._keep_esi(source, strict=strict)
         self._note_further_errors()

@@ -19,6 +19,7 @@ from catenary.procedure.modules import read_module_lists
 from catenary.procedure.names import name_entries
 from catenary.procedure.pdo_offers import read_first_mapping
 from catenary.procedure.profile import read_profile
+from catenary.procedure.register_commands import run_commands
 from catenary.procedure.sii import read_image
 from catenary.procedure.sii_owner import hand_over
 from catenary.procedure.station import Station, station_of, within
@@ -83,11 +84,13 @@ def bring_to_pre_op(
     station = station_of(device)
     if device.mailbox is None:
         yield from hand_over(station)
+        yield from run_commands(station, device.register_commands, "IP")
         yield from request_state(station, AlState.PRE_OP)
         return ScannedDevice(device)
     channel = MailboxChannel(station, device.mailbox)
     yield from configure_mailbox(channel)
     yield from hand_over(station)
+    yield from run_commands(station, device.register_commands, "IP")
     yield from request_state(station, AlState.PRE_OP)
     if device.coe:
         device = yield from read_profile(channel, device)

@@ -128,7 +128,7 @@ def run(arguments: argparse.Namespace) -> int:
     source = arguments.source or only_share(arguments.uid)
     further = [share_name("--also", each) for each in arguments.also]
     base = None if arguments.base is None else share_name("--base", arguments.base)
-    check_distinct([source.removeprefix(PREFIX), *further])
+    check_distinct([source.removeprefix(PREFIX), *further], base)
     options = Options(
         host=arguments.host,
         port=arguments.port,
@@ -192,8 +192,13 @@ def share_name(option: str, text: str) -> str:
     return name
 
 
-def check_distinct(names: Sequence[str]) -> None:
-    """Raise UsageError if a share is named twice."""
+def check_distinct(names: Sequence[str], base: str | None) -> None:
+    """Raise UsageError if a share of axes is named twice, or is also that of the base."""
+    if base in names:
+        raise UsageError(
+            f"--base {base}: this share has axes",
+            hint="name the share with the fields position and quaternion of the robot's base",
+        )
     twice = next((name for name in names if names.count(name) > 1), None)
     if twice is not None:
         raise UsageError(

@@ -21,14 +21,19 @@ def add_parser(commands: Commands) -> None:
     parser = add_command(
         commands,
         "init",
-        help="write a machine file from the devices of a segment",
+        help="write a machine file from the devices of a segment, or from an ENI",
         description="Brings all devices to PRE-OP and writes machine.toml with the identities of "
         "the devices, the drives, and the names of process data. Lines marked FILL IN need your "
-        "values. With --schema, prints the JSON schema of machine files for editors.",
-        example="catenary init eth0 -o machine.toml\ncatenary init --schema",
+        "values. An ENI (bus.xml) is converted without a network. With --schema, prints the JSON "
+        "schema of machine files for editors.",
+        example="catenary init eth0 -o machine.toml\ncatenary init bus.xml -o machine.toml\n"
+        "catenary init --schema",
     )
     parser.add_argument(
-        "target", metavar="TARGET", nargs="?", help="eth0, virtual, virtual:FILE.toml ..."
+        "target",
+        metavar="TARGET",
+        nargs="?",
+        help="eth0, virtual, virtual:FILE.toml ..., or an ENI: bus.xml",
     )
     parser.add_argument(
         "-o",
@@ -55,13 +60,30 @@ def run(arguments: argparse.Namespace) -> int:
         raise UsageError("TARGET is missing", hint="for example: catenary init eth0")
     if arguments.output.exists() and not arguments.force:
         raise UsageError(f"{arguments.output} already exists", hint="use -o FILE or --force")
+    if arguments.target.lower().endswith(".xml"):
+        return convert(arguments.target, arguments.output)
     return write(arguments.target, arguments.output)
+
+
+def convert(path: str, output: Path) -> int:
+    """Write the machine file of an ENI, and print what it cannot contain. Return the status."""
+    from catenary.esi.eni import read_eni
+    from catenary.machine.eni.text import eni_text
+
+    eni = read_eni(path)
+    text, notes = eni_text(eni)
+    output.write_text(text, encoding="utf-8")
+    print(f"{output}: {len(eni.devices)} devices")
+    print_open_lines(text, output)
+    for note in (*map(str, eni.warnings), *notes):
+        print(f"warning: {note}", file=sys.stderr)
+    return 0
 
 
 def write(target: str, output: Path) -> int:
     """Write the file and print the lines to fill in. Return the exit status."""
     from catenary.cli.failure import with_hint
-    from catenary.machine.text import FILL_IN, machine_text
+    from catenary.machine.text import machine_text
     from catenary.target import MainDevice
 
     with MainDevice(target) as main:
@@ -71,14 +93,21 @@ def write(target: str, output: Path) -> int:
         [device.description for device in devices], target_in_file(target, output), encoders
     )
     output.write_text(text, encoding="utf-8")
-    open_lines = [n for n, line in enumerate(text.splitlines(), 1) if f"# {FILL_IN}" in line]
     print(f"{output}: {len(devices)} devices")
-    for line in open_lines:
-        print(f"{output}:{line}: {FILL_IN}")
+    print_open_lines(text, output)
     errors = [device.error for device in devices if device.error is not None]
     for error in errors:
         print(f"error: {with_hint(error)}", file=sys.stderr)
     return 1 if errors else 0
+
+
+def print_open_lines(text: str, output: Path) -> None:
+    """Print the lines that need a value."""
+    from catenary.machine.text import FILL_IN
+
+    for number, line in enumerate(text.splitlines(), 1):
+        if f"# {FILL_IN}" in line:
+            print(f"{output}:{number}: {FILL_IN}")
 
 
 def read_encoders(devices: Sequence[SubDevice]) -> Mapping[tuple[int, int], float]:

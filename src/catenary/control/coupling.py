@@ -61,8 +61,8 @@ class Coupling:
         peer: stiffness and damping of the other side; None if they are those of this side.
         scale: this side's motion divided by the other side's. The other side uses the reciprocal.
         deflection: largest effective deflection of the spring [rad], in this side's coordinates. It
-            limits the torque of the spring to K · deflection. A saturated spring is not stiffer,
-            so the condition holds if both sides have the same limit.
+            limits the torque of the spring to K · deflection, with and without a link. A saturated
+            spring is not stiffer, so the condition holds if both sides have the same limit.
         hold: stiffness with which an axis holds without a link [N·m/rad]; None for `stiffness`. It
             must be below B / δ, since this spring acts δ late, too.
         align: speed at which an initial distance between both sides is closed [rad/s]. This winds
@@ -195,8 +195,8 @@ def coupling(
     """Compute one step of axis `i`.
 
     Without a link, the axis holds its position at the loss, with the stiffness `hold` and the same
-    damping. When the link returns, the reference starts at the own position, so the torque has no
-    step. It then approaches the received position with the speed `align`.
+    damping. When the link returns, the spring keeps the torque with which it has held, so the
+    torque has no step. The reference then approaches the received position with the speed `align`.
 
     Args:
         memory: `Coupling.memory`.
@@ -219,21 +219,24 @@ def coupling(
         raise ValueError("coupling: not the parameters of a Coupling")
     p, m = 1 + GAINS * i, STATES * i
     reach = parameters[p + 3]
+    held = 0.0
+    if memory[m] == HOLDING:
+        held = limited(parameters[p + 4] * (memory[m + 1] - position), parameters[p] * reach)
     if connected == 0.0 or not math.isfinite(peer):
         if memory[m] != HOLDING:
             memory[m], memory[m + 1] = HOLDING, position
-        spring = parameters[p + 4] * limited(memory[m + 1] - position, reach)
+        spring = held
     else:
         wanted = parameters[p + 2] * peer
-        aligned(memory, m, wanted, parameters[p + 5] * dt, position)
+        aligned(memory, m, wanted, parameters[p + 5] * dt, position + held / parameters[p])
         spring = parameters[p] * limited(wanted + memory[m + 2] - position, reach)
     torque: float = spring - parameters[p + 1] * velocity
     return torque
 
 
 @compiles
-def aligned(memory: Row, m: int, wanted: float, step: float, position: float) -> None:
-    """Reduce the offset of the reference by at most `step`. It starts at the own position."""
+def aligned(memory: Row, m: int, wanted: float, step: float, start: float) -> None:
+    """Reduce the offset of the reference by at most `step`. The reference begins at `start`."""
     if memory[m] != COUPLED:
-        memory[m], memory[m + 2] = COUPLED, position - wanted
+        memory[m], memory[m + 2] = COUPLED, start - wanted
     memory[m + 2] -= limited(memory[m + 2], step)

@@ -730,9 +730,12 @@ cdef class Engine:
         cdef int64_t until = self.now_ns() + duration
         cdef int rc
         if link.flags & CAT_LINK_SPENDS:
-            with nogil:
-                rc = link.spend(link.self, duration)
-            return self.interrupted(rc) if rc < 0 else 0
+            while True:
+                with nogil:
+                    rc = link.spend(link.self, duration)
+                if rc >= 0:
+                    return 0
+                self.interrupted(rc)
         while self.now_ns() < until:
             with nogil:
                 rc = link.wait_until(link.self, until, 0)

@@ -7,6 +7,7 @@ from catenary.drive.io import Inputs, Outputs
 from catenary.drive.move import Move
 from catenary.drive.process_data import ProcessData
 from catenary.drive.recovery import Phase, Recovery, Stop
+from catenary.drive.start_up_list import read_start_up
 from catenary.plan.request import DistributedClock
 from catenary.plan.start_up_object import StartUp
 
@@ -23,4 +24,5 @@ __all__ = [
     "Recovery",
     "StartUp",
     "Stop",
+    "read_start_up",
 ]

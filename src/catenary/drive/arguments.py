@@ -22,7 +22,7 @@ from catenary.wire.cia402 import Mode
 
 AxisSource: TypeAlias = SubDevice | tuple[SubDevice, int]
 PdoEntry: TypeAlias = tuple[int, int, int] | str  # (index, subindex, bits), or a channel name
-PdoName: TypeAlias = int | str  # number, or name of a PDO or a mapping
+PdoName: TypeAlias = int | str | WrittenPdo  # number, or name of a PDO or a mapping
 PdoList: TypeAlias = str | Sequence[PdoName] | Mapping[PdoName, Sequence[PdoEntry]]
 ColumnSpec: TypeAlias = ChannelSpec | AxisObject
 Columns: TypeAlias = Sequence[str | tuple[str, ColumnSpec]] | Mapping[str, ColumnSpec]
@@ -177,11 +177,15 @@ def written_pdos(
 
 
 def _is_pdo(given: object) -> bool:
-    """Return True for a number or a name; a number in quotes is neither."""
+    """Return True for a number, a name or a WrittenPdo; a number in quotes is not valid."""
+    if isinstance(given, WrittenPdo):
+        return True
     return isinstance(given, int) or (isinstance(given, str) and not given.startswith("0x"))
 
 
-def _numbered(index: int) -> WrittenPdo:
+def _numbered(index: int | WrittenPdo) -> WrittenPdo:
+    if isinstance(index, WrittenPdo):
+        return index
     if not 0x1600 <= index < 0x1C00:
         raise ValueError(
             f"pdos: 0x{index:04X} is not a PDO; use 0x1600 to 0x19FF for outputs and 0x1A00 to "
@@ -199,7 +203,7 @@ def _written_entry(
         near = get_close_matches(entry, named, n=1)
         guess = f"; did you mean {near[0]!r}?" if near else ""
         known = f"known names are {', '.join(named)}" if named else "this request has no names"
-        place = repr(pdo) if isinstance(pdo, str) else f"0x{pdo:04X}"
+        place = f"0x{pdo:04X}" if isinstance(pdo, int) else repr(pdo)
         raise ValueError(f"pdos: unknown name {entry!r} in {place}; {known}{guess}")
     found = named[entry]
     return ObjectReference(found.index, found.subindex, found.bit_length)

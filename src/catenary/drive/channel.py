@@ -33,6 +33,7 @@ class Channel:
             number.
         unit: unit of the value, for display.
         output: True if the column is written. Used only by `Drives(columns=...)`.
+        pdo: PDO that contains the object, if several do; 0 for any.
 
     Raises:
         TypeError: The type is not numeric.
@@ -46,6 +47,7 @@ class Channel:
     _: KW_ONLY
     unit: str = ""
     output: bool = False
+    pdo: int = 0
 
     def __post_init__(self) -> None:
         if not 0 < self.index <= 0xFFFF or not 0 <= self.subindex <= 0xFF:

@@ -36,7 +36,7 @@ def chosen_channels(sub: SubDevice, named: Mapping[str, Channel]) -> tuple[Named
         named: channels by name.
     """
     return tuple(
-        NamedChannel(name, sub.position, channel, Which(bit_length=channel.bit_length))
+        NamedChannel(name, sub.position, channel, Which(channel.pdo, channel.bit_length))
         for name, channel in named.items()
     )
 

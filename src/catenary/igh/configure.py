@@ -274,8 +274,8 @@ def _register(
 
 def _no_complete_access(label: str, download: Download) -> ConfigurationError:
     return ConfigurationError(
-        f"{label}: start-up object {download.place} (ESI {download.source}) needs complete access, "
-        "which is not available with libethercat",
+        f"{label}: start-up object {download.place} ({download.origin} {download.source}) needs "
+        "complete access, which is not available with libethercat",
         hint="give its entries as start_up= objects; they replace it",
     )
 

@@ -39,7 +39,7 @@ def _start_up(file: MachineFile, table: StartUpTable, path: KeyPath) -> StartUp:
     index, subindex = object_of(file, (*path, "object"), table.object)
     options: dict[str, Any] = {
         name: getattr(table, name)
-        for name in ("before_mapping", "verify")
+        for name in ("before_mapping", "verify", "complete_access")
         if getattr(table, name) is not UNSET
     }
     value: bool | int | float | str | bytes = table.value

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 
 from catenary.bus import SubDevice
 from catenary.drive import Drives
@@ -20,6 +21,7 @@ from catenary.machine.requests import (
     make_drives,
     make_process_data,
 )
+from catenary.machine.variables import Variables
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,30 +32,32 @@ class MachineParts:
     drives: ByName[Drives] = field(default_factory=lambda: ByName("drives", {}, {}))
     process_data: ByName[ProcessData] = field(default_factory=lambda: ByName("data", {}, {}))
     requests: tuple[LoopRequest, ...] = ()
+    variables: Variables = field(default_factory=lambda: Variables({}, {}, {}))  # of an ENI
+    notes: tuple[str, ...] = ()  # warnings about an ENI, and its differences from the plan
 
 
-def raise_differences(file: MachineFile, found: Sequence[Comparison]) -> None:
+def raise_differences(path: Path, found: Sequence[Comparison]) -> None:
     """Raise an error for the first difference between file and segment, if there is one.
 
     The other differences are notes of the error. Unknown and absent devices are not differences.
 
     Args:
-        file: the machine file.
+        path: the file with the expected devices.
         found: comparisons of the devices.
 
     Raises:
         IdentityError: A device has another identity, or two devices have the same alias.
         SegmentError: A required device is missing.
     """
-    errors = [_error(file, each) for each in found if each.verdict in ("different", "missing")]
+    errors = [_error(path, each) for each in found if each.verdict in ("different", "missing")]
     if errors:
         for other in errors[1:]:
             errors[0].add_note(f"also: {other}")
         raise errors[0]
 
 
-def _error(file: MachineFile, found: Comparison) -> CatenaryError:
-    text = f'{file.path}: device "{found.name}": {found.fault}'
+def _error(path: Path, found: Comparison) -> CatenaryError:
+    text = f'{path}: device "{found.name}": {found.fault}'
     if found.found is None or found.expected is None:
         return SegmentError(text, hint=found.cause)
     return IdentityError(
@@ -78,8 +82,6 @@ def make_found(file: MachineFile, found: Sequence[Comparison]) -> MachineParts:
             option is not valid, or the ESI file of a device does not describe it.
     """
     subs = {each.name: each.found for each in found if each.verdict == "same" and each.found}
-    for name, sub in subs.items():
-        sub.give_name(name)
     for sub in subs.values():
         if sub.error is not None:
             raise sub.error

@@ -4,24 +4,22 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Self
-
-from msgspec import UNSET
+from typing import TYPE_CHECKING, Any, Protocol, Self
 
 from catenary.bus import SubDevice
 from catenary.bus.master import MasterSource
 from catenary.drive import Drives
 from catenary.drive.process_data import ProcessData
+from catenary.esi.eni import is_eni
 from catenary.link import LinkSource
 from catenary.loop import ClockOptions, Loop, Scheduling, StopPolicy
 from catenary.loop.devices import LoopRequest
 from catenary.loop.laws.law import Laws
 from catenary.machine.by_name import ByName
-from catenary.machine.comparison import compare
-from catenary.machine.esi_files import esi_places
-from catenary.machine.found import MachineParts, make_found, raise_differences
-from catenary.machine.options import loop_options
-from catenary.machine.read import read_machine
+from catenary.machine.eni.machine import EniMachine
+from catenary.machine.found import MachineParts
+from catenary.machine.toml_machine import TomlMachine
+from catenary.machine.variables import Variables
 from catenary.plan.cycle import ExecutionMode
 from catenary.plan.sink import Sink
 from catenary.plan.trigger import Trigger
@@ -29,6 +27,19 @@ from catenary.target import MainDevice, segment_of, source_of
 
 if TYPE_CHECKING:
     from catenary.virtual import Segment
+
+
+class MachineDescription(Protocol):
+    """Machine that a file describes: `TomlMachine` or `EniMachine`."""
+
+    @property
+    def name(self) -> str: ...
+
+    def source(self) -> LinkSource: ...
+
+    def find(self, main: MainDevice, *, passive: bool) -> MachineParts: ...
+
+    def loop_options(self, parts: MachineParts) -> dict[str, Any]: ...
 
 
 class Machine:
@@ -44,23 +55,34 @@ class Machine:
     PRE-OP. At the end, it brings them to INIT. `subs`, `drives`, `process_data`, `requests` and
     `loop` raise RuntimeError while the machine is not open.
 
+    A file with the ending ".xml" is an ENI (docs/how_to/eni.md). Its devices and their process data
+    have the names of the file, and `variables` has its process image.
+
     Args:
-        path: the machine file.
+        path: the machine file, or an ENI.
         target: "eth0", "virtual:line.toml", "virtual:line/" (a clone) or a `Segment`; None for the
-            `target` of the file.
+            `target` of the file. An ENI has none.
         force: open the link even if another master is active on the interface.
+        without: mailbox protocols of an ENI whose commands are left out, such as "EoE".
 
     Raises:
         MachineFileError: The file cannot be read, or it is not valid. The error names line and key.
+            A command of an ENI cannot be run.
+        ValueError: `without` is given for a machine file, or has an unknown protocol.
         ConfigurationError: `target` is not a valid name.
         TypeError: `target` is neither a name nor a link source.
     """
 
     def __init__(
-        self, path: str | Path, target: str | LinkSource | None = None, *, force: bool = False
+        self,
+        path: str | Path,
+        target: str | LinkSource | None = None,
+        *,
+        force: bool = False,
+        without: Sequence[str] = (),
     ) -> None:
-        self._file = read_machine(path)
-        source = self._file.source() if target is None else source_of(target)
+        self._described = _read(path, [without] if isinstance(without, str) else without)
+        source = self._described.source() if target is None else source_of(target)
         self._segment = segment_of(source)
         self._main = MainDevice(source, force=force)
         self._has_own_master = isinstance(source, MasterSource)
@@ -85,7 +107,8 @@ class Machine:
         """
         self._main.open()
         try:
-            self._found = self._find()
+            self._found = self._described.find(self._main, passive=not self._has_own_master)
+            self._name_devices()
         except BaseException:
             self._main.close()
             raise
@@ -130,6 +153,16 @@ class Machine:
         return self._opened.process_data
 
     @property
+    def variables(self) -> Variables:
+        """Variables in the process image of an ENI, by their full names; empty for other files."""
+        return self._opened.variables
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """Warnings about an ENI, commands that are not run, and differences from the plan."""
+        return self._opened.notes
+
+    @property
     def requests(self) -> tuple[LoopRequest, ...]:
         """Requests for a loop, for example for `machine.main.plan(*machine.requests)`."""
         return self._opened.requests
@@ -163,7 +196,7 @@ class Machine:
             RuntimeError: The machine is not open.
             ValueError: An option is not valid.
         """
-        options = self._file_options()
+        options = self._described.loop_options(self._opened)
         given = {
             "period": period,
             "execution": execution,
@@ -180,42 +213,28 @@ class Machine:
         options |= {name: value for name, value in given.items() if value is not None}
         return Loop(*self.requests, laws=laws, sink=sink, trigger=trigger, **options)
 
-    def _file_options(self) -> dict[str, Any]:
-        """Return the options of the file for a loop.
-
-        Raises:
-            MachineFileError: There are neither drives nor process data with present devices.
-            KeyError: The device of `clocks.reference` is absent.
-        """
-        if not self.drives and not self.process_data:
-            raise self._file.error(
-                (),
-                "no drives or process data have all their devices present",
-                hint="connect the missing devices, or add a [drives.NAME] table: "
-                "docs/reference/machine_file.md",
-            )
-        reference = self._file.tables.clocks.reference
-        return loop_options(self._file, None if reference is UNSET else self.subs[reference])
-
     @property
     def _opened(self) -> MachineParts:
         if not self._main.is_open:
             raise RuntimeError("the machine is not open; use it in a `with` statement")
         return self._found
 
-    def _find(self) -> MachineParts:
-        """Check the identities, bring the devices to PRE-OP, scan them, and make the requests."""
-        file = self._file
-        places = esi_places(file)
-        if not self._has_own_master:  # the IgH master does not support a passive scan
-            raise_differences(file, compare(file.tables.device, self._main.passive_scan()))
-        found = compare(file.tables.device, self._main.scan(strict=False, esi=places))
-        raise_differences(file, found)
-        parts = make_found(file, found)
+    def _name_devices(self) -> None:
+        """Give the devices the names of the file, for messages and for `segment["j2"]`."""
+        for name, sub in self._found.subs.items():
+            sub.give_name(name)
         if self._segment is not None:
-            stations = {name: sub.description.station_address for name, sub in parts.subs.items()}
+            stations = {n: sub.description.station_address for n, sub in self._found.subs.items()}
             self._segment.name_devices(stations)
-        return parts
 
     def __repr__(self) -> str:
-        return f"<Machine {self._file.tables.name or self._file.path} on {self._main!r}>"
+        return f"<Machine {self._described.name} on {self._main!r}>"
+
+
+def _read(path: str | Path, without: Sequence[str]) -> MachineDescription:
+    """Return the description in a machine file or an ENI."""
+    if is_eni(path):
+        return EniMachine(path, without)
+    if without:
+        raise ValueError(f"without={without!r}: only for an ENI (.xml)")
+    return TomlMachine(path)

@@ -117,6 +117,7 @@ class StartUpTable(Table, frozen=True, kw_only=True):
     type: Optional[TypeName] = UNSET
     before_mapping: Optional[bool] = UNSET
     verify: Optional[bool] = UNSET
+    complete_access: Optional[bool] = UNSET
     comment: str = ""
 
 

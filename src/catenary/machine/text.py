@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 
 from catenary.machine.schema import FORMAT
@@ -16,7 +17,7 @@ UNSIGNED = {  # type by length [bits]
     **{40: "UINT40", 48: "UINT48", 56: "UINT56", 64: "ULINT"},
 }
 ENCODER = (0x608F, 1), (0x608F, 2)  # encoder counts, motor turns
-_HEAD = """\
+HEAD = """\
 # Written by `catenary init`. To compare this file with the segment, run `catenary check FILE`.
 # A number is in SI units (rad, s, N·m). Text has a unit: "170 deg", "500 us", "90 rpm".
 # Complete the lines marked {mark} and remove the "#" before them.
@@ -31,7 +32,7 @@ period = "1 ms"
 # Devices, in the order on the cable. You can rename them. A device is identified by its alias, or
 # by its position if it has no alias. `catenary alias TARGET POSITION VALUE` writes an alias.
 """
-_DRIVES = """
+DRIVES = """
 # Axes. The options are those of cat.Drives. A list has one value per axis, in the order of `axes`.
 [drives.axes]
 axes = [{axes}]
@@ -60,7 +61,7 @@ def machine_text(
         encoders: encoder counts per turn by (position, slot), for drives that report them.
     """
     names = _names(devices)
-    parts = [_HEAD.format(mark=FILL_IN, format=FORMAT, target=_quoted(target))]
+    parts = [HEAD.format(mark=FILL_IN, format=FORMAT, target=quoted(target))]
     repeated = _repeated([device.alias for device in devices])
     for name, device in zip(names, devices, strict=True):
         parts.append(_device(name, device, has_alias=device.alias not in {0, *repeated}))
@@ -74,7 +75,7 @@ def _device(name: str, device: DeviceDescription, *, has_alias: bool) -> str:
     address = f"alias = {device.alias}" if has_alias else f"position = {device.position}"
     label = ", ".join(part for part in (device.order, device.name) if part)
     return f"""
-[[device]]                            # position {device.position}: {_comment(label)}
+[[device]]                            # position {device.position}: {comment_text(label)}
 name = "{name}"
 {address}
 identity = {{ vendor = 0x{identity.vendor:X}, product = 0x{identity.product:X}, \
@@ -96,7 +97,7 @@ def _drives(
     if not axes:
         return ""
     counts = [encoders.get(place) for _, place in axes]
-    return _DRIVES.format(
+    return DRIVES.format(
         mark=FILL_IN, axes=", ".join(text for text, _ in axes), counts=_counts(counts)
     )
 
@@ -139,8 +140,8 @@ def _channels(device: DeviceDescription) -> dict[Direction, dict[str, str]]:
     ]
     short = [entry.name for _, entry, _ in found]
     unique = len(set(short)) == len(short)
-    names = _unique(
-        [_slug(e.name if unique else f"{pdo} {e.name}", "value") for _, e, pdo in found]
+    names = unique_names(
+        [slug(e.name if unique else f"{pdo} {e.name}", "value") for _, e, pdo in found]
     )
     channels: dict[Direction, dict[str, str]] = {direction: {} for direction in Direction}
     for name, (direction, entry, _) in zip(names, found, strict=True):
@@ -181,36 +182,36 @@ def _type_name(entry: Entry) -> str:
 
 
 def _names(devices: Sequence[DeviceDescription]) -> list[str]:
-    return _unique([_slug(device.order or device.name, "device") for device in devices])
+    return unique_names([slug(device.order or device.name, "device") for device in devices])
 
 
-def _unique(names: Sequence[str]) -> list[str]:
+def unique_names(names: Sequence[str]) -> list[str]:
     """Return the names, with numbers from 1 for those that occur more than once."""
-    repeated = _repeated(names)
+    repeated, given = _repeated(names), set(names)
     used: dict[str, int] = {}
-    made: list[str] = []
+    made: dict[str, None] = {}  # in their order
     for name in names:
         unique = name
-        while name in repeated and (unique == name or unique in made or unique in names):
+        while name in repeated and (unique == name or unique in made or unique in given):
             used[name] = used.get(name, 0) + 1
             unique = f"{name}_{used[name]}"
-        made.append(unique)
-    return made
+        made[unique] = None
+    return list(made)
 
 
 def _repeated(values: Sequence[object]) -> set[object]:
-    return {value for value in values if values.count(value) > 1}
+    return {value for value, count in Counter(values).items() if count > 1}
 
 
-def _slug(text: str, default: str) -> str:
+def slug(text: str, default: str) -> str:
     """Return a text as a TOML bare key: lower case, with "_" for other characters."""
     return re.sub(r"[^a-z0-9]+", "_", text.lower()).strip("_") or default
 
 
-def _quoted(text: str) -> str:
+def quoted(text: str) -> str:
     return json.dumps(text, ensure_ascii=False)
 
 
-def _comment(text: str) -> str:
+def comment_text(text: str) -> str:
     """Return a text of a device without characters that would end a comment."""
     return "".join(letter if letter.isprintable() else "?" for letter in text)

@@ -29,6 +29,7 @@ from catenary.model.process_data import (
     mapped_entries,
     mapped_pdos,
 )
+from catenary.model.register_command import RegisterCommand
 from catenary.wire.features import Information
 from catenary.wire.sii import MailboxProtocol
 from catenary.wire.sii_categories import SyncManagerUse
@@ -169,6 +170,8 @@ class DeviceDescription:
     esi: str = ""  # file and line of its ESI; empty without one
     documented: tuple[ObjectInformation, ...] = ()  # dictionary of its ESI
     init_commands: tuple[InitCommand, ...] = ()
+    register_commands: tuple[RegisterCommand, ...] = ()  # of an ENI, at the transitions
+    commands_origin: str = "ESI"  # kind of the file that gives the commands: "ESI" or "ENI"
     named_mappings: tuple[NamedMapping, ...] = ()
     timeouts: Timeouts = NO_TIMEOUTS
     watchdog: WatchdogValues = NO_WATCHDOG_VALUES

@@ -28,8 +28,8 @@ typedef struct cat_clock {
     int (*wait_until)(void *self, int64_t deadline);
 
     /* Spends execution time [ns]. A virtual clock lets the time pass; participants of higher priority
-     * on the same processor preempt it. The machine's clock busy-waits. Returns 0, or -errno as
-     * above. */
+     * on the same processor preempt it. The machine's clock busy-waits. Returns 0, or -errno.
+     * -EINTR: a signal interrupted the wait; call again to continue. */
     int (*spend)(void *self, int64_t duration);
 
     /* Ends the current `wait_until`, or the next one if no thread waits. */

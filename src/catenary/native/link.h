@@ -45,7 +45,8 @@ typedef struct cat_link {
     int (*wait_until)(void *self, int64_t deadline, int wake_on_frame);
 
     /* Only with CAT_LINK_SPENDS. Lets execution time [ns] pass. Participants of higher priority on
-     * the same virtual processor preempt it, so more time may pass. Returns 0, or -errno as above. */
+     * the same virtual processor preempt it, so more time may pass. Returns 0, or -errno as above:
+     * after -EINTR, call again to continue. */
     int (*spend)(void *self, int64_t duration);
 
     /* Only with CAT_LINK_FORETELLS (segments in this process). Returns the arrival time of the

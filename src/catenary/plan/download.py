@@ -19,7 +19,8 @@ class Download:
     verify: bool = False  # read back and compared, unless it is write-only
     text: str = ""  # value as the application gave it; empty for objects of Catenary and the ESI
     complete_access: bool = False  # writes all subindices from `subindex` on
-    source: str = ""  # file, line and comment of a command of the ESI
+    source: str = ""  # file, line and comment of a command of the ESI or ENI
+    origin: str = "ESI"  # or "ENI"
 
     @property
     def place(self) -> str:

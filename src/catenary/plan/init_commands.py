@@ -1,4 +1,4 @@
-"""Objects that an ESI requires to be written at state transitions (ETG.2000, `CoE/InitCmd`).
+"""Objects that an ESI or ENI requires to be written at state transitions (`CoE/InitCmd`).
 
 Commands of the transitions IP and PS are written in PRE-OP, in this order, before the start-up
 objects of the application. The mailbox is not available in INIT, so IP is the first step in
@@ -19,6 +19,7 @@ from catenary.plan.download import Download
 from catenary.plan.start_up_object import MAPPING_OBJECTS, StartUp
 
 PRE_OP_STEPS, SAFE_OP_STEPS = ("IP", "PS"), ("SO",)
+BY_PLAN = "the plan writes the mapping"  # reason to omit a command
 
 
 class Commands(NamedTuple):
@@ -27,6 +28,7 @@ class Commands(NamedTuple):
     in_pre_op: tuple[Download, ...] = ()
     in_safe_op: tuple[Download, ...] = ()
     omitted: tuple[str, ...] = ()  # commands that are not written, and the reason
+    origin: str = "ESI"  # or "ENI"
 
     @property
     def written(self) -> tuple[Download, ...]:
@@ -53,6 +55,7 @@ def choose_commands(
     """
     if not device.init_commands or not device.coe:
         return NO_COMMANDS
+    origin = device.commands_origin
     given = {(each.index, each.subindex) for each in objects}
     mapped = {(entry.index, entry.subindex) for entry in outputs}
     reasons = {each: _reason(each, given, own, mapped) for each in device.init_commands}
@@ -63,7 +66,7 @@ def choose_commands(
         for each, reason in reasons.items()
         if reason and known.intersection(each.transitions)
     ]
-    in_pre_op = tuple(dict.fromkeys(_downloads(written, PRE_OP_STEPS)))
+    in_pre_op = tuple(dict.fromkeys(_downloads(written, PRE_OP_STEPS, origin)))
     # In SAFE-OP, a fixed command would follow the object of the application, and undo it.
     late = [each for each in written if not _is_given(each, given)]
     omitted += [
@@ -71,7 +74,8 @@ def choose_commands(
         for each in written
         if each not in late and {*SAFE_OP_STEPS}.intersection(each.transitions)
     ]
-    return Commands(in_pre_op, tuple(_downloads(late, SAFE_OP_STEPS)), tuple(omitted))
+    in_safe_op = tuple(_downloads(late, SAFE_OP_STEPS, origin))
+    return Commands(in_pre_op, in_safe_op, tuple(omitted), origin)
 
 
 def _reason(
@@ -83,7 +87,7 @@ def _reason(
     """Return the reason why a command is not written; empty if it is written."""
     place = (command.index, command.subindex)
     if any(command.index in objects for objects in MAPPING_OBJECTS):
-        return "the plan writes the mapping"
+        return BY_PLAN
     if _is_given(command, given) and not command.fixed:
         return "your start-up object replaces it"
     if place in own:
@@ -98,7 +102,9 @@ def _is_given(command: InitCommand, given: Collection[tuple[int, int]]) -> bool:
     return (command.index, command.subindex) in given
 
 
-def _downloads(commands: Sequence[InitCommand], steps: Sequence[str]) -> Iterator[Download]:
+def _downloads(
+    commands: Sequence[InitCommand], steps: Sequence[str], origin: str
+) -> Iterator[Download]:
     for step in steps:
         for each in commands:
             if step in each.transitions:
@@ -108,6 +114,7 @@ def _downloads(commands: Sequence[InitCommand], steps: Sequence[str]) -> Iterato
                     each.data,
                     complete_access=each.complete_access,
                     source=f"{each.source} {each.comment}".strip(),
+                    origin=origin,
                 )
 
 

@@ -14,6 +14,7 @@ from catenary.plan.frames import ACYCLIC_GUARD
 from catenary.plan.layout import Layout
 from catenary.plan.modules import ident_lines, module_lines
 from catenary.plan.numbers import entry_places
+from catenary.plan.register_commands import register_lines
 from catenary.plan.start_up import DevicePlan
 from catenary.wire.cia402 import Mode
 from catenary.wire.clock import Activation
@@ -97,6 +98,7 @@ def _devices(devices: Sequence[DevicePlan]) -> Iterator[str]:
         yield from _entries(Direction.INPUT, device.inputs, place.input_offset)
         if device.left_out:
             yield f"    not exchanged (optional): {', '.join(device.left_out)}"
+        yield from (f"    register {each}" for each in register_lines(device.registers))
 
 
 def _start_up(devices: Sequence[DevicePlan]) -> Iterator[str]:
@@ -109,7 +111,9 @@ def _start_up(devices: Sequence[DevicePlan]) -> Iterator[str]:
         if device.modules is not None:
             yield from (f"        {'modules':<15} {each}" for each in ident_lines(device.modules))
         old = {change.what: change.old or "(not read)" for change in device.changes}
-        yield from (_download("ESI", each, old) for each in device.commands.in_pre_op)
+        yield from (
+            _download(device.commands.origin, each, old) for each in device.commands.in_pre_op
+        )
         yield from (_download("before mapping", each, old) for each in device.before_mapping)
         for change in device.changes:
             if ":" not in change.what:  # a list of PDOs or of entries
@@ -117,8 +121,11 @@ def _start_up(devices: Sequence[DevicePlan]) -> Iterator[str]:
                 yield f"        {'mapping':<15} {change.what}  {before} → {change.new}"
         for each in device.start_up:
             yield _download("yours" if each.text else "Catenary", each, old)
-        yield from (_download("ESI, in SAFE-OP", each, old) for each in device.commands.in_safe_op)
-        yield from (f"        {'ESI, omitted':<15} {each}" for each in device.commands.omitted)
+        origin = device.commands.origin
+        late = f"{origin}, in SAFE-OP"
+        yield from (_download(late, each, old) for each in device.commands.in_safe_op)
+        omitted = f"{origin}, omitted"
+        yield from (f"        {omitted:<15} {each}" for each in device.commands.omitted)
 
 
 def _download(owner: str, download: Download, old: Mapping[str, str]) -> str:

@@ -28,6 +28,7 @@ from catenary.model.device import (
     mapped_entries,
     mapped_pdos,
 )
+from catenary.model.register_command import RegisterCommand
 from catenary.plan.changes import Change, mapping_changes, value_changes
 from catenary.plan.clocks import SyncPlan
 from catenary.plan.download import Download
@@ -71,6 +72,7 @@ class DevicePlan:
     watchdog_source: str = ""  # file and line; empty if it is not from an ESI
     mapping_source: str = ""  # "CoE", "SII", "ESI FILE:LINE", or of the OpMode or named mapping
     modules: ModulePlan | None = None  # None: the device is not modular
+    registers: tuple[RegisterCommand, ...] = ()  # of an ENI, sent at the transitions
 
     @property
     def downloads(self) -> tuple[Download, ...]:
@@ -140,6 +142,7 @@ def make_device_plan(
         commands=commands,
         watchdog_source=watchdog_source,
         mapping_source=_mapping_source(device, outputs, inputs),
+        registers=device.register_commands,
     )
 
 
@@ -208,8 +211,11 @@ def _object_download(device: DeviceDescription, requested: StartUp) -> Download:
         requested.index,
         requested.subindex,
         requested.encode(kind),
-        verify=requested.verify and (known is None or known.readable),
+        verify=requested.verify
+        and not requested.complete_access
+        and (known is None or known.readable),
         text=requested.text(kind),
+        complete_access=requested.complete_access,
     )
 
 

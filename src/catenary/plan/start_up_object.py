@@ -24,6 +24,8 @@ class StartUp:
         type: A type of `catenary.types`. None uses the type in the device's object dictionary.
         before_mapping: True to write the value before the PDO mapping; False to write it after.
         verify: True to read the value back and compare it. Write-only objects are not read.
+        complete_access: True to write all subindices from `subindex` on (0 or 1) with one
+            request. `value` then has the bytes of all of them, and is not read back.
 
     Raises:
         ValueError: The index, the subindex or the value is out of range, or the object belongs to
@@ -39,6 +41,7 @@ class StartUp:
     type: Scalar | None = None
     before_mapping: bool = False
     verify: bool = True
+    complete_access: bool = False
 
     def __post_init__(self) -> None:
         if isinstance(self.index, str) or isinstance(self.subindex, str):
@@ -54,6 +57,8 @@ class StartUp:
                 f"start-up object {self.place} is part of the PDO mapping; write the mapping with "
                 "pdos= of the request"
             )
+        if self.complete_access:
+            self._check_complete_access()
         if self.type is None:
             return
         if not isinstance(self.type, DataType):
@@ -62,6 +67,16 @@ class StartUp:
                 "such as types.UDINT"
             )
         self.encode(self.type)
+
+    def _check_complete_access(self) -> None:
+        if self.subindex > 1:
+            raise ValueError(
+                f"start-up object {self.place}: complete access begins at subindex 0 or 1"
+            )
+        if not isinstance(self.value, bytes):
+            raise TypeError(
+                f"start-up object {self.place}: complete access needs the bytes of all subindices"
+            )
 
     @property
     def place(self) -> str:

@@ -4,8 +4,8 @@ After a crash of the MainDevice a drive uses its last outputs until the watchdog
 CSV its own control loops hold the axis until then. In CST it applies a stale torque, so the default
 is short.
 
-The watchdog time of an ESI replaces the default of 100 ms, but not the short one in CST. An ESI
-never disables the watchdog; only the application does.
+The watchdog time of an ESI or ENI replaces the default of 100 ms, but not the short one in CST.
+These files never disable the watchdog; only the application does.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ TARGET_TORQUES = frozenset(Object.TARGET_TORQUE + SLOT_OFFSET * slot for slot in
 def choose_watchdog(
     device: DeviceDescription, request: DeviceRequest, seconds: float | None, period_ns: int
 ) -> tuple[int, str]:
-    """Return the watchdog time of a device [ns], 0 for off, and its source in an ESI.
+    """Return the watchdog time of a device [ns], 0 for off, and its source in a file.
 
     Args:
         device: Device, for error messages.
@@ -48,7 +48,7 @@ def choose_watchdog(
         watchdog_ns = -(-longest // WATCHDOG_UNIT_NS) * WATCHDOG_UNIT_NS
     else:
         watchdog_ns = _esi_watchdog_ns(device)
-        source = f"ESI {device.esi}"
+        source = f"{device.commands_origin} {device.esi}".strip()
         if watchdog_ns < max(LEAST_EXCHANGES * exchange_ns, WATCHDOG_UNIT_NS):
             watchdog_ns, source = DEFAULT_NS, ""
     _check(device, request, watchdog_ns, period_ns)

@@ -120,7 +120,7 @@ def write_object(channel: MailboxChannel, step: Download) -> Procedure[None]:
     except SdoAbort as abort:
         if not (step.optional and abort.code in OPTIONAL_ABORTS):
             what = f"start-up object {step.place} = {step.text or step.data.hex(' ')}"
-            what += f" (ESI {step.source})" * bool(step.source)
+            what += f" ({step.origin} {step.source})" * bool(step.source)
             raise refused(channel, step.index, step.subindex, abort.code, what=what) from abort
     if not step.verify:
         return

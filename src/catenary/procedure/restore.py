@@ -6,9 +6,11 @@ its EEPROM remains. As in IgH and TwinCAT, it is brought to INIT and configured 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 from catenary.model.device import DeviceDescription, Identity
+from catenary.model.register_command import RegisterCommand
 from catenary.plan.start_up import DevicePlan, renewed
 from catenary.procedure.al_state import request_state
 from catenary.procedure.configure import configure_mailbox, configure_process_data
@@ -16,6 +18,7 @@ from catenary.procedure.exchange import Procedure, Request, read, write, write_m
 from catenary.procedure.mailbox import MailboxChannel
 from catenary.procedure.modules import prepare_modules
 from catenary.procedure.pdo import read_mapping, verify_mapping, write_downloads, write_in_safe_op
+from catenary.procedure.register_commands import run_commands
 from catenary.procedure.sii import read_identity
 from catenary.procedure.sii_owner import hand_over
 from catenary.procedure.station import Station, answered
@@ -98,7 +101,11 @@ def identify(station: Station) -> Procedure[Identity]:
     return (yield from read_identity(station))
 
 
-def bring_to_pre_op(station: Station, channel: MailboxChannel | None) -> Procedure[None]:
+def bring_to_pre_op(
+    station: Station,
+    channel: MailboxChannel | None,
+    commands: Sequence[RegisterCommand] = (),
+) -> Procedure[None]:
     """Bring a device from any state through INIT to PRE-OP.
 
     In INIT, its FMMUs, SyncManagers and SYNC signals are cleared, its mailbox is configured, and
@@ -107,6 +114,7 @@ def bring_to_pre_op(station: Station, channel: MailboxChannel | None) -> Procedu
     Args:
         station: The device.
         channel: Its mailbox; None if it has none.
+        commands: Register commands of an ENI.
     """
     yield from request_state(station, AlState.INIT)
     requests = [
@@ -120,6 +128,7 @@ def bring_to_pre_op(station: Station, channel: MailboxChannel | None) -> Procedu
     if channel is not None:
         yield from configure_mailbox(channel)
     yield from hand_over(station)
+    yield from run_commands(station, commands, "IP")
     yield from request_state(station, AlState.PRE_OP)
 
 
@@ -150,10 +159,12 @@ def bring_to_safe_op(
         if again.mapping_changed:
             yield from verify_mapping(channel, device, again)
     yield from configure_process_data(station, device, plan)
+    yield from run_commands(station, plan.registers, "PS")
     if clock is not None:
         yield from clock
     yield from request_state(station, AlState.SAFE_OP)
     yield from write_in_safe_op(channel, plan)
+    yield from run_commands(station, plan.registers, "SO")
 
 
 def _cleared(station: Station, start: int, size: int) -> Request:

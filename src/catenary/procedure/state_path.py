@@ -20,6 +20,7 @@ from catenary.procedure.configure import (
 from catenary.procedure.exchange import Procedure
 from catenary.procedure.mailbox import MailboxChannel
 from catenary.procedure.pdo import read_mapping
+from catenary.procedure.register_commands import run_commands
 from catenary.procedure.sii import read_words
 from catenary.procedure.sii_owner import hand_over, with_eeprom
 from catenary.procedure.station import Station
@@ -85,6 +86,7 @@ def climb(
         if state is AlState.PRE_OP and before not in (AlState.SAFE_OP, AlState.OP):
             channel = yield from _open_mailbox(station, device)
             yield from hand_over(station)
+            yield from run_commands(station, device.register_commands, "IP")
         elif state is AlState.BOOT and before is not AlState.BOOT:
             yield from _open_bootstrap(station)
         yield from request_state(station, state)
@@ -121,6 +123,7 @@ def bring_to_safe_op(
         plan: Its plan.
     """
     yield from configure_process_data(station, device, plan)
+    yield from run_commands(station, plan.registers, "PS")
     return (yield from request_state(station, AlState.SAFE_OP))
 
 

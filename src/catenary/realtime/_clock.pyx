@@ -19,18 +19,14 @@ cdef extern from "virtual_time.h":
     enum:
         VT_PARTICIPANTS, VT_OWN_PROCESSOR
         VT_FREE, VT_RUNNING, VT_ASIDE
-    ctypedef struct vt_participant:
-        pass
     ctypedef struct virtual_time:
         int64_t now
-        vt_participant who[1]
     int vt_init(virtual_time *) nogil
     int vt_join(virtual_time *, int32_t priority, int32_t cpu) nogil
     void vt_expect(virtual_time *, int slot) nogil
     void vt_change(virtual_time *, int slot, uint32_t state) nogil
     int vt_wait_until(virtual_time *, int slot, int64_t deadline) nogil
     int vt_spend(virtual_time *, int slot, int64_t duration) nogil
-    int vt_sleep(vt_participant *) nogil
     void vt_wake(virtual_time *, int slot) nogil
 
 FOREVER = CAT_CLOCK_FOREVER
@@ -83,13 +79,15 @@ cdef class Timer:
 
     cdef int spend_some(self, int64_t duration) except -1:
         cdef int64_t at_once = duration
+        cdef int error
         if not self.table.flags & CAT_CLOCK_VIRTUAL:
             at_once = SPENT_AT_ONCE_NS
         while duration > 0:
             with nogil:
-                self.table.spend(self.table.self, min(duration, at_once))
-            duration -= at_once
+                error = self.table.spend(self.table.self, min(duration, at_once))
             PyErr_CheckSignals()
+            if error != -EINTR:
+                duration -= at_once
         return 0
 
     def wake(self):
@@ -172,12 +170,8 @@ cdef int virtual_wait_until(void *owner, int64_t deadline) noexcept nogil:
 
 
 cdef int virtual_spend(void *owner, int64_t duration) noexcept nogil:
-    """Spend virtual time, even if signals interrupt the sleep. Python handles them afterwards."""
     cdef participant_t *p = <participant_t *>owner
-    cdef int error = vt_spend(p.time, p.slot, duration)
-    while error == -EINTR:
-        error = vt_sleep(&p.time.who[p.slot])
-    return error
+    return vt_spend(p.time, p.slot, duration)
 
 
 cdef void virtual_wake(void *owner) noexcept nogil:

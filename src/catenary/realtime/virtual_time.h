@@ -232,14 +232,18 @@ static int vt_wait_until(virtual_time *v, int slot, int64_t deadline) {
     return woken;
 }
 
-/* Return 0 if the time is spent, -EINTR after a signal (call vt_sleep to continue). */
+/* Return 0 if the time is spent, -EINTR after a signal. Call it again to continue: it then waits for
+ * the rest of the time, whatever `duration` is. */
 static int vt_spend(virtual_time *v, int slot, int64_t duration) {
     vt_participant *p = &v->who[slot];
     if (duration <= 0) return 0;
     vt_lock(v);
-    vt_make_ready(v, p, duration);
-    p->order = 0;                     /* already served: before participants of equal priority */
-    vt_schedule(v);
+    int goes_on = p->state == VT_READY || p->turn != p->seen;
+    if (!goes_on) {
+        vt_make_ready(v, p, duration);
+        p->order = 0;                 /* already served: before participants of equal priority */
+        vt_schedule(v);
+    }
     vt_unlock(v);
     return vt_sleep(p);
 }

@@ -31,6 +31,12 @@ def parse(target: str) -> LinkSource:
     """
     target = named_target(target)
     kind, colon, rest = target.partition(":")
+    if target.lower().endswith(".xml") and not colon:
+        raise ConfigurationError(
+            f"{target!r} is an XML file, not a segment",
+            hint='run an ENI with cat.Machine("bus.xml", target="eth0"), or convert it: '
+            "catenary init bus.xml",
+        )
     if kind in (VIRTUAL, VIRTUAL_REALTIME) and (rest or not colon):
         return _virtual(rest, realtime=kind == VIRTUAL_REALTIME)
     if "," in target:

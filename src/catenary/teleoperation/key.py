@@ -41,8 +41,8 @@ def read_key(path: Path | str | None = None) -> bytes:
         path: the file; None: the digits are in the environment, `CATENARY_TELEOPERATION_KEY`.
 
     Raises:
-        ConfigurationError: the key is absent or invalid, the file is a link, belongs to another
-            user, or other users can read it.
+        ConfigurationError: the key is absent or invalid, or the file is a link, a device, too
+            large, of another user, or open to other users.
     """
     if path is None:
         if VARIABLE not in os.environ:
@@ -72,6 +72,11 @@ def _check(path: Path | str, status: os.stat_result) -> None:
     if not stat.S_ISREG(status.st_mode):
         raise ConfigurationError(
             f"the key {path} is not a file", hint=f"name the file of the key; make one: {MAKE}"
+        )
+    if status.st_size > SIZE_MAX:
+        raise ConfigurationError(
+            f"the key {path} has {status.st_size} bytes, and a key file {2 * KEY_BYTES + 1}",
+            hint=f"name the file of the key; make one: {MAKE}",
         )
     if status.st_uid != user:
         raise ConfigurationError(

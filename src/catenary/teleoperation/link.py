@@ -46,6 +46,7 @@ class Link:
         self.delays = Delays()
         self._max_delay_ns, self._settle_ns = max_delay_ns, settle_ns
         self._other = 0  # session of the other side
+        self.proven = 0  # the same, once it has answered this side in time
         self._window = SequenceWindow()
         self._sequence = 0
         self._newest: tuple[int, int] | None = None  # sent there, received here
@@ -86,6 +87,7 @@ class Link:
         if packet.leaving:
             self._lose("the other program has ended")
             return None
+        self.proven = packet.session
         self.delays.receive(now_ns, packet.sent_ns, packet.echo_ns, packet.hold_ns)
         return None
 
@@ -97,6 +99,7 @@ class Link:
             if self._timely_since is not None:
                 return Refusal.SESSION
             self._other, self._window = packet.session, SequenceWindow()
+            self.delays = Delays()  # the clock of another program may have another offset
         return self._window.accept(packet.sequence)
 
     def update(self, now_ns: int) -> LinkState:

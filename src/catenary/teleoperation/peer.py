@@ -94,6 +94,11 @@ class Peer:
         return self._link.losses
 
     @property
+    def other_session(self) -> int:
+        """Random number of the other program, which changes if it restarts; 0 before its answer."""
+        return self._link.proven
+
+    @property
     def delay(self) -> float | None:
         """Sum of both delays now [s], including hold times; None if unknown."""
         return _seconds(self._link.delays.sum_ns(self._transport.now_ns))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import socket
 import time
 from typing import Protocol
@@ -9,6 +10,11 @@ from typing import Protocol
 from catenary.errors import LinkError
 from catenary.teleoperation.packet import SIZE_MAX
 
+HINTS = {
+    errno.EADDRINUSE: "another program uses this port: ss -ulpn; each program needs its own",
+    errno.EADDRNOTAVAIL: "bind an address of this machine (ip address), or 0.0.0.0 for all of them",
+    errno.EACCES: "use a port above 1023",
+}
 TRAFFIC_CLASS = 0xB8  # DSCP 46, expedited forwarding (RFC 3246)
 
 
@@ -39,7 +45,7 @@ class UdpTransport:
         remote: address of the other side, such as "arm.local:7002" or "[fd00::2]:7002".
 
     Raises:
-        ValueError: an address has no port.
+        ValueError: an address has no port, or that of the other side is 0.
         LinkError: a name is unknown, the address families differ, or the port is in use.
     """
 
@@ -93,10 +99,12 @@ def open_socket(bind: str, remote: str) -> socket.socket:
         remote: address of the other side.
 
     Raises:
-        ValueError: an address has no port.
+        ValueError: an address has no port, or that of the other side is 0.
         LinkError: the addresses cannot be used.
     """
     places = parse_address(bind), parse_address(remote)
+    if places[1][1] == 0:
+        raise ValueError(f"{remote!r}: give the port of the other side, 1 to 65535")
     try:
         family, *_, target = socket.getaddrinfo(*places[1], type=socket.SOCK_DGRAM)[0]
         source = socket.getaddrinfo(*places[0], family=family, type=socket.SOCK_DGRAM)[0][-1]
@@ -132,8 +140,11 @@ def parse_address(text: str) -> tuple[str, int]:
 
 
 def _unusable(bind: str, remote: str, error: OSError) -> LinkError:
-    return LinkError(
-        f"cannot send from {bind} to {remote}: {error.strerror}",
-        hint="both addresses must be of one family (IPv4 or IPv6), and each program needs a port "
-        "of its own: ss -ulpn",
-    )
+    if isinstance(error, socket.gaierror):
+        hint = (
+            "check the host names: getent hosts NAME; both addresses must be of one family (IPv4 "
+            "or IPv6)"
+        )
+    else:
+        hint = HINTS.get(error.errno or 0, "compare both addresses with those of: ip address")
+    return LinkError(f"cannot send from {bind} to {remote}: {error.strerror}", hint=hint)

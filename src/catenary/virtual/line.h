@@ -215,9 +215,10 @@ static int line_spend(void *self, int64_t duration) {
     segment_end *e = self;
     cat_segment *s = e->segment;
     int result = s->clock->spend(s->clock->self, duration);
+    if (result < 0)
+        return result;
     int64_t present = s->clock->now(s->clock->self);
-    int passed = present > s->now ? wait_in_virtual_time(e, present, 0) : 0;
-    return result < 0 ? result : passed;
+    return present > s->now ? wait_in_virtual_time(e, present, 0) : 0;
 }
 
 static int wait_in_real_time(segment_end *e, int64_t deadline, int wake_on_frame) {

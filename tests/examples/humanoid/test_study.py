@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -42,6 +43,22 @@ def test_the_table_names_the_law_and_the_impulses(results: dict[str, dict[str, A
     text = study.table(study.summary(results))
     assert text.startswith("plain PD\n")
     assert "forward 30, backward 20, left 40, right 41 N·s" in text
+
+
+@pytest.mark.parametrize("most", [0.0, 5.0, 31.0])
+def test_the_largest_impulse_is_one_after_which_the_robot_stands(
+    most: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    class Falling:
+        """Simulation that falls after an impulse of more than `most` [N·s]."""
+
+        def run(self, control: object, seconds: float, pushes: tuple[Push, ...]) -> Any:
+            [push] = pushes
+            return SimpleNamespace(fall="" if push.force[0] * push.length <= most else "fallen")
+
+    monkeypatch.setattr(study, "simulation", lambda law: Falling())
+    found = study.impulse("plain PD", "forward")
+    assert found <= most < found + study.RESOLUTION
 
 
 def test_a_fall_has_no_sway(results: dict[str, dict[str, Any]]) -> None:

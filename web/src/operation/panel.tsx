@@ -33,11 +33,13 @@ export function OperationPanel({ connection }: { connection: Connection }) {
     return made;
   }, [requests]);
   useEffect(() => endOnInterruption(connection, hold), [connection, hold, hello?.run]);
+  useEffect(() => forgetWithTheConnection(connection, requests), [connection, requests, hello?.run]);
   if (modes.length + presets.length === 0) return null;
   const operator = connection.role.value === "operator";
-  const ready = connection.state.value === "open" && connection.running.value;
+  const ready =
+    connection.state.value === "open" && connection.status.value !== null && connection.running.value;
   const group = { hold, held: held.value, disabled: !operator || !ready || requests.waits };
-  const mode = connection.status.value?.mode ?? null;
+  const mode = connection.mode.value;
   const state = <Chip tone={mode === null ? "" : "info"}>{mode ?? text.operation.unknown}</Chip>;
   return (
     <Panel title={text.operation.title} actions={state} class="operation">
@@ -62,6 +64,15 @@ function endOnInterruption(connection: Connection, hold: Hold<Target>): () => vo
     for (const kind of kinds) window.removeEventListener(kind, end);
     document.removeEventListener("visibilitychange", end);
     for (const each of ends) each();
+  };
+}
+
+/** Forget the report at the end of a run, and give up a request whose connection ends. */
+function forgetWithTheConnection(connection: Connection, requests: OperationRequests): () => void {
+  const end = connection.state.subscribe((state) => state !== "open" && requests.interrupt());
+  return () => {
+    end();
+    requests.forget();
   };
 }
 

@@ -2,6 +2,7 @@
 
 import { signal } from "@preact/signals";
 import { RemoteError } from "../connection.ts";
+import { text } from "../strings.ts";
 
 export type Kind = "mode" | "preset";
 export type Outcome = "requested" | "accepted" | "refused" | "unanswered" | "failed";
@@ -30,6 +31,7 @@ const OUTCOMES: Readonly<Record<string, Outcome>> = {
 export class OperationRequests {
   readonly report = signal<Report | null>(null); // of the last request
   private readonly caller: Caller;
+  private number = 0; // of the newest request; only its answer is reported
 
   constructor(caller: Caller) {
     this.caller = caller;
@@ -43,13 +45,33 @@ export class OperationRequests {
   /** Request a mode or a preset, and report the answer. A request while one waits has no effect. */
   async request({ kind, name }: Target): Promise<void> {
     if (this.report.peek()?.outcome === "requested") return;
+    const number = ++this.number;
     this.report.value = { kind, name, outcome: "requested", reason: "" };
+    const found = await this.answer({ kind, name });
+    if (number === this.number) this.report.value = { kind, name, ...found };
+  }
+
+  /** Report that the answer to an open request is lost. */
+  interrupt(): void {
+    const report = this.report.peek();
+    if (report?.outcome !== "requested") return;
+    this.number++;
+    this.report.value = { ...report, outcome: "unanswered", reason: text.operation.interrupted };
+  }
+
+  /** Forget the last request. */
+  forget(): void {
+    this.number++;
+    this.report.value = null;
+  }
+
+  private async answer({ kind, name }: Target): Promise<{ outcome: Outcome; reason: string }> {
     try {
       if (kind === "mode") await this.caller.call("set_mode", { mode: name });
       else await this.caller.call("run_preset", { preset: name });
-      this.report.value = { kind, name, outcome: "accepted", reason: "" };
+      return { outcome: "accepted", reason: "" };
     } catch (error) {
-      this.report.value = { kind, name, ...failure(error) };
+      return failure(error);
     }
   }
 }

@@ -36,6 +36,7 @@ from catenary.procedure.al_state import request_state
 from catenary.procedure.al_status_poll import Answer, survey
 from catenary.procedure.exchange import Procedure, after
 from catenary.procedure.pdo import write_in_safe_op
+from catenary.procedure.register_commands import run_commands
 from catenary.wire.al import ERROR_FLAG, STATE_MASK, AlState
 
 Submit = Callable[[Procedure[None]], Pending[None]]
@@ -352,6 +353,7 @@ class Watch:
         """Request OP, as the configuration is usually intact. After a failure, start from INIT."""
         if charge.failures == 0:
             yield from write_in_safe_op(charge.sub.channel, charge.plan)
+            yield from run_commands(charge.sub.station, charge.plan.registers, "SO")
             yield from request_state(charge.sub.station, AlState.OP)
         else:
             yield from self._restored(charge)
@@ -359,7 +361,7 @@ class Watch:
     def _restored(self, charge: Charge) -> Procedure[None]:
         """Configure the device from INIT on, and bring it to OP."""
         sub, plan = charge.sub, charge.plan
-        yield from restore.bring_to_pre_op(sub.station, sub.channel)
+        yield from restore.bring_to_pre_op(sub.station, sub.channel, plan.registers)
         sub.state = AlState.PRE_OP
         clock = self._rejoin(plan.position, plan) if self._rejoin is not None else None
         yield from restore.bring_to_safe_op(sub.station, sub.channel, sub.description, plan, clock)
@@ -368,6 +370,8 @@ class Watch:
 
     def _waiting(self, charge: Charge) -> Procedure[Any]:
         """Bring the device to PRE-OP, and hold it there."""
-        yield from restore.bring_to_pre_op(charge.sub.station, charge.sub.channel)
+        yield from restore.bring_to_pre_op(
+            charge.sub.station, charge.sub.channel, charge.plan.registers
+        )
         charge.sub.state = AlState.PRE_OP
         self._hold(charge, 'on_return="hold"')

@@ -1,1 +1,0 @@
-import{h as e,i as t}from"./chunk-D6EXJMUY.js";var o=e(location.hash);window.addEventListener("hashchange",()=>o.value=location.hash);var i=t(()=>o.value.replace(/^#\/?/,"").split("/").map(n=>a(n)));function c(...n){return`#/${n.map(r=>encodeURIComponent(r)).join("/")}`}function a(n){try{return decodeURIComponent(n)}catch{return n}}export{i as a,c as b};

@@ -1,0 +1,1 @@
+import{h as e,i as t}from"./chunk-LJGABZ57.js";var o=e(location.hash);window.addEventListener("hashchange",()=>o.value=location.hash);var i=t(()=>o.value.replace(/^#\/?/,"").split("/").map(n=>a(n)));function c(...n){return`#/${n.map(r=>encodeURIComponent(r)).join("/")}`}function a(n){try{return decodeURIComponent(n)}catch{return n}}export{i as a,c as b};
