@@ -28,7 +28,6 @@ WIDE = {
     "loop/loop.py: Loop.__init__": VOCABULARY,
     "machine/machine.py: Machine.loop": "the options of Loop",
     "virtual/devices/analog_inputs.py: AnalogInputs.__init__": VOCABULARY,
-    "virtual/devices/described.py: DescribedDevice.__init__": VOCABULARY,
     "virtual/devices/model_sensor.py: ModelSensor.__init__": VOCABULARY,
     **{
         f"control/{place}": "step of a law, compiled by numba"

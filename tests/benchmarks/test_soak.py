@@ -25,7 +25,7 @@ from catenary.loop.fault_report import FaultReport
 from catenary.loop.watches.device import Watch
 from catenary.virtual import DigitalOutputs, Fault, Segment, Servo
 from catenary.virtual import faults as f
-from catenary.virtual.devices.servo import Received
+from catenary.virtual.devices.motor_device import Received
 
 SEED = 7
 LINE, RING, CLOCKS = Setting(), Setting("ring"), Setting("line", True)

@@ -9,7 +9,7 @@ import pytest
 import catenary as cat
 from catenary.bus.esi_check import Comparison, Depth, check_device
 from catenary.esi.device import EsiDevice
-from catenary.virtual import Segment, from_esi
+from catenary.virtual import Segment, TwinOptions, from_esi
 from catenary.virtual.coe.quirks import MailboxQuirks
 from catenary.virtual.devices.described import DescribedDevice
 from catenary.wire.al import AlState
@@ -137,7 +137,9 @@ def test_another_device_is_not_read() -> None:
 def test_a_mailbox_with_faults_ends_with_notes(
     quirks: MailboxQuirks, expected: list[str], note: str
 ) -> None:
-    with cat.MainDevice(Segment([DescribedDevice(DRIVE, mailbox_quirks=quirks)])) as main:
+    with cat.MainDevice(
+        Segment([DescribedDevice(DRIVE, options=TwinOptions(mailbox_quirks=quirks))])
+    ) as main:
         found = check(main, DRIVE)
     serious = [each.what for each in found.differences if each.severity != "info"]
     assert serious == expected
@@ -149,7 +151,9 @@ def test_a_truncated_list_of_objects_is_not_a_difference() -> None:
     for index in range(0x2000, 0x2100):
         large = with_object(large, variable(index, "Value", "UINT", 16))
     quirks = MailboxQuirks(object_list="missing")
-    with cat.MainDevice(Segment([DescribedDevice(large, mailbox_quirks=quirks)])) as main:
+    with cat.MainDevice(
+        Segment([DescribedDevice(large, options=TwinOptions(mailbox_quirks=quirks))])
+    ) as main:
         found = check(main, large)
     assert found.differences == ()
     assert "the list of objects is truncated" in found.notes[0]

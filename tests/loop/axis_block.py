@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from catenary.virtual import DescribedDevice
+from catenary.virtual import DescribedDevice, TwinOptions
 from catenary.virtual.devices.application import Application
 from catenary.virtual.devices.described import esi_device
 from catenary.virtual.scheduler import Scheduler
@@ -22,8 +22,9 @@ class AxisBlock(DescribedDevice):
     """Two CiA 402 axes without faults and without limits."""
 
     def __init__(self, folder: Path, modules: Sequence[str | int | None]) -> None:
-        super().__init__(esi_device(folder / "esi" / FILE), modules=modules)
-        self.axes = [number for number, module in enumerate(modules) if module]
+        options = TwinOptions(modules=modules, motor=None)
+        super().__init__(esi_device(folder / "esi" / FILE), options=options)
+        self._axes = [number for number, module in enumerate(modules) if module]
 
     def started(self, scheduler: Scheduler) -> None:
         super().started(scheduler)
@@ -31,7 +32,7 @@ class AxisBlock(DescribedDevice):
         self._step()
 
     def _step(self) -> None:
-        for axis in self.axes:
+        for axis in self._axes:
             if 0x6040 + 0x800 * axis in self.application.dictionary.objects:
                 self._follow(0x800 * axis)
         self._scheduler.after(STEP_NS, self._step)
@@ -48,7 +49,7 @@ class AxisBlock(DescribedDevice):
     def _with_mode(self) -> list[int]:
         """Return the offsets of axes with 0x6061 in a PDO."""
         mapped = {entry.index for pdo in self.esi.pdos for entry in pdo.entries}
-        return [0x800 * axis for axis in self.axes if 0x6061 + 0x800 * axis in mapped]
+        return [0x800 * axis for axis in self._axes if 0x6061 + 0x800 * axis in mapped]
 
 
 class LateBlock(AxisBlock):

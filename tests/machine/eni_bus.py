@@ -15,7 +15,7 @@ from catenary.esi.device import (
 from catenary.esi.dictionary import EsiDictionary, EsiObject, EsiObjectEntry
 from catenary.esi.eni import EniDevice, EniFile
 from catenary.model.device import Direction
-from catenary.virtual import DescribedDevice, Segment, from_esi
+from catenary.virtual import DescribedDevice, Segment, TwinOptions
 from catenary.wire.sii import MailboxProtocol
 from catenary.wire.sii_categories import SyncManagerUse
 
@@ -29,7 +29,7 @@ def segment_of(eni: EniFile) -> Segment:
 
 def device_of(device: EniDevice) -> DescribedDevice:
     """Return the virtual device."""
-    return from_esi(esi_of(device))
+    return DescribedDevice(esi_of(device), options=TwinOptions(motor=None))
 
 
 def esi_of(device: EniDevice) -> EsiDevice:

@@ -26,7 +26,8 @@ from catenary.esi.device import (
 )
 from catenary.esi.dictionary import EsiDictionary, EsiObject, EsiObjectEntry
 from catenary.model.device import Direction
-from catenary.virtual import DescribedDevice, Segment, from_esi
+from catenary.virtual import DescribedDevice, Segment, TwinOptions, from_esi
+from catenary.virtual.devices.twin import NO_OPTIONS
 from catenary.wire.sii import MailboxProtocol
 from catenary.wire.sii_categories import SyncManagerUse
 from tests.virtual.main_device import SM0, STATION, MainDevice
@@ -93,8 +94,10 @@ DRIVE = EsiDevice(
 
 
 @contextmanager
-def opened(device: EsiDevice) -> Iterator[tuple[cat.MainDevice, DescribedDevice]]:
-    model = from_esi(device, serial=7)
+def opened(
+    device: EsiDevice, options: TwinOptions = NO_OPTIONS
+) -> Iterator[tuple[cat.MainDevice, DescribedDevice]]:
+    model = DescribedDevice(device, serial=7, options=options)
     with cat.MainDevice(Segment([model])) as main:
         main.scan()
         yield main, model
@@ -113,7 +116,7 @@ def test_the_scan_finds_what_the_esi_describes() -> None:
 
 
 def test_process_data_reaches_the_objects() -> None:
-    with opened(DRIVE) as (main, model):
+    with opened(DRIVE, TwinOptions(motor=None)) as (main, model):
         data = cat.ProcessData(main.subs[0])
         with cat.Loop(data, period=2e-3) as loop:
             data.outputs[:2] = b"\x06\x00"
@@ -229,7 +232,7 @@ def test_an_unknown_object_is_a_lookup_error() -> None:
         with pytest.raises(LookupError, match="no object 0x5000:00"):
             model.read_object(0x5000)
         with pytest.raises(LookupError, match="not in a PDO"):
-            model.write_object(0x6083, 0, bytes(4))
+            model.write_object(0x1008, 0, bytes(4))
 
 
 @pytest.mark.parametrize(("length", "status"), [(5, 0x04), (6, 0x12)])

@@ -64,7 +64,7 @@ def diagnose(
     totals = yield from read_error_counters(stations)
     answers = yield from survey(stations)
     topology = make_topology([sub.description.open_ports for sub in subs], ring=ring)
-    names = Names(tuple(sub.name for sub in subs))
+    names = Names(tuple(sub.description.full_name for sub in subs))
     counters, restarted = totals, frozenset[int]()
     if since is not None and len(since.totals) == len(totals):
         counters, restarted = counted_since(totals, since.totals)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING, Protocol
 
 from catenary.bus.pdo_table import PdoTable
@@ -108,6 +109,12 @@ class SubDevice:
     def station(self) -> Station:
         """Station address, with position and name for messages."""
         return station_of(self.description)
+
+    def give_name(self, name: str) -> None:
+        """Use the name of a machine file in messages, before the name in the SII."""
+        self.description = replace(self.description, given_name=name)
+        if self.channel is not None:
+            self.channel.station = self.station
 
     def read_state(self) -> DeviceState:
         """Read the EtherCAT state of the device, and update `state`."""

@@ -52,6 +52,7 @@ TARGET is one of
   eth0,eth1          two interfaces, if the segment is a ring between them
   virtual            a virtual segment: coupler, outputs, three servos, outputs
   virtual:FILE.toml  a virtual segment from a file (docs/reference/segment_file.md)
+  virtual:FOLDER/    twins of the devices of a clone (docs/how_to/test_your_machine.md)
   virtual-realtime[:FILE.toml]  the same, on this machine's clock
   machine.toml       the target in a machine file (docs/reference/machine_file.md)
   share:NAME         the running program that owns a share: scan, state, diag, sdo and reg read

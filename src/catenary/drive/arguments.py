@@ -80,8 +80,8 @@ def check_drive(sub: SubDevice) -> None:
     assignments = (*sub.description.inputs, *sub.description.outputs)
     if not any(entry.index == STATUSWORD for entry in mapped_entries(assignments)):
         raise ValueError(
-            f"device {sub.position} ({sub.name}) is not a drive: it has no CiA 402 objects; use "
-            "Inputs or Outputs for its process data; main.subs.drives are the drives"
+            f"{sub.station} is not a drive: it has no CiA 402 objects; use Inputs or "
+            "Outputs for its process data; main.subs.drives are the drives"
         )
 
 

@@ -7,6 +7,7 @@ compiled code, before the devices leave OP.
 
 from __future__ import annotations
 
+import math
 import threading
 import warnings
 import weakref
@@ -289,6 +290,25 @@ class Loop:
             wait_for_move(iter(self), move, timeout)
         else:
             self._background.wait(move, timeout)
+
+    def run_for(self, seconds: float) -> None:
+        """Run cycles for a time. The axes hold, or continue their moves.
+
+        Args:
+            seconds: The time [s].
+
+        Raises:
+            ValueError: The time is not positive and finite.
+            RuntimeError: The loop is not open, or a background thread iterates it.
+            CatenaryError: The iteration fails, for example with WorkingCounterError.
+        """
+        if not 0 < seconds < math.inf:
+            raise ValueError(f"seconds={seconds}: must be positive and finite")
+        start: float | None = None
+        for cycle in self:
+            start = cycle.time if start is None else start
+            if cycle.time - start >= seconds:
+                return
 
     def _make_iteration(self) -> Iteration | NetworksIteration:
         first = self._opened

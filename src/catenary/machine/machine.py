@@ -60,8 +60,8 @@ class Machine:
 
     Args:
         path: the machine file, or an ENI.
-        target: "eth0", "virtual:line.toml" or a `Segment`; None for the `target` of the file. An
-            ENI has none.
+        target: "eth0", "virtual:line.toml", "virtual:line/" (a clone) or a `Segment`; None for the
+            `target` of the file. An ENI has none.
         force: open the link even if another master is active on the interface.
         without: mailbox protocols of an ENI whose commands are left out, such as "EoE".
 
@@ -108,6 +108,7 @@ class Machine:
         self._main.open()
         try:
             self._found = self._described.find(self._main, passive=not self._has_own_master)
+            self._name_devices()
         except BaseException:
             self._main.close()
             raise
@@ -124,7 +125,7 @@ class Machine:
 
     @property
     def segment(self) -> Segment:
-        """Virtual segment of the target.
+        """Virtual segment of the target. `segment["j2"]` is the device that the file names so.
 
         Raises:
             RuntimeError: The target is not a virtual segment.
@@ -217,6 +218,14 @@ class Machine:
         if not self._main.is_open:
             raise RuntimeError("the machine is not open; use it in a `with` statement")
         return self._found
+
+    def _name_devices(self) -> None:
+        """Give the devices the names of the file, for messages and for `segment["j2"]`."""
+        for name, sub in self._found.subs.items():
+            sub.give_name(name)
+        if self._segment is not None:
+            stations = {n: sub.description.station_address for n, sub in self._found.subs.items()}
+            self._segment.name_devices(stations)
 
     def __repr__(self) -> str:
         return f"<Machine {self._described.name} on {self._main!r}>"

@@ -176,6 +176,12 @@ class DeviceDescription:
     timeouts: Timeouts = NO_TIMEOUTS
     watchdog: WatchdogValues = NO_WATCHDOG_VALUES
     modular: ModularDevice | None = None  # slots and modules, from an ESI file
+    given_name: str = ""  # name in a machine file
+
+    @property
+    def full_name(self) -> str:
+        """Name for messages: that of the machine file, if there is one, then that of the device."""
+        return ", ".join(name for name in dict.fromkeys((self.given_name, self.name)) if name)
 
     @property
     def profile(self) -> int | None:
@@ -274,4 +280,4 @@ class DeviceDescription:
         return None
 
     def __str__(self) -> str:
-        return f"device {self.position} ({self.name})"
+        return f"device {self.position} ({self.full_name})"

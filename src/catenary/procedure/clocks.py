@@ -313,7 +313,7 @@ def _place(device: DeviceDescription, times: PortTimes | None) -> ClockPlace:
 
 
 def _station(device: DeviceDescription) -> Station:
-    return Station(device.position, device.station_address, device.name)
+    return Station(device.position, device.station_address, device.full_name)
 
 
 def _station_at(devices: Sequence[DeviceDescription], request: Request) -> Station:

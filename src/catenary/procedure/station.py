@@ -26,7 +26,7 @@ class Station(NamedTuple):
 
 def station_of(device: DeviceDescription) -> Station:
     """Return the station of a device, with its name for errors and the timeouts of its ESI."""
-    return Station(device.position, device.station_address, device.name, device.timeouts)
+    return Station(device.position, device.station_address, device.full_name, device.timeouts)
 
 
 def answered(reply: Reply, station: Station, what: str) -> bytes:

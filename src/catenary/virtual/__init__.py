@@ -15,7 +15,9 @@ from catenary.virtual.devices import (
     Servo,
 )
 from catenary.virtual.devices.described import DescribedDevice, from_esi
+from catenary.virtual.devices.motor import Motor
 from catenary.virtual.devices.servo_quirks import ServoQuirks
+from catenary.virtual.devices.twin import Twin, TwinOptions
 from catenary.virtual.fault_player import FaultEvent, Loss
 from catenary.virtual.faults import Fault
 from catenary.virtual.joint import Joint
@@ -42,6 +44,7 @@ __all__ = [
     "MailboxQuirks",
     "MappingQuirks",
     "ModelSensor",
+    "Motor",
     "Plant",
     "PlantPart",
     "Segment",
@@ -50,6 +53,8 @@ __all__ = [
     "Servo",
     "ServoQuirks",
     "SiiQuirks",
+    "Twin",
+    "TwinOptions",
     "demo_segment",
     "faults",
     "from_esi",

@@ -76,6 +76,8 @@ HINT = (
     "docs/how_to/faults.md those of faults"
 )
 
+AGAIN = "clone the segment again, without loose cables"
+
 
 @contextmanager
 def _named(where: str) -> Iterator[None]:
@@ -98,11 +100,24 @@ def _device_in_fault(folder: Path, kind: type, given: Any) -> Any:
         raise ValueError(str(error)) from error  # msgspec names the place
 
 
+def _read_clone(path: str | Path, *, clock: ClockKind, ring: bool) -> Segment:
+    if ring:
+        raise ConfigurationError(
+            f"{path}: a clone cannot be a ring", hint="serve it without the second interface"
+        )
+    try:
+        return Segment.from_clone(path, clock=clock)
+    except OUT_OF_RANGE as error:  # of the wiring
+        raise ConfigurationError(f"{path}: {error}", hint=AGAIN) from error
+
+
 def _read(path: str | Path) -> SegmentFile:
     try:
         content = Path(path).read_bytes()
     except OSError as error:
-        raise ConfigurationError(f"{path}: {error.strerror}") from error
+        clone = str(path).endswith("/")
+        hint = f"make a clone: catenary clone TARGET -o {path}" if clone else ""
+        raise ConfigurationError(f"{path}: {error.strerror}", hint=hint) from error
     try:
         hook = partial(_device_in_fault, Path(path).parent)
         file = msgspec.toml.decode(content, type=SegmentFile, dec_hook=hook)
@@ -114,10 +129,10 @@ def _read(path: str | Path) -> SegmentFile:
 
 
 def read_segment(path: str | Path, *, clock: ClockKind = "virtual", ring: bool = False) -> Segment:
-    """Read a segment and its faults from a TOML file.
+    """Read a segment and its faults from a TOML file, or the twins of a clone folder.
 
     Args:
-        path: Path of the file.
+        path: Path of the file, or of a folder that `catenary clone` has written.
         clock: See `Segment`.
         ring: True makes the segment a ring, regardless of the file.
 
@@ -125,6 +140,8 @@ def read_segment(path: str | Path, *, clock: ClockKind = "virtual", ring: bool =
         ConfigurationError: The file cannot be read or is invalid, or its plant cannot be simulated.
             The message names the file.
     """
+    if Path(path).is_dir():
+        return _read_clone(path, clock=clock, ring=ring)
     file = _read(path)
     devices = []
     for position, table in enumerate(file.device):

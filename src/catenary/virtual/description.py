@@ -118,6 +118,8 @@ class Description:
     loop_control: bool = True  # True if 0x0101 can close the ports
     lrw: bool = True
     sii_variant: str = ""  # differences of the SII from the device
+    fmmu_count: int = field(default=8, repr=False)  # not repr: the revision depends on it
+    sync_manager_count: int = field(default=8, repr=False)
     facts: FileFacts | None = field(default=None, repr=False)  # None: one of our own kinds
 
     @property

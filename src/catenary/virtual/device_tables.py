@@ -16,8 +16,10 @@ from catenary.virtual.devices.digital_inputs import DigitalInputs
 from catenary.virtual.devices.digital_outputs import DigitalOutputs
 from catenary.virtual.devices.junction import Junction
 from catenary.virtual.devices.model_sensor import ModelSensor
+from catenary.virtual.devices.motor import Motor
 from catenary.virtual.devices.servo import Servo
 from catenary.virtual.devices.servo_quirks import NO_QUIRKS, ServoQuirks
+from catenary.virtual.devices.twin import STANDARD_MOTOR, TwinOptions
 from catenary.virtual.mapping_quirks import NO_MAPPING_QUIRKS, MappingQuirks
 from catenary.virtual.sii_quirks import NO_SII_QUIRKS, SiiQuirks
 
@@ -37,13 +39,16 @@ class CrystalTable(msgspec.Struct, forbid_unknown_fields=True, frozen=True, kw_o
         )
 
 
-class _Table(
+class _PlacedTable(
     msgspec.Struct, forbid_unknown_fields=True, tag_field="kind", frozen=True, kw_only=True
 ):
     name: str = ""
+    behind: tuple[int, int] | None = None
+
+
+class _Table(_PlacedTable, frozen=True, kw_only=True):
     alias: int = 0
     serial: int = 0
-    behind: tuple[int, int] | None = None
 
 
 class _ClockedTable(_Table, frozen=True, kw_only=True):
@@ -207,6 +212,9 @@ class EsiTable(_ClockedTable, tag="esi", frozen=True, kw_only=True):
     chosen: str = msgspec.field(default="", name="device")
     mailbox_delay: float = 300e-6
     mailbox_quirks: MailboxQuirks = NO_MAILBOX_QUIRKS
+    mapping_quirks: MappingQuirks | None = None
+    quirks: ServoQuirks = NO_QUIRKS
+    motor: Motor = STANDARD_MOTOR
     modules: tuple[str | int, ...] | None = None  # "" for an empty slot
 
     def device(self) -> Device:
@@ -215,11 +223,48 @@ class EsiTable(_ClockedTable, tag="esi", frozen=True, kw_only=True):
             name=self.name,
             alias=self.alias,
             serial=self.serial,
-            mailbox_delay=self.mailbox_delay,
-            crystal=self.crystal.crystal(),
-            clock_bits=self.clock_bits,
-            mailbox_quirks=self.mailbox_quirks,
-            modules=self.modules,
+            options=TwinOptions(
+                motor=self.motor,
+                modules=self.modules,
+                mailbox_delay=self.mailbox_delay,
+                crystal=self.crystal.crystal(),
+                clock_bits=self.clock_bits,
+                quirks=self.quirks,
+                mapping_quirks=self.mapping_quirks,
+                mailbox_quirks=self.mailbox_quirks,
+            ),
+        )
+
+
+class SiiTable(_PlacedTable, tag="sii", frozen=True, kw_only=True):
+    sii: str  # relative to the folder of the segment file
+    alias: int | None = None  # that of the image
+    serial: int | None = None
+    clock: bool | None = None
+    crystal: CrystalTable = CrystalTable()
+    clock_bits: ClockBits = 64
+    mailbox_delay: float = 300e-6
+    mailbox_quirks: MailboxQuirks = NO_MAILBOX_QUIRKS
+    mapping_quirks: MappingQuirks | None = None
+    quirks: ServoQuirks = NO_QUIRKS
+    motor: Motor = STANDARD_MOTOR
+
+    def device(self) -> Device:
+        return Device.from_sii(
+            self.sii,
+            name=self.name,
+            alias=self.alias,
+            serial=self.serial,
+            clock=self.clock,
+            options=TwinOptions(
+                motor=self.motor,
+                mailbox_delay=self.mailbox_delay,
+                crystal=self.crystal.crystal(),
+                clock_bits=self.clock_bits,
+                quirks=self.quirks,
+                mapping_quirks=self.mapping_quirks,
+                mailbox_quirks=self.mailbox_quirks,
+            ),
         )
 
 
@@ -232,11 +277,12 @@ DeviceTable = (
     | ModelSensorTable
     | ServoTable
     | EsiTable
+    | SiiTable
 )
 
 
 def located(table: DeviceTable, folder: Path) -> DeviceTable:
-    """Return the table with the path of its ESI, if it has one.
+    """Return the table with the path of its ESI or SII, if it has one.
 
     Args:
         table: The table, with a path that is relative to the segment file.
@@ -244,4 +290,6 @@ def located(table: DeviceTable, folder: Path) -> DeviceTable:
     """
     if isinstance(table, EsiTable):
         return msgspec.structs.replace(table, esi=str(folder / table.esi))
+    if isinstance(table, SiiTable):
+        return msgspec.structs.replace(table, sii=str(folder / table.sii))
     return table

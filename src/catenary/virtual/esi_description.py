@@ -8,6 +8,13 @@ from dataclasses import replace
 from catenary.esi.device import EsiDevice, EsiEntry, EsiMailbox, EsiPdo, EsiSyncManager
 from catenary.esi.sii_process_data import PART_BITS, type_number
 from catenary.model.device import Direction
+from catenary.virtual.blueprint import (
+    BUFFER_MAX,
+    EMULATION,
+    RAM_LEAST,
+    SYNC_MANAGERS_MAX,
+    ram_for,
+)
 from catenary.virtual.description import (
     Channel,
     Description,
@@ -21,29 +28,22 @@ from catenary.virtual.mapping_quirks import MappingQuirks
 from catenary.wire.sii import MailboxProtocol, Sii
 from catenary.wire.sii_categories import CoeDetails, SyncManagerUse
 
-RAM_START, RAM_MAX = 0x1000, 61440
-RAM_LEAST = 0x2000  # [bytes]
-SYNC_MANAGERS_MAX = 8  # of a virtual controller
-BUFFER_MAX = 2048  # largest buffer with process data [bytes]
-EMULATION = 0x0100  # bit of the first word of ConfigData
 MODULAR = 5001  # device profile without a number in the file
 BITS_MAX = 255  # of an entry
 
 
-def describe_esi(device: EsiDevice, sii: Sii, *, name: str, serial: int, slots: int) -> Description:
+def describe_esi(device: EsiDevice, sii: Sii, *, serial: int) -> Description:
     """Return the description of a virtual device.
 
     Args:
         device: The device, with its modules in place.
         sii: Its SII.
-        name: Name in messages.
         serial: Serial number.
-        slots: Number of slots of the model.
     """
     general, header = sii.general, sii.header
     mailbox = mailbox_of(device)
     return Description(
-        name=name,
+        name=device.name or device.type,
         order=device.type,
         group=device.group,
         product_code=device.key.product,
@@ -61,7 +61,6 @@ def describe_esi(device: EsiDevice, sii: Sii, *, name: str, serial: int, slots: 
         tx_pdos=pdos_of(device, Direction.INPUT),
         clock=device.has_clock,
         ram=ram_of(device),
-        slots=slots,
         current_milliampere=general.current_ma if general else 0,
         mapping_quirks=_permissions(device.mailbox),
         lrw=not device.use_lrd_lwr,
@@ -113,11 +112,11 @@ def channels_of(device: EsiDevice) -> tuple[Channel, ...]:
 
 def ram_of(device: EsiDevice) -> int:
     """Return the size of the memory from 0x1000 on, so that all buffers fit [bytes]."""
-    needed = [RAM_LEAST, device.controller.dpram_size]
+    buffers = []
     for each in usable(device):
         size = sum(pdo.bit_length for pdo in device.pdos if pdo.sync_manager == each.index) // 8 + 1
-        needed.append(each.start - RAM_START + 3 * max(size, each.default_size))
-    return min(max(needed), RAM_MAX)
+        buffers.append((each.start, max(size, each.default_size)))
+    return ram_for(buffers, max(RAM_LEAST, device.controller.dpram_size))
 
 
 def device_type_of(device: EsiDevice) -> int:

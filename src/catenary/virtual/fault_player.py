@@ -14,7 +14,7 @@ from catenary.virtual._wires import FRAME_FAULTS_MAX, Wires
 from catenary.virtual.devices.applied import AppliedDevice
 from catenary.virtual.devices.device import Device
 from catenary.virtual.devices.model_sensor import ModelSensor
-from catenary.virtual.devices.servo import Servo
+from catenary.virtual.devices.motor_device import MotorDevice
 from catenary.virtual.plant import PlantPart
 from catenary.virtual.scheduler import Agenda
 from catenary.virtual.wiring import Wiring
@@ -214,9 +214,9 @@ class FaultPlayer:
             raise ValueError(f"device: device {position} ({device.kind}) has no application")
         return device
 
-    def _servo(self, position: int) -> Servo:
+    def _servo(self, position: int) -> MotorDevice:
         device = self._devices[position]
-        if not isinstance(device, Servo):
+        if not isinstance(device, MotorDevice) or not device.axes:
             raise ValueError(f"device: device {position} ({device.kind}) is not a servo")
         return device
 

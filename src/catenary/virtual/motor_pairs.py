@@ -6,13 +6,13 @@ from collections.abc import Sequence
 
 from catenary.errors import ConfigurationError
 from catenary.virtual.devices.device import Device
-from catenary.virtual.devices.servo import Servo
+from catenary.virtual.devices.motor_device import MotorDevice
 from catenary.virtual.joint import Joint
 
 
 def pair_motors(
     name: str, joints: Sequence[Joint], devices: Sequence[Device]
-) -> list[tuple[Servo, int]]:
+) -> list[tuple[MotorDevice, int]]:
     """Return the (servo, axis) that drives each joint.
 
     Args:
@@ -26,7 +26,7 @@ def pair_motors(
     present = {
         (position, axis): device
         for position, device in enumerate(devices)
-        if isinstance(device, Servo)
+        if isinstance(device, MotorDevice)
         for axis in range(device.axes)
     }
     rest = iter(sorted(present.keys() - {joint.axis for joint in joints}))

@@ -20,7 +20,8 @@ from catenary.virtual._plant import CompiledPlant
 from catenary.virtual._segment import Core
 from catenary.virtual.devices.device import Device
 from catenary.virtual.devices.model_sensor import ModelSensor
-from catenary.virtual.devices.servo import Servo
+from catenary.virtual.devices.motor import Motor
+from catenary.virtual.devices.motor_device import MotorDevice
 from catenary.virtual.joint import Joint
 from catenary.virtual.motor_pairs import pair_motors
 from catenary.virtual.mujoco_model import Model
@@ -344,36 +345,37 @@ class PlantPart:
         """
         motors = pair_motors(self._model.path.name, self.joints, devices)
         self.plant.claim(core, self.joints)
-        for joint, (servo, _axis) in zip(self.joints, motors, strict=True):
+        for joint, (servo, axis) in zip(self.joints, motors, strict=True):
+            motor = servo.motors[axis]
             self._model.add_motor(
                 joint.name,
-                inertia=servo.inertia * joint.gear**2,
-                viscous=servo.viscous_friction * joint.gear**2,
+                inertia=motor.inertia * joint.gear**2,
+                viscous=motor.viscous_friction * joint.gear**2,
             )
         self._model.settle()
         self._inertias = [self._model.inertia(j.name) / j.gear**2 for j in self.joints]
         for n, (servo, axis) in enumerate(motors):
-            self._make_joint(n, servo)
+            self._make_joint(n, servo.motors[axis])
             self._connect_motor(n, servo, axis)
         self._wired = [*motors]
         for device in devices:
             self._connect_sensor(device)
         self._compiled.add_member(core)
 
-    def _make_joint(self, n: int, servo: Servo) -> None:
+    def _make_joint(self, n: int, motor: Motor) -> None:
         joint = self.joints[n]
-        most = servo.rated_torque * servo.max_torque_ratio * joint.gear
+        most = motor.rated_torque * motor.max_torque_ratio * joint.gear
         self._compiled.make_joint(
             self._numbers[n],
             **self._model.addresses(joint.name)._asdict(),
             ratio=joint.ratio,
             zero=joint.zero,
-            dry=self._model.dry_friction(joint.name) + servo.coulomb_friction * joint.gear,
+            dry=self._model.dry_friction(joint.name) + motor.coulomb_friction * joint.gear,
             brake=most if joint.brake is None else joint.brake,
             brake_delay_ns=round(joint.brake_delay * SECOND),
         )
 
-    def _connect_motor(self, n: int, servo: Servo, axis: int) -> None:
+    def _connect_motor(self, n: int, servo: MotorDevice, axis: int) -> None:
         """Connect a motor to joint `n`, and tune its loops for the inertia of the joint."""
         self._compiled.hang(self._numbers[n], servo.core, servo.position, axis)
         servo.tune(self._inertias[n], axis)
@@ -404,6 +406,6 @@ class PlantPart:
             if device is not old:
                 continue
             self._wired[n] = new, axis
-            if isinstance(new, Servo) and axis < new.axes:
+            if isinstance(new, MotorDevice) and axis < new.axes:
                 self._connect_motor(n, new, axis)
         self._connect_sensor(new)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import heapq
+import threading
 from collections.abc import Callable
 from itertools import count
 from typing import Protocol
@@ -24,6 +25,8 @@ class Agenda:
         self._clock = clock
         self._heap: list[tuple[int, int, Callable[[], None]]] = []
         self._order = count()
+        self.deferred = False  # True while a thread runs the service in real time
+        self.lock = threading.RLock()  # held while the service runs
 
     @property
     def now(self) -> int:
@@ -39,6 +42,17 @@ class Agenda:
 
     def after(self, delay_ns: int, action: Callable[[], None]) -> None:
         self.at(self._clock.now + delay_ns, action)
+
+    def soon(self, action: Callable[[], None]) -> None:
+        """Run an action that changes a device. Any thread may call it.
+
+        In real time, the thread of the service runs it. In virtual time, it runs at once.
+        """
+        if self.deferred:
+            self.after(0, action)
+            return
+        with self.lock:
+            action()
 
     def run_due(self) -> None:
         """Run all actions that are due."""

@@ -4,15 +4,19 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
+from os import PathLike
 from typing import Literal, NamedTuple, Protocol, runtime_checkable
 
 from catenary.virtual._segment import Core
 from catenary.virtual._segment_link import SegmentLink
 from catenary.virtual._wires import Wires
+from catenary.virtual.cloned_line import cloned_line
+from catenary.virtual.device_names import DeviceNames
 from catenary.virtual.devices.coupler import Coupler
 from catenary.virtual.devices.device import Device
 from catenary.virtual.devices.digital_outputs import DigitalOutputs
 from catenary.virtual.devices.servo import Servo
+from catenary.virtual.devices.twin import TwinOptions
 from catenary.virtual.fault_player import FaultEvent, FaultPlayer, Loss
 from catenary.virtual.faults import Fault
 from catenary.virtual.plant import Plant, PlantPart
@@ -65,7 +69,8 @@ class SegmentEnd:
 
 
 class Segment:
-    """Virtual devices and their cables. `segment[i]` is the device at position i.
+    """Virtual devices and their cables. `segment[i]` is the device at position i, `segment["j2"]`
+    that with this name.
 
     Args:
         devices: Devices, in the order in which they process frames.
@@ -118,23 +123,61 @@ class Segment:
         self.plant = None if part is None else part.plant
         self._service = Service(self._core, self._devices, part)
         self._faults = FaultPlayer(
-            self._core,
-            self._wires,
-            self._devices,
-            wiring,
-            self._service.agenda,
-            part,
+            self._core, self._wires, self._devices, wiring, self._service.agenda, part
         )
         self._service.at_first_frame(self._faults.start)
         self._links: dict[bool, SegmentLink] = {}
+        self._names = DeviceNames(self._core, self._devices)
         for fault in faults:
             self.inject(fault)
+
+    @classmethod
+    def from_clone(
+        cls,
+        folder: str | PathLike[str],
+        *,
+        clock: ClockKind | SharedClock = "virtual",
+        plant: Plant | PlantPart | None = None,
+        faults: Sequence[Fault] = (),
+        options: Mapping[str, TwinOptions] | None = None,
+    ) -> Segment:
+        """Return a segment with twins of the devices of a clone (docs/how_to/test_your_machine.md).
+
+        Args:
+            folder: Folder that `catenary clone` has written.
+            clock: See `Segment`.
+            plant: See `Segment`.
+            faults: See `Segment`.
+            options: Motors and quirks of devices, by name; None: the standard ones.
+
+        Raises:
+            CloneError: A file of the folder is missing or not valid.
+            ConfigurationError: The SII of a device was not read, the devices cannot be connected,
+                or the plant does not fit them.
+            ValueError: An option is out of range.
+        """
+        devices, behind = cloned_line(folder, options)
+        return cls(devices, clock=clock, plant=plant, faults=faults, behind=behind)
 
     def __len__(self) -> int:
         return len(self._devices)
 
-    def __getitem__(self, position: int) -> Device:
-        return self._devices[position]
+    def __getitem__(self, key: int | str) -> Device:
+        """Return the device at a position, or with a name.
+
+        Raises:
+            IndexError: There is no such position.
+            KeyError: No device has the name, or several have it.
+        """
+        return self._devices[key if isinstance(key, int) else self._names.find(key)]
+
+    def name_devices(self, stations: Mapping[str, int]) -> None:
+        """Give devices the names of a machine file, for `segment["j2"]`.
+
+        Args:
+            stations: Station address of each device, by its name, as the last scan set it.
+        """
+        self._names.give(stations)
 
     def __iter__(self) -> Iterator[Device]:
         return iter(self._devices)
@@ -198,6 +241,7 @@ class Segment:
         if self.clock == "monotonic" and not self._links:
             self._service.start()
         self._links[second] = link
+        self._service.agenda.deferred = self.clock == "monotonic"
         if second:
             self._wires.raise_end(1, True)
         return link
@@ -208,6 +252,7 @@ class Segment:
             self._wires.raise_end(1, False)
         if self.clock == "monotonic" and not self._links:
             self._service.stop()
+            self._service.agenda.deferred = False
 
     # -- faults --------------------------------------------------------------------------------
 
@@ -305,8 +350,7 @@ class Segment:
     def switch_power(self, device: int, on: bool) -> None:
         """Switch a device on or off. Any thread may call it.
 
-        While a link is open, the service of the segment does it: at once in real time, and when the
-        time advances in virtual time.
+        In real time, while a link is open, the thread of the service does it.
 
         Args:
             device: Position of the device.
@@ -318,11 +362,10 @@ class Segment:
         if not 0 <= device < len(self._devices):
             raise ValueError(f"there is no device {device}; it has {len(self._devices)} devices")
         chosen = self._devices[device]
-        action = chosen.switch_on if on else chosen.switch_off
-        if self._links:
-            self._service.agenda.after(0, action)  # the service may be running the device now
+        if on:
+            chosen.power_on()
         else:
-            action()
+            chosen.power_off()
 
     def _plug_first(self, devices: int) -> None:
         for number in range(len(self._devices)):

@@ -57,7 +57,8 @@ class Service:
         before = signal.pthread_sigmask(signal.SIG_BLOCK, ())
         try:
             signal.pthread_sigmask(signal.SIG_BLOCK, STOP_SIGNALS)
-            self._run_due()
+            with self.agenda.lock:
+                self._run_due()
         finally:
             signal.pthread_sigmask(signal.SIG_SETMASK, before)
         return self.agenda.next_due

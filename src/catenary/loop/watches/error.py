@@ -35,7 +35,7 @@ class ErrorWatch:
             [sub.description.open_ports for sub in self._subs],
             ring=ring_of(main.link) is not None,
         )
-        self.names = Names(tuple(sub.name for sub in self._subs))
+        self.names = Names(tuple(sub.description.full_name for sub in self._subs))
 
     def run(self) -> Procedure[None]:
         """Read the counters once per period until cancelled."""

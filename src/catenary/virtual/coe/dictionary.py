@@ -61,6 +61,13 @@ class Entry:
     read: Callable[[], bytes]
     write: Callable[[bytes], None] | None = None
     slot: int = -1  # slot of the process data; -1: none
+    signed: bool = False  # True if the slot has a sign
+    unlisted: int = 0  # mapping flags that the description of the entry does not show
+
+    @property
+    def mappable(self) -> int:
+        """Access flags with those for PDOs that the description does not show."""
+        return self.access | self.unlisted
 
 
 @dataclass(slots=True)
@@ -70,10 +77,14 @@ class Object:
     code: int
     data_type: int
     entries: dict[int, Entry] = field(default_factory=dict)
+    maximum: int | None = None  # highest subindex in the description; None: that of the entries
+    described: bool = True  # False: requests for its descriptions are refused
 
     @property
     def highest(self) -> int:
-        return max(self.entries)
+        if self.maximum is not None:
+            return self.maximum
+        return 0 if self.code == VARIABLE else max(self.entries)
 
 
 def constant(name: str, data_type: int, value: bytes, access: int = READ_ANY) -> Entry:
@@ -161,6 +172,11 @@ class Dictionary:
             raise Abort(NO_SUBINDEX)
         return self.objects[index].entries[subindex]
 
+    def known_entry(self, index: int, subindex: int) -> Entry | None:
+        """Return an entry; None if it does not exist."""
+        found = self.objects.get(index)
+        return None if found is None else found.entries.get(subindex)
+
     def _state_bit(self) -> int:
         return {2: 1, 4: 2, 8: 4}.get(self._state(), 0)
 
@@ -221,7 +237,8 @@ class Dictionary:
         if index not in self.objects:
             raise Abort(NO_OBJECT)
         entries = self.objects[index].entries
-        if self.objects[index].code == VARIABLE or any(e.bits % 8 for e in entries.values()):
+        is_record = self.objects[index].code != VARIABLE and 0 in entries
+        if not is_record or any(e.bits % 8 for e in entries.values()):
             raise Abort(NO_COMPLETE_ACCESS)
         count = data[:1] if first == 0 else b""
         at = 2 if first == 0 else 0

@@ -100,17 +100,17 @@ class InformationServer:
 
     def _object(self, index: int) -> bytes:
         found = self._dictionary.objects.get(index)
-        if found is None:
+        if found is None or not found.described:
             return self._error(NO_OBJECT)
-        highest = 0 if found.code == 7 else found.highest
-        head = struct.pack("<HHBB", index, found.data_type, highest, found.code)
+        head = struct.pack("<HHBB", index, found.data_type, found.highest, found.code)
         return self._described(OBJECT, head, found.name)
 
     def _entry(self, index: int, subindex: int, information: int) -> bytes:
         found = self._dictionary.objects.get(index)
-        if found is None or subindex not in found.entries:
-            code = NO_OBJECT if found is None else NO_SUBINDEX
-            return self._error(code)
+        if found is None or not found.described:
+            return self._error(NO_OBJECT)
+        if subindex not in found.entries:
+            return self._error(NO_SUBINDEX)
         entry = found.entries[subindex]
         head = struct.pack(
             "<HBBHHH", index, subindex, information & 0, entry.data_type, entry.bits, entry.access

@@ -106,6 +106,11 @@ class PdoObjects:
         for channel in channels:
             self._add_assignment(channel, rx if channel.outputs else tx)
 
+    @property
+    def indices(self) -> set[int]:
+        """Indices of the assignments and mappings."""
+        return {*self._mappings, *self._assigned}
+
     def _add_mapping(self, pdo: Pdo, flag: int) -> None:
         packed = [e.index << 16 | e.subindex << 8 | e.bits for e in pdo.entries]
         table = self._mappings[pdo.index] = _Table(packed, flag, fixed=pdo.fixed)
@@ -185,7 +190,7 @@ class PdoObjects:
             entry = self._dictionary.entry(index, subindex)
         except Abort:
             raise Abort(CANNOT_BE_MAPPED) from None
-        if not entry.access & flag or entry.bits != bits:
+        if not entry.mappable & flag or entry.bits != bits:
             raise Abort(CANNOT_BE_MAPPED)
 
     def _check(self, table: _Table) -> None:

@@ -360,10 +360,7 @@ class Application:
         return (start, length, found & ENABLE_AND_MODE, enabled) == expected
 
     def lacks_for_op(self) -> int:
-        has_outputs = any(
-            each.outputs and self.pdos.size(each.assignment) for each in self._channels
-        )
-        if has_outputs and not self._core.outputs_seen(self._position):
+        if self._has_outputs() and not self._core.outputs_seen(self._position):
             return NO_VALID_OUTPUTS
         if self.synchronisation is not None and self.synchronisation.awaits_pulses():
             return NO_SYNC_ERROR
@@ -383,7 +380,14 @@ class Application:
         if before != state == SAFE_OP:
             self._core.expect_outputs(self._position)
             self._core.refresh_inputs(self._position)
-        self._core.enable_outputs(self._position, state == OP)
+        self._core.enable_outputs(self._position, state == OP and self._takes_outputs())
+
+    def _takes_outputs(self) -> bool:
+        """Return False for a device from a file without outputs: a pulse then misses none."""
+        return not self._from_file or self._has_outputs()
+
+    def _has_outputs(self) -> bool:
+        return any(each.outputs and self.pdos.size(each.assignment) for each in self._channels)
 
     def _gate(self, *, mailbox: bool, process_data: bool) -> None:
         gates = {} if self._box is None else {0: mailbox, 1: mailbox}
@@ -399,17 +403,31 @@ class Application:
                 continue
             entries: list[tuple[int, int, int, bool]] = []
             for placed in self.pdos.placed(channel.assignment):
-                entry = self.dictionary.entry(placed.index, placed.subindex)
-                if entry.slot >= 0 and entry.access & (MAP_RX if channel.outputs else MAP_TX):
-                    signed = entry.data_type in SIGNED
-                    entries.append((placed.bit, placed.bits, entry.slot, signed))
+                entry = self.dictionary.known_entry(placed.index, placed.subindex)
+                if entry is None:  # a clone may have PDOs with objects that it does not list
+                    continue
+                if entry.slot >= 0 and entry.mappable & (MAP_RX if channel.outputs else MAP_TX):
+                    entries.append((placed.bit, placed.bits, entry.slot, entry.signed))
             n = channel.sync_manager if entries else -1
             entries = entries[: _segment.MAPPED_MAX]  # only devices from files have more
             self._core.map_process_data(self._position, channel.outputs, n, entries)
             if entries:
                 mapped.add(channel.outputs)
 
-    def slot_entry(self, name: str, data_type: int, bits: int, slot: int, access: int) -> Entry:
+    def put_slot(self, slot: int, value: int) -> None:
+        """Set a slot of the model."""
+        self._core.put_slot(self._position, slot, value)
+
+    def slot_entry(
+        self,
+        name: str,
+        data_type: int,
+        bits: int,
+        slot: int,
+        access: int,
+        *,
+        signed: bool | None = None,
+    ) -> Entry:
         """Return a dictionary entry whose value is a slot of the model.
 
         Args:
@@ -418,8 +436,10 @@ class Application:
             bits: Size of the value [bits].
             slot: Number of the slot.
             access: Access flags.
+            signed: True if the model needs a sign; None: as the data type requires.
         """
-        signed, size = data_type in SIGNED, (bits + 7) // 8
+        signed = data_type in SIGNED if signed is None else signed
+        size = (bits + 7) // 8
 
         def read() -> bytes:
             value = self._core.slot(self._position, slot) & ((1 << bits) - 1)
@@ -432,4 +452,4 @@ class Application:
             self._core.put_slot(self._position, slot, value)
 
         writable = access & WRITE_ANY
-        return Entry(name, data_type, bits, access, read, write if writable else None, slot)
+        return Entry(name, data_type, bits, access, read, write if writable else None, slot, signed)

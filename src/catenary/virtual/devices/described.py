@@ -1,8 +1,4 @@
-"""Virtual device from the ESI of a vendor: its memory, mailbox, objects and process data.
-
-The device has no behaviour of its own: a drive does not move. Outputs and inputs are objects that
-`read_object` and `write_object` access. It runs free: SYNC signals have no effect.
-"""
+"""Virtual device from the ESI of a vendor: memory, mailbox, objects, process data and modules."""
 
 from __future__ import annotations
 
@@ -17,26 +13,17 @@ from catenary.esi.module_choice import ModuleName, choose_modules
 from catenary.esi.placement import default_placements, slot_places, with_placements
 from catenary.esi.selection import select_device
 from catenary.esi.sii import assemble_sii
-from catenary.model.device import Direction
-from catenary.virtual.coe.dictionary import Abort, Entry
-from catenary.virtual.coe.esi_objects import EsiObjects, code_of, slots_of
+from catenary.virtual.blueprint import Blueprint
+from catenary.virtual.coe.esi_objects import esi_objects
 from catenary.virtual.coe.module_lists import CONFIGURED, ModuleLists
-from catenary.virtual.coe.quirks import NO_MAILBOX_QUIRKS, MailboxQuirks
-from catenary.virtual.crystal import EXACT, ClockBits, Crystal
-from catenary.virtual.description import Description
+from catenary.virtual.crystal import EXACT, Crystal
 from catenary.virtual.devices.application import Application
-from catenary.virtual.devices.applied import AppliedDevice, MailboxOptions
-from catenary.virtual.esi_description import describe_esi, pdos_of
-from catenary.virtual.scheduler import Scheduler
-from catenary.virtual.sii_quirks import NO_SII_QUIRKS
+from catenary.virtual.devices.twin import NO_OPTIONS, Twin, TwinOptions
+from catenary.virtual.esi_description import describe_esi
 from catenary.wire.sii import MailboxProtocol, decode_sii
 
-TEXTS = (0x1008, 0x1009, 0x100A)  # name and versions
-UPDATE_NS = 1_000_000  # interval between updates of the inputs
-REFUSES_COE = MailboxQuirks(error_reply="unsupported")
 
-
-class DescribedDevice(AppliedDevice):
+class DescribedDevice(Twin):
     """Virtual device with the SII, objects and process data of an ESI."""
 
     kind = "esi"
@@ -48,11 +35,7 @@ class DescribedDevice(AppliedDevice):
         name: str = "",
         alias: int = 0,
         serial: int = 0,
-        mailbox_delay: float = 300e-6,
-        crystal: Crystal = EXACT,
-        clock_bits: ClockBits = 64,
-        mailbox_quirks: MailboxQuirks = NO_MAILBOX_QUIRKS,
-        modules: Sequence[ModuleName | None] | None = None,
+        options: TwinOptions = NO_OPTIONS,
     ) -> None:
         """Initialise the device.
 
@@ -61,73 +44,36 @@ class DescribedDevice(AppliedDevice):
             name: Name in messages; empty: that of the ESI. The SII has the name of the ESI.
             alias: Station alias.
             serial: Serial number.
-            mailbox_delay: Time until a request is answered [s].
-            crystal: Frequency error and jitter of the clock.
-            clock_bits: Width of the clock, 32 or 64.
-            mailbox_quirks: Quirks of the mailbox.
-            modules: Modules in the slots of a modular device; None: the default modules.
+            options: Properties that the ESI does not give, and the modules in the slots.
 
         Raises:
             ValueError: A value is out of range.
             ConfigurationError: The ESI does not give a valid SII, or a slot does not accept a
                 module.
         """
+        if not 0 <= alias <= 0xFFFF:
+            raise ValueError(f"alias must be 0 to 65535, not {alias}")
         coe = device.mailbox is None or MailboxProtocol.COE in device.mailbox.protocols
-        super().__init__(
-            name=name or device.name or device.type,
-            alias=alias,
-            serial=serial,
-            lrw=not device.use_lrd_lwr,
-            crystal=crystal,
-            clock_bits=clock_bits,
-            sii_quirks=NO_SII_QUIRKS,
-            mailbox=MailboxOptions(
-                delay=mailbox_delay, quirks=mailbox_quirks if coe else REFUSES_COE
-            ),
-        )
+        modules = options.modules
         placed = default_placements(device) if modules is None else choose_modules(device, modules)
         self._modular = device if coe else replace(device, slots=None)
         self._detected = {each.place.number: each.module.ident for each in placed}
         self.esi = with_placements(device, placed)
-        self.ports = _ports(device.physics)
-        self._image = _image(device, serial, alias)
-        self._rx, self._tx = (pdos_of(self.esi, each) for each in Direction)
-        self._slots = slots_of(self._rx, self._tx)
-
-    def sii_image(self) -> bytes:
-        """Return the content of the EEPROM. Modules are not in it, as in real devices."""
-        return self._image
-
-    def description(self) -> Description:
-        return describe_esi(
-            self.esi,
-            decode_sii(self._image),
-            name=self.name,
-            serial=self.serial,
-            slots=len(self._slots),
+        image = _image(device, serial, alias)
+        super().__init__(
+            Blueprint(
+                describe_esi(self.esi, decode_sii(image), serial=serial),
+                image,
+                _ports(device.physics),
+                esi_objects(self.esi),
+                serves_coe=coe,
+            ),
+            name=name,
+            options=options,
         )
 
-    def started(self, scheduler: Scheduler) -> None:
-        super().started(scheduler)
-        if self._slots:
-            self.core.run_model(self.position, UPDATE_NS)
-        if self.description().emulation:
-            self.application.map_process_data()
-
     def add_objects(self, application: Application) -> None:
-        dictionary = application.dictionary
-        own = set(dictionary.objects) - self._given_texts()
-        objects = EsiObjects(self.esi, self._rx, self._tx, application.slot_entry)
-        for index, (name, entries) in objects.make().items():
-            if index not in own:
-                dictionary.add(index, name, entries, code=code_of(entries))
-        self._add_module_lists(application)
-        for slot, value in objects.defaults.items():
-            signed = len(value) == 8
-            self.core.put_slot(self.position, slot, int.from_bytes(value, "little", signed=signed))
-
-    def _add_module_lists(self, application: Application) -> None:
-        """Add the module lists of a modular device. Its file can give the configured modules."""
+        super().add_objects(application)
         slots = self._modular.slots
         if slots is None:
             return
@@ -140,50 +86,6 @@ class DescribedDevice(AppliedDevice):
         lists = ModuleLists(count, detected, known if any(entries) else without)
         lists.add_to(application.dictionary, slots.index_increment)
         application.module_lists = lists
-
-    def _given_texts(self) -> set[int]:
-        """Return the indices of name and versions that the file gives."""
-        dictionary = self.esi.dictionary
-        entries = [dictionary.entry(index) for index in TEXTS] if dictionary else []
-        return {entry.index for entry in entries if entry is not None and entry.default}
-
-    def read_object(self, index: int, subindex: int = 0) -> bytes:
-        """Return the value of an object, such as an output, regardless of its access rights.
-
-        Args:
-            index: Index of the object.
-            subindex: Subindex of the entry.
-
-        Raises:
-            LookupError: The device does not have the object.
-        """
-        return self._entry(index, subindex).read()
-
-    def write_object(self, index: int, subindex: int, data: bytes) -> None:
-        """Set the value of an object in a PDO, such as an input, regardless of its access rights.
-
-        Args:
-            index: Index of the object.
-            subindex: Subindex of the entry.
-            data: The value, little endian.
-
-        Raises:
-            LookupError: The device does not have the object in a PDO of at most 64 bits.
-        """
-        entry = self._entry(index, subindex)
-        if entry.slot < 0:
-            raise LookupError(
-                f"{self.name}: 0x{index:04X}:{subindex:02X} is not in a PDO, or exceeds 64 bits"
-            )
-        value = int.from_bytes(data, "little", signed=len(data) == 8)
-        self.core.put_slot(self.position, entry.slot, value)
-        self.core.refresh_inputs(self.position)
-
-    def _entry(self, index: int, subindex: int) -> Entry:
-        try:
-            return self.application.dictionary.entry(index, subindex)
-        except Abort:
-            raise LookupError(f"{self.name}: no object 0x{index:04X}:{subindex:02X}") from None
 
 
 def from_esi(
@@ -216,9 +118,8 @@ def from_esi(
     """
     if not isinstance(source, EsiDevice):
         source = esi_device(source, device)
-    return DescribedDevice(
-        source, name=name, alias=alias, serial=serial, crystal=crystal, modules=modules
-    )
+    options = TwinOptions(crystal=crystal, modules=modules)
+    return DescribedDevice(source, name=name, alias=alias, serial=serial, options=options)
 
 
 def esi_device(path: str | PathLike[str], wanted: str = "") -> EsiDevice:

@@ -6,8 +6,10 @@ Devices with a microcontroller add an `Application`.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
-from typing import ClassVar
+from os import PathLike
+from typing import TYPE_CHECKING, ClassVar
 
 from catenary.virtual._segment import FOREVER, Core
 from catenary.virtual.crystal import EXACT, ClockBits, Crystal
@@ -15,6 +17,10 @@ from catenary.virtual.description import Description
 from catenary.virtual.scheduler import Agenda, Scheduler
 from catenary.virtual.sii_image import make_sii_image
 from catenary.virtual.sii_quirks import NO_SII_QUIRKS, SiiQuirks
+
+if TYPE_CHECKING:
+    from catenary.virtual.devices.described import DescribedDevice
+    from catenary.virtual.devices.twin import Twin, TwinOptions
 
 INIT, PRE_OP, SAFE_OP, OP = 1, 2, 4, 8
 RESET_DELAY_NS, RESET_NS = 100_000, 20_000_000  # delay, and time to reload the EEPROM
@@ -54,6 +60,81 @@ class Device:
         self._scheduler: Scheduler | None = None
         self.position = -1
 
+    @staticmethod
+    def from_sii(
+        source: bytes | str | PathLike[str],
+        *,
+        name: str = "",
+        alias: int | None = None,
+        serial: int | None = None,
+        clock: bool | None = None,
+        options: TwinOptions | None = None,
+    ) -> Twin:
+        """Return a virtual device with the EEPROM and the default process data of an SII.
+
+        Args:
+            source: The image, or the path of a binary file, as `catenary sii read` writes it.
+            name: Name in messages; empty: that of the SII.
+            alias: Station alias; None: that of the image.
+            serial: Serial number; None: that of the image.
+            clock: True if the device has a clock; None: True if the image has modes for it.
+            options: Motors, quirks and clock of the device.
+
+        Raises:
+            ConfigurationError: The file cannot be read, or the image is not valid or has no
+                identity.
+            ValueError: A number is out of range.
+        """
+        from catenary.virtual.devices.twins import twin_from_sii
+
+        return twin_from_sii(
+            source, name=name, alias=alias, serial=serial, clock=clock, options=options
+        )
+
+    @staticmethod
+    def from_esi(
+        path: str | PathLike[str],
+        device: str = "",
+        *,
+        product: int | None = None,
+        revision: int | None = None,
+        name: str = "",
+        alias: int = 0,
+        serial: int = 0,
+        options: TwinOptions | None = None,
+    ) -> DescribedDevice:
+        """Return a virtual device with the EEPROM, objects and rules of an ESI.
+
+        Args:
+            path: Path of the ESI file.
+            device: Device in the file: order code or name. Needed if the file has several devices,
+                and `product` is None.
+            product: Product code of the device in the file.
+            revision: Revision of the device; None: the newest one.
+            name: Name in messages; empty: that of the ESI.
+            alias: Station alias.
+            serial: Serial number.
+            options: Motors, modules, quirks and clock of the device.
+
+        Raises:
+            EsiError: The file cannot be read.
+            ConfigurationError: The file has no such device, gives no valid SII, or a slot does not
+                accept a module.
+            ValueError: A number is out of range, or `revision` is given without `product`.
+        """
+        from catenary.virtual.devices.twins import twin_from_esi
+
+        return twin_from_esi(
+            path,
+            device,
+            product=product,
+            revision=revision,
+            name=name,
+            alias=alias,
+            serial=serial,
+            options=options,
+        )
+
     def description(self) -> Description:
         raise NotImplementedError
 
@@ -92,8 +173,8 @@ class Device:
             sii=self.sii_image(),
             slots=description.slots,
             axes=description.axes,
-            fmmus=8,
-            sync_managers=8,
+            fmmus=description.fmmu_count,
+            sync_managers=description.sync_manager_count,
             clock_bits=self.clock_bits if description.clock else 0,
             lrw=description.lrw,
             identification=description.identification,
@@ -129,6 +210,20 @@ class Device:
         self._scheduler.end()
         self._scheduler = None
         self.core.switch_power(self.position, False)
+
+    def power_on(self) -> None:
+        """Switch the power on. Any thread may call it."""
+        self._soon(self.switch_on)
+
+    def power_off(self) -> None:
+        """Switch the power off. Its neighbours lose the link. Any thread may call it."""
+        self._soon(self.switch_off)
+
+    def _soon(self, action: Callable[[], None]) -> None:
+        if self._agenda is None:
+            action()
+        else:
+            self._agenda.soon(action)
 
     def reset(self) -> None:
         """Schedule a power cycle for the time when the requesting frame has left the device.

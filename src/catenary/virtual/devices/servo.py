@@ -8,11 +8,9 @@ mille of the rated torque.
 
 from __future__ import annotations
 
-import math
-from typing import NamedTuple
+from dataclasses import replace
 
 from catenary.virtual import _segment
-from catenary.virtual._motors import Motors
 from catenary.virtual.coe.dictionary import (
     ARRAY,
     INTEGER8,
@@ -30,8 +28,10 @@ from catenary.virtual.coe.quirks import NO_MAILBOX_QUIRKS, MailboxQuirks
 from catenary.virtual.crystal import EXACT, ClockBits, Crystal
 from catenary.virtual.description import Description, MappedEntry, Pdo
 from catenary.virtual.devices.application import Application, mailbox_of, sync_managers_of
-from catenary.virtual.devices.applied import AppliedDevice, MailboxOptions
-from catenary.virtual.devices.servo_homing import add_homing, homing_presets
+from catenary.virtual.devices.applied import MailboxOptions
+from catenary.virtual.devices.motor import Motor
+from catenary.virtual.devices.motor_device import STEP_NS, MotorDevice
+from catenary.virtual.devices.servo_homing import add_homing
 from catenary.virtual.devices.servo_objects import (
     BITS,
     DEFAULT_RX,
@@ -40,34 +40,17 @@ from catenary.virtual.devices.servo_objects import (
     OBJECTS,
     RW,
     RX,
-    profile_presets,
 )
 from catenary.virtual.devices.servo_quirks import NO_QUIRKS, ServoQuirks
 from catenary.virtual.devices.synchronisation import DC_SYNC0, DC_SYNC1, Synchronisation
 from catenary.virtual.mapping_quirks import NO_MAPPING_QUIRKS, MappingQuirks
-from catenary.virtual.scheduler import Scheduler
 from catenary.virtual.sii_quirks import NO_SII_QUIRKS, SiiQuirks
 
-STEP_NS = 250_000
 MINIMUM_CYCLE_NS = 62_500  # shortest SYNC0 cycle
 COPY_NS = 20_000  # minimum time from the arrival of outputs to SYNC0
-BOOT_SECONDS = 0.02
 SUPPORTED_MODES = {0, 1, 3, 6, 8, 9, 10}
 SUPPORTED_MODES_MASK = sum(1 << mode - 1 for mode in SUPPORTED_MODES - {0})  # 0x6502
-VELOCITY_BANDWIDTH = 2 * math.pi * 80  # rad/s
-POSITION_BANDWIDTH = 100.0  # rad/s
-POSITIVE = ("counts_per_turn", "inertia", "rated_torque", "max_torque_ratio", "max_velocity")
 AXIS_STRIDE, PDO_STRIDE = 0x800, 0x10
-STATES = (
-    "NOT READY TO SWITCH ON",
-    "SWITCH ON DISABLED",
-    "READY TO SWITCH ON",
-    "SWITCHED ON",
-    "OPERATION ENABLED",
-    "QUICK STOP ACTIVE",
-    "FAULT REACTION ACTIVE",
-    "FAULT",
-)
 
 
 def _pdo(index: int, name: str, objects: tuple[int, ...], axis: int, sync_manager: int) -> Pdo:
@@ -84,24 +67,7 @@ def _pdo(index: int, name: str, objects: tuple[int, ...], axis: int, sync_manage
     return Pdo(index + PDO_STRIDE * axis, name, entries, sync_manager)
 
 
-class Received(NamedTuple):
-    """Outputs of one axis, as raw values of its objects."""
-
-    controlword: int  # 0x6040
-    position: int  # 0x607A, counts
-    velocity: int  # 0x60FF, counts per second
-    torque: int  # 0x6071, per mille of the rated torque
-
-
-RECEIVED_SLOTS = (
-    _segment.SLOT_CONTROLWORD,
-    _segment.SLOT_TARGET_POSITION,
-    _segment.SLOT_TARGET_VELOCITY,
-    _segment.SLOT_TARGET_TORQUE,
-)
-
-
-class Servo(AppliedDevice):
+class Servo(MotorDevice):
     """Servo drive with 1 to 8 axes and their motors."""
 
     kind = "servo"
@@ -167,6 +133,22 @@ class Servo(AppliedDevice):
         Raises:
             ValueError: A value is out of range.
         """
+        if not 1 <= axes <= _segment.AXES_MAX:
+            raise ValueError(f"axes must be 1 to {_segment.AXES_MAX}, not {axes}")
+        if not 1 <= sync_missed_limit <= 0xFFFF:
+            raise ValueError(f"sync_missed_limit must be 1 to 65535, not {sync_missed_limit}")
+        motor = Motor(
+            counts_per_turn=counts_per_turn,
+            velocity_counts_per_turn=velocity_counts_per_turn,
+            inertia=inertia,
+            viscous_friction=viscous_friction,
+            coulomb_friction=coulomb_friction,
+            rated_torque=rated_torque,
+            max_torque_ratio=max_torque_ratio,
+            max_velocity=max_velocity,
+            following_error_turns=following_error_turns,
+            position_limits=position_limits,
+        )
         super().__init__(
             name=name,
             alias=alias,
@@ -177,9 +159,9 @@ class Servo(AppliedDevice):
             sii_quirks=sii_quirks,
             mailbox=MailboxOptions(mailbox_bytes, mailbox_delay, mailbox_quirks),
         )
-        self.axes = axes
+        self.install_motors([motor] * axes, quirks)
         self.counts_per_turn = counts_per_turn
-        self.velocity_counts_per_turn = velocity_counts_per_turn or counts_per_turn
+        self.velocity_counts_per_turn = motor.velocity_counts
         self.inertia = inertia
         self.viscous_friction = viscous_friction
         self.coulomb_friction = coulomb_friction
@@ -189,23 +171,7 @@ class Servo(AppliedDevice):
         self.following_error_turns = following_error_turns
         self.position_limits = position_limits
         self.sync_missed_limit = sync_missed_limit
-        self.quirks = quirks
         self.mapping_quirks = mapping_quirks
-        self._check_values()
-        self._inertias = [inertia] * axes  # inertias for which the loops are tuned
-
-    def _check_values(self) -> None:
-        """Raise ValueError if a value is out of range."""
-        for field in POSITIVE:
-            value = getattr(self, field)
-            if not 0 < value < math.inf:
-                raise ValueError(f"{field} must be positive, not {value}")
-        if not 1 <= self.axes <= _segment.AXES_MAX:
-            raise ValueError(f"axes must be 1 to {_segment.AXES_MAX}, not {self.axes}")
-        if not 1 <= self.sync_missed_limit <= 0xFFFF:
-            raise ValueError(f"sync_missed_limit must be 1 to 65535, not {self.sync_missed_limit}")
-        if self.viscous_friction < 0 or self.coulomb_friction < 0:
-            raise ValueError("friction must be 0 or more")
 
     def _pdos(
         self, base: int, default: tuple[int, ...], others: tuple[tuple[int, ...], ...]
@@ -247,83 +213,6 @@ class Servo(AppliedDevice):
             loop_control=self.quirks.closes_ports,
             lrw=self.lrw,
         )
-
-    def started(self, scheduler: Scheduler) -> None:
-        counts_per_radian = self.counts_per_turn / (2 * math.pi)
-        for axis in range(self.axes):
-            velocity_gain, integral_gain = self._gains(axis)
-            self._motors.make(
-                self.position,
-                axis,
-                inertia=self.inertia,
-                viscous=self.viscous_friction,
-                coulomb=self.coulomb_friction,
-                rated_torque=self.rated_torque,
-                velocity_limit=self.max_velocity,
-                counts_per_radian=counts_per_radian,
-                velocity_per_radian=self.velocity_counts_per_turn / (2 * math.pi),
-                position_gain=POSITION_BANDWIDTH,
-                velocity_gain=velocity_gain,
-                integral_gain=integral_gain,
-                boot=BOOT_SECONDS,
-            )
-            self._motors.set_quirks(
-                self.position,
-                axis,
-                mode_delay=self.quirks.mode_delay,
-                refused_modes=self.quirks.refused_mask,
-                never_bit_12=self.quirks.bit_12 == "never",
-                follows_without_bit_12=self.quirks.follows_without_bit_12,
-                ignores_quick_stop=self.quirks.ignores_quick_stop,
-                ignores_disable=self.quirks.ignores_disable,
-            )
-            self._preset(axis, counts_per_radian)
-        super().started(scheduler)
-        self.core.run_model(self.position, STEP_NS)
-
-    def _gains(self, axis: int) -> tuple[float, float]:
-        velocity_gain = self._inertias[axis] * VELOCITY_BANDWIDTH
-        return velocity_gain, velocity_gain * VELOCITY_BANDWIDTH / 5
-
-    def tune(self, inertia: float, axis: int = 0) -> None:
-        """Tune the velocity loop to a total inertia.
-
-        Args:
-            inertia: Total inertia at the motor shaft, including the motor [kg·m²].
-            axis: Axis number.
-        """
-        self._inertias[axis] = inertia
-        velocity_gain, integral_gain = self._gains(axis)
-        self._motors.tune(
-            self.position, axis, velocity_gain=velocity_gain, integral_gain=integral_gain
-        )
-
-    def _preset(self, axis: int, counts_per_radian: float) -> None:
-        low, high = self.position_limits or (0.0, 0.0)
-        quick_stop = self.quirks.quick_stop_option
-        deceleration = round(1000 * self.velocity_counts_per_turn / (2 * math.pi))  # 1000 rad/s2
-        for slot, value in (
-            (_segment.SLOT_ABORT_CONNECTION_OPTION, self.quirks.abort_connection_option),
-            (_segment.SLOT_QUICK_STOP_OPTION, 2 if quick_stop == "absent" else quick_stop),
-            (_segment.SLOT_DISABLE_OPTION, 1),
-            (_segment.SLOT_FAULT_OPTION, 2),
-            (
-                _segment.SLOT_FOLLOWING_WINDOW,
-                round(self.following_error_turns * self.counts_per_turn),
-            ),
-            (_segment.SLOT_FOLLOWING_TIME, 10),
-            (_segment.SLOT_LIMIT_MIN, round(low * counts_per_radian)),
-            (_segment.SLOT_LIMIT_MAX, round(high * counts_per_radian)),
-            (_segment.SLOT_MAX_TORQUE, round(1000 * self.max_torque_ratio)),
-            (_segment.SLOT_MAX_SPEED, round(self.max_velocity * 60 / (2 * math.pi))),
-            (_segment.SLOT_QUICK_STOP_DECELERATION, deceleration),
-            (_segment.SLOT_DECELERATION, deceleration // 2),
-            (_segment.SLOT_INTERPOLATION_PERIOD, 1),
-            (_segment.SLOT_INTERPOLATION_EXPONENT, -3),
-            *profile_presets(self.counts_per_turn, self.velocity_counts_per_turn),
-            *homing_presets(self.velocity_counts_per_turn / (2 * math.pi)),
-        ):
-            self.core.put_slot(self.position, _segment.SLOTS_PER_AXIS * axis + slot, value)
 
     def add_objects(self, application: Application) -> None:
         application.synchronisation = Synchronisation(
@@ -407,88 +296,4 @@ class Servo(AppliedDevice):
             if write is not None:
                 write(data)
 
-        return Entry(
-            entry.name, entry.data_type, entry.bits, entry.access, entry.read, checked, entry.slot
-        )
-
-    @property
-    def _motors(self) -> Motors:
-        return Motors(self.core)
-
-    # -- for tests and plants ------------------------------------------------------------------
-
-    def axis_position(self, axis: int = 0) -> float:
-        """Return the exact position of the motor [rad]."""
-        return self._motors.state(self.position, axis)[0]
-
-    @property
-    def position_rad(self) -> float:
-        """Exact position of the first axis [rad]."""
-        return self.axis_position()
-
-    @property
-    def velocity_rad_s(self) -> float:
-        """Exact velocity of the first axis [rad/s]."""
-        return self._motors.state(self.position, 0)[1]
-
-    @property
-    def torque_nm(self) -> float:
-        """Motor torque of the first axis [N·m]."""
-        return self._motors.state(self.position, 0)[2]
-
-    def received(self, axis: int = 0) -> Received:
-        """Return the present controlword and targets of the axis, as raw values."""
-        first = _segment.SLOTS_PER_AXIS * axis
-        return Received(*(self.core.slot(self.position, first + slot) for slot in RECEIVED_SLOTS))
-
-    def drive_state(self, axis: int = 0) -> str:
-        """Return the name of the CiA 402 state."""
-        return STATES[self._motors.state(self.position, axis)[3]]
-
-    def move_to(self, position: float, axis: int = 0) -> None:
-        """Move the shaft to a position, as if by hand.
-
-        Args:
-            position: New position [rad].
-            axis: Axis number.
-        """
-        self._motors.place(self.position, axis, position)
-
-    def apply_load(self, torque: float, axis: int = 0) -> None:
-        """Apply an external torque to the shaft, until the next call.
-
-        Args:
-            torque: Torque [N·m].
-            axis: Axis number.
-        """
-        self._motors.load(self.position, axis, torque)
-
-    def inject_fault(self, code: int, axis: int = 0) -> None:
-        """Inject a fault.
-
-        Args:
-            code: Error code (0x603F). 0 removes the cause, so that the fault can be reset.
-            axis: Axis number.
-        """
-        self._motors.inject(self.position, axis, code)
-
-    def hide_bit_12(self, seconds: float, axis: int = 0) -> None:
-        """Hide bit 12 of the statusword from the next step on.
-
-        While the bit is hidden, the drive holds its last demand value. With the quirk
-        `follows_without_bit_12`, it follows its targets instead.
-
-        Args:
-            seconds: Duration [s]; `inf`: without end.
-            axis: Axis number.
-        """
-        self._motors.hide_bit_12(self.position, axis, seconds)
-
-    def switch_sto(self, active: bool, axis: int = 0) -> None:
-        """Activate or deactivate safe torque off (STO).
-
-        Args:
-            active: True activates STO, which removes the torque.
-            axis: Axis number.
-        """
-        self._motors.stop_torque(self.position, axis, active)
+        return replace(entry, write=checked)

@@ -6,6 +6,9 @@ also checks the configuration of the SYNC unit.
 The supported types are 0 (free run) and 2 (DC Sync0). With a quirk, type 3 (DC Sync1) replaces type
 2. If 0x1C32:01 was not written, the SYNC unit determines the type: if its signal is active on entry
 to SAFE-OP, the device synchronises to the signal. Common device stacks behave in the same way.
+
+A twin follows SYNC1 if this signal is active, otherwise SYNC0. Its objects are those of its file.
+They only store values.
 """
 
 from __future__ import annotations
@@ -58,7 +61,7 @@ class Synchronisation:
         minimum_cycle_ns: int,
         copy_ns: int,
         missed_limit: int,
-        synchronous_type: int = DC_SYNC0,
+        synchronous_type: int | None = DC_SYNC0,
     ) -> None:
         """Add the objects to the dictionary.
 
@@ -71,7 +74,8 @@ class Synchronisation:
             copy_ns: Minimum time from the arrival of outputs to the pulse [ns].
             missed_limit: Number of consecutive pulses without new outputs after which the device
                 reports an error.
-            synchronous_type: Type for the signal of the device: DC_SYNC0 or DC_SYNC1.
+            synchronous_type: Type for the signal of the device: DC_SYNC0 or DC_SYNC1. None: the
+                type of the active signal, and no objects.
         """
         self._core = core
         self._position = position
@@ -79,12 +83,16 @@ class Synchronisation:
         self._minimum_ns = minimum_cycle_ns
         self._copy_ns = copy_ns
         self._limit = missed_limit
-        self._synchronous = synchronous_type
-        self._pulses = PULSES[synchronous_type]
+        self._follows_any = synchronous_type is None
+        self._synchronous = DC_SYNC0 if synchronous_type is None else synchronous_type
         self._written: int | None = None  # 0x1C32:01
         self._cycle_written = 0  # 0x1C32:02
         self._checked_ns = 0  # cycle of the pulses at the last check; 0: free run
         self._tune()
+        if not self._follows_any:
+            self._add_objects(dictionary, copy_ns)
+
+    def _add_objects(self, dictionary: Dictionary, copy_ns: int) -> None:
         for index, name, copy in (
             (OUTPUTS, "SM output parameter", copy_ns),
             (INPUTS, "SM input parameter", 0),  # inputs are latched at the pulse
@@ -111,9 +119,11 @@ class Synchronisation:
         self._checked_ns = 0
         by_pdi, activation = self._core.peek(self._position, SYNC_CONTROL, 2)
         switched_on = bool(activation & ACTIVE)
+        if self._follows_any:
+            self._synchronous = DC_SYNC1 if activation & PULSES[DC_SYNC1] else DC_SYNC0
         if not switched_on:
             return INVALID_DC_CONFIGURATION if self._written == self._synchronous else 0
-        if self._written == FREE_RUN or not activation & self._pulses or by_pdi & 1:
+        if self._written == FREE_RUN or not activation & PULSES[self._synchronous] or by_pdi & 1:
             return INVALID_DC_CONFIGURATION
         if self.sync0_cycle_ns < self._minimum_ns:
             return DC_SYNC0_CYCLE_TIME
@@ -133,7 +143,7 @@ class Synchronisation:
         """
         if self._checked_ns:
             self._core.run_model_by_pulses(
-                self._position, self._pulses, self._checked_ns, self._step_ns
+                self._position, PULSES[self._synchronous], self._checked_ns, self._step_ns
             )
 
     def end(self) -> None:
