@@ -10,6 +10,7 @@ from typing import NoReturn
 from catenary.cli import (
     alias,
     bench,
+    capture,
     check,
     dashboard,
     demo,
@@ -40,7 +41,7 @@ PROGRAM = "catenary"
 DESCRIPTION = "Real-time EtherCAT for Python."
 COMMANDS = (
     *(scan, state, graph, diag, sdo, reg, alias, sii, esi),
-    *(init, check),
+    *(init, check, capture),
     *(demo, dashboard, top, doctor, bench, virtual, realtime),
     *(record, merge, plot, foxglove, ros2, include),
 )

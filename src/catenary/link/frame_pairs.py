@@ -1,29 +1,18 @@
-"""Pairs of sent and returned frames in a recording.
-
-The first conclusive criterion determines whether a frame was sent or returned:
-
-1. The file: pcapng can store the direction of a packet.
-2. The source address: the first controller sets bit 1 of its first byte. This is inconclusive if
-   all frames of an address have the bit, because the address of a virtual interface contains it
-   (02:...). It is also inconclusive if none has the bit, because some simulators do not set it.
-3. The content: a frame is sent with all working counters 0, and returns with larger ones. If no
-   device answered, controllers have still incremented a position or broadcast address. A frame that
-   returns unchanged returns at once, or with padding; a master repeats a frame only after some ms.
-"""
+"""Pairs of sent and returned frames in a recording. The rules are in capture/direction.py."""
 
 from __future__ import annotations
 
 import os
 from collections import defaultdict, deque
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
-from typing import NamedTuple, TypeAlias
+from typing import NamedTuple
 
+from catenary.capture.direction import LOST_NS, CapturedFrame, Shape, is_outbound, shape_of
 from catenary.errors import DecodeError
 from catenary.wire.capture import decode_capture
-from catenary.wire.datagram import EcatCommand
-from catenary.wire.frame import MINIMUM_SIZE, Frame, decode_frame
-from catenary.wire.pcapng import Direction, Packet
+from catenary.wire.frame import decode_frame
+from catenary.wire.pcapng import Packet
 
 
 class Exchange(NamedTuple):
@@ -32,27 +21,6 @@ class Exchange(NamedTuple):
     sent: bytes
     answer: bytes
     latency_ns: int = 0
-
-
-Shape: TypeAlias = tuple[tuple[int, int, int], ...]
-
-LOST_NS = 100_000_000  # later frames are not answers: masters wait 2 ms (SOEM) to 50 ms (ours)
-AT_ONCE_NS = 1_000_000  # enough for a hundred devices; shorter than the repetition of any master
-
-# Every controller increments the address of these commands (ETG.1000.4 §5.4.1.2)
-_COUNTED_UP = frozenset(
-    (
-        *(EcatCommand.APRD, EcatCommand.APWR, EcatCommand.APRW, EcatCommand.ARMW),
-        *(EcatCommand.BRD, EcatCommand.BWR, EcatCommand.BRW),
-    )
-)
-
-
-class _Seen(NamedTuple):
-    """A packet that is an EtherCAT frame."""
-
-    packet: Packet
-    frame: Frame
 
 
 def read_exchanges(path: str | os.PathLike[str]) -> list[Exchange]:
@@ -73,65 +41,40 @@ def pair(packets: Iterable[Packet]) -> list[Exchange]:
     The lengths of the data must be equal as well. Frames without an answer within `LOST_NS` count
     as lost. Lost frames and frames of other protocols are omitted.
     """
-    seen = _ethercat(packets)
+    packets = list(packets)
+    seen = list(_ethercat(packets))
     conclusive = _conclusive_sources(seen)
-    waiting: dict[Shape, deque[_Seen]] = defaultdict(deque)
+    waiting: dict[Shape, deque[CapturedFrame]] = defaultdict(deque)
     exchanges = []
     for each in seen:
         sent = waiting[shape_of(each.frame)]
-        while sent and each.packet.time_ns - sent[0].packet.time_ns > LOST_NS:
+        while sent and each.time_ns - sent[0].time_ns > LOST_NS:
             sent.popleft()
-        if _is_outbound(each, sent, conclusive):
+        oldest = sent[0] if sent else None
+        if is_outbound(each, oldest, conclusive=each.frame.sender in conclusive):
             sent.append(each)
-        elif sent:
-            question, answer = sent.popleft().packet, each.packet
-            latency = max(answer.time_ns - question.time_ns, 0)
-            exchanges.append(Exchange(question.data, answer.data, latency))
+        elif oldest is not None:
+            sent.popleft()
+            question, answer = packets[oldest.number - 1].data, packets[each.number - 1].data
+            exchanges.append(Exchange(question, answer, max(each.time_ns - oldest.time_ns, 0)))
     return exchanges
 
 
-def shape_of(frame: Frame) -> Shape:
-    """Return command, index and data length of each datagram; an answer has the same."""
-    return tuple((int(d.command), d.index, len(d.data)) for d in frame.datagrams)
-
-
-def _ethercat(packets: Iterable[Packet]) -> list[_Seen]:
-    found = []
-    for packet in packets:
+def _ethercat(packets: Iterable[Packet]) -> Iterator[CapturedFrame]:
+    for number, packet in enumerate(packets, 1):
         try:
-            found.append(_Seen(packet, decode_frame(packet.data)))
+            frame = decode_frame(packet.data)
         except DecodeError:
             continue
-    return found
+        yield CapturedFrame(number, packet.time_ns, frame, len(packet.data), packet.direction)
 
 
-def _conclusive_sources(seen: Iterable[_Seen]) -> frozenset[bytes]:
+def _conclusive_sources(seen: Iterable[CapturedFrame]) -> frozenset[bytes]:
     """Return the source addresses that occur with and without the bit that controllers set."""
     found: dict[bytes, set[bool]] = defaultdict(set)
     for each in seen:
         found[each.frame.sender].add(each.frame.has_passed_controller)
     return frozenset(source for source, bits in found.items() if len(bits) == 2)
-
-
-def _is_outbound(each: _Seen, waiting: Sequence[_Seen], conclusive: frozenset[bytes]) -> bool:
-    if each.packet.direction is not Direction.UNKNOWN:
-        return each.packet.direction is Direction.OUTBOUND
-    if each.frame.sender in conclusive:
-        return not each.frame.has_passed_controller
-    if any(datagram.working_counter for datagram in each.frame.datagrams):
-        return False
-    return not (waiting and _came_back_uncounted(waiting[0], each))
-
-
-def _came_back_uncounted(sent: _Seen, each: _Seen) -> bool:
-    """Return True if no device answered, but controllers forwarded the frame."""
-    pairs = list(zip(sent.frame.datagrams, each.frame.datagrams, strict=True))
-    if any(a.data != b.data or a.ado != b.ado for a, b in pairs):
-        return False
-    if any(a.adp != b.adp for a, b in pairs):
-        return all(a.adp == b.adp or a.command in _COUNTED_UP for a, b in pairs)
-    padded = len(sent.packet.data) < MINIMUM_SIZE <= len(each.packet.data)
-    return padded or each.packet.time_ns - sent.packet.time_ns <= AT_ONCE_NS
 
 
 def by_question(exchanges: Sequence[Exchange]) -> dict[bytes, list[Exchange]]:

@@ -11,9 +11,10 @@ one. `Capture.cut` is the number of its bytes.
 
 from __future__ import annotations
 
+import io
 import struct
-from collections.abc import Iterator
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 from enum import IntEnum
 from typing import NamedTuple
 
@@ -24,10 +25,13 @@ ETHERNET = 1  # LINKTYPE_ETHERNET
 _SECTION = 0x0A0D0D0A  # the same in both byte orders
 _MAGIC = 0x1A2B3C4D
 _INTERFACE = 1
+_OLD_PACKET = 2  # obsolete, but old files contain it
 _SIMPLE_PACKET = 3
 _STATISTICS = 5
 _ENHANCED_PACKET = 6
 _MINIMUM_BLOCK = 12
+_MAXIMUM_BLOCK = 1 << 24  # Wireshark's limit
+_MAXIMUM_INTERFACES = 1 << 12
 
 _OPTION_END = 0
 _OPTION_COMMENT = 1
@@ -132,28 +136,43 @@ def decode_pcapng(data: bytes) -> Capture:
 
     A truncated last block is omitted.
     """
-    state = _State()
-    end = 0
-    for block in _blocks(data):
-        end = block.end
-        if block.kind == _SECTION:
-            state.first_interface = len(state.interfaces)
-        elif block.kind == _INTERFACE:
-            state.interfaces.append(_decode_interface(block))
-        elif block.kind == _ENHANCED_PACKET:
-            state.packets.append(_decode_enhanced(block, state))
-        elif block.kind == _SIMPLE_PACKET:
-            state.packets.append(_decode_simple(block, state))
-    return Capture(tuple(state.interfaces), tuple(state.packets), cut=len(data) - end)
+    packets = PcapngPackets(io.BytesIO(data).read)
+    found = tuple(packets)
+    return Capture(tuple(packets.interfaces), found, cut=packets.cut)
 
 
-@dataclass(slots=True)
-class _State:
-    """Interfaces and packets that were decoded so far."""
+class PcapngPackets:
+    """Owner of the interfaces of a file whose packets are decoded one by one.
 
-    interfaces: list[Interface] = field(default_factory=list)
-    packets: list[Packet] = field(default_factory=list)
-    first_interface: int = 0  # index of the first interface of the current section
+    Iterate over it once. It needs memory for one block only.
+    """
+
+    def __init__(self, read: Callable[[int], bytes]) -> None:
+        """Decode the bytes that `read(size)` returns, which are fewer only at the end."""
+        self._read = read
+        self._first_interface = 0  # index of the first interface of the current section
+        self._dropped: dict[int, int] = {}
+        self.interfaces: list[Interface] = []
+        self.cut = 0  # bytes of a truncated block at the end
+
+    @property
+    def dropped(self) -> int:
+        """Number of packets that the recording program dropped, from its statistics."""
+        return sum(self._dropped.values())
+
+    def __iter__(self) -> Iterator[Packet]:
+        """Yield the packets. Raises DecodeError if a block is invalid."""
+        for block in self._blocks():
+            if block.kind == _SECTION:
+                self._first_interface = len(self.interfaces)
+            elif block.kind == _INTERFACE:
+                self._add_interface(block)
+            elif block.kind in (_ENHANCED_PACKET, _OLD_PACKET):
+                yield _decode_enhanced(block, self)
+            elif block.kind == _SIMPLE_PACKET:
+                yield _decode_simple(block, self)
+            elif block.kind == _STATISTICS:
+                self._note_statistics(block)
 
     def interface(self, number: int) -> int:
         """Return the index in the file of an interface of the current section.
@@ -164,19 +183,65 @@ class _State:
         Raises:
             DecodeError: The file does not describe the interface.
         """
-        found = self.first_interface + number
+        found = self._first_interface + number
         if found >= len(self.interfaces):
             raise DecodeError(
                 f"pcapng: a packet refers to interface {number}, which the file does not describe"
             )
         return found
 
+    def _add_interface(self, block: _Block) -> None:
+        if len(self.interfaces) >= _MAXIMUM_INTERFACES:
+            raise DecodeError(f"pcapng: more than {_MAXIMUM_INTERFACES} interfaces")
+        self.interfaces.append(_decode_interface(block))
+
+    def _note_statistics(self, block: _Block) -> None:
+        number = block.unpack("I")[0]
+        dropped = _decode_options(block, 12).get(_OPTION_DROPPED, b"")
+        if len(dropped) == 8:  # a later block of the interface replaces the number
+            self._dropped[self.interface(number)] = struct.unpack(block.order + "Q", dropped)[0]
+
+    def _blocks(self) -> Iterator[_Block]:
+        """Yield every complete block.
+
+        Raises DecodeError if a block is invalid, or if the first block is incomplete.
+        """
+        offset, order = 0, ""
+        while head := self._read(_MINIMUM_BLOCK):
+            if len(head) < _MINIMUM_BLOCK:
+                if offset:
+                    self.cut = len(head)
+                    return
+                raise DecodeError(
+                    f"pcapng block: needs {_MINIMUM_BLOCK} bytes, received {len(head)}"
+                )
+            if head[:4] == b"\x0a\x0d\x0d\x0a":
+                order = _byte_order(head[8:12])
+            if not order:
+                raise DecodeError("pcapng: the file does not begin with a section header")
+            kind, length = struct.unpack_from(order + "II", head)
+            if length < _MINIMUM_BLOCK or length % 4 or length > _MAXIMUM_BLOCK:
+                raise _invalid_length(offset, length)
+            data = head + self._read(length - _MINIMUM_BLOCK)
+            if len(data) < length:
+                if not offset:
+                    raise _invalid_length(offset, length)
+                self.cut = len(data)
+                return
+            if struct.unpack_from(order + "I", data, length - 4)[0] != length:
+                raise DecodeError(f"pcapng: block at byte {offset} has two different lengths")
+            yield _Block(kind, order, data[8:-4])
+            offset += length
+
+
+def _invalid_length(offset: int, length: int) -> DecodeError:
+    return DecodeError(f"pcapng: block at byte {offset} has an invalid length of {length} bytes")
+
 
 class _Block(NamedTuple):
     kind: int
     order: str  # "<" or ">"
     body: bytes
-    end: int  # offset in the file
 
     def unpack(self, layout: str) -> tuple[int, ...]:
         """Return the fields at the start of the body."""
@@ -184,35 +249,6 @@ class _Block(NamedTuple):
         if size > len(self.body):
             raise DecodeError(f"pcapng: block {self.kind} has {len(self.body)} bytes, needs {size}")
         return struct.unpack_from(self.order + layout, self.body)
-
-
-def _blocks(data: bytes) -> Iterator[_Block]:
-    """Yield every complete block.
-
-    Raises DecodeError if a block is invalid, or if the first block is incomplete.
-    """
-    offset, order = 0, ""
-    while offset < len(data):
-        if offset + _MINIMUM_BLOCK > len(data):
-            if offset:
-                return
-            raise DecodeError(f"pcapng block: needs {_MINIMUM_BLOCK} bytes, received {len(data)}")
-        if data[offset : offset + 4] == b"\x0a\x0d\x0d\x0a":
-            order = _byte_order(data[offset + 8 : offset + 12])
-        if not order:
-            raise DecodeError("pcapng: the file does not begin with a section header")
-        kind, length = struct.unpack_from(order + "II", data, offset)
-        end = offset + length
-        if length < _MINIMUM_BLOCK or length % 4 or (end > len(data) and not offset):
-            raise DecodeError(
-                f"pcapng: block at byte {offset} has an invalid length of {length} bytes"
-            )
-        if end > len(data):
-            return
-        if struct.unpack_from(order + "I", data, end - 4)[0] != length:
-            raise DecodeError(f"pcapng: block at byte {offset} has two different lengths")
-        yield _Block(kind, order, bytes(data[offset + 8 : end - 4]), end)
-        offset = end
 
 
 def _byte_order(magic: bytes) -> str:
@@ -235,8 +271,10 @@ def _decode_interface(block: _Block) -> Interface:
     )
 
 
-def _decode_enhanced(block: _Block, state: _State) -> Packet:
+def _decode_enhanced(block: _Block, state: PcapngPackets) -> Packet:
     number, high, low, captured, original = block.unpack("IIIII")
+    if block.kind == _OLD_PACKET:  # interface and drop count have 16 bits each
+        number = block.unpack("H")[0]
     interface = state.interface(number)
     end = 20 + captured
     if end > len(block.body):
@@ -258,7 +296,7 @@ def _direction(block: _Block, flags: bytes) -> Direction:
     return Direction(bits) if bits < 3 else Direction.UNKNOWN
 
 
-def _decode_simple(block: _Block, state: _State) -> Packet:
+def _decode_simple(block: _Block, state: PcapngPackets) -> Packet:
     (original,) = block.unpack("I")
     data = block.body[4 : 4 + original]
     original_length = original if original != len(data) else None

@@ -1,0 +1,71 @@
+"""Services of the mailbox protocols EoE, FoE and SoE, ETG.1000.6 §5."""
+
+from __future__ import annotations
+
+from catenary.wire.mailbox import Mailbox, Type
+
+_FOE_SERVICES = {
+    1: "read request",
+    2: "write request",
+    3: "data",
+    4: "acknowledge",
+    5: "error",
+    6: "busy",
+}
+_FOE_NAMED = (1, 2)  # a file name follows the password
+_FOE_ERROR = 5
+_FOE_HEADER_SIZE = 6
+_SOE_SERVICES = {
+    1: "read request",
+    2: "read response",
+    3: "write request",
+    4: "write response",
+    5: "notification",
+    6: "emergency",
+}
+_SOE_ERROR = 0x10  # bit of the first byte
+_EOE_SERVICES = {
+    0: "frame fragment",
+    1: "time stamp response",
+    2: "set IP parameter request",
+    3: "set IP parameter response",
+    4: "set filter request",
+    5: "set filter response",
+    6: "get IP parameter request",
+    7: "get IP parameter response",
+    8: "get filter request",
+    9: "get filter response",
+}
+
+
+def service_text(mailbox: Mailbox) -> str:
+    """Return the service of a message, as far as it is known; empty if it is not."""
+    if mailbox.type is Type.FOE and len(mailbox.data) >= _FOE_HEADER_SIZE:
+        return _foe(mailbox.data)
+    if mailbox.type is Type.SOE and len(mailbox.data) >= 4:
+        return _soe(mailbox.data)
+    if mailbox.type is Type.EOE and mailbox.data:
+        return _EOE_SERVICES.get(mailbox.data[0] & 0x0F, "")
+    return ""
+
+
+def _foe(data: bytes) -> str:
+    service = data[0]
+    text = _FOE_SERVICES.get(service, f"service {service}")
+    if service in _FOE_NAMED:
+        name = data[_FOE_HEADER_SIZE:].split(b"\x00", 1)[0].decode("latin-1")
+        return f"{text} {name!r}"
+    if service == _FOE_ERROR:
+        return f"{text} 0x{int.from_bytes(data[2:6], 'little'):04X}"
+    return text
+
+
+def _soe(data: bytes) -> str:
+    service, drive = data[0] & 0x07, data[0] >> 5
+    number = int.from_bytes(data[2:4], "little")
+    kind = "P" if number & 0x8000 else "S"
+    text = f"{_SOE_SERVICES.get(service, f'service {service}')} {kind}-{number >> 12 & 7}-"
+    text += f"{number & 0x0FFF:04d} drive {drive}"
+    if data[0] & _SOE_ERROR:
+        return f"{text} error 0x{int.from_bytes(data[-2:], 'little'):04X}"
+    return text
