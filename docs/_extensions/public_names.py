@@ -8,7 +8,7 @@ from typing import TypeVar
 
 EVENTS = "catenary.bus.event_types"  # `catenary.events`
 MODULES = (
-    *("control", "drive", "esi", "realtime", "record", "remote", "sensors", "share"),
+    *("capture", "control", "drive", "esi", "realtime", "record", "remote", "sensors", "share"),
     "teleoperation",
     "virtual",
 )

@@ -1,4 +1,4 @@
-"""Fuzz targets for every codec of `catenary.wire` and `catenary.types`.
+"""Fuzz targets for every codec of `catenary.wire` and `catenary.types`, and for captures.
 
     python tests/fuzz/fuzz_wire.py [--seconds N] [--seed S] [--target NAME]
 
@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import argparse
 import importlib.util
+import io
 import random
 import struct
 import sys
@@ -19,6 +20,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from catenary import types
+from catenary.capture import EventStream
+from catenary.capture.notes import notes
 from catenary.errors import DecodeError
 from catenary.wire import (
     al,
@@ -77,6 +80,24 @@ def _method(value: Any) -> bytes:
 
 def _first(data: bytes) -> datagram.Datagram:
     return datagram.decode_datagram(data)[0]
+
+
+def _timeline(data: bytes) -> list[str]:
+    """Return the text of every event of a capture, and its notes."""
+    stream = EventStream(io.BytesIO(data).read)
+    texts = [f"{event.step} {event.content}" for event in stream]
+    return [*texts, *notes(stream.counts, stream.masters)]
+
+
+def _timeline_of_frames(data: bytes) -> list[str]:
+    """Return the timeline of frames, each with its length in two bytes before it."""
+    blocks, rest = [pcapng.encode_header("eth0")], data
+    while len(rest) > 2:
+        size = int.from_bytes(rest[:2], "little") % frame.MAXIMUM_SIZE
+        packet = pcapng.Packet(20_000 * len(blocks), rest[2 : 2 + size])
+        blocks.append(pcapng.encode_packet(packet))
+        rest = rest[2 + size :]
+    return _timeline(b"".join(blocks))
 
 
 def _word(name: str, decode: Callable[[int], Any], size: int, *values: int) -> Target:
@@ -141,6 +162,29 @@ PCAP = (
     struct.pack("<IHHiIII", 0xA1B2C3D4, 2, 4, 0, 0, 65535, 1)
     + struct.pack("<4I", 1, 2, len(FRAME), len(FRAME))
     + FRAME
+)
+MAILBOX_DATA = mailbox.Mailbox(mailbox.Type.COE, SDO_DOWNLOAD, 1).encode(64)
+BRING_UP = tuple(
+    frame.encode_frame([datagram.Datagram(command, address, data, i, counter)], source=source)
+    for i, (command, address, data) in enumerate(
+        (
+            (datagram.EcatCommand.APWR, 0x0010_0000, b"\x01\x10"),
+            (datagram.EcatCommand.FPWR, 0x0800_1001, bytes.fromhex("0010400026000100")),
+            (datagram.EcatCommand.FPWR, 0x0808_1001, bytes.fromhex("4010400022000100")),
+            (datagram.EcatCommand.FPWR, 0x1000_1001, MAILBOX_DATA),
+            (datagram.EcatCommand.FPRD, 0x1040_1001, MAILBOX_DATA),
+            (datagram.EcatCommand.FPWR, 0x0502_1001, bytes.fromhex("000108000000")),
+            (datagram.EcatCommand.FPRD, 0x0508_1001, SII[16:24]),
+            (datagram.EcatCommand.FPRD, 0x0130_1001, bytes.fromhex("140000001a00")),
+            (datagram.EcatCommand.FRMW, 0x0910_1001, bytes(8)),
+            (datagram.EcatCommand.LRW, 0x0001_0000, bytes(4)),
+        )
+    )
+    for counter, source in ((0, b"\x10" * 6), (1, b"\x12" + b"\x10" * 5))
+)
+FRAMES = b"".join(len(each).to_bytes(2, "little") + each for each in BRING_UP)
+TIMELINE = pcapng.encode_header("eth0") + b"".join(
+    pcapng.encode_packet(pcapng.Packet(20_000 * i, data)) for i, data in enumerate(BRING_UP)
 )
 CAPTURE = pcapng.encode_header("eth0") + pcapng.encode_packet(pcapng.Packet(5, FRAME, "hello"))
 
@@ -256,6 +300,8 @@ TARGETS = (
     Target("pcapng.decode_pcapng", pcapng.decode_pcapng, None, (CAPTURE,)),
     Target("capture.decode_capture", capture.decode_capture, None, (CAPTURE, PCAP)),
     Target("pcap.decode_pcap", pcap.decode_pcap, None, (PCAP,)),
+    Target("capture.EventStream", _timeline, None, (TIMELINE, PCAP)),
+    Target("capture.EventStream of frames", _timeline_of_frames, None, (FRAMES,)),
 )
 
 _TELLING = (0x00, 0x01, 0x07, 0x0F, 0x7F, 0x80, 0xFE, 0xFF)

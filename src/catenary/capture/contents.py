@@ -39,7 +39,7 @@ class AddressAssigned:
 
 @dataclass(frozen=True, slots=True)
 class IdentityRead:
-    """The master read the identity from the EEPROM. `serial` is None if it was not read yet."""
+    """The master read the identity from the EEPROM. `serial`: None if it was not read yet."""
 
     kind: ClassVar[str] = "identity"
     vendor: int
@@ -96,7 +96,7 @@ class StateReached:
 
 @dataclass(frozen=True, slots=True)
 class StateRefused:
-    """The device reported an error in AL status. `code` is None if it was not read."""
+    """The device reported an error in AL status. `code`: None if it was not read."""
 
     kind: ClassVar[str] = "state-error"
     state: AlState  # the actual state

@@ -56,7 +56,7 @@ def step_of(state: AlState | None, requested: AlState | None, *, configures: boo
 
 
 def common_step(steps: Iterable[Step]) -> Step:
-    """Return the step of several devices. A state is None if it differs among them."""
+    """Return the step of several devices, with None for a state that differs among them."""
     befores, afters = set(), set()
     for step in steps:
         befores.add(step.before)
@@ -83,7 +83,7 @@ class Event:
 
 @dataclass(frozen=True, slots=True)
 class Device:
-    """A device as a master has addressed it. Values that the capture does not show are None."""
+    """A device as a master has addressed it. None: the capture does not show this value."""
 
     number: int  # in the order of appearance, from 0
     position: int | None = None

@@ -106,8 +106,6 @@ class MasterFollower:
             for found in self._follow_broadcast(each):
                 yield None, found
             return
-        if each.command.is_logical or each.command is EcatCommand.NOP:
-            return
         if each.by_position and (address := each.was_written(STATION_ADDRESS)) is not None:
             yield from self._assign(each, int.from_bytes(address, "little"))
         device = self._device(each)

@@ -48,7 +48,7 @@ def _frame_notes(counts: FileCounts) -> Iterator[str]:
     if counts.unsupported:
         yield (
             f"{counts.unsupported} packets were skipped because their link type carries no "
-            "Ethernet frames: capture on the network interface itself, not on `any` or loopback"
+            "Ethernet frames: capture on the network interface of the master"
         )
     if counts.shortened:
         yield (

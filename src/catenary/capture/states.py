@@ -81,7 +81,7 @@ class StateFollower:
         return StateReached(state, after)
 
     def flush(self) -> Iterator[Found]:
-        """Yield an error whose status code was not read."""
+        """Yield an error without its status code, because the master did not read it."""
         if self._error_open:
             yield self._refusal(None)
 

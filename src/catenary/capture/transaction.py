@@ -89,7 +89,7 @@ class Transaction:
 
 
 def transactions(pair: FramePair, device_count: int | None) -> Iterator[Transaction]:
-    """Yield the datagrams of a frame.
+    """Yield the datagrams of a frame, without those of process data and NOP.
 
     Args:
         pair: The sent and the returned frame.
@@ -99,6 +99,8 @@ def transactions(pair: FramePair, device_count: int | None) -> Iterator[Transact
     base = pair.answer or pair.sent
     assert base is not None
     for i, datagram in enumerate(base.frame.datagrams):
+        if datagram.command.is_logical or datagram.command is EcatCommand.NOP:
+            continue
         sent = pair.sent.frame.datagrams[i] if pair.sent else None
         answer = datagram if pair.answer else None
         yield _transaction(base, sent, answer, device_count)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from catenary.cli import capture_show
+from catenary.cli import capture_diff, capture_sdo, capture_show
 from catenary.cli.parsers import Commands, add_command
 
 
@@ -16,3 +16,5 @@ def add_parser(commands: Commands) -> None:
         example="catenary capture show twincat.pcapng",
     ).add_subparsers(title="commands", metavar="COMMAND", required=True)
     capture_show.add_to(group)
+    capture_diff.add_to(group)
+    capture_sdo.add_to(group)

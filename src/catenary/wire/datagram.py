@@ -41,7 +41,7 @@ class EcatCommand(IntEnum):
     @property
     def is_logical(self) -> bool:
         """True if the address is logical."""
-        return self in (EcatCommand.LRD, EcatCommand.LWR, EcatCommand.LRW)
+        return self in _LOGICAL
 
 
 _READS = frozenset(
@@ -57,6 +57,7 @@ _READS = frozenset(
         *(EcatCommand.LRD, EcatCommand.LRW, EcatCommand.ARMW, EcatCommand.FRMW),
     )
 )
+_LOGICAL = frozenset((EcatCommand.LRD, EcatCommand.LWR, EcatCommand.LRW))
 _WRITES = frozenset(
     (
         *(
@@ -76,6 +77,7 @@ WORKING_COUNTER_SIZE = 2
 OVERHEAD = HEADER_SIZE + WORKING_COUNTER_SIZE
 MAXIMUM_DATA_SIZE = 0x07FF  # limit of the 11-bit field; an Ethernet frame holds 1486 bytes
 
+_COMMANDS = tuple(EcatCommand)  # by number
 _HEADER = struct.Struct("<BBIHH")
 _LENGTH_MASK = 0x07FF
 _RESERVED_MASK = 0x3800
@@ -146,7 +148,7 @@ def decode_datagram(data: bytes, offset: int = 0) -> tuple[Datagram, bool]:
             f"datagram at byte {offset}: needs {OVERHEAD} bytes, {max(len(data) - offset, 0)} left"
         )
     command, index, address, length, interrupt = _HEADER.unpack_from(data, offset)
-    if command > EcatCommand.FRMW:
+    if command >= len(_COMMANDS):
         raise DecodeError(f"datagram at byte {offset}: unknown command {command}")
     if length & _RESERVED_MASK:
         raise DecodeError(f"datagram at byte {offset}: reserved bits set in 0x{length:04X}")
@@ -158,7 +160,7 @@ def decode_datagram(data: bytes, offset: int = 0) -> tuple[Datagram, bool]:
             f"{max(len(data) - start - WORKING_COUNTER_SIZE, 0)} received"
         )
     datagram = Datagram(
-        EcatCommand(command),
+        _COMMANDS[command],
         address,
         bytes(data[start:end]),
         index,

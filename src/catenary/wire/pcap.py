@@ -41,7 +41,7 @@ def decode_pcap(data: bytes) -> Capture:
 
 
 class PcapPackets:
-    """Owner of the header of a file whose packets are decoded one by one.
+    """Owner of the header of a file. It decodes the packets one by one.
 
     Iterate over it once. It needs memory for one packet only.
     """

@@ -142,7 +142,7 @@ def decode_pcapng(data: bytes) -> Capture:
 
 
 class PcapngPackets:
-    """Owner of the interfaces of a file whose packets are decoded one by one.
+    """Owner of the interfaces of a file. It decodes the packets one by one.
 
     Iterate over it once. It needs memory for one block only.
     """
