@@ -145,8 +145,8 @@ def test_a_removed_interface_ends_the_recording_with_complete_files(tmp_path: Pa
         with socket.socket(socket.AF_PACKET, socket.SOCK_RAW, 0) as there:
             there.bind((names[1], 0))
             there.send(b"\xff" * 12 + b"\x88\xa4" + bytes(46))
-        stack.pop_all()
-    with recorder:
+        kept = stack.pop_all()
+    with kept:
         last = recorder.read_line(START)
         assert recorder.process.wait(START) == 1
     path = tmp_path / "line-0001.pcapng"
