@@ -47,6 +47,7 @@ if TYPE_CHECKING:
     )
     from catenary.link.interfaces import interfaces
     from catenary.loop import (
+        CaptureOptions,
         ClockOptions,
         Cycle,
         ExternalClock,
@@ -66,6 +67,7 @@ if TYPE_CHECKING:
 __version__ = "0.1.0"
 
 __all__ = [
+    "CaptureOptions",
     "CatenaryError",
     "ClockError",
     "ClockOptions",
@@ -142,6 +144,7 @@ _HOMES = {
     **dict.fromkeys(_DRIVE, "catenary.drive"),
     **dict.fromkeys(
         (
+            "CaptureOptions",
             "ClockOptions",
             "Cycle",
             "ExternalClock",
