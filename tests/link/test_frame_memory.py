@@ -5,10 +5,11 @@ from __future__ import annotations
 import errno
 import os
 from pathlib import Path
+from typing import cast
 
 import pytest
 
-from catenary.link import Interface, frame_memory
+from catenary.link import Interface, Link, frame_memory
 from catenary.link.frame_memory import FrameMemory
 from catenary.wire.capture import decode_capture
 from catenary.wire.pcapng import Packet, encode_packet
@@ -16,6 +17,10 @@ from tests.link.dissector import dissect
 from tests.link.python_link import PythonLink, frame
 
 MEGABYTE = 1 << 20
+
+
+def memory_of(link: PythonLink) -> FrameMemory:
+    return FrameMemory(cast(Link, link), MEGABYTE)
 
 
 def filled(memory: FrameMemory, link: PythonLink, count: int, *, size: int = 40) -> None:
@@ -32,7 +37,7 @@ def test_a_capture_has_exactly_the_frames_of_its_time(
     tmp_path: Path, from_ms: int, to_ms: int
 ) -> None:
     path, link = tmp_path / "x.pcapng", PythonLink()
-    memory = FrameMemory(link, MEGABYTE)
+    memory = memory_of(link)
     filled(memory, link, 1000)
     memory.close()
     first, last = memory.write(path, from_ms * 1_000_000 - 7, to_ms * 1_000_000)
@@ -45,7 +50,7 @@ def test_a_capture_has_exactly_the_frames_of_its_time(
 
 def test_frames_beyond_the_size_are_freed(tmp_path: Path, tshark: str) -> None:
     path, link = tmp_path / "x.pcapng", PythonLink()
-    memory = FrameMemory(link, MEGABYTE)
+    memory = memory_of(link)
     filled(memory, link, 6000, size=1400)
     memory.close()
     memory.trim()
@@ -60,7 +65,7 @@ def test_frames_beyond_the_size_are_freed(tmp_path: Path, tshark: str) -> None:
 
 def test_a_time_without_frames_gives_an_empty_capture(tmp_path: Path) -> None:
     path, link = tmp_path / "x.pcapng", PythonLink()
-    memory = FrameMemory(link, MEGABYTE)
+    memory = memory_of(link)
     memory.close()
     assert memory.write(path, 5, 9) == (9, 9)
     memory.release()
@@ -70,7 +75,7 @@ def test_a_time_without_frames_gives_an_empty_capture(tmp_path: Path) -> None:
 
 def test_frames_that_look_like_blocks_do_not_mislead_the_search(tmp_path: Path) -> None:
     link = PythonLink()
-    memory = FrameMemory(link, MEGABYTE)
+    memory = memory_of(link)
     inner = encode_packet(Packet(1, bytes(60)))
     frames = [frame(bytes(shift) + inner * 9) for shift in range(64)]
     for number, each in enumerate(frames):
@@ -109,7 +114,7 @@ def test_a_capture_during_the_recording_ends_with_a_complete_block(
 def test_an_existing_file_is_kept(tmp_path: Path) -> None:
     path = tmp_path / "x.pcapng"
     path.write_text("kept")
-    memory = FrameMemory(PythonLink(), MEGABYTE)
+    memory = memory_of(PythonLink())
     memory.close()
     with pytest.raises(FileExistsError):
         memory.write(path, 0, 1)
@@ -124,7 +129,7 @@ def test_refuses_more_than_half_of_the_available_memory(
     (tmp_path / "meminfo").write_text("MemTotal: 9000 kB\nMemAvailable:    2047 kB\n")
     monkeypatch.setattr(frame_memory, "MEMORY", tmp_path / "meminfo")
     with pytest.raises(OSError, match="1 MiB for frames are too much: 1 MiB are available"):
-        FrameMemory(PythonLink(), MEGABYTE)
+        memory_of(PythonLink())
 
 
 def test_without_memory_the_error_comes_at_the_start(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -135,6 +140,6 @@ def test_without_memory_the_error_comes_at_the_start(monkeypatch: pytest.MonkeyP
     link = PythonLink()
     before = len(os.listdir("/proc/self/fd"))
     with pytest.raises(OSError, match="Cannot allocate memory"):
-        FrameMemory(link, MEGABYTE)
+        memory_of(link)
     assert len(os.listdir("/proc/self/fd")) == before
     assert not link.closed
