@@ -45,7 +45,7 @@ class FrameMemory:
         """Allocate `size` bytes, and record the frames of `link`, which stays open."""
         require_memory(size)
         self._size = size
-        self._punched = 0  # bytes at the start of the file whose pages are free
+        self._punched = 0  # freed bytes at the start of the file
         self._header = encode_header(link.name)
         self._file = os.memfd_create("catenary frames", os.MFD_CLOEXEC)
         try:

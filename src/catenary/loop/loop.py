@@ -127,9 +127,7 @@ class Loop:
         )
         self._networks = make_networks(requests, settings, cpu, sink, laws)
         self._quorum = checked_quorum(scheduling.quorum, len(self._networks))
-        self._enable = enable
-        leaving = (Loop.close, Loop.__exit__, Loop._leave, leave_open_loop)
-        self._guard = SignalGuard(tuple(each.__code__ for each in leaving))
+        self._enable, self._guard = enable, make_guard()
         self._leaving = threading.RLock()
         self._iteration: Iteration | NetworksIteration | None = None
         self._background: Background | None = None
@@ -594,6 +592,12 @@ class Loop:
             if is_ours:
                 self._leaving.release()
         return problems
+
+
+def make_guard() -> SignalGuard:
+    """Return signal handlers that let the functions that leave a loop complete."""
+    leaving = (Loop.close, Loop.__exit__, Loop._leave, leave_open_loop)
+    return SignalGuard(tuple(each.__code__ for each in leaving))
 
 
 def checked_quorum(quorum: int | None, count: int) -> int:

@@ -65,8 +65,7 @@ class Session:
         stop: StopPolicy,
         exchange: Callable[[Session], Exchange],
     ) -> None:
-        self.main = main
-        self.plan = plan
+        self.main, self.plan = main, plan
         self.exchange: Exchange = exchange(self)
         self.engine = self.exchange.make_engine()
         self.views = self._bind(requests)
