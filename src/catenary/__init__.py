@@ -48,6 +48,7 @@ if TYPE_CHECKING:
     )
     from catenary.link.interfaces import interfaces
     from catenary.loop import (
+        CaptureOptions,
         ClockOptions,
         Cycle,
         ExternalClock,
@@ -67,6 +68,7 @@ if TYPE_CHECKING:
 __version__ = "0.1.0"
 
 __all__ = [
+    "CaptureOptions",
     "CatenaryError",
     "ClockError",
     "ClockOptions",
@@ -146,6 +148,7 @@ _HOMES = {
     **dict.fromkeys(_DRIVE, "catenary.drive"),
     **dict.fromkeys(
         (
+            "CaptureOptions",
             "ClockOptions",
             "Cycle",
             "ExternalClock",

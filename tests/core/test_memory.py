@@ -14,6 +14,7 @@ import pytest
 
 from catenary.core import Engine
 from catenary.link import Recorder
+from catenary.link.frame_memory import FrameMemory
 from catenary.virtual import Coupler, Segment
 from tests.core.rig import al_status, bench, frame_plan, make_plan
 
@@ -71,6 +72,21 @@ def test_the_native_thread_has_no_page_faults_while_a_recorder_copies_its_frames
         engine = make_engine(link)
         run(engine, CYCLES)
         assert link.recorded >= 2 * CYCLES
+    assert engine.counters["page_faults"] == 0
+
+
+def test_the_native_thread_has_no_page_faults_while_frames_are_kept_in_memory() -> None:
+    segment = Segment([Coupler(), Coupler()], clock="monotonic")
+    memory = FrameMemory(segment.open_link(), 1 << 20)
+    try:
+        run(make_engine(memory.link), CYCLES)
+        engine = make_engine(memory.link)
+        run(engine, CYCLES)
+        memory.trim()
+        assert memory.link.recorded >= 2 * CYCLES
+    finally:
+        memory.close()
+        memory.release()
     assert engine.counters["page_faults"] == 0
 
 

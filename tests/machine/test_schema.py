@@ -40,7 +40,12 @@ def names(options: type) -> set[str]:
         (schema.ClockTable, names(DistributedClock), set(), set()),
         (schema.HomingTable, names(HomingMethod), set(), set()),
         # laws, sinks and triggers are objects of a program; clocks has a table at the top
-        (schema.LoopTable, parameters(Loop), set(), {"laws", "sink", "trigger", "clocks"}),
+        (
+            schema.LoopTable,
+            parameters(Loop),
+            set(),
+            {"laws", "sink", "trigger", "clocks", "capture"},
+        ),
         # start-up objects and modules stand at the device; a clock is called dc in Python
         (schema.DrivesTable, parameters(Drives), {"axes", "clock"}, {"dc", "start_up", "modules"}),
         (

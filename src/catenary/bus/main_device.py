@@ -94,6 +94,18 @@ class MainDevice:
         """Source of the link, such as an interface or a virtual segment."""
         return self._source
 
+    def replace_link(self, link: Link) -> None:
+        """Send and receive through another link from now on, such as a recorder of the present one.
+
+        Args:
+            link: An open link to the same segment. `close` closes it.
+
+        Raises:
+            RuntimeError: A loop runs, or the MainDevice is not open.
+        """
+        self.runner.replace_link(link)
+        self._link = link
+
     @property
     def is_open(self) -> bool:
         """True while the link is open."""

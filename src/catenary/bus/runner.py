@@ -129,6 +129,11 @@ class BlockingRunner:
                 raise LinkLent("a loop uses the link: use the runner of the loop")
             yield
 
+    def replace_link(self, link: Link) -> None:
+        """Wait for running procedures, then use another link to the same segment."""
+        with self._mine():
+            self._link = link
+
     def flush(self) -> None:
         """Discard the received frames that are pending, and count them as stale."""
         while self._link.receive() is not None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from catenary.cli import capture_diff, capture_sdo, capture_show
+from catenary.cli import capture_diff, capture_record, capture_sdo, capture_show
 from catenary.cli.parsers import Commands, add_command
 
 
@@ -18,3 +18,4 @@ def add_parser(commands: Commands) -> None:
     capture_show.add_to(group)
     capture_diff.add_to(group)
     capture_sdo.add_to(group)
+    capture_record.add_to(group)

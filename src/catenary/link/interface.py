@@ -38,10 +38,13 @@ class Interface:
     """A network interface, selected by its name in `ip link`.
 
     `mapped_ring=False` receives frames by `recv`, which is slower; it is meant for comparisons.
+    `visible=True` sends frames through the queue of the kernel. Other programs, such as tcpdump and
+    `catenary capture record`, then also receive the sent frames. Each frame takes longer to send.
     """
 
     name: str
     mapped_ring: bool = True
+    visible: bool = False
 
     def open_link(self) -> RawLink:
         """Open the raw link.
@@ -52,7 +55,7 @@ class Interface:
             OSError: The receive ring cannot be mapped.
         """
         check(self.name)
-        raw = open_socket(self.name)
+        raw = open_socket(self.name, visible=self.visible)
         try:
             size, receive_path = request_ring(raw) if self.mapped_ring else (0, "recv (requested)")
             raw.bind((self.name, ETHERTYPE))
@@ -118,8 +121,12 @@ def ask(asking: socket.socket, request: int, name: str) -> int:
     return int(struct.unpack_from("=H", answer, 16)[0])
 
 
-def open_socket(name: str) -> socket.socket:
+def open_socket(name: str, *, visible: bool = False) -> socket.socket:
     """Open an AF_PACKET socket, which receives no frames until it is bound.
+
+    Args:
+        name: Name of the interface, for errors.
+        visible: True to send frames through the queue of the kernel, where other programs see them.
 
     Raises:
         LinkError: Permission is missing, or the kernel lacks a socket option.
@@ -132,7 +139,7 @@ def open_socket(name: str) -> socket.socket:
         ) from error
     try:
         opened.setblocking(False)
-        opened.setsockopt(SOL_PACKET, PACKET_QDISC_BYPASS, 1)
+        opened.setsockopt(SOL_PACKET, PACKET_QDISC_BYPASS, not visible)
         # Otherwise, sent frames are also received and look like answers of an empty segment.
         opened.setsockopt(SOL_PACKET, PACKET_IGNORE_OUTGOING, 1)
     except OSError as error:

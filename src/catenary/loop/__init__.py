@@ -1,6 +1,7 @@
 """The cyclic loop: from process-data requests to `for cycle in loop`, and control laws."""
 
 from catenary.core import Cycle
+from catenary.loop.capture_options import CaptureOptions
 from catenary.loop.external_clock import ExternalClock
 from catenary.loop.laws.law import Law, Parameter, law
 from catenary.loop.laws.run import LawRun
@@ -10,6 +11,7 @@ from catenary.loop.options import ClockOptions, Scheduling, StopPolicy
 from catenary.loop.stream import Stream
 
 __all__ = [
+    "CaptureOptions",
     "ClockOptions",
     "Cycle",
     "ExternalClock",

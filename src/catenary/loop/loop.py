@@ -8,6 +8,7 @@ compiled code, before the devices leave OP.
 from __future__ import annotations
 
 import math
+import os
 import threading
 import warnings
 import weakref
@@ -20,6 +21,7 @@ from catenary.core import Cycle, Iteration
 from catenary.errors import LawError
 from catenary.log import Log
 from catenary.loop.background import Background, program_ends
+from catenary.loop.capture_options import CaptureOptions, capture_options
 from catenary.loop.clocks import Clocks
 from catenary.loop.devices import LoopRequest
 from catenary.loop.laws.law import Law, LawFunction, Laws
@@ -35,7 +37,7 @@ from catenary.loop.networks import (
     share_time,
 )
 from catenary.loop.options import ClockOptions, Scheduling, StopPolicy
-from catenary.loop.session import Session, take_down
+from catenary.loop.session import Session
 from catenary.loop.signals import SignalGuard
 from catenary.loop.stream import Stream
 from catenary.loop.timing import Timing
@@ -83,6 +85,8 @@ class Loop:
         trigger: `TriggerSender` or `TriggerReceiver` of `cat.share`: start the cycles of loops in
             other processes with those of this loop, or the reverse (docs/how_to/networks.md).
         log_axes: True to also log the values of every axis (docs/how_to/recording.md).
+        capture: Folder for pcapng files with the frames around an error or a stopped axis, or
+            `CaptureOptions` (docs/how_to/capture.md). None: no files.
 
     Raises:
         ValueError: An option is impossible, or a request names devices of several MainDevices.
@@ -107,6 +111,7 @@ class Loop:
         clocks: ClockOptions = ClockOptions(),
         trigger: Trigger | None = None,
         log_axes: bool = False,
+        capture: CaptureOptions | str | os.PathLike[str] | None = None,
     ) -> None:
         settings = Settings(
             period=period,
@@ -119,12 +124,11 @@ class Loop:
             scheduling=scheduling,
             clocks=clocks,
             trigger=trigger,
+            capture=capture_options(capture),
         )
         self._networks = make_networks(requests, settings, cpu, sink, laws)
         self._quorum = checked_quorum(scheduling.quorum, len(self._networks))
-        self._enable = enable
-        leaving = (Loop.close, Loop.__exit__, Loop._leave, leave_open_loop)
-        self._guard = SignalGuard(tuple(each.__code__ for each in leaving))
+        self._enable, self._guard = enable, make_guard()
         self._leaving = threading.RLock()
         self._iteration: Iteration | NetworksIteration | None = None
         self._background: Background | None = None
@@ -586,9 +590,9 @@ class Loop:
         self._finalizer = weakref.finalize(self, leave_open_loop, sessions, self._guard)
 
     def _report_end(self, error: BaseException) -> None:
-        """Report the error that ends the loop to the sinks."""
-        for session in self._sessions:
-            session.report_end(error)
+        """Report the error that ends the loop to the sinks and captures."""
+        for network in self._networks:
+            network.report_end(error)
 
     def _leave(self) -> list[Exception]:
         """Stop every network, regardless of errors in the others; return the problems.
@@ -600,8 +604,7 @@ class Loop:
         try:
             problems = leave_all(self._sessions, self._guard)
             for network in self._networks:
-                if network.current_session is None:
-                    problems += take_down(network.main)
+                problems += network.take_down()
         finally:
             self._guard.restore()
             if self._finalizer is not None:
@@ -609,6 +612,12 @@ class Loop:
             if is_ours:
                 self._leaving.release()
         return problems
+
+
+def make_guard() -> SignalGuard:
+    """Return signal handlers that let the functions that leave a loop complete."""
+    leaving = (Loop.close, Loop.__exit__, Loop._leave, leave_open_loop)
+    return SignalGuard(tuple(each.__code__ for each in leaving))
 
 
 def checked_quorum(quorum: int | None, count: int) -> int:

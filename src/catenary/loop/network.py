@@ -17,14 +17,16 @@ from catenary.core import (
 )
 from catenary.errors import ConfigurationError, LawError
 from catenary.log import Log
+from catenary.loop.capture_options import CaptureOptions
 from catenary.loop.clock_discipline import DisciplineOptions
 from catenary.loop.clocks import Clocks
 from catenary.loop.devices import LoopRequest
 from catenary.loop.external_cycle import CarriedExchange, carried
+from catenary.loop.frame_capture import FrameCapture
 from catenary.loop.frame_exchange import FrameExchange
 from catenary.loop.laws.law import Law
 from catenary.loop.options import ClockOptions, Scheduling, StopPolicy, check_groups, one_of
-from catenary.loop.session import Session
+from catenary.loop.session import Session, take_down
 from catenary.loop.stream import Stream
 from catenary.loop.timing import Timing
 from catenary.loop.watches.external_clock import ExternalClockWatch
@@ -61,6 +63,7 @@ class Settings:
     scheduling: Scheduling
     clocks: ClockOptions
     trigger: Trigger | None
+    capture: CaptureOptions | None
 
     def __post_init__(self) -> None:
         one_of("execution", self.execution, ("threaded", "inline"))
@@ -146,6 +149,7 @@ class Network:
     ) -> None:
         self.main = main
         self.current_session: Session | None = None
+        self._capture: FrameCapture | None = None
         self.number = 0  # of this network in the loop
         self.count = 1  # networks of the loop
         self.requests = requests
@@ -241,6 +245,7 @@ class Network:
             abandon: Function that leaves the loop. It is called when the MainDevice is closed.
         """
         self.current_session = None
+        self._capture = self._begin_capture()
         plan = self._make_plan()
         self.main.configure(plan)
         is_carried = self.main.carrier is not None
@@ -252,6 +257,7 @@ class Network:
             stop=self._settings.stop,
             exchange=CarriedExchange if is_carried else FrameExchange,
         )
+        session.capture = self._capture
         session.switch_interval = self._settings.scheduling.switch_interval
         self._compile_laws(session)
         session.external = self._make_external(session)
@@ -263,6 +269,41 @@ class Network:
         if isinstance(self._sink, ServingSink):
             self._sink.serve(self)
         return session
+
+    def _begin_capture(self) -> FrameCapture | None:
+        """Keep the frames from now on; None without captures.
+
+        Raises:
+            ConfigurationError: Another master makes the frames, or the folder cannot be written.
+        """
+        options = self._settings.capture
+        if options is None:
+            return None
+        if self.main.carrier is not None:
+            raise ConfigurationError(
+                "capture= is not possible: an external master makes the frames",
+                hint="omit the option, or open the network interface directly",
+            )
+        return FrameCapture(options, self.main)
+
+    def report_end(self, error: BaseException) -> None:
+        """Report the error that ends the loop to the sink and to the capture."""
+        if self.current_session is not None:
+            self.current_session.report_end(error)
+        elif self._capture is not None:
+            self._capture.fail(error)
+
+    def take_down(self) -> list[Exception]:
+        """Bring the devices of a network without a session to PRE-OP; return the problems.
+
+        Then end the capture. No effect if the network has a session, which does the same.
+        """
+        if self.current_session is not None:
+            return []
+        problems = take_down(self.main)
+        if self._capture is not None:
+            self._capture.end()
+        return problems
 
     def _compile_laws(self, session: Session) -> None:
         """Compile the laws of the options. Raise LawError with the number of the network."""

@@ -29,6 +29,7 @@ from catenary.loop.buffers import bind_requests
 from catenary.loop.clocks import Clocks
 from catenary.loop.exchange import Exchange
 from catenary.loop.fault_report import FaultReport
+from catenary.loop.frame_capture import FrameCapture
 from catenary.loop.interpreter import switch_interval
 from catenary.loop.laws.runner import LawRunner
 from catenary.loop.options import StopPolicy
@@ -64,8 +65,7 @@ class Session:
         stop: StopPolicy,
         exchange: Callable[[Session], Exchange],
     ) -> None:
-        self.main = main
-        self.plan = plan
+        self.main, self.plan = main, plan
         self.exchange: Exchange = exchange(self)
         self.engine = self.exchange.make_engine()
         self.views = self._bind(requests)
@@ -80,6 +80,7 @@ class Session:
         self.watch = self.exchange.watch
         self.switch_interval: float | None = None  # [s] of the interpreter; used by an inline loop
         self.external: ExternalClockWatch | None = None
+        self.capture: FrameCapture | None = None
         self.trigger: TriggerWatch | None = None
         self._attached = ExitStack()
         self._opened = self._left = False
@@ -123,7 +124,9 @@ class Session:
         self._attached.callback(watch.close)
 
     def report_end(self, error: BaseException) -> None:
-        """Publish the error that ends the loop."""
+        """Publish the error that ends the loop, and keep the frames around it."""
+        if self.capture is not None:
+            self.capture.fail(error)
         if self._publisher is not None:
             self._publisher.report_end(error)
 
@@ -341,8 +344,24 @@ class Session:
                 Exception
             ) as problem:  # the next steps are more important; all problems are returned
                 problems.append(problem)
+        self._end_capture(problems)
         self.main.events.end_loop()
         return problems
+
+    def _end_capture(self, problems: list[Exception]) -> None:
+        """End the capture of the frames. The first problem of leaving is an error, too.
+
+        Args:
+            problems: Problems while leaving; a failure of the capture is added.
+        """
+        if self.capture is None:
+            return
+        if problems:
+            self.capture.fail(problems[0])
+        try:
+            self.capture.end()
+        except Exception as problem:  # all problems are returned
+            problems.append(problem)
 
     def make_outputs_safe(self) -> None:
         """Set the output bytes of process data to their safe values. The next cycle sends them."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol, Self
@@ -12,7 +13,7 @@ from catenary.drive import Drives
 from catenary.drive.process_data import ProcessData
 from catenary.esi.eni import is_eni
 from catenary.link import LinkSource
-from catenary.loop import ClockOptions, Loop, Scheduling, StopPolicy
+from catenary.loop import CaptureOptions, ClockOptions, Loop, Scheduling, StopPolicy
 from catenary.loop.devices import LoopRequest
 from catenary.loop.laws.law import Laws
 from catenary.machine.by_name import ByName
@@ -184,6 +185,7 @@ class Machine:
         scheduling: Scheduling | None = None,
         clocks: ClockOptions | None = None,
         trigger: Trigger | None = None,
+        capture: CaptureOptions | str | os.PathLike[str] | None = None,
     ) -> Loop:
         """Return a loop with all drives and process data of the machine.
 
@@ -209,6 +211,7 @@ class Machine:
             "stop": stop,
             "scheduling": scheduling,
             "clocks": clocks,
+            "capture": capture,
         }
         options |= {name: value for name, value in given.items() if value is not None}
         return Loop(*self.requests, laws=laws, sink=sink, trigger=trigger, **options)
