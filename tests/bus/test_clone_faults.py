@@ -12,13 +12,16 @@ from catenary.line import Line, read_line
 from catenary.link import Recorder, Ring
 from catenary.virtual import MailboxQuirks, faults
 from catenary.wire.al import AlState
+from catenary.wire.frame import decode_frame, is_alien
 from tests.bus.cloned_segment import (
     SERVO,
     WRIST,
     bring,
     contents,
     make_segment,
+    memory,
 )
+from tests.bus.links import Meddler
 
 
 @pytest.fixture
@@ -121,6 +124,49 @@ def test_a_state_that_changes_meanwhile_ends_the_writing(
         line = cat.clone(link, tmp_path / "line", progress=change)
     assert "it is not written to" in line.devices[SERVO].missing["objects"]
     assert len(line.devices[SERVO].objects) == 10
+
+
+def test_nothing_is_written_after_a_device_left_pre_op_during_an_upload(
+    segment: cat.Segment, tmp_path: Path
+) -> None:
+    bring(segment, SERVO=AlState.PRE_OP)
+    station = segment.core.peek(SERVO, 0x10, 2)
+    writes = []
+
+    def change(count: int, frame: bytes) -> list[bytes]:
+        """Set SAFE-OP when the servo has taken the tenth message, and note later writes."""
+        for each in [] if is_alien(frame) else decode_frame(frame).datagrams:
+            if each.command.name == "FPWR" and each.adp.to_bytes(2, "little") == station:
+                writes.append(each)
+                if len(writes) == 10:
+                    segment.core.poke(SERVO, 0x0130, b"\x04")
+        return [frame]
+
+    with Meddler(segment.open_link(), change) as link:
+        line = cat.clone(link, tmp_path / "line")
+    assert "it is not written to" in line.devices[SERVO].missing["sii"]
+    assert len(writes) == 10
+
+
+@pytest.mark.parametrize("moment", range(1, 400, 21))
+def test_an_interruption_restores_the_devices(
+    segment: cat.Segment, tmp_path: Path, moment: int
+) -> None:
+    bring(segment, COUPLER=AlState.INIT, WRIST=AlState.PRE_OP)
+    segment.core.poke(WRIST, 0x0500, b"\x01")  # its processor owns the EEPROM
+    segment.core.poke(WRIST, 0x0010, bytes(2))
+    before = [memory(segment, n) for n in range(len(segment))]
+
+    frames = iter(range(moment))
+
+    def interrupt(count: int, frame: bytes) -> list[bytes]:
+        if next(frames, None) == moment - 1:
+            raise KeyboardInterrupt
+        return [frame]
+
+    with Meddler(segment.open_link(), interrupt) as link, pytest.raises(KeyboardInterrupt):
+        cat.clone(link, tmp_path / "line", pre_op=True)
+    assert [memory(segment, n) for n in range(len(segment))] == before
 
 
 def test_a_device_that_disappears_is_an_error_and_not_a_clone(
