@@ -14,14 +14,14 @@ from typing import TypeVar
 from catenary.errors import DecodeError, MailboxError, SegmentError, StateError
 from catenary.model.describe import MAILBOX_MIN
 from catenary.model.device import DeviceDescription, MailboxLayout
-from catenary.procedure.al_state import read_state, request_state
+from catenary.procedure.al_state import read_state, request_state, write_control
 from catenary.procedure.clone_registers import Present
 from catenary.procedure.exchange import Procedure, Request, read, write
 from catenary.procedure.mailbox import IN, OUT, MailboxChannel
 from catenary.procedure.state_path import climb
 from catenary.procedure.station import Station, answered, station_of
 from catenary.procedure.stations import STATION_BASE
-from catenary.wire.al import STATE_MASK, AlState
+from catenary.wire.al import STATE_MASK, AlControl, AlState
 from catenary.wire.datagram import EcatCommand
 from catenary.wire.frame import MAXIMUM_DATA
 from catenary.wire.register import (
@@ -260,6 +260,8 @@ def lower(before: Before) -> Procedure[None]:
 
 def _lower(before: Before) -> Procedure[None]:
     station = before.station
+    # After an interruption, a device that still reports INIT may be on its way to PRE-OP.
+    yield from write_control(station, AlControl(AlState.INIT))
     yield from request_state(station, AlState.INIT)
     off = [write(EcatCommand.FPWR, station.address, sync_manager_activation(k), 0) for k in MAILBOX]
     blocks = [
