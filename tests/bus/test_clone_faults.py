@@ -183,7 +183,7 @@ def test_an_interruption_after_a_write_restores_the_device(
 
     with (
         Meddler(segment.open_link(), interrupt) as link,
-        pytest.raises(KeyboardInterrupt) as raised,
+        pytest.raises(KeyboardInterrupt) as error,
     ):
         cat.clone(link, tmp_path / "line", pre_op=True)
     assert not getattr(error.value, "__notes__", [])
