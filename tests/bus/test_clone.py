@@ -175,9 +175,11 @@ def test_a_device_is_read_again_if_it_does_not_fit_or_on_request(
     cat.clone(segment, folder, pre_op=True)
     edited = folder / "02-Catenary_virtual_servo" / "device.toml"
     text = edited.read_text()
+    (folder / "line.toml").unlink()  # as after an interruption
     edited.write_text(text.replace("serial = 0x00000005", "serial = 0x00000006"))
     cat.clone(segment, folder, pre_op=True)
     assert edited.read_text() == text
+    (folder / "line.toml").unlink()
     edited.write_text(text.replace("notes = []", 'notes = ["mine"]'))
     cat.clone(segment, folder, pre_op=True)
     assert "mine" in edited.read_text()
@@ -185,18 +187,38 @@ def test_a_device_is_read_again_if_it_does_not_fit_or_on_request(
     assert edited.read_text() == text
 
 
+def test_a_complete_clone_is_read_again_so_that_it_shows_changes(
+    segment: cat.Segment, tmp_path: Path
+) -> None:
+    def stop(text: str, done: int, total: int) -> None:
+        if "wrist" in text:
+            raise KeyboardInterrupt
+
+    folder = tmp_path / "line"
+    cat.clone(segment, folder, pre_op=True)
+    changed = b"\x07"
+    for position in (SERVO, WRIST):
+        segment.core.poke(position, 0x0300, changed)
+    with pytest.raises(KeyboardInterrupt):
+        cat.clone(segment, folder, pre_op=True, progress=stop)
+    line = cat.clone(segment, folder, pre_op=True)  # not a mixture of old and new devices
+    for position in (SERVO, WRIST):
+        assert line.devices[position].registers[0x0300][:1] == changed
+    assert read_line(folder) == line
+
+
 def test_a_finished_device_is_not_replaced_by_less(segment: cat.Segment, tmp_path: Path) -> None:
     folder = tmp_path / "line"
     whole = cat.clone(segment, folder, pre_op=True)
     before = contents(folder)
+    own = [name for name in before if name.startswith(("02-", "03-", "04-"))]
     bring(segment, OUTPUTS=AlState.OP)  # and all devices have other addresses
     line = cat.clone(segment, folder)
-    assert line.devices == whole.devices
-    [note] = line.notes
-    assert note.startswith("device 2 (Catenary virtual 4-channel output): kept from an earlier")
+    assert line.devices[1:] == whole.devices[1:]  # the coupler was read again
+    assert all("kept from an earlier clone" in note for note in line.notes)
+    assert line.notes[1].startswith("device 2 (Catenary virtual 4-channel output): kept")
     after = contents(folder)
-    del before["line.toml"], after["line.toml"]
-    assert after == before
+    assert {name: after[name] for name in own} == {name: before[name] for name in own}
     assert not cat.clone(segment, folder, fresh=True).complete
 
 

@@ -10,8 +10,10 @@ import catenary as cat
 from catenary.errors import LinkError, NoDeviceError, SegmentError
 from catenary.line import Line, read_line
 from catenary.link import Recorder, Ring
+from catenary.procedure.exchange import Procedure, after
 from catenary.virtual import MailboxQuirks, faults
 from catenary.wire.al import AlState
+from catenary.wire.frame import decode_frame, is_alien
 from tests.bus.cloned_segment import (
     SERVO,
     WRIST,
@@ -19,6 +21,7 @@ from tests.bus.cloned_segment import (
     contents,
     make_segment,
 )
+from tests.bus.links import Meddler
 
 
 @pytest.fixture
@@ -121,6 +124,72 @@ def test_a_state_that_changes_meanwhile_ends_the_writing(
         line = cat.clone(link, tmp_path / "line", progress=change)
     assert "it is not written to" in line.devices[SERVO].missing["objects"]
     assert len(line.devices[SERVO].objects) == 10
+
+
+def test_nothing_is_written_after_a_device_left_pre_op_during_an_upload(
+    segment: cat.Segment, tmp_path: Path
+) -> None:
+    bring(segment, SERVO=AlState.PRE_OP)
+    station = segment.core.peek(SERVO, 0x10, 2)
+    writes = []
+
+    def change(count: int, frame: bytes) -> list[bytes]:
+        """Set SAFE-OP when the servo has taken the tenth message, and note later writes."""
+        for each in [] if is_alien(frame) else decode_frame(frame).datagrams:
+            if each.command.name == "FPWR" and each.adp.to_bytes(2, "little") == station:
+                writes.append(each)
+                if len(writes) == 10:
+                    segment.core.poke(SERVO, 0x0130, b"\x04")
+        return [frame]
+
+    with Meddler(segment.open_link(), change) as link:
+        line = cat.clone(link, tmp_path / "line")
+    assert "it is not written to" in line.devices[SERVO].missing["sii"]
+    assert len(writes) == 10
+
+
+def wait(seconds: float) -> Procedure[None]:
+    yield after(seconds)
+
+
+def configuration(segment: cat.Segment) -> list[bytes]:
+    """Return address, AL status, owner of the EEPROM and mailbox of device 0, without states."""
+    places = ((0x10, 2), (0x130, 6), (0x500, 1), (0x800, 5), (0x806, 1), (0x808, 5), (0x80E, 1))
+    return [segment.core.peek(0, *place) for place in places]
+
+
+@pytest.mark.parametrize("state", [AlState.INIT, AlState.PRE_OP])
+@pytest.mark.parametrize("register", [0x0010, 0x0120, 0x0500, 0x0502, 0x0800, 0x1000])
+def test_an_interruption_after_a_write_restores_the_device(
+    tmp_path: Path, state: AlState, register: int
+) -> None:
+    segment = cat.Segment([cat.virtual.Servo()])
+    with cat.MainDevice(segment) as main:
+        main.request_states(main.passive_scan(), [0], state)
+    segment.core.poke(0, 0x0010, bytes(2))
+    segment.core.poke(0, 0x0500, b"\1")  # its processor owns the EEPROM
+    before = configuration(segment)
+    if state is AlState.PRE_OP and register in (0x0120, 0x0800):
+        pytest.skip("a clone does not write this register in PRE-OP")
+    interrupted = False
+
+    def interrupt(count: int, frame: bytes) -> list[bytes]:
+        nonlocal interrupted
+        found = () if is_alien(frame) else decode_frame(frame).datagrams
+        if not interrupted and any(each.command.writes and each.ado == register for each in found):
+            interrupted = True
+            raise KeyboardInterrupt
+        return [frame]
+
+    with (
+        Meddler(segment.open_link(), interrupt) as link,
+        pytest.raises(KeyboardInterrupt) as error,
+    ):
+        cat.clone(link, tmp_path / "line", pre_op=True)
+    assert not getattr(error.value, "__notes__", [])
+    with cat.MainDevice(segment) as main:
+        main.converse(wait(0.1))  # for a change of state on its way
+    assert configuration(segment) == before
 
 
 def test_a_device_that_disappears_is_an_error_and_not_a_clone(

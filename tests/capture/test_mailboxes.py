@@ -107,6 +107,26 @@ def test_missing_answers_are_shown(made: Conversation) -> None:
     assert str(second) == "write 0x1C12:00 = 0x00 not answered"
 
 
+@pytest.mark.parametrize(
+    "late",
+    [
+        UploadResponse(0x1008, 0, b"EL", 2, expedited=True),
+        DownloadResponse(0x6060, 0),
+        Abort(0x1008, 0, 0x06090030),
+    ],
+)
+def test_a_late_answer_does_not_belong_to_the_next_request(
+    made: Conversation, late: UploadResponse | DownloadResponse | Abort
+) -> None:
+    made.request(UploadRequest(0x1008, 0))
+    made.request(UploadRequest(0x6060, 0))
+    made.response(late)
+    made.response(UploadResponse(0x6060, 0, b"\x08", 1, expedited=True))
+    first, second = messages(made)
+    assert str(first) == "read 0x1008:00 not answered"
+    assert str(second) == "read 0x6060:00 = 0x08"
+
+
 def test_a_full_mailbox_takes_no_message(made: Conversation) -> None:
     """The master repeats the request; it is one transfer."""
     made.request(UploadRequest(0x1000, 0))

@@ -40,6 +40,20 @@ def test_a_frame_at_the_end_of_the_file_is_not_lost() -> None:
     assert (stream.masters[0].master.sent, stream.masters[0].master.lost) == (2, 0)
 
 
+def test_copies_of_frames_on_both_interfaces_of_a_ring_are_omitted() -> None:
+    made = Conversation()
+    for _ in range(3):
+        made.exchange(READ, answers=[(b"\x01\x00", 1)])
+    for sent in made.packets[::2]:
+        made.packets.append(replace(sent, time_ns=sent.time_ns + 1_000))  # second interface
+        made.packets.append(replace(sent, time_ns=sent.time_ns + 30_000))  # returned unprocessed
+    made.packets.sort(key=lambda packet: packet.time_ns)
+    stream = made.stream()
+    assert not [event for event in stream if isinstance(event.content, FramesLost)]
+    master = stream.masters[0].master
+    assert (master.sent, master.returned, master.lost, master.collisions) == (3, 3, 0, 0)
+
+
 def test_only_the_sent_direction_still_shows_requests() -> None:
     made = Conversation()
     made.exchange(INIT, answers=[(None, 0)], returned=False)

@@ -104,7 +104,12 @@ def test_an_unreadable_file(
     if content is not None:
         file.write_bytes(content)
     assert main(["capture", "show", str(file)]) == 2
-    assert capsys.readouterr().err.startswith("catenary: ")
+    assert capsys.readouterr().err.startswith(f"catenary: {file}: ")
+
+
+def test_an_end_before_the_start(path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["capture", "show", str(path), "--from", "5", "--to", "1"]) == 2
+    assert "--to must not be before --from" in capsys.readouterr().err
 
 
 def test_a_damaged_file(made: Conversation, tmp_path: Path) -> None:

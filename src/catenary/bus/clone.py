@@ -19,7 +19,7 @@ from catenary.bus.ring import check_direction
 from catenary.errors import CatenaryError, CloneError, ConfigurationError, SegmentError
 from catenary.line.reader import kept_device
 from catenary.line.values import ClonedDevice, Line
-from catenary.line.writer import finish, prepare, write_device
+from catenary.line.writer import finish, is_complete, prepare, write_device
 from catenary.link import RingLink
 from catenary.link.ring_state import Shape
 from catenary.model.topology import Topology, make_topology, open_ports
@@ -99,9 +99,13 @@ def _read(main: MainDevice, folder: Path | None, options: CloneOptions, progress
     where = None if folder is None else prepare(folder)
     topology = make_topology([open_ports(each.dl_status) for each in present], ring=ring)
     notes = list(topology.contradictions)
+    keeps = not (options.fresh or is_complete(where))
     with _addressed(main, present, notes) as addresses:
         devices = [
-            _device(main, where, _source(each, address, topology), options, progress, notes)
+            _device(
+                *(main, where, _source(each, address, topology), options, progress, notes),
+                keeps=keeps,
+            )
             for each, address in zip(present, addresses, strict=True)
         ]
         _require_unchanged(main, present)
@@ -140,16 +144,24 @@ def _addressed(
     try:
         for device, address in zip(devices, addresses, strict=True):
             if address is not None and address != device.station_address:
+                changed.append((device, address))  # before the write: Ctrl-C may follow it
                 main.converse(give_address(device, address))
-                changed.append((device, address))
         yield addresses
-    finally:
-        for device, address in changed:
-            try:
-                main.converse(return_address(device, address))
-            except CatenaryError as error:
-                text = f"device {device.rank} keeps the station address 0x{address:04X}"
-                notes.append(f"{text}: {error.message}")
+    except BaseException as error:
+        for note in _return_addresses(main, changed):
+            error.add_note(note)
+        raise
+    notes += _return_addresses(main, changed)
+
+
+def _return_addresses(main: MainDevice, changed: Sequence[tuple[Present, int]]) -> Iterator[str]:
+    """Write back the station addresses. Yield the reasons for those that cannot be restored."""
+    for device, address in changed:
+        try:
+            main.converse(return_address(device, address))
+        except CatenaryError as error:
+            text = f"device {device.rank} may keep the station address 0x{address:04X}"
+            yield f"{text}: {error.message}"
 
 
 def _device(
@@ -159,8 +171,10 @@ def _device(
     options: CloneOptions,
     progress: Progress,
     notes: list[str],
+    *,
+    keeps: bool,
 ) -> ClonedDevice:
-    """Read and write one device, or keep its folder of an earlier clone.
+    """Read and write one device, or keep its folder of an interrupted clone (`keeps`).
 
     A finished device is not replaced by the same device with missing parts.
     """
@@ -175,9 +189,10 @@ def _device(
     if folder is None:
         return reading.read()
     earlier = None if options.fresh else _earlier(folder, source.present.rank)
-    identity = None if earlier is None else reading.identity()
-    if earlier is not None and identity is not None and reading.fits(earlier, identity):
-        return earlier
+    if earlier is not None and keeps:
+        identity = reading.identity()
+        if identity is not None and reading.fits(earlier, identity):
+            return earlier
     device = reading.read()
     if earlier is not None and reading.surpassed(device, earlier):
         name = f"device {device.position} ({earlier.name})"

@@ -18,8 +18,10 @@ from catenary.procedure.clone_access import (
     join_mailbox,
     lower,
     raise_to_pre_op,
+    read_eeprom_owner,
     remember,
-    require_writable,
+    return_eeprom,
+    while_writable,
 )
 from catenary.procedure.clone_objects import Question, read_dictionary
 from catenary.procedure.clone_registers import Present
@@ -102,7 +104,7 @@ class DeviceClone:
         if self._source.address is None:
             return None
         try:
-            found = self._main.converse(self._guarded(read_identity(self._station)))
+            found = self._from_eeprom(read_identity(self._station))
         except CatenaryError:  # the reading of the whole SII reports the reason
             return None
         return found if self._serials else found._replace(serial=0)
@@ -215,7 +217,7 @@ class DeviceClone:
             self._missing["objects"] = self._not_written()
             return None
         try:
-            extent = self._main.converse(self._guarded(read_extent(self._station)))
+            extent = self._from_eeprom(read_extent(self._station))
             image = b"".join(self._parts(extent))
         except CatenaryError as error:
             self._missing["sii"] = self._reason(error)
@@ -230,14 +232,25 @@ class DeviceClone:
         total = extent.size // 2
         for first in range(0, total, SII_PART):
             words = min(SII_PART, total - first)
-            yield self._main.converse(self._guarded(read_words(self._station, first, words)))
+            yield self._from_eeprom(read_words(self._station, first, words))
             self._report(f"device {self._present.rank}: EEPROM", first + words, total)
 
-    def _guarded(self, procedure: Procedure[T]) -> Procedure[T]:
-        """Run a reading of the EEPROM, if the device is still in INIT or PRE-OP."""
-        yield from require_writable(self._station)
+    def _from_eeprom(self, procedure: Procedure[T]) -> T:
+        """Run a reading of the EEPROM while the device is in INIT or PRE-OP.
+
+        The EEPROM returns to its owner, also after Ctrl-C.
+        """
         bounded = within(SII_TIMEOUT, self._station, procedure, "its EEPROM was")
-        return (yield from with_eeprom(self._station, bounded))
+        reading = while_writable(self._station, with_eeprom(self._station, bounded))
+        owner = self._main.converse(read_eeprom_owner(self._station))
+        try:
+            return self._main.converse(reading)
+        except KeyboardInterrupt as interrupt:
+            try:
+                self._main.converse(return_eeprom(self._station, owner))
+            except CatenaryError as error:
+                interrupt.add_note(f"its EEPROM may be assigned to EtherCAT: {error.message}")
+            raise
 
     def _reason(self, error: CatenaryError) -> str:
         """Return the message of an error on one line, without the device at its start."""
@@ -285,11 +298,16 @@ class DeviceClone:
             if channel is None:
                 raise MailboxError(f"{description} has no mailbox")
             yield channel
-        finally:
-            self._lower(before)
+        except BaseException as error:
+            if reason := self._lower(before):
+                error.add_note(f"{description}: {reason}")
+            raise
+        self._lower(before)
 
-    def _lower(self, before: Before) -> None:
+    def _lower(self, before: Before) -> str:
+        """Bring the device back to INIT. Return the reason if it fails, else an empty text."""
         try:
             self._main.converse(lower(before))
         except CatenaryError as error:
             self._missing["state"] = f"not brought back to INIT: {self._reason(error)}"
+        return self._missing.get("state", "")

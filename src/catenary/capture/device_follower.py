@@ -66,7 +66,7 @@ class DeviceFollower:
             data: The written bytes.
         """
         self.registers.write(address, data)
-        self._mailbox.configure()
+        self._mailbox.configure(address, len(data))
 
     def flush(self) -> Iterator[Found]:
         """Yield what was not answered at the end of the capture."""
@@ -95,7 +95,7 @@ class DeviceFollower:
                     continue
                 self._clock_written = True
             yield content
-        self._mailbox.configure()
+        self._mailbox.configure(each.ado, len(data))
 
     def _eeprom_contents(self, each: Transaction) -> Iterator[Content]:
         if not is_eeprom(each.ado):

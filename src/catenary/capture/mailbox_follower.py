@@ -13,8 +13,11 @@ from catenary.capture.transaction import Transaction
 from catenary.errors import DecodeError
 from catenary.wire.coe import Emergency, Message, decode_coe
 from catenary.wire.mailbox import Mailbox, Type, decode_error, decode_mailbox
-from catenary.wire.register import PROCESS_RAM
+from catenary.wire.register import PROCESS_RAM, SYNC_MANAGER_COUNT, sync_manager
 from catenary.wire.sync_manager import Direction
+
+_LAST = sync_manager(SYNC_MANAGER_COUNT - 1)
+_SYNC_MANAGERS = range(sync_manager(0).address, _LAST.address + _LAST.size)
 
 
 class MailboxFollower:
@@ -26,9 +29,15 @@ class MailboxFollower:
         self._last_read = b""
         self.sdo = SdoFollower()
 
-    def configure(self) -> None:
-        """Read the mailboxes again, after a write to a SyncManager."""
-        self._areas = {each: self._registers.mailbox(each) for each in Direction}
+    def configure(self, address: int, size: int) -> None:
+        """Read the mailboxes again, after a write to a register.
+
+        Args:
+            address: Address of the first byte.
+            size: Number of bytes.
+        """
+        if address < _SYNC_MANAGERS.stop and address + size > _SYNC_MANAGERS.start:
+            self._areas = {each: self._registers.mailbox(each) for each in Direction}
 
     def follow(self, each: Transaction) -> Iterator[Content]:
         """Follow a datagram to or from the process memory of the device."""

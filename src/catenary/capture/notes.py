@@ -20,8 +20,8 @@ def notes(counts: FileCounts, masters: Sequence[MasterSummary]) -> Iterator[str]
     if len(masters) > 1:
         sources = ", ".join(str(each.master) for each in masters)
         yield (
-            f"{len(masters)} source addresses send EtherCAT frames: {sources}. Two masters on one "
-            "segment disturb each other"
+            f"{len(masters)} source addresses send EtherCAT frames: {sources}. One master has two "
+            "if it uses two interfaces (redundancy). Two masters on one segment disturb each other"
         )
     for each in masters:
         yield from _master_notes(each)

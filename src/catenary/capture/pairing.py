@@ -11,6 +11,7 @@ from catenary.capture.direction import AT_ONCE_NS, LOST_NS, CapturedFrame, is_ou
 LOOK_AHEAD = 512  # frames that decide whether the source address shows the direction
 MAXIMUM_WAITING = 256  # frames of one source on their way
 MAXIMUM_SOURCES = 64
+MAXIMUM_COPIES = 4  # answered frames, and copies, that are kept for the next frames
 
 
 class FramePair(NamedTuple):
@@ -30,11 +31,33 @@ class _Source:
         self.bits: set[bool] = set()
         self.waiting: deque[CapturedFrame] = deque()
         self.colliding: set[int] = set()  # numbers of waiting frames
+        self.answered: deque[CapturedFrame] = deque(maxlen=MAXIMUM_COPIES)  # sent frames
+        self.copies: deque[CapturedFrame] = deque(maxlen=MAXIMUM_COPIES)
 
     def oldest_like(self, each: CapturedFrame) -> CapturedFrame | None:
         """Return the oldest waiting frame with the same commands, indices and lengths."""
         shape = shape_of(each.frame)
         return next((sent for sent in self.waiting if shape_of(sent.frame) == shape), None)
+
+    def has_copy(self, each: CapturedFrame) -> bool:
+        """Return True if the same frame was sent just before, on the other interface of a ring.
+
+        The second copy of a frame also returns without having passed a controller.
+        """
+        return any(
+            each.time_ns - sent.time_ns < AT_ONCE_NS
+            and sent.frame.datagrams == each.frame.datagrams
+            for sent in (*self.waiting, *self.answered)
+        )
+
+    def take_copy(self, answer: CapturedFrame) -> CapturedFrame | None:
+        """Remove and return the copy to which a second answer belongs: that of another program."""
+        shape = shape_of(answer.frame)
+        for copy in self.copies:
+            if answer.time_ns - copy.time_ns < AT_ONCE_NS and shape_of(copy.frame) == shape:
+                self.copies.remove(copy)
+                return copy
+        return None
 
     def expired(self, now_ns: int) -> Iterator[CapturedFrame]:
         """Remove and yield the frames that are lost."""
@@ -51,8 +74,8 @@ def pair_frames(frames: Iterable[CapturedFrame]) -> Iterator[FramePair]:
 
     Each answer is paired with the oldest unanswered frame of the same source that has the same
     commands, indices and data lengths. A frame without an answer within `LOST_NS` is yielded
-    alone, and so is an answer to a frame that the capture does not contain. Frames of more than
-    `MAXIMUM_SOURCES` source addresses are omitted.
+    alone, and so is an answer to a frame that the capture does not contain. Copies of a sent frame
+    in a ring are omitted, and so are frames of more than `MAXIMUM_SOURCES` source addresses.
     """
     sources: dict[bytes, _Source] = {}
     ahead: deque[CapturedFrame] = deque()
@@ -88,13 +111,20 @@ def _pair(each: CapturedFrame, sources: dict[bytes, _Source]) -> Iterator[FrameP
     waiting = source.oldest_like(each)
     conclusive = len(source.bits) == 2
     if is_outbound(each, waiting, conclusive=conclusive):
+        if conclusive and source.has_copy(each):
+            source.copies.append(each)
+            return
         if conclusive and waiting and each.time_ns - waiting.time_ns < AT_ONCE_NS:
             source.colliding.add(each.number)
         source.waiting.append(each)
         return
     collides = False
-    if waiting is not None:
+    if waiting is None:
+        waiting = source.take_copy(each)
+        collides = waiting is not None
+    else:
         source.waiting.remove(waiting)
+        source.answered.append(waiting)
         collides = waiting.number in source.colliding
         source.colliding.discard(waiting.number)
     yield FramePair(address, waiting, each, collides=collides)

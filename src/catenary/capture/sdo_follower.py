@@ -87,6 +87,8 @@ class SdoFollower:
         transfer = self._transfer
         if isinstance(message, SdoInformation):
             yield from self._information(message)
+        elif transfer is not None and _is_late(message, transfer.request):
+            return
         elif isinstance(message, Abort):
             yield from self._abort(message, time_ns)
         elif transfer is None:
@@ -139,6 +141,20 @@ class SdoFollower:
     def _answered(self, query: SdoInformationRead, abort: int | None) -> SdoInformationRead:
         self._query = None
         return SdoInformationRead(query.opcode, query.index, query.subindex, self._size, abort)
+
+
+def _is_late(message: Message, request: DownloadRequest | UploadRequest) -> bool:
+    """Return True for an answer to another request: one that was given up, or was not captured."""
+    if not isinstance(message, DownloadResponse | UploadResponse | Abort):
+        return False
+    if isinstance(message, DownloadResponse) and not isinstance(request, DownloadRequest):
+        return True
+    if isinstance(message, UploadResponse) and not isinstance(request, UploadRequest):
+        return True
+    # Some devices abort a segment with index 0.
+    is_nameless = isinstance(message, Abort) and not message.index
+    place = (message.index, message.subindex)
+    return not is_nameless and place != (request.index, request.subindex)
 
 
 def _query(message: SdoInformation) -> SdoInformationRead:

@@ -49,6 +49,8 @@ class StateFollower:
 
     def follow(self, each: Transaction) -> Iterator[Found]:
         """Follow a datagram to this device."""
+        if each.ado > AL_STATUS_CODE.address:
+            return
         if (control := each.was_written(AL_CONTROL)) is not None:
             yield from self._request(each, control)
         if each.command.reads and not each.command.writes:

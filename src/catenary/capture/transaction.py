@@ -81,9 +81,11 @@ class Transaction:
         return self._part(self.written, register)
 
     def _part(self, data: bytes | None, register: Register[Any]) -> bytes | None:
-        start = register.address - self.ado
+        start = register.address - (self.address >> 16)
+        if data is None or not 0 <= start < len(data):
+            return None
         size = 1 if register in _FIRST_BYTE_SUFFICES else register.size
-        if data is None or start < 0 or start + size > len(data):
+        if start + size > len(data):
             return None
         return data[start : start + register.size]
 

@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING, BinaryIO
 
 from catenary.cli.arguments import position, seconds
-from catenary.cli.failure import report
+from catenary.cli.failure import UsageError, report
 from catenary.cli.parsers import Commands, add_command, add_json
 from catenary.errors import DecodeError
 
@@ -54,13 +54,18 @@ def run(arguments: argparse.Namespace) -> int:
     from catenary.capture import EventStream
 
     until = None if arguments.end is None else round(arguments.end * 1e9)
+    if arguments.end is not None and arguments.end < (arguments.start or 0.0):
+        raise UsageError("--to must not be before --from")
     try:
         with open_capture(arguments.file) as file:
             stream = EventStream(file.read, until_ns=until)
             return _show(stream, arguments)
     except BrokenPipeError:
         raise
-    except (DecodeError, OSError) as error:
+    except DecodeError as error:
+        report(DecodeError(f"{arguments.file}: {error.message}", hint=error.hint))
+        return UNREADABLE
+    except OSError as error:
         report(error)
         return UNREADABLE
 

@@ -25,8 +25,8 @@ def add_parser(commands: Commands) -> None:
         description="Reads registers, EEPROMs, object dictionaries with values, mappings, clocks "
         "and error counters of all devices, and writes them as text files. No state is changed "
         "without --pre-op. Devices in SAFE-OP, OP and BOOT are not written to: only their "
-        "registers are read. An interrupted clone continues. Exit status 1 if a part is missing; "
-        "the folder has the reason.",
+        "registers are read. An interrupted clone continues; a complete one is read again. "
+        "Exit status 1 if a part is missing; the folder has the reason.",
         example="catenary clone eth0 -o line/ --pre-op\ncatenary clone eth0 -o line/ --fresh",
     )
     add_target(parser)
@@ -39,7 +39,9 @@ def add_parser(commands: Commands) -> None:
         help="bring devices in INIT to PRE-OP to read their objects, then back to INIT",
     )
     parser.add_argument(
-        "--fresh", action="store_true", help="read devices again that the folder already has"
+        "--fresh",
+        action="store_true",
+        help="replace the devices of the folder, even if parts of them cannot be read now",
     )
     parser.add_argument(
         "--without-serials", action="store_true", help="leave the serial numbers out"

@@ -1,5 +1,7 @@
 """Entry point of the `catenary` command, which handles Ctrl-C even during the imports."""
 
+import sys
+
 INTERRUPTED = 130  # 128 + SIGINT
 
 
@@ -9,5 +11,7 @@ def main() -> int:
         from catenary.cli.main import main as run
 
         return run()
-    except KeyboardInterrupt:
+    except KeyboardInterrupt as interrupt:
+        for note in getattr(interrupt, "__notes__", ()):  # what could not be restored
+            print(f"catenary: {note}", file=sys.stderr)
         return INTERRUPTED

@@ -16,6 +16,7 @@ LINE_FILE, DEVICE_FILE, SII_FILE, OBJECTS_FILE = (
     "sii.bin",
     "objects.tsv",
 )
+PARTIAL = ".partial"
 LIMITS = {  # bytes
     LINE_FILE: 16 << 20,
     DEVICE_FILE: 4 << 20,
@@ -39,7 +40,7 @@ def read_bytes(path: Path) -> bytes:
     with open(opened, "rb") as file:
         if not stat.S_ISREG(os.fstat(opened).st_mode):
             raise CloneError("not a regular file", file=str(path), hint=AGAIN)
-        limit = LIMITS[path.name]
+        limit = LIMITS[path.name.removesuffix(PARTIAL)]
         try:
             data = file.read(limit + 1)
         except OSError as error:

@@ -10,12 +10,20 @@ from pathlib import Path
 
 from catenary.errors import CloneError
 from catenary.line.device_file import device_text
-from catenary.line.files import DEVICE_FILE, LIMITS, LINE_FILE, OBJECTS_FILE, SII_FILE, check_folder
-from catenary.line.line_file import FOLDER, folder_name, line_text
+from catenary.line.files import (
+    DEVICE_FILE,
+    LIMITS,
+    LINE_FILE,
+    OBJECTS_FILE,
+    PARTIAL,
+    SII_FILE,
+    check_folder,
+    read_text,
+)
+from catenary.line.line_file import FOLDER, folder_name, line_text, parse_line
 from catenary.line.object_file import objects_text
 from catenary.line.values import ClonedDevice, Line
 
-PARTIAL = ".partial"
 _OWN = re.compile(rf"({FOLDER.pattern})({re.escape(PARTIAL)})?")
 _FILES = {DEVICE_FILE, SII_FILE, OBJECTS_FILE}
 
@@ -38,7 +46,9 @@ def write_line(line: Line, folder: str | Path) -> None:
 
 
 def prepare(folder: str | Path) -> Path:
-    """Make the folder of a clone, or check an existing one. Remove its `line.toml`.
+    """Make the folder of a clone, or check an existing one. Rename its `line.toml`.
+
+    An interrupted clone thus differs from a complete one that is read again (`is_complete`).
 
     Args:
         folder: The folder.
@@ -55,8 +65,22 @@ def prepare(folder: str | Path) -> Path:
             file=str(where),
             hint="name a new folder with -o",
         )
-    (where / LINE_FILE).unlink(missing_ok=True)
+    if (where / LINE_FILE).exists():
+        (where / LINE_FILE).replace(where / (LINE_FILE + PARTIAL))
     return where
+
+
+def is_complete(folder: Path) -> bool:
+    """Return True if a prepared folder had a complete clone.
+
+    Args:
+        folder: The folder, after `prepare`.
+    """
+    path = folder / (LINE_FILE + PARTIAL)
+    try:
+        return parse_line(read_text(path), str(path)).complete
+    except CloneError:  # missing, half written, or edited
+        return False
 
 
 def write_device(device: ClonedDevice, folder: Path) -> Path:

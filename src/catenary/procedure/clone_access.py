@@ -9,22 +9,24 @@ from __future__ import annotations
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from itertools import chain
+from typing import TypeVar
 
 from catenary.errors import DecodeError, MailboxError, SegmentError, StateError
 from catenary.model.describe import MAILBOX_MIN
 from catenary.model.device import DeviceDescription, MailboxLayout
-from catenary.procedure.al_state import read_state, request_state
+from catenary.procedure.al_state import read_state, request_state, write_control
 from catenary.procedure.clone_registers import Present
-from catenary.procedure.exchange import Procedure, read, write
+from catenary.procedure.exchange import Procedure, Request, read, write
 from catenary.procedure.mailbox import IN, OUT, MailboxChannel
 from catenary.procedure.state_path import climb
 from catenary.procedure.station import Station, answered, station_of
 from catenary.procedure.stations import STATION_BASE
-from catenary.wire.al import STATE_MASK, AlState
+from catenary.wire.al import STATE_MASK, AlControl, AlState
 from catenary.wire.datagram import EcatCommand
 from catenary.wire.frame import MAXIMUM_DATA
 from catenary.wire.register import (
     AL_STATUS,
+    PROCESS_RAM,
     SII_CONFIGURATION,
     STATION_ADDRESS,
     sync_manager,
@@ -37,6 +39,8 @@ from catenary.wire.sync_manager import (
     SyncManager,
     decode_sync_manager,
 )
+
+T = TypeVar("T")
 
 WRITABLE = (AlState.INIT, AlState.PRE_OP)
 MAILBOX = (OUT, IN)
@@ -140,6 +144,37 @@ def require_writable(station: Station, *states: AlState) -> Procedure[None]:
         raise _left(station, found.word & STATE_MASK, found.code)
 
 
+def while_writable(station: Station, procedure: Procedure[T], *states: AlState) -> Procedure[T]:
+    """Run a procedure, and read the state of the device before each access that changes it.
+
+    These are writes, and reads of the process memory, which empty a mailbox. If the state is no
+    longer allowed, the procedure ends without another access: not even to restore something.
+
+    Args:
+        station: The device.
+        procedure: The procedure to run.
+        states: The allowed states; INIT and PRE-OP by default.
+
+    Raises:
+        StateError: The device is in another state.
+    """
+    try:
+        step = next(procedure)
+        while True:
+            if any(map(_changes_device, step if isinstance(step, list) else ())):
+                yield from require_writable(station, *states)
+            step = procedure.send((yield step))
+    except StopIteration as stop:
+        result: T = stop.value
+        return result
+    finally:
+        procedure.close()
+
+
+def _changes_device(request: Request) -> bool:
+    return request.command.writes or request.address >> 16 >= PROCESS_RAM
+
+
 def _left(station: Station, state: int, code: int) -> StateError:
     return StateError(
         f"{station} is in state {state} now; it is not written to",
@@ -174,6 +209,28 @@ def remember(station: Station) -> Procedure[Before]:
     return Before(station, managers, owned)
 
 
+def read_eeprom_owner(station: Station) -> Procedure[int]:
+    """Read the register that assigns the EEPROM to EtherCAT or to the device's processor."""
+    [reply] = yield [read(EcatCommand.FPRD, station.address, SII_CONFIGURATION)]
+    return SII_CONFIGURATION.unpack(answered(reply, station, "EEPROM owner"))
+
+
+def return_eeprom(station: Station, owner: int) -> Procedure[None]:
+    """Assign the EEPROM to its owner again, after an interrupted reading.
+
+    Args:
+        station: The device.
+        owner: Content of the register before the reading.
+
+    Raises:
+        StateError: The device is neither in INIT nor in PRE-OP.
+    """
+    yield from require_writable(station)
+    request = write(EcatCommand.FPWR, station.address, SII_CONFIGURATION, owner & 1)
+    [reply] = yield [request]
+    answered(reply, station, "EEPROM owner")
+
+
 def raise_to_pre_op(device: DeviceDescription) -> Procedure[MailboxChannel | None]:
     """Bring a device from INIT to PRE-OP, with the mailbox of its SII.
 
@@ -185,7 +242,8 @@ def raise_to_pre_op(device: DeviceDescription) -> Procedure[MailboxChannel | Non
     """
     station = station_of(device)
     yield from require_writable(station, AlState.INIT)
-    return (yield from climb(station, device, AlState.PRE_OP))
+    climbing = climb(station, device, AlState.PRE_OP)
+    return (yield from while_writable(station, climbing))
 
 
 def lower(before: Before) -> Procedure[None]:
@@ -197,8 +255,13 @@ def lower(before: Before) -> Procedure[None]:
     Raises:
         StateError: The device is no longer in INIT or PRE-OP, or does not reach INIT.
     """
+    yield from while_writable(before.station, _lower(before))
+
+
+def _lower(before: Before) -> Procedure[None]:
     station = before.station
-    yield from require_writable(station)
+    # After an interruption, a device that still reports INIT may be on its way to PRE-OP.
+    yield from write_control(station, AlControl(AlState.INIT))
     yield from request_state(station, AlState.INIT)
     off = [write(EcatCommand.FPWR, station.address, sync_manager_activation(k), 0) for k in MAILBOX]
     blocks = [

@@ -9,11 +9,12 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import NamedTuple, TypeAlias
 
-from catenary.errors import CatenaryError, MailboxError, ResponseTimeout, SdoAbort
+from catenary.errors import CatenaryError, MailboxError, ResponseTimeout, SdoAbort, StateError
 from catenary.line.values import SERIAL_WITHHELD, ClonedEntry, ClonedObject
-from catenary.procedure.clone_access import require_writable
+from catenary.procedure.clone_access import while_writable
 from catenary.procedure.exchange import Procedure
 from catenary.procedure.mailbox import MailboxChannel
 from catenary.procedure.sdo import OBJECT_MISSING, upload, upload_small
@@ -80,11 +81,14 @@ def read_dictionary(
         CatenaryError: The device does not answer at all, or cannot be asked.
     """
     reader = _Reader(channel, question, progress)
-    yield from _first_answer(channel)
+    in_pre_op = partial(while_writable, channel.station)
+    yield from in_pre_op(_first_answer(channel), AlState.PRE_OP)
     try:
-        yield from reader.all_objects()
+        yield from in_pre_op(reader.all_objects(), AlState.PRE_OP)
     except _Ended as end:
         reader.missing.append(str(end))
+    except StateError as error:
+        reader.missing.append(f"reading ended: {reader.reason(error)}")
     objects = tuple(sorted(reader.objects.values(), key=lambda each: each.index))
     return Dictionary(objects, "; ".join(reader.missing), tuple(reader.notes))
 
@@ -129,7 +133,7 @@ class _Reader:
         while self._done < len(wanted):
             self._total = len(wanted)
             index = wanted[self._done]
-            yield from self._continue()
+            self._continue()
             yield from self._described(index) if listed else self._undescribed(index)
             if not listed and index in self.objects:
                 wanted += [pdo for pdo in self._assigned(index) if pdo not in wanted]
@@ -141,10 +145,10 @@ class _Reader:
         try:
             indices, note = yield from read_object_list(self._channel)
         except SdoAbort as error:
-            self.notes.append(f"the device does not list its objects: {self._reason(error)}")
+            self.notes.append(f"the device does not list its objects: {self.reason(error)}")
             return ()
         except _FAILURES as error:
-            reason = self._reason(error)
+            reason = self.reason(error)
             if self._channel.layout.sdo_information:
                 self.missing.append(f"the list of objects cannot be read: {reason}")
             else:
@@ -161,27 +165,20 @@ class _Reader:
         values = [entry.value or b"" for entry in self.objects[index].entries if entry.subindex]
         return [int.from_bytes(value[:2], "little") for value in values if any(value[:2])]
 
-    def _continue(self) -> Procedure[None]:
+    def _continue(self) -> None:
         """Raise _Ended if the reading must not continue."""
-        yield from self._check_state()
         progress = f"{self._done} of {self._total} objects were read"
         if self._deadline.passed_at(self._channel.received_ns):
             raise _Ended(f"reading ended after {self._question.timeout:g} s: {progress}")
         if self._failures >= FAILURES_MAX:
             raise _Ended(f"reading ended after {FAILURES_MAX} failures in a row: {progress}")
 
-    def _check_state(self) -> Procedure[None]:
-        try:
-            yield from require_writable(self._channel.station, AlState.PRE_OP)
-        except CatenaryError as error:
-            raise _Ended(f"reading ended: {self._reason(error)}") from error
-
     def _described(self, index: int) -> Procedure[None]:
         try:
             found = yield from read_object_description(self._channel, index)
         except (SdoAbort, *_FAILURES) as error:
             self._count(error)
-            reason = self._reason(error)
+            reason = self.reason(error)
             self.objects[index] = ClonedObject(index, 0, 0, 0, reason=reason)
             yield from self._undescribed(index, reason)
             return
@@ -190,7 +187,7 @@ class _Reader:
         entries: list[ClonedEntry] = []
         reasons: list[str] = []
         for subindex in range(last + 1):
-            yield from self._continue()
+            self._continue()
             entry = yield from self._entry(index, subindex, reasons)
             entries += [] if entry is None else [entry]
             self.objects[index] = ClonedObject(
@@ -208,11 +205,11 @@ class _Reader:
         except SdoAbort as error:
             self._failures = 0
             if error.code not in OBJECT_MISSING:
-                reasons.append(f"0x{subindex:02X} is not described: {self._reason(error)}")
+                reasons.append(f"0x{subindex:02X} is not described: {self.reason(error)}")
             return None
         except _FAILURES as error:
             self._count(error)
-            reasons.append(f"0x{subindex:02X} is not described: {self._reason(error)}")
+            reasons.append(f"0x{subindex:02X} is not described: {self.reason(error)}")
             return None
         self._failures = 0
         return (yield from self._with_value(_cloned(found)))
@@ -225,7 +222,7 @@ class _Reader:
         entries = [count]
         last = count.value[0] if count.value and _is_list(index) else 0
         for subindex in range(1, last + 1):
-            yield from self._continue()
+            self._continue()
             entries.append((yield from self._with_value(_plain(index, subindex))))
         self.objects[index] = ClonedObject(index, 0, 0, last, "", tuple(entries), reason)
 
@@ -245,7 +242,7 @@ class _Reader:
             return replace(entry, abort=error.code)
         except _FAILURES as error:
             self._count(error)
-            return replace(entry, reason=self._reason(error))
+            return replace(entry, reason=self.reason(error))
         self._failures = 0
         return replace(entry, value=value)
 
@@ -253,7 +250,8 @@ class _Reader:
         """Count a missing answer. A refusal is an answer."""
         self._failures = 0 if isinstance(error, SdoAbort) else self._failures + 1
 
-    def _reason(self, error: CatenaryError) -> str:
+    def reason(self, error: CatenaryError) -> str:
+        """Return the message of an error without the device."""
         return error.message.removeprefix(f"{self._channel.station}").lstrip(": ")
 
 

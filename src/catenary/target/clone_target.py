@@ -31,11 +31,11 @@ def clone(
 
     Args:
         target: Name of a segment, or a link source.
-        folder: Folder of the clone. It is made if it does not exist. Finished devices of an earlier
-            clone whose identity and position fit are kept.
+        folder: Folder of the clone. It is made if it does not exist. Finished devices of an
+            interrupted clone whose identity and position fit are kept.
         pre_op: Bring devices in INIT to PRE-OP to read their objects, then back to INIT.
         serials: False leaves serial numbers out.
-        fresh: Read all devices again.
+        fresh: Read all devices again, and replace complete ones even if parts are missing now.
         objects_timeout: Longest time for the objects of one device [s].
         progress: Function to call with (text, done, total).
 
