@@ -109,6 +109,7 @@ def test_only_commands_to_other_registers_are_run(tmp_path: Path) -> None:
         ("<Transition>IP</Transition><Comment>PDI", "<Comment>PDI", "InitCmd has no Transition"),
         ("<Data>ea03", "<Data>e8zz", "'e8zz' is not hexadecimal data"),
         ("<Data>ea03", "<Data>e80", "'e80' is not hexadecimal data"),
+        ("<Data>ea03", "<Data>eax03", "'eax03' is not hexadecimal data"),
         ("<Data>ea03</Data>", "<DataLength>9999</DataLength>", "9999 bytes; at most 1486"),
         ("<Data>ea03</Data>", "<Data></Data>", "0 bytes of data"),
         ("<DataMask>f0ff", "<DataMask>f0", "2 bytes of Data and 1 of DataMask"),
@@ -228,6 +229,8 @@ def test_register_commands_of_an_encrypted_file_are_refused(tmp_path: Path) -> N
          "Adp is 1002, but this device has 1001"),
         ("<Ado>1040</Ado><Data>ea03</Data>", "<Ado>1052</Ado><DataLength>8</DataLength>",
          "registers of the bring-up together with others: the plan sets the watchdog"),
+        ("<Cmd>5</Cmd><Adp>1001</Adp>\n     <Ado>1040</Ado>",
+         "<Cmd>11</Cmd><Addr>#x08000000</Addr>", "LWR is not supported"),
         ("<Ccs>1", "<Ccs>2", "Ccs 2 is not supported"),
         ("</CoE>", "</CoE><SoE><InitCmds><InitCmd><Transition>PS</Transition><OpCode>3</OpCode>"
          "<IDN>32796</IDN><Data>01</Data></InitCmd></InitCmds></SoE>", "SoE is not supported"),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -17,6 +18,7 @@ from catenary.errors import (
     SegmentError,
 )
 from catenary.esi.eni import read_eni
+from catenary.machine.eni.machine import device_names
 from catenary.virtual import Coupler, Segment
 from tests.esi.eni_file import write_eni
 from tests.machine.eni_bus import device_of, segment_of
@@ -178,6 +180,18 @@ def test_additional_and_missing_devices(tmp_path: Path) -> None:
         cat.Machine(path, target=segment),
     ):
         pass
+
+
+def test_each_device_has_a_name_of_its_own(tmp_path: Path) -> None:
+    [device] = read_eni(write_eni(tmp_path)).devices
+    eni = replace(
+        read_eni(write_eni(tmp_path)),
+        devices=tuple(
+            replace(device, position=position, name=name)
+            for position, name in enumerate(["Drive", "Drive", "Drive 1", "Box"])
+        ),
+    )
+    assert device_names(eni) == ["Drive 0", "Drive 1", "Drive 1 2", "Box 3"]
 
 
 def test_an_eni_needs_a_target(tmp_path: Path) -> None:

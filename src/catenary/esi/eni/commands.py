@@ -6,12 +6,12 @@ from collections.abc import Iterator
 
 from catenary.esi.eni.fields import Fields
 from catenary.esi.eni.known import PROTOCOLS
+from catenary.esi.eni.own_registers import LOGICAL
 from catenary.esi.eni.values import MailboxCommand, RegisterCommand, Validation
 from catenary.esi.xml import Element
 from catenary.model.esi_settings import InitCommand
 from catenary.wire.datagram import EcatCommand
 
-LOGICAL = (EcatCommand.LRD, EcatCommand.LWR, EcatCommand.LRW)
 STATES = "IPSOB"  # letters of a transition: INIT, PRE-OP, SAFE-OP, OP, BOOT
 MILLISECOND = 1e-3
 DOWNLOAD = 1  # Ccs of CoE

@@ -152,11 +152,13 @@ class EniMachine:
 
 def device_names(eni: EniFile) -> list[str]:
     """Return a unique name for each device: that of the file, with its position if needed."""
-    names = Counter(device.name for device in eni.devices)
-    return [
-        device.name if names[device.name] == 1 else f"{device.name} {device.position}"
-        for device in eni.devices
+    count = Counter(device.name for device in eni.devices)
+    numbered = [f"{device.name} {device.position}" for device in eni.devices]
+    names = [
+        device.name if count[device.name] == 1 else each
+        for device, each in zip(eni.devices, numbered, strict=True)
     ]
+    return names if len(set(names)) == len(names) else numbered
 
 
 def device_tables(eni: EniFile) -> list[DeviceTable]:
