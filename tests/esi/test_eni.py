@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gzip
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -13,9 +14,11 @@ from catenary.esi.eni.checks import check_commands
 from catenary.esi.eni.clocks import sync_signals
 from catenary.esi.eni.own_registers import left_out, vendor_commands
 from catenary.esi.eni.places import place_variables
+from catenary.esi.eni.settings import with_eni
 from catenary.esi.source import Source
 from catenary.model.device import Direction
 from tests.esi.eni_file import ENI, line_of, write_eni
+from tests.plan.devices import servo
 
 
 def test_a_device_has_identity_addresses_and_memory(tmp_path: Path) -> None:
@@ -78,12 +81,41 @@ def test_a_variable_over_several_entries_is_left_out(tmp_path: Path) -> None:
     assert "bits 32 to 55" in place_variables(eni).left_out["Drive.Inputs.Position"]
 
 
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("<BitLength>48", "<BitLength>64", "Drive: 64 bits of outputs, but its PDOs have 48"),
+        ("<ByteSize>6", "<ByteSize>5", "'Drive.Outputs.Target' ends after the 5 bytes of the"),
+        ("<BitOffs>72", "<BitOffs>79", ""),
+        ("<BitOffs>72", "<BitOffs>80", "'Drive.WcState' ends after the 10 bytes of the inputs"),
+    ],
+)
+def test_sizes_that_contradict_each_other_are_warnings(
+    tmp_path: Path, old: str, new: str, message: str
+) -> None:
+    warnings = read_eni(write_eni(tmp_path, (old, new))).warnings
+    assert len(warnings) == bool(message)
+    assert all(message in str(each) for each in warnings)
+
+
 def test_clocks_come_from_the_commands(tmp_path: Path) -> None:
     [device] = read_eni(write_eni(tmp_path)).devices
     found = sync_signals(device)
     assert found is not None
     assert found.assign_activate == 0x0300
     assert (found.sync0, found.sync1, found.shift) == pytest.approx((2e-3, 0, 250e-6))
+
+
+def test_timeouts_come_from_the_commands_and_are_bounded(tmp_path: Path) -> None:
+    path = write_eni(
+        tmp_path,
+        ("<Comment>ramp</Comment><Timeout>0<", "<Comment>ramp</Comment><Timeout>9000<"),
+        ("<Ado>3968</Ado><Data>01", "<Ado>288</Ado><Timeout>600000</Timeout><Data>0400"),
+        ("<Transition>OI</Transition>", "<Transition>PS</Transition>"),
+    )
+    eni = read_eni(path)
+    found = with_eni(replace(servo(0), identity=eni.devices[0].identity), eni).timeouts
+    assert (found.pre_op, found.safe_op_and_op, found.mailbox_response) == (None, 60.0, 9.0)
 
 
 def test_only_commands_to_other_registers_are_run(tmp_path: Path) -> None:
@@ -233,7 +265,8 @@ def test_register_commands_of_an_encrypted_file_are_refused(tmp_path: Path) -> N
          "<Cmd>11</Cmd><Addr>#x08000000</Addr>", "LWR is not supported"),
         ("<Ccs>1", "<Ccs>2", "Ccs 2 is not supported"),
         ("</CoE>", "</CoE><SoE><InitCmds><InitCmd><Transition>PS</Transition><OpCode>3</OpCode>"
-         "<IDN>32796</IDN><Data>01</Data></InitCmd></InitCmds></SoE>", "SoE is not supported"),
+         "<IDN>32796</IDN><Data>01</Data></InitCmd></InitCmds></SoE>",
+         "P-0-0028 of drive 0: SoE is not supported"),
     ],
 )  # fmt: skip
 def test_commands_that_cannot_be_run_are_refused(

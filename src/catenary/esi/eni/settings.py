@@ -12,6 +12,7 @@ from catenary.model.esi_settings import Timeouts, WatchdogValues
 from catenary.wire import register
 
 ASSIGN_ACTIVATE = register.ACTIVATION.address - 1  # 0x0980, SYNC unit control
+TIMEOUT_MAX = 60.0  # [s], as for those of an ESI
 SII_DATA = 0x0508
 SII_CONTROL = 0x0502
 REVISION_WORD, SERIAL_WORD = 0x000C, 0x000E  # words of the SII
@@ -73,14 +74,19 @@ def watchdog_of(device: EniDevice) -> WatchdogValues:
 
 
 def _timeouts(device: EniDevice) -> Timeouts:
-    """Return the timeouts of the commands that request a state."""
+    """Return the timeouts of the commands that request a state, and of the mailbox commands."""
 
     def longest(*transitions: str) -> float | None:
         commands = (written(device, register.AL_CONTROL.address, each) for each in transitions)
         times = [each.timeout for each in commands if each is not None and each.timeout]
-        return max(times, default=None)
+        return min(max(times), TIMEOUT_MAX) if times else None
 
-    return Timeouts(pre_op=longest("IP"), safe_op_and_op=longest("PS", "SO"))
+    answer = max((each.timeout for each in device.requests), default=0.0)
+    return Timeouts(
+        pre_op=longest("IP"),
+        safe_op_and_op=longest("PS", "SO"),
+        mailbox_response=min(answer, TIMEOUT_MAX) or None,
+    )
 
 
 def checked_words(commands: Sequence[RegisterCommand]) -> frozenset[int]:
