@@ -106,6 +106,13 @@ def test_clocks_come_from_the_commands(tmp_path: Path) -> None:
     assert (found.sync0, found.sync1, found.shift) == pytest.approx((2e-3, 0, 250e-6))
 
 
+def test_the_activation_can_be_written_as_one_byte(tmp_path: Path) -> None:
+    path = write_eni(tmp_path, ("<Ado>2432</Ado><Data>0003", "<Ado>2433</Ado><Data>07"))
+    found = sync_signals(read_eni(path).devices[0])
+    assert found is not None
+    assert found.assign_activate == 0x0700
+
+
 def test_timeouts_come_from_the_commands_and_are_bounded(tmp_path: Path) -> None:
     path = write_eni(
         tmp_path,

@@ -121,6 +121,33 @@ def test_notes_name_what_differs_from_the_plan(tmp_path: Path) -> None:
         assert "clock" not in notes
 
 
+def test_a_clock_that_no_command_starts_is_a_note(tmp_path: Path) -> None:
+    path = write_eni(tmp_path, ("<Ado>2432</Ado><Data>0003", "<Ado>2432</Ado><Data>0000"))
+    with cat.Machine(path, target=segment_of(read_eni(path))) as machine:
+        assert any("DC/CycleTime0 has no effect" in note for note in machine.notes)
+
+
+def test_an_output_is_not_written_by_its_command(tmp_path: Path) -> None:
+    """The process data is 0 until the application writes it, so a command has no lasting effect."""
+    path = write_eni(
+        tmp_path,
+        ("<Index>#x6040</Index>", "<Index>#x6060</Index>"),
+        ("<Index>8448</Index>", "<Index>24672</Index>"),
+        ("<Data>05</Data>", "<Data>0800</Data>"),
+        ("<Transition>SO</Transition><Comment>late", "<Transition>PS</Transition><Comment>late"),
+    )
+    segment = segment_of(read_eni(path))
+    with cat.Machine(path, target=segment) as machine:
+        [note] = [each for each in machine.notes if "0x6060:00" in each]
+        assert "the process data writes this output in each cycle; set it to 08 00 there" in note
+        with machine.loop() as loop:
+            run(loop)
+            assert segment[0].read_object(0x6060) == b"\0\0"
+            machine.variables["Drive.Outputs.Control word"] = 8
+            run(loop)
+            assert segment[0].read_object(0x6060) == b"\x08\0"
+
+
 def test_the_watchdog_is_that_of_the_file(tmp_path: Path) -> None:
     command = (
         "<InitCmd><Transition>IP</Transition><Cmd>5</Cmd><Adp>1001</Adp><Ado>1056</Ado>"

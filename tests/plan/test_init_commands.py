@@ -72,7 +72,7 @@ def test_objects_of_catenary_the_mapping_and_outputs_count_more() -> None:
     mapping = replace(FILTER, index=0x1C12)
     device = plan_of(mode, own, mapping, request=written).devices[0]
     assert [line.split(": ")[1].split(" (")[0] for line in device.commands.omitted] == [
-        "it is an output of the process data",
+        "the process data writes this output in each cycle; set it to 08 there",
         "Catenary writes this object",
         "the plan writes the mapping",
     ]

@@ -92,7 +92,10 @@ def _reason(
         return "your start-up object replaces it"
     if place in own:
         return "Catenary writes this object"
-    return "it is an output of the process data" if place in mapped else ""
+    if place in mapped:
+        data = command.data.hex(" ")
+        return f"the process data writes this output in each cycle; set it to {data} there"
+    return ""
 
 
 def _is_given(command: InitCommand, given: Collection[tuple[int, int]]) -> bool:
