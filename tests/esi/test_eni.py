@@ -142,6 +142,7 @@ def test_only_commands_to_other_registers_are_run(tmp_path: Path) -> None:
         ("<Name>Drive</Name>", "<Name> </Name>", "Info has no Name"),
         ("<Type>Outputs", "<Type>Sideways", "Type: 'Sideways' is neither"),
         ("<Pdo>5632", "<Pdo>5633", "PDO 0x1601 is not described"),
+        ("<Pdo>5632</Pdo>", "<Pdo>5632</Pdo><Pdo>5632</Pdo>", "PDO 0x1600 is assigned twice"),
         ("<BitStart>0", "<BitStart>-1", "'-1' does not fit"),
         ("PS</Transition><Comment>set sm 2", "XX</Transition><Comment>set sm 2",
          "InitCmd 'set sm 2'/Transition: 'XX' is not a transition"),
