@@ -173,19 +173,35 @@ def test_another_device_is_named_with_both_identities(tmp_path: Path) -> None:
     assert segment[0].core.peek(0, PDI_WATCHDOG, 2) != b"\xea\x03"
 
 
-def test_a_checked_revision_is_compared(tmp_path: Path) -> None:
-    read_revision = (
+def write_checked(folder: Path, mask: str = "") -> Path:
+    """Write a file with another revision than that of the device, and its comparison."""
+    commands = (
         "<InitCmd><Transition>IP</Transition><Cmd>2</Cmd><Adp>0</Adp><Ado>1282</Ado>"
         "<Data>00010c000000</Data></InitCmd><InitCmd><Transition>IP</Transition><Cmd>1</Cmd>"
         "<Adp>0</Adp><Ado>1288</Ado><Data>00000000</Data><Validate><Data>21040100</Data>"
-        "<Timeout>100</Timeout></Validate></InitCmd>"
+        f"{mask}<Timeout>100</Timeout></Validate></InitCmd>"
     )
-    segment = segment_of(read_eni(write_eni(tmp_path)))
-    path = write_eni(
-        tmp_path,
-        ("</Mailbox>\n   <InitCmds>", f"</Mailbox>\n   <InitCmds>{read_revision}"),
+    return write_eni(
+        folder,
+        ("</Mailbox>\n   <InitCmds>", f"</Mailbox>\n   <InitCmds>{commands}"),
         ("<RevisionNo>66592", "<RevisionNo>66593"),
     )
+
+
+def test_the_masked_bits_of_a_revision_are_compared(tmp_path: Path) -> None:
+    segment = segment_of(read_eni(write_eni(tmp_path)))
+    path = write_checked(tmp_path, "<DataMask>f0ffffff</DataMask>")
+    with cat.Machine(path, target=segment) as machine:
+        assert any("the ENI has revision 0x00010421" in note for note in machine.notes)
+    path = write_checked(tmp_path, "<DataMask>0f000000</DataMask>")
+    expected = "revision 0x00010421 under mask 0x0000000F, found 0x00010420"
+    with pytest.raises(IdentityError, match=expected), cat.Machine(path, target=segment):
+        pass
+
+
+def test_a_checked_revision_is_compared(tmp_path: Path) -> None:
+    segment = segment_of(read_eni(write_eni(tmp_path)))
+    path = write_checked(tmp_path)
     with (
         pytest.raises(IdentityError, match=r"revision 0x00010421, found .* revision 0x00010420"),
         cat.Machine(path, target=segment),

@@ -9,6 +9,7 @@ from catenary.esi.eni.own_registers import WRITES, vendor_commands
 from catenary.esi.eni.values import EniDevice, EniFile, RegisterCommand
 from catenary.model.device import DeviceDescription
 from catenary.model.esi_settings import Timeouts, WatchdogValues
+from catenary.model.register_command import Validation
 from catenary.wire import register
 
 ASSIGN_ACTIVATE = register.ACTIVATION.address - 1  # 0x0980, SYNC unit control
@@ -89,16 +90,17 @@ def _timeouts(device: EniDevice) -> Timeouts:
     )
 
 
-def checked_words(commands: Sequence[RegisterCommand]) -> frozenset[int]:
-    """Return the words of the SII that the commands compare, such as the revision.
+def checked_words(commands: Sequence[RegisterCommand]) -> dict[int, Validation]:
+    """Return the validations of words of the SII that the commands read, such as the revision.
 
     A read of the SII data register is preceded by the command that starts it, with the word in its
     data (ETG.1000.4 §6.4).
     """
-    found, word = set(), None
+    found: dict[int, Validation] = {}
+    word = None
     for each in commands:
         if each.offset == SII_CONTROL and len(each.data) >= 6:
             word = int.from_bytes(each.data[2:6], "little")
         elif each.offset == SII_DATA and each.validation is not None and word is not None:
-            found.add(word)
-    return frozenset(found)
+            found[word] = each.validation
+    return found
