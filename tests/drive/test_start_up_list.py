@@ -9,7 +9,7 @@ import pytest
 import catenary as cat
 from catenary.drive import read_start_up
 from catenary.errors import MachineFileError
-from catenary.esi.eni import read_eni
+from catenary.esi.eni import read_eni, read_start_up_list
 from tests.esi.eni_file import write_eni
 from tests.machine.eni_bus import segment_of
 
@@ -91,9 +91,12 @@ def test_soe_is_refused_by_idn(tmp_path: Path) -> None:
         "<IDN>32800</IDN><Elements>64</Elements><Attribute>0</Attribute><Data>0b00</Data>"
         "</InitCmd></InitCmds></SoE></EtherCATMailbox>"
     )
-    with pytest.raises(MachineFileError, match="IDN 32800 of drive 1: SoE is not supported") as e:
+    with pytest.raises(MachineFileError, match="P-0-0032 of drive 1: SoE is not supported") as e:
         read_start_up(path)
     assert e.value.line == 4
+    [found] = read_start_up_list(path)
+    assert (found.idn, found.drive, found.elements, found.operation) == (0x8020, 1, 0x40, 3)
+    assert (found.data, found.transitions, found.source.line) == (b"\x0b\x00", ("PS",), 4)
 
 
 def test_another_file_is_refused(tmp_path: Path) -> None:

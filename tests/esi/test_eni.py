@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gzip
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -13,9 +14,11 @@ from catenary.esi.eni.checks import check_commands
 from catenary.esi.eni.clocks import sync_signals
 from catenary.esi.eni.own_registers import left_out, vendor_commands
 from catenary.esi.eni.places import place_variables
+from catenary.esi.eni.settings import with_eni
 from catenary.esi.source import Source
 from catenary.model.device import Direction
 from tests.esi.eni_file import ENI, line_of, write_eni
+from tests.plan.devices import servo
 
 
 def test_a_device_has_identity_addresses_and_memory(tmp_path: Path) -> None:
@@ -78,12 +81,48 @@ def test_a_variable_over_several_entries_is_left_out(tmp_path: Path) -> None:
     assert "bits 32 to 55" in place_variables(eni).left_out["Drive.Inputs.Position"]
 
 
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("<BitLength>48", "<BitLength>64", "Drive: 64 bits of outputs, but its PDOs have 48"),
+        ("<ByteSize>6", "<ByteSize>5", "'Drive.Outputs.Target' ends after the 5 bytes of the"),
+        ("<BitOffs>72", "<BitOffs>79", ""),
+        ("<BitOffs>72", "<BitOffs>80", "'Drive.WcState' ends after the 10 bytes of the inputs"),
+    ],
+)
+def test_sizes_that_contradict_each_other_are_warnings(
+    tmp_path: Path, old: str, new: str, message: str
+) -> None:
+    warnings = read_eni(write_eni(tmp_path, (old, new))).warnings
+    assert len(warnings) == bool(message)
+    assert all(message in str(each) for each in warnings)
+
+
 def test_clocks_come_from_the_commands(tmp_path: Path) -> None:
     [device] = read_eni(write_eni(tmp_path)).devices
     found = sync_signals(device)
     assert found is not None
     assert found.assign_activate == 0x0300
     assert (found.sync0, found.sync1, found.shift) == pytest.approx((2e-3, 0, 250e-6))
+
+
+def test_the_activation_can_be_written_as_one_byte(tmp_path: Path) -> None:
+    path = write_eni(tmp_path, ("<Ado>2432</Ado><Data>0003", "<Ado>2433</Ado><Data>07"))
+    found = sync_signals(read_eni(path).devices[0])
+    assert found is not None
+    assert found.assign_activate == 0x0700
+
+
+def test_timeouts_come_from_the_commands_and_are_bounded(tmp_path: Path) -> None:
+    path = write_eni(
+        tmp_path,
+        ("<Comment>ramp</Comment><Timeout>0<", "<Comment>ramp</Comment><Timeout>9000<"),
+        ("<Ado>3968</Ado><Data>01", "<Ado>288</Ado><Timeout>600000</Timeout><Data>0400"),
+        ("<Transition>OI</Transition>", "<Transition>PS</Transition>"),
+    )
+    eni = read_eni(path)
+    found = with_eni(replace(servo(0), identity=eni.devices[0].identity), eni).timeouts
+    assert (found.pre_op, found.safe_op_and_op, found.mailbox_response) == (None, 60.0, 9.0)
 
 
 def test_only_commands_to_other_registers_are_run(tmp_path: Path) -> None:
@@ -103,12 +142,14 @@ def test_only_commands_to_other_registers_are_run(tmp_path: Path) -> None:
         ("<Name>Drive</Name>", "<Name> </Name>", "Info has no Name"),
         ("<Type>Outputs", "<Type>Sideways", "Type: 'Sideways' is neither"),
         ("<Pdo>5632", "<Pdo>5633", "PDO 0x1601 is not described"),
+        ("<Pdo>5632</Pdo>", "<Pdo>5632</Pdo><Pdo>5632</Pdo>", "PDO 0x1600 is assigned twice"),
         ("<BitStart>0", "<BitStart>-1", "'-1' does not fit"),
         ("PS</Transition><Comment>set sm 2", "XX</Transition><Comment>set sm 2",
          "InitCmd 'set sm 2'/Transition: 'XX' is not a transition"),
         ("<Transition>IP</Transition><Comment>PDI", "<Comment>PDI", "InitCmd has no Transition"),
         ("<Data>ea03", "<Data>e8zz", "'e8zz' is not hexadecimal data"),
         ("<Data>ea03", "<Data>e80", "'e80' is not hexadecimal data"),
+        ("<Data>ea03", "<Data>eax03", "'eax03' is not hexadecimal data"),
         ("<Data>ea03</Data>", "<DataLength>9999</DataLength>", "9999 bytes; at most 1486"),
         ("<Data>ea03</Data>", "<Data></Data>", "0 bytes of data"),
         ("<DataMask>f0ff", "<DataMask>f0", "2 bytes of Data and 1 of DataMask"),
@@ -228,9 +269,12 @@ def test_register_commands_of_an_encrypted_file_are_refused(tmp_path: Path) -> N
          "Adp is 1002, but this device has 1001"),
         ("<Ado>1040</Ado><Data>ea03</Data>", "<Ado>1052</Ado><DataLength>8</DataLength>",
          "registers of the bring-up together with others: the plan sets the watchdog"),
+        ("<Cmd>5</Cmd><Adp>1001</Adp>\n     <Ado>1040</Ado>",
+         "<Cmd>11</Cmd><Addr>#x08000000</Addr>", "LWR is not supported"),
         ("<Ccs>1", "<Ccs>2", "Ccs 2 is not supported"),
         ("</CoE>", "</CoE><SoE><InitCmds><InitCmd><Transition>PS</Transition><OpCode>3</OpCode>"
-         "<IDN>32796</IDN><Data>01</Data></InitCmd></InitCmds></SoE>", "SoE is not supported"),
+         "<IDN>32796</IDN><Data>01</Data></InitCmd></InitCmds></SoE>",
+         "P-0-0028 of drive 0: SoE is not supported"),
     ],
 )  # fmt: skip
 def test_commands_that_cannot_be_run_are_refused(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -17,6 +18,7 @@ from catenary.errors import (
     SegmentError,
 )
 from catenary.esi.eni import read_eni
+from catenary.machine.eni.machine import device_names
 from catenary.virtual import Coupler, Segment
 from tests.esi.eni_file import write_eni
 from tests.machine.eni_bus import device_of, segment_of
@@ -119,6 +121,33 @@ def test_notes_name_what_differs_from_the_plan(tmp_path: Path) -> None:
         assert "clock" not in notes
 
 
+def test_a_clock_that_no_command_starts_is_a_note(tmp_path: Path) -> None:
+    path = write_eni(tmp_path, ("<Ado>2432</Ado><Data>0003", "<Ado>2432</Ado><Data>0000"))
+    with cat.Machine(path, target=segment_of(read_eni(path))) as machine:
+        assert any("DC/CycleTime0 has no effect" in note for note in machine.notes)
+
+
+def test_an_output_is_not_written_by_its_command(tmp_path: Path) -> None:
+    """The process data is 0 until the application writes it, so a command has no lasting effect."""
+    path = write_eni(
+        tmp_path,
+        ("<Index>#x6040</Index>", "<Index>#x6060</Index>"),
+        ("<Index>8448</Index>", "<Index>24672</Index>"),
+        ("<Data>05</Data>", "<Data>0800</Data>"),
+        ("<Transition>SO</Transition><Comment>late", "<Transition>PS</Transition><Comment>late"),
+    )
+    segment = segment_of(read_eni(path))
+    with cat.Machine(path, target=segment) as machine:
+        [note] = [each for each in machine.notes if "0x6060:00" in each]
+        assert "the process data writes this output in each cycle; set it to 08 00 there" in note
+        with machine.loop() as loop:
+            run(loop)
+            assert segment[0].read_object(0x6060) == b"\0\0"
+            machine.variables["Drive.Outputs.Control word"] = 8
+            run(loop)
+            assert segment[0].read_object(0x6060) == b"\x08\0"
+
+
 def test_the_watchdog_is_that_of_the_file(tmp_path: Path) -> None:
     command = (
         "<InitCmd><Transition>IP</Transition><Cmd>5</Cmd><Adp>1001</Adp><Ado>1056</Ado>"
@@ -144,19 +173,35 @@ def test_another_device_is_named_with_both_identities(tmp_path: Path) -> None:
     assert segment[0].core.peek(0, PDI_WATCHDOG, 2) != b"\xea\x03"
 
 
-def test_a_checked_revision_is_compared(tmp_path: Path) -> None:
-    read_revision = (
+def write_checked(folder: Path, mask: str = "") -> Path:
+    """Write a file with another revision than that of the device, and its comparison."""
+    commands = (
         "<InitCmd><Transition>IP</Transition><Cmd>2</Cmd><Adp>0</Adp><Ado>1282</Ado>"
         "<Data>00010c000000</Data></InitCmd><InitCmd><Transition>IP</Transition><Cmd>1</Cmd>"
         "<Adp>0</Adp><Ado>1288</Ado><Data>00000000</Data><Validate><Data>21040100</Data>"
-        "<Timeout>100</Timeout></Validate></InitCmd>"
+        f"{mask}<Timeout>100</Timeout></Validate></InitCmd>"
     )
-    segment = segment_of(read_eni(write_eni(tmp_path)))
-    path = write_eni(
-        tmp_path,
-        ("</Mailbox>\n   <InitCmds>", f"</Mailbox>\n   <InitCmds>{read_revision}"),
+    return write_eni(
+        folder,
+        ("</Mailbox>\n   <InitCmds>", f"</Mailbox>\n   <InitCmds>{commands}"),
         ("<RevisionNo>66592", "<RevisionNo>66593"),
     )
+
+
+def test_the_masked_bits_of_a_revision_are_compared(tmp_path: Path) -> None:
+    segment = segment_of(read_eni(write_eni(tmp_path)))
+    path = write_checked(tmp_path, "<DataMask>f0ffffff</DataMask>")
+    with cat.Machine(path, target=segment) as machine:
+        assert any("the ENI has revision 0x00010421" in note for note in machine.notes)
+    path = write_checked(tmp_path, "<DataMask>0f000000</DataMask>")
+    expected = "revision 0x00010421 under mask 0x0000000F, found 0x00010420"
+    with pytest.raises(IdentityError, match=expected), cat.Machine(path, target=segment):
+        pass
+
+
+def test_a_checked_revision_is_compared(tmp_path: Path) -> None:
+    segment = segment_of(read_eni(write_eni(tmp_path)))
+    path = write_checked(tmp_path)
     with (
         pytest.raises(IdentityError, match=r"revision 0x00010421, found .* revision 0x00010420"),
         cat.Machine(path, target=segment),
@@ -178,6 +223,18 @@ def test_additional_and_missing_devices(tmp_path: Path) -> None:
         cat.Machine(path, target=segment),
     ):
         pass
+
+
+def test_each_device_has_a_name_of_its_own(tmp_path: Path) -> None:
+    [device] = read_eni(write_eni(tmp_path)).devices
+    eni = replace(
+        read_eni(write_eni(tmp_path)),
+        devices=tuple(
+            replace(device, position=position, name=name)
+            for position, name in enumerate(["Drive", "Drive", "Drive 1", "Box"])
+        ),
+    )
+    assert device_names(eni) == ["Drive 0", "Drive 1", "Drive 1 2", "Box 3"]
 
 
 def test_an_eni_needs_a_target(tmp_path: Path) -> None:

@@ -10,6 +10,7 @@ import catenary as cat
 from catenary.cli.main import main
 from catenary.esi.eni import read_eni
 from catenary.machine import read_machine
+from catenary.model.device import Direction
 from tests.esi.eni_file import write_eni
 from tests.machine.eni_bus import segment_of
 
@@ -30,7 +31,8 @@ def test_a_drive_becomes_an_axis(tmp_path: Path, capsys: pytest.CaptureFixture[s
     assert COUNTS in text
     output.write_text(text.replace(COUNTS, "counts_per_turn = 65536 "))
     tables = read_machine(output).tables
-    assert tables.drives["axes"].pdos == [0x1600, 0x1A00]
+    assert isinstance(tables.drives["axes"].pdos, dict)
+    assert list(tables.drives["axes"].pdos) == ["0x1600", "0x1A00"]
     assert tables.clocks.reference == "drive"
     segment = segment_of(read_eni(path))
     with pytest.warns(UserWarning, match="no velocity_limit"):
@@ -43,6 +45,50 @@ def test_a_drive_becomes_an_axis(tmp_path: Path, capsys: pytest.CaptureFixture[s
         assert device.sync is not None
         assert (device.sync.assign_activate, device.sync.shift_ns) == (0x0300, 250_000)
         assert segment[0].read_object(0x2000, 1) == b"\x11\x22"
+
+
+def test_the_file_has_the_mapping_and_the_times_of_the_eni(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    segment = segment_of(read_eni(write_eni(tmp_path)))
+    watchdog = (
+        "<InitCmd><Transition>IP</Transition><Cmd>5</Cmd><Adp>1001</Adp><Ado>1056</Ado>"
+        "<Data>1027</Data></InitCmd>"
+    )
+    gap = "<Entry><Index>0</Index><BitLen>8</BitLen></Entry>"
+    path = write_eni(
+        tmp_path,
+        ("<Entry><Index>#x607a", f"{gap}<Entry><Index>#x607a"),
+        ("<ShiftTime>250000", "<ShiftTime>-1234567"),
+        ("</Mailbox>\n   <InitCmds>", f"</Mailbox>\n   <InitCmds>{watchdog}"),
+    )
+    output = tmp_path / "machine.toml"
+    assert main(["init", str(path), "-o", str(output)]) == 0
+    notes = capsys.readouterr().err
+    assert "Drive: the watchdog time is not converted" in notes
+    assert "the command at OI to register 0x0F80 (farewell) = 01 is not converted" in notes
+    output.write_text(output.read_text().replace(COUNTS, "counts_per_turn = 65536 "))
+    with pytest.warns(UserWarning, match="no velocity_limit"):
+        machine = cat.Machine(output, target=segment).open()
+    with machine:
+        [device] = machine.main.plan(*machine.requests, period=2e-3).devices
+        [pdo] = device.assignments(Direction.OUTPUT)[0].pdos
+        assert [(each.index, each.bit_length) for each in pdo.entries] == [
+            (0x6040, 16),
+            (0, 8),
+            (0x607A, 32),
+        ]
+        assert device.sync is not None
+        assert device.sync.shift_ns == -1_234_567
+
+
+def test_entries_without_a_variable_are_named(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    gap = "<Entry><Index>0</Index><BitLen>8</BitLen></Entry></TxPdo>"
+    path = write_eni(tmp_path, ("#x6040", "#x7040"), ("</TxPdo>", gap))
+    assert main(["init", str(path), "-o", str(tmp_path / "machine.toml")]) == 0
+    assert "the entries of PDO 0x1A00 are not converted" in capsys.readouterr().err
 
 
 def test_io_becomes_process_data_with_start_up_objects(shared_data: Path, tmp_path: Path) -> None:

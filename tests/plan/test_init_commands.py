@@ -39,6 +39,12 @@ def test_a_command_of_both_steps_in_pre_op_is_written_once() -> None:
     assert len(plan_of(both).devices[0].downloads) == 1
 
 
+def test_a_repeated_command_is_written_again() -> None:
+    """All commands of a file without line breaks have the same source."""
+    commands = plan_of(FILTER, replace(FILTER, data=b"\x06\x00"), FILTER).devices[0].commands
+    assert [each.data[0] for each in commands.in_pre_op] == [5, 6, 5]
+
+
 def test_your_object_replaces_a_command_that_is_not_fixed() -> None:
     request = DeviceRequest(objects=(StartUp(0x2010, 0, 7, type=types.UINT),))
     free = plan_of(FILTER, request=request).devices[0]
@@ -66,7 +72,7 @@ def test_objects_of_catenary_the_mapping_and_outputs_count_more() -> None:
     mapping = replace(FILTER, index=0x1C12)
     device = plan_of(mode, own, mapping, request=written).devices[0]
     assert [line.split(": ")[1].split(" (")[0] for line in device.commands.omitted] == [
-        "it is an output of the process data",
+        "the process data writes this output in each cycle; set it to 08 there",
         "Catenary writes this object",
         "the plan writes the mapping",
     ]

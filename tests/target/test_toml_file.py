@@ -10,6 +10,7 @@ from catenary.errors import ConfigurationError, MachineFileError
 from catenary.igh import Master
 from catenary.link import Interface, Ring
 from catenary.target import MainDevice, is_machine_file, parse
+from catenary.target.toml_file import read_toml
 from catenary.virtual import Segment
 
 
@@ -55,3 +56,19 @@ def test_a_target_that_is_not_text_is_refused(tmp_path: Path) -> None:
     path.write_text("target = 3\n")
     with pytest.raises(MachineFileError, match="target = 3 is not text"):
         parse(str(path))
+
+
+@pytest.mark.parametrize(
+    ("text", "hint"),
+    [
+        ("<?xml version='1.0'?><EtherCATConfig/>", "convert an ENI with `catenary init bus.xml"),
+        ("a = " + "x" * 10_000, "the line is: a = x"),
+    ],
+)
+def test_the_hint_about_another_file_is_short(tmp_path: Path, text: str, hint: str) -> None:
+    path = tmp_path / "machine.toml"
+    path.write_text(text)
+    with pytest.raises(MachineFileError, match="not TOML") as caught:
+        read_toml(path)
+    assert hint in caught.value.hint
+    assert len(caught.value.hint) < 250

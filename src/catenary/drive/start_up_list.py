@@ -82,7 +82,7 @@ def _check(command: MailboxCommand, path: str) -> None:
     place = f"{command.protocol}/InitCmds/InitCmd"
     place += f" ({command.comment})" * bool(command.comment)
     if command.protocol != "CoE":
-        what = f"IDN {command.idn} of drive {command.drive}: " if command.idn is not None else ""
+        what = f"{command.parameter}: " if command.parameter else ""
         message = f"{what}{command.protocol} is not supported; only CoE objects can be written"
     elif command.operation != DOWNLOAD:
         message = f"Ccs {command.operation} is not supported; only downloads (Ccs 1)"

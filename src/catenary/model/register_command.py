@@ -15,6 +15,11 @@ class Validation:
     mask: bytes  # as long as `data`
     timeout: float  # [s]
 
+    @property
+    def is_masked(self) -> bool:
+        """True if some bits are not compared."""
+        return any(each != 0xFF for each in self.mask)
+
     def accepts(self, found: bytes) -> bool:
         """Return True if the bits of the mask have the expected values."""
         start = found[: len(self.data)]

@@ -66,7 +66,7 @@ def choose_commands(
         for each, reason in reasons.items()
         if reason and known.intersection(each.transitions)
     ]
-    in_pre_op = tuple(dict.fromkeys(_downloads(written, PRE_OP_STEPS, origin)))
+    in_pre_op = tuple(_downloads(written, PRE_OP_STEPS, origin))
     # In SAFE-OP, a fixed command would follow the object of the application, and undo it.
     late = [each for each in written if not _is_given(each, given)]
     omitted += [
@@ -92,7 +92,10 @@ def _reason(
         return "your start-up object replaces it"
     if place in own:
         return "Catenary writes this object"
-    return "it is an output of the process data" if place in mapped else ""
+    if place in mapped:
+        data = command.data.hex(" ")
+        return f"the process data writes this output in each cycle; set it to {data} there"
+    return ""
 
 
 def _is_given(command: InitCommand, given: Collection[tuple[int, int]]) -> bool:
@@ -105,9 +108,13 @@ def _is_given(command: InitCommand, given: Collection[tuple[int, int]]) -> bool:
 def _downloads(
     commands: Sequence[InitCommand], steps: Sequence[str], origin: str
 ) -> Iterator[Download]:
-    for step in steps:
+    """Yield the commands of the steps. One of both IP and PS is written once, at IP.
+
+    The same object may occur with the same value again, such as a key that unlocks parameters.
+    """
+    for number, step in enumerate(steps):
         for each in commands:
-            if step in each.transitions:
+            if step in each.transitions and not set(steps[:number]).intersection(each.transitions):
                 yield Download(
                     each.index,
                     each.subindex,

@@ -81,8 +81,7 @@ def _fault(command: RegisterCommand, reply: Reply) -> str:
     validation = command.validation
     if validation is None or validation.accepts(reply.data):
         return ""
-    everything = validation.mask == b"\xff" * len(validation.mask)
-    mask = "" if everything else f" under mask {validation.mask.hex(' ')}"
+    mask = f" under mask {validation.mask.hex(' ')}" if validation.is_masked else ""
     found = reply.data[: len(validation.data)].hex(" ")
     return f"expected {validation.data.hex(' ')}{mask}, read {found}"
 

@@ -10,6 +10,7 @@ from pathlib import Path
 from catenary.errors import MachineFileError
 
 VIRTUAL = ("virtual", "virtual-realtime")  # targets that may name the file of a segment
+LINE_MAX = 200  # characters of a line in an error
 _PLACE = re.compile(r"\s*\(at (?:line (\d+), column (\d+)|end of document)\)")
 
 
@@ -93,5 +94,8 @@ def _parts(message: str, text: str) -> tuple[str, int]:
 
 
 def _hint(text: str, line: int) -> str:
-    content = text.splitlines()[line - 1 : line]
-    return f"the line is: {content[0].strip()}" if content and content[0].strip() else ""
+    if text.lstrip("\ufeff \r\n\t").startswith("<"):
+        return "this is an XML file; convert an ENI with `catenary init bus.xml -o machine.toml`"
+    content = "".join(text.splitlines()[line - 1 : line]).strip()
+    more = " ..." if len(content) > LINE_MAX else ""
+    return f"the line is: {content[:LINE_MAX]}{more}" if content else ""

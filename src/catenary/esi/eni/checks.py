@@ -104,7 +104,7 @@ def _check_request(
                 eni,
                 place,
                 request.source,
-                f"{request.protocol} is not supported",
+                f"{request.parameter}: {request.protocol} is not supported".removeprefix(": "),
                 f'to run the bus without it: cat.Machine(..., without=["{request.protocol}"])',
             )
     elif request.operation != DOWNLOAD:

@@ -29,10 +29,13 @@ def sync_signals(device: EniDevice) -> SyncSignals | None:
     Args:
         device: The device.
     """
-    activation = written(device, ASSIGN_ACTIVATE, "PS")
-    if activation is None or len(activation.data) < 2:
-        return None
-    assign = int.from_bytes(activation.data[:2], "little")
+    word = written(device, ASSIGN_ACTIVATE, "PS")
+    byte = written(device, register.ACTIVATION.address, "PS")
+    assign = 0
+    if word is not None and len(word.data) >= 2:
+        assign = int.from_bytes(word.data[:2], "little")
+    elif byte is not None:
+        assign = byte.data[0] << 8
     if not assign:
         return None
     clock = device.clock

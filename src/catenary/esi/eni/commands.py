@@ -6,15 +6,16 @@ from collections.abc import Iterator
 
 from catenary.esi.eni.fields import Fields
 from catenary.esi.eni.known import PROTOCOLS
+from catenary.esi.eni.own_registers import LOGICAL
 from catenary.esi.eni.values import MailboxCommand, RegisterCommand, Validation
 from catenary.esi.xml import Element
 from catenary.model.esi_settings import InitCommand
 from catenary.wire.datagram import EcatCommand
 
-LOGICAL = (EcatCommand.LRD, EcatCommand.LWR, EcatCommand.LRW)
 STATES = "IPSOB"  # letters of a transition: INIT, PRE-OP, SAFE-OP, OP, BOOT
 MILLISECOND = 1e-3
 DOWNLOAD = 1  # Ccs of CoE
+SOE_VALUE = 0x40  # Elements of SoE: the value of the IDN
 TIMEOUT_MAX = 600_000  # of a command [ms]
 DATA_MAX = 1486  # of one datagram [bytes], ETG.1000.4
 
@@ -152,6 +153,7 @@ def _mailbox_command(protocol: str, element: Element, fields: Fields) -> Mailbox
         download=download,
         operation=fields.number(element, "OpCode" if is_soe else "Ccs", bits=8, default=1),
         idn=fields.number(element, "IDN", bits=16) if is_soe else None,
+        elements=fields.number(element, "Elements", bits=8, default=SOE_VALUE) if is_soe else 0,
         drive=fields.number(element, "DriveNo", bits=8, default=0) if is_soe else 0,
         disabled=fields.flag(element, "Disabled"),
         timeout=read_timeout(element, fields),

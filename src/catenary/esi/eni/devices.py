@@ -128,12 +128,19 @@ def _sync_managers(
 ) -> tuple[EniSyncManager, ...]:
     if process_data is None:
         return ()
-    found = ((index, process_data.find(f"Sm{index}")) for index in range(SYNC_MANAGERS))
-    return tuple(
-        _sync_manager(index, element, pdos, fields)
-        for index, element in found
-        if element is not None and fields.text(element, "Type") not in MAILBOX_TYPES
-    )
+    managers: list[EniSyncManager] = []
+    assigned: set[int] = set()
+    for index in range(SYNC_MANAGERS):
+        element = process_data.find(f"Sm{index}")
+        if element is None or fields.text(element, "Type") in MAILBOX_TYPES:
+            continue
+        manager = _sync_manager(index, element, pdos, fields)
+        for pdo in manager.pdos:
+            if pdo.index in assigned:
+                fields.refuse(element, f"PDO 0x{pdo.index:04X} is assigned twice", tag="Pdo")
+            assigned.add(pdo.index)
+        managers.append(manager)
+    return tuple(managers)
 
 
 def _sync_manager(

@@ -118,7 +118,9 @@ class Fields:
         found = parent.find(tag)
         if found is None:
             return None
-        digits = HEX_PREFIX.sub("", BLANK.sub("", found.text), count=1)
+        digits = BLANK.sub("", found.text)
+        prefix = HEX_PREFIX.match(digits)
+        digits = digits[prefix.end() :] if prefix else digits
         try:
             return bytes.fromhex(digits)
         except ValueError:

@@ -23,11 +23,14 @@ OWN_REGISTERS = (  # first and last address, reason
 UPWARDS = frozenset(("IP", "PS", "SO"))
 READS = (EcatCommand.APRD, EcatCommand.FPRD)
 WRITES = (EcatCommand.APWR, EcatCommand.FPWR)
+LOGICAL = (EcatCommand.LRD, EcatCommand.LWR, EcatCommand.LRW)
 BY_POSITION = (EcatCommand.APRD, EcatCommand.APWR)
 
 
 def own_reason(command: RegisterCommand) -> str:
     """Return the reason why Catenary does not run a command; empty if it runs it."""
+    if command.command in LOGICAL:  # its address is not that of a register
+        return ""
     last = command.offset + len(command.data) - 1
     for first, end, reason in OWN_REGISTERS:
         if first <= command.offset and last <= end:

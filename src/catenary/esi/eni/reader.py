@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
+from itertools import islice
 from pathlib import Path
 from typing import Never
 
@@ -9,9 +11,10 @@ from catenary.errors import EsiError, MachineFileError
 from catenary.esi.document import Limits, open_document
 from catenary.esi.eni.commands import read_address, read_register_commands
 from catenary.esi.eni.devices import read_devices
-from catenary.esi.eni.fields import Fields
+from catenary.esi.eni.fields import WARNINGS_MAX, Fields
 from catenary.esi.eni.known import CONFIG
-from catenary.esi.eni.values import EniCyclicCommand, EniFile, Variable
+from catenary.esi.eni.values import EniCyclicCommand, EniDevice, EniFile, Variable
+from catenary.esi.source import EsiWarning
 from catenary.esi.xml import Element, find_elements
 from catenary.model.device import Direction
 from catenary.wire.datagram import EcatCommand
@@ -75,6 +78,9 @@ def read_eni(path: str | Path) -> EniFile:
     master = config.find("Master")
     devices = read_devices(config, fields)
     image = config.find("ProcessImage")
+    variables = _variables(image, fields)
+    sizes = _size(image, "Inputs", fields), _size(image, "Outputs", fields)
+    fields.warnings += islice(_contradictions(devices, variables, sizes), WARNINGS_MAX)
     return EniFile(
         path=name,
         encrypted=fields.encrypted,
@@ -82,8 +88,8 @@ def read_eni(path: str | Path) -> EniFile:
         devices=devices,
         cycle_time=_cycle_time(config, fields),
         cyclic=_cyclic(config, fields),
-        variables=_variables(image, fields),
-        image_sizes=(_size(image, "Inputs", fields), _size(image, "Outputs", fields)),
+        variables=variables,
+        image_sizes=sizes,
         warnings=tuple(fields.warnings),
     )
 
@@ -157,6 +163,30 @@ def _variable(element: Element, direction: Direction, fields: Fields) -> Variabl
         bit_offset=fields.number(element, "BitOffs"),
         source=fields.source(element),
     )
+
+
+def _contradictions(
+    devices: Sequence[EniDevice], variables: Sequence[Variable], sizes: tuple[int, int]
+) -> Iterator[EsiWarning]:
+    """Yield lengths of devices other than those of their PDOs, and variables outside the image."""
+    for device in devices:
+        for direction in Direction:
+            bits = sum(part.bit_length for part in device.image(direction))
+            lengths = [manager.bit_length for manager in device.managers(direction)]
+            if not sum(lengths) <= bits <= sum(-(-length // 8) * 8 for length in lengths):
+                yield EsiWarning(
+                    device.source,
+                    f"{device.name}: {bits} bits of {direction.noun}, but its PDOs have "
+                    f"{sum(lengths)}; the PDOs are used",
+                )
+    ends = {Direction.INPUT: sizes[0], Direction.OUTPUT: sizes[1]}
+    for each in variables:
+        size = ends[each.direction]
+        if size and each.bit_offset + each.bit_length > 8 * size:
+            yield EsiWarning(
+                each.source,
+                f"variable {each.name!r} ends after the {size} bytes of the {each.direction.noun}",
+            )
 
 
 def _size(image: Element | None, tag: str, fields: Fields) -> int:

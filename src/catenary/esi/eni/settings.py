@@ -9,9 +9,11 @@ from catenary.esi.eni.own_registers import WRITES, vendor_commands
 from catenary.esi.eni.values import EniDevice, EniFile, RegisterCommand
 from catenary.model.device import DeviceDescription
 from catenary.model.esi_settings import Timeouts, WatchdogValues
+from catenary.model.register_command import Validation
 from catenary.wire import register
 
 ASSIGN_ACTIVATE = register.ACTIVATION.address - 1  # 0x0980, SYNC unit control
+TIMEOUT_MAX = 60.0  # [s], as for those of an ESI
 SII_DATA = 0x0508
 SII_CONTROL = 0x0502
 REVISION_WORD, SERIAL_WORD = 0x000C, 0x000E  # words of the SII
@@ -73,26 +75,32 @@ def watchdog_of(device: EniDevice) -> WatchdogValues:
 
 
 def _timeouts(device: EniDevice) -> Timeouts:
-    """Return the timeouts of the commands that request a state."""
+    """Return the timeouts of the commands that request a state, and of the mailbox commands."""
 
     def longest(*transitions: str) -> float | None:
         commands = (written(device, register.AL_CONTROL.address, each) for each in transitions)
         times = [each.timeout for each in commands if each is not None and each.timeout]
-        return max(times, default=None)
+        return min(max(times), TIMEOUT_MAX) if times else None
 
-    return Timeouts(pre_op=longest("IP"), safe_op_and_op=longest("PS", "SO"))
+    answer = max((each.timeout for each in device.requests), default=0.0)
+    return Timeouts(
+        pre_op=longest("IP"),
+        safe_op_and_op=longest("PS", "SO"),
+        mailbox_response=min(answer, TIMEOUT_MAX) or None,
+    )
 
 
-def checked_words(commands: Sequence[RegisterCommand]) -> frozenset[int]:
-    """Return the words of the SII that the commands compare, such as the revision.
+def checked_words(commands: Sequence[RegisterCommand]) -> dict[int, Validation]:
+    """Return the validations of words of the SII that the commands read, such as the revision.
 
     A read of the SII data register is preceded by the command that starts it, with the word in its
     data (ETG.1000.4 §6.4).
     """
-    found, word = set(), None
+    found: dict[int, Validation] = {}
+    word = None
     for each in commands:
         if each.offset == SII_CONTROL and len(each.data) >= 6:
             word = int.from_bytes(each.data[2:6], "little")
         elif each.offset == SII_DATA and each.validation is not None and word is not None:
-            found.add(word)
-    return frozenset(found)
+            found[word] = each.validation
+    return found

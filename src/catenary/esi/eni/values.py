@@ -35,11 +35,20 @@ class MailboxCommand:
     download: InitCommand | None = None  # the object of a CoE command
     operation: int = 0  # Ccs of CoE (1: download), OpCode of SoE (3: write)
     idn: int | None = None  # of SoE
+    elements: int = 0  # of SoE: parts of the IDN; 0x40 is the value
     drive: int = 0  # of SoE
     disabled: bool = False
     timeout: float = 0.0
     comment: str = ""
     source: Source = NO_SOURCE
+
+    @property
+    def parameter(self) -> str:
+        """IDN and drive of a SoE command, such as "P-0-0032 of drive 1"; empty for others."""
+        if self.idn is None:
+            return ""
+        letter, group, number = "SP"[self.idn >> 15], self.idn >> 12 & 7, self.idn & 0xFFF
+        return f"{letter}-{group}-{number:04d} of drive {self.drive}"
 
 
 @dataclass(frozen=True, slots=True)

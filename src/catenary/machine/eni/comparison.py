@@ -200,6 +200,11 @@ def _watchdog(device: EniDevice, planned: DevicePlan) -> Iterator[str]:
 def _clock(device: EniDevice, planned: DevicePlan) -> Iterator[str]:
     signals, sync = sync_signals(device), planned.sync
     if signals is None and sync is None:
+        if device.clock is not None and device.clock.sync0:
+            yield (
+                f"{device.clock.source}: DC/CycleTime0 has no effect, because no command at PS "
+                "starts the SYNC signals (0x0980)"
+            )
         return
     theirs = "no SYNC signals"
     if signals is not None:

@@ -13,7 +13,7 @@ from msgspec import UNSET
 
 from catenary.bus import SubDevice
 from catenary.drive import ProcessData
-from catenary.errors import ConfigurationError, MachineFileError
+from catenary.errors import ConfigurationError, IdentityError, MachineFileError
 from catenary.esi.eni import EniFile, read_eni
 from catenary.esi.eni.checks import check_commands
 from catenary.esi.eni.own_registers import left_out, vendor_commands
@@ -78,12 +78,15 @@ class EniMachine:
         """
         eni, tables = self._eni, device_tables(self._eni)
         if passive:
-            raise_differences(Path(eni.path), compare(tables, main.passive_scan()))
+            found = compare(tables, main.passive_scan())
+            raise_differences(Path(eni.path), found)
+            _check_masked(eni, found)
         else:
             self._refuse_kernel_master()
         subs = main.scan(strict=False, esi=False, settings=partial(with_eni, eni=eni))
         found = compare(tables, subs)
         raise_differences(Path(eni.path), found)
+        _check_masked(eni, found)
         parts = self._parts({each.name: each.found for each in found if each.found is not None})
         for sub in parts.subs.values():
             if sub.error is not None:
@@ -152,22 +155,25 @@ class EniMachine:
 
 def device_names(eni: EniFile) -> list[str]:
     """Return a unique name for each device: that of the file, with its position if needed."""
-    names = Counter(device.name for device in eni.devices)
-    return [
-        device.name if names[device.name] == 1 else f"{device.name} {device.position}"
-        for device in eni.devices
+    count = Counter(device.name for device in eni.devices)
+    numbered = [f"{device.name} {device.position}" for device in eni.devices]
+    names = [
+        device.name if count[device.name] == 1 else each
+        for device, each in zip(eni.devices, numbered, strict=True)
     ]
+    return names if len(set(names)) == len(names) else numbered
 
 
 def device_tables(eni: EniFile) -> list[DeviceTable]:
     """Return the devices with the identities to check.
 
     Vendor and product are always checked, revision and serial number only if a command of the file
-    compares them.
+    compares all of their bits.
     """
     tables = []
     for name, device in zip(device_names(eni), eni.devices, strict=True):
-        checked = checked_words(device.commands)
+        validations = checked_words(device.commands).items()
+        checked = {word for word, each in validations if not each.is_masked}
         identity = device.identity
         tables.append(
             DeviceTable(
@@ -182,6 +188,27 @@ def device_tables(eni: EniFile) -> list[DeviceTable]:
             )
         )
     return tables
+
+
+def _check_masked(eni: EniFile, found: Sequence[Comparison[SubDevice]]) -> None:
+    """Raise IdentityError for a revision without the bits that a command of the file compares."""
+    for device, each in zip(eni.devices, found, strict=False):
+        validation = checked_words(device.commands).get(REVISION_WORD)
+        if validation is None or each.found is None:
+            continue
+        revision = each.found.identity.revision
+        if validation.is_masked and not validation.accepts(revision.to_bytes(4, "little")):
+            data, mask = (
+                int.from_bytes(part, "little") for part in (validation.data, validation.mask)
+            )
+            raise IdentityError(
+                f'{eni.path}: device "{each.name}": expected revision 0x{data:08X} under mask '
+                f"0x{mask:08X}, found 0x{revision:08X}",
+                position=device.position,
+                expected=device.identity,
+                found=each.found.identity,
+                hint="export the ENI with the revision of the device, or without this comparison",
+            )
 
 
 def _identity_notes(eni: EniFile, found: Sequence[Comparison[SubDevice]]) -> list[str]:

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
-from catenary.esi.eni.own_registers import UPWARDS, vendor_commands
+from catenary.esi.device import EsiPdo
+from catenary.esi.eni.own_registers import own_reason
 from catenary.esi.eni.places import PlacedVariable, place_variables
+from catenary.esi.eni.settings import watchdog_of
 from catenary.esi.eni.values import EniDevice, EniFile, MailboxCommand
 from catenary.machine.eni.machine import DEFAULT_PERIOD, device_tables
 from catenary.machine.eni.requests import clock, number_type
@@ -36,7 +38,7 @@ def eni_text(eni: EniFile) -> tuple[str, tuple[str, ...]]:
     """
     names = unique_names([slug(device.name, "device") for device in eni.devices])
     notes: list[str] = []
-    period = f"{(eni.cycle_time or DEFAULT_PERIOD) * 1e6:g} us"
+    period = _time(eni.cycle_time or DEFAULT_PERIOD)
     head = HEAD.format(mark=FILL_IN, format=FORMAT, target=quoted("eth0"))
     head = head.replace("# cat.Machine(", f"# {FILL_IN}: your interface. cat.Machine(")
     head, devices, rest = head.partition("# Devices, ")
@@ -49,7 +51,7 @@ def eni_text(eni: EniFile) -> tuple[str, tuple[str, ...]]:
     by_device = placed.by_device()
     for name, device in zip(names, eni.devices, strict=True):
         if not slots_of(device):
-            parts += _process_data(name, device, by_device.get(device.position, ()))
+            parts += _process_data(name, device, by_device.get(device.position, ()), notes)
     notes += [f"{eni.path}: variable {name!r}: {why}" for name, why in placed.left_out.items()]
     return "".join(parts), tuple(notes)
 
@@ -102,11 +104,16 @@ identity = {{ {identity} }}
     lines = [line for each in device.requests for line in _start_up(device, each, notes)]
     if lines:
         yield "start_up = [\n" + "".join(f"    {line},\n" for line in lines) + "]\n"
-    for command in vendor_commands(device):
-        steps = ", ".join(sorted(UPWARDS.intersection(command.transitions)))
+    notes += [
+        f"{each.source}: {device.name}: the command at {', '.join(each.transitions)} to register "
+        f"{each} = {each.data.hex(' ')} is not converted"
+        for each in device.commands
+        if not own_reason(each)
+    ]
+    if watchdog_of(device).process_data is not None:
         notes.append(
-            f"{command.source}: {device.name}: the command at {steps} to register {command} = "
-            f"{command.data.hex(' ')} is not converted"
+            f"{device.source}: {device.name}: the watchdog time is not converted; "
+            "write `watchdog` in [loop] to change the default"
         )
 
 
@@ -162,7 +169,7 @@ def _drives(names: Sequence[str], devices: Sequence[EniDevice]) -> Iterator[str]
     counts = f"# counts_per_turn = 0                  # {FILL_IN}: encoder counts per motor turn"
     yield DRIVES.format(mark=FILL_IN, axes=", ".join(axes), counts=counts)
     yield from _same(
-        [f"pdos = [{_indices(device)}]" for _, device, _ in drives], "different PDOs: add pdos"
+        [f"pdos = {_written_pdos(device)}" for _, device, _ in drives], "different PDOs: add pdos"
     )
     clocks = [_clock(device) for _, device, _ in drives]
     if any(clocks):
@@ -174,9 +181,23 @@ def _same(lines: Sequence[str], otherwise: str) -> Iterator[str]:
     yield f"{lines[0]}\n" if len(set(lines)) == 1 else f"# the drives have {otherwise}\n"
 
 
-def _indices(device: EniDevice) -> str:
-    pdos = [pdo.index for manager in device.sync_managers for pdo in manager.pdos]
-    return ", ".join(f"0x{index:04X}" for index in pdos)
+def _written_pdos(device: EniDevice) -> str:
+    """Return the PDOs: numbers if all are fixed, else a table with the entries."""
+    pdos = [pdo for manager in device.sync_managers for pdo in manager.pdos]
+    if all(pdo.fixed for pdo in pdos):
+        return f"[{', '.join(f'0x{pdo.index:04X}' for pdo in pdos)}]"
+    return f"{{ {', '.join(map(_with_entries, pdos))} }}"
+
+
+def _with_entries(pdo: EsiPdo) -> str:
+    entries = () if pdo.fixed else pdo.entries
+    written = (f"[0x{each.index:04X}, {each.subindex}, {each.bit_length}]" for each in entries)
+    return f'"0x{pdo.index:04X}" = [{", ".join(written)}]'
+
+
+def _time(seconds: float) -> str:
+    """Return a time with its nanoseconds."""
+    return f"{round(seconds * 1e9) / 1000:.15g} us"
 
 
 def _clock(device: EniDevice) -> str:
@@ -184,13 +205,13 @@ def _clock(device: EniDevice) -> str:
     if request is None:
         return ""
     times = (("sync0", request.sync0), ("sync1", request.sync1), ("shift", request.shift))
-    given = [f'{name} = "{time * 1e6:g} us"' for name, time in times if time is not None]
+    given = [f'{name} = "{_time(time)}"' for name, time in times if time is not None]
     given.append(f"assign_activate = 0x{request.assign_activate:04X}")
     return f"clock = {{ {', '.join(given)} }}"
 
 
 def _process_data(
-    name: str, device: EniDevice, variables: Sequence[PlacedVariable]
+    name: str, device: EniDevice, variables: Sequence[PlacedVariable], notes: list[str]
 ) -> Iterator[str]:
     if not any(device.managers(direction) for direction in Direction):
         return
@@ -217,6 +238,11 @@ def _process_data(
             entries = [at.get((pdo.index, entry)) for entry in pdo.entries]
             known = [quoted(entry) for entry in entries if entry is not None]
             kept = pdo.fixed or len(known) < len(entries)
+            if kept and not pdo.fixed:
+                notes.append(
+                    f"{pdo.source}: {device.name}: the entries of PDO 0x{pdo.index:04X} are not "
+                    "converted, because not all have a variable; those of the device are used"
+                )
             yield f'"0x{pdo.index:04X}" = [{"" if kept else ", ".join(known)}]\n'
 
 
