@@ -99,7 +99,7 @@ def _read(main: MainDevice, folder: Path | None, options: CloneOptions, progress
     where = None if folder is None else prepare(folder)
     topology = make_topology([open_ports(each.dl_status) for each in present], ring=ring)
     notes = list(topology.contradictions)
-    keeps = not (options.fresh or is_complete(where))
+    keeps = where is not None and not (options.fresh or is_complete(where))
     with _addressed(main, present, notes) as addresses:
         devices = [
             _device(
