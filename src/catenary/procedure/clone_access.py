@@ -93,15 +93,16 @@ def _changes_device(request: Request) -> bool:
 
 
 def left_state(station: Station, state: int, code: int) -> StateError:
-    """Return the error for a device that is no longer in an allowed state.
+    """Return the error for a device that has left the allowed states.
 
     Args:
         station: The device.
         state: Its state now.
         code: Its AL status code.
     """
+    name = str(AlState(state)) if state in tuple(AlState) else f"state {state}"
     return StateError(
-        f"{station} is in state {state} now; it is not written to",
+        f"{station} is in {name} now; it is not written to",
         position=station.position,
         requested=int(AlState.PRE_OP),
         actual=state,
