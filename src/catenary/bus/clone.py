@@ -23,7 +23,7 @@ from catenary.line.writer import finish, is_complete, prepare, write_device
 from catenary.link import RingLink
 from catenary.link.ring_state import Shape
 from catenary.model.topology import Topology, make_topology, open_ports
-from catenary.procedure.clone_access import give_address, return_address, unambiguous
+from catenary.procedure.clone_addresses import give_address, return_address, unambiguous
 from catenary.procedure.clone_registers import Present, read_present
 from catenary.procedure.stations import count
 

@@ -1,4 +1,4 @@
-"""Access to devices for a clone: which ones may be written to, addresses, states and mailboxes.
+"""Access to devices for a clone: which ones may be written to, states and mailboxes.
 
 Reading an EEPROM or an object needs writes to the device. They are allowed in INIT and PRE-OP only.
 What is changed is restored.
@@ -6,12 +6,10 @@ What is changed is restored.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
-from itertools import chain
 from typing import TypeVar
 
-from catenary.errors import DecodeError, MailboxError, SegmentError, StateError
+from catenary.errors import DecodeError, MailboxError, StateError
 from catenary.model.describe import MAILBOX_MIN
 from catenary.model.device import DeviceDescription, MailboxLayout
 from catenary.procedure.al_state import read_state, request_state, write_control
@@ -20,15 +18,12 @@ from catenary.procedure.exchange import Procedure, Request, read, write
 from catenary.procedure.mailbox import IN, OUT, MailboxChannel
 from catenary.procedure.state_path import climb
 from catenary.procedure.station import Station, answered, station_of
-from catenary.procedure.stations import STATION_BASE
 from catenary.wire.al import STATE_MASK, AlControl, AlState
 from catenary.wire.datagram import EcatCommand
 from catenary.wire.frame import MAXIMUM_DATA
 from catenary.wire.register import (
-    AL_STATUS,
     PROCESS_RAM,
     SII_CONFIGURATION,
-    STATION_ADDRESS,
     sync_manager,
     sync_manager_activation,
 )
@@ -51,84 +46,6 @@ def is_writable(device: Present) -> bool:
     return device.state in WRITABLE
 
 
-def unambiguous(devices: Sequence[Present]) -> tuple[int | None, ...]:
-    """Return an address for each device to which only this device answers.
-
-    Devices in INIT and PRE-OP keep their address if it is unique, else get a free one. Other
-    devices have None, because their address cannot be changed.
-    """
-    answering = [each.station_address for each in devices]
-    aliases = [each.alias if each.answers_to_alias else 0 for each in devices]
-    taken = {*answering, *aliases, *(each.alias for each in devices)}
-    found: list[int | None] = []
-    for rank, device in enumerate(devices):
-        address = device.station_address
-        if not is_writable(device):
-            found.append(None)
-            continue
-        others = (*answering[:rank], *answering[rank + 1 :], *aliases[:rank], *aliases[rank + 1 :])
-        if address == 0 or address in others:
-            address = _free(STATION_BASE + rank, taken)
-            taken.add(address)
-        found.append(address)
-    return tuple(found)
-
-
-def _free(first: int, taken: Collection[int]) -> int:
-    """Return the first address from `first` on that no device has; 0 is not an address."""
-    free = (n for n in chain(range(first, 0x10000), range(1, first)) if n not in taken)
-    return next(free)
-
-
-def give_address(device: Present, address: int) -> Procedure[None]:
-    """Write a station address by position, if the same device is there in INIT or PRE-OP.
-
-    Args:
-        device: Registers of the device.
-        address: The new station address.
-
-    Raises:
-        StateError: The device is in another state.
-        SegmentError: Another device is at its position.
-    """
-    station = Station(device.rank, address)
-    state, now = yield [
-        read(EcatCommand.APRD, -device.rank, AL_STATUS),
-        read(EcatCommand.APRD, -device.rank, STATION_ADDRESS),
-    ]
-    word = AL_STATUS.unpack(answered(state, station, "AL status"))
-    if word & STATE_MASK not in WRITABLE:
-        raise _left(station, word & STATE_MASK, 0)
-    found = STATION_ADDRESS.unpack(answered(now, station, "station address"))
-    if found != device.station_address:
-        raise SegmentError(
-            f"{station} has the station address 0x{found:04X}, and had "
-            f"0x{device.station_address:04X} before",
-            hint="a device was plugged in or unplugged: check the cables, then clone again",
-        )
-    [reply] = yield [write(EcatCommand.APWR, -device.rank, STATION_ADDRESS, address)]
-    answered(reply, station, "station address")
-
-
-def return_address(device: Present, address: int) -> Procedure[None]:
-    """Write back the station address of a device that has another one.
-
-    Args:
-        device: Registers of the device before its address was changed.
-        address: Its present address, to which no other device answers.
-
-    Raises:
-        StateError: The device is neither in INIT nor in PRE-OP.
-    """
-    station = Station(device.rank, address)
-    yield from require_writable(station)
-    request = write(EcatCommand.FPWR, address, STATION_ADDRESS, device.station_address)
-    # Not repeated: after a lost answer, the device has its old address already.
-    [reply] = yield [request._replace(repeatable=False)]
-    if not reply.lost:
-        answered(reply, station, "station address")
-
-
 def require_writable(station: Station, *states: AlState) -> Procedure[None]:
     """Check that a device is still in INIT or PRE-OP, or in one of `states`.
 
@@ -141,7 +58,7 @@ def require_writable(station: Station, *states: AlState) -> Procedure[None]:
     """
     found = yield from read_state(station)
     if found.state not in (states or WRITABLE):
-        raise _left(station, found.word & STATE_MASK, found.code)
+        raise left_state(station, found.word & STATE_MASK, found.code)
 
 
 def while_writable(station: Station, procedure: Procedure[T], *states: AlState) -> Procedure[T]:
@@ -175,9 +92,17 @@ def _changes_device(request: Request) -> bool:
     return request.command.writes or request.address >> 16 >= PROCESS_RAM
 
 
-def _left(station: Station, state: int, code: int) -> StateError:
+def left_state(station: Station, state: int, code: int) -> StateError:
+    """Return the error for a device that has left the allowed states.
+
+    Args:
+        station: The device.
+        state: Its state now.
+        code: Its AL status code.
+    """
+    name = str(AlState(state)) if state in tuple(AlState) else f"state {state}"
     return StateError(
-        f"{station} is in state {state} now; it is not written to",
+        f"{station} is in {name} now; it is not written to",
         position=station.position,
         requested=int(AlState.PRE_OP),
         actual=state,
