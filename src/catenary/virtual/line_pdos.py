@@ -59,15 +59,22 @@ def _placed(pdo: Pdo, manager: int) -> Pdo:
 
 def _pdo(device: ClonedDevice, each: ClonedObject, names: dict[int, Pdo]) -> Pdo:
     known = names.get(each.index)
-    first = each.entry(0)
     return Pdo(
         each.index,
         each.name or (known.name if known else ""),
         tuple(_entries(device, each)),
         UNASSIGNED,
-        fixed=first is None or not first.access & WRITABLE,
+        fixed=_is_fixed(each, known),
         mandatory=known is not None and known.mandatory,
     )
+
+
+def _is_fixed(each: ClonedObject, known: Pdo | None) -> bool:
+    """Return True if the mapping cannot be changed. Without a description, the SII decides."""
+    first = each.entry(0)
+    if first is not None and not (first.access or first.bit_length):
+        return known is not None and known.fixed
+    return first is None or not first.access & WRITABLE
 
 
 def _entries(device: ClonedDevice, each: ClonedObject) -> Iterator[MappedEntry]:

@@ -72,9 +72,13 @@ def _has_value(facts: ObjectFacts) -> bool:
 def _dressed(
     facts: ObjectFacts, stored: Mapping[int, Entry], live: Mapping[int, Entry]
 ) -> dict[int, Entry]:
-    """Return the entries of the file, with the behaviour of those of the device."""
+    """Return the entries of the file, with the behaviour of those of the device.
+
+    If the file has no description of the object, it has only the entries that were in use.
+    """
     recorded = {entry.subindex: entry for entry in facts.entries}
-    return {
+    unused = {} if facts.code else {k: each for k, each in live.items() if k not in stored}
+    return unused | {
         subindex: _with_behaviour(recorded[subindex], entry, live[subindex])
         if subindex in live
         else entry

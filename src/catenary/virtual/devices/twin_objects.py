@@ -108,7 +108,10 @@ class TwinObjects:
         self.values: dict[int, int] = {}
 
     def make(self) -> dict[int, tuple[ObjectFacts, dict[int, Entry]]]:
-        """Return all objects by index, with their entries."""
+        """Return all objects by index, with their entries.
+
+        A real device that describes none of its objects also has those in its PDOs.
+        """
         found = {
             each.index: (
                 each,
@@ -116,12 +119,13 @@ class TwinObjects:
             )
             for each in self._objects
         }
-        if self._exact:
+        if self._exact and any(each.code for each in self._objects):
             return found
         for (index, subindex), mapped in self._mapped.items():
             facts, entries = found.setdefault(index, (ObjectFacts(index, mapped.name, ()), {}))
             if subindex not in entries:
-                named = EntryFacts(subindex, mapped.name, mapped.data_type, mapped.bits, READ_ANY)
+                access = READ_ANY | (WRITE_ANY if self._flags[index, subindex] & MAP_RX else 0)
+                named = EntryFacts(subindex, mapped.name, mapped.data_type, mapped.bits, access)
                 entries[subindex] = self._entry(facts.index, named)
         return {index: (facts, _counted(entries)) for index, (facts, entries) in found.items()}
 
