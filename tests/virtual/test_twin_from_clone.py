@@ -31,8 +31,6 @@ from catenary.virtual import (
     faults,
     read_segment,
 )
-from catenary.virtual.coe.information import InformationServer
-from catenary.virtual.scheduler import Scheduler
 from catenary.wire import register
 from catenary.wire.sdo_information import Access
 from tests.virtual.plants import PENDULUM
@@ -377,34 +375,3 @@ def test_an_object_that_no_pdo_carries_can_be_mapped(tmp_path: Path) -> None:
             data["word"] = 0x1234
             loop.run_for(0.02)
             assert twin_of(segment, 1).read_object(0x2102) == b"\x34\x12"
-
-
-class Undescribed(Servo):
-    """A servo that neither lists nor describes its objects."""
-
-    def started(self, scheduler: Scheduler) -> None:
-        super().started(scheduler)
-        dictionary = self.application.dictionary
-        self.application._information = InformationServer(dictionary, size=122, supported=False)
-
-
-def test_a_drive_without_descriptions_moves_and_maps(tmp_path: Path) -> None:
-    """Its clone has no object of CiA 402, and only the entries of its PDOs that are in use."""
-    first, second = and_again(Segment([Undescribed(serial=1)]), tmp_path)
-    assert first.devices[0].object(0x6041) is None
-    assert first == second
-    segment = Segment.from_clone(tmp_path / "first")
-    with cat.MainDevice(segment) as main:
-        arm = cat.Drives(main.scan().drives, counts_per_turn=TURN, velocity_limit=1.0)
-        with cat.Loop(arm, period=1e-3) as loop:
-            loop.wait(arm.move_by(0.2))
-            assert twin_of(segment, 0).axis_position() == pytest.approx(0.2, abs=5e-3)
-    with cat.MainDevice(segment) as main:
-        [sub] = main.scan()
-        for index, values in ((0x1600, (0x6040_0010, 0x607A_0020)), (0x1C12, (0x1600, 0x1602))):
-            size = 4 if index == 0x1600 else 2
-            sub.sdo.write(index, 0, b"\0")
-            for subindex, value in enumerate(values, start=1):
-                sub.sdo.write(index, subindex, value.to_bytes(size, "little"))
-            sub.sdo.write(index, 0, b"\2")
-            assert sub.sdo.read(index, 0) == b"\2"

@@ -12,11 +12,11 @@ from catenary.virtual.coe.object_facts import EntryFacts, ObjectFacts
 from catenary.virtual.description import Description, FileFacts
 from catenary.virtual.line_pdos import cloned_pdos
 from catenary.virtual.mapping_quirks import MappingQuirks
-from catenary.virtual.sii_blueprint import decoded, describe_sii, ports_of
+from catenary.virtual.sii_blueprint import CHECKSUM_BYTE, decoded, describe_sii, ports_of
 from catenary.virtual.wiring import Place
 from catenary.wire.features import Information, PortKind
 from catenary.wire.sdo_information import Access
-from catenary.wire.sii import HEADER_SIZE, MailboxProtocol, Sii
+from catenary.wire.sii import HEADER_SIZE, MailboxProtocol, Sii, checksum_of
 
 FMMUS_MAX = 8  # of a virtual controller
 ASSIGNMENTS = range(0x1C10, 0x1C30)
@@ -57,8 +57,14 @@ def cloned_blueprint(device: ClonedDevice, folder: str) -> Blueprint:
         serves_coe=coe,
         information=_information(information),
         clock_bits=32 if information is not None and information.clock_bits == 32 else None,
-        alias=device.alias,
+        alias=None if device.alias == _loaded_alias(image, sii) else device.alias,
     )
+
+
+def _loaded_alias(image: bytes, sii: Sii) -> int:
+    """Return the alias that a controller loads. It ignores an image with a wrong checksum."""
+    valid = image[CHECKSUM_BYTE] == checksum_of(image)
+    return sii.header.station_alias if valid else 0
 
 
 def parents(devices: Sequence[ClonedDevice]) -> dict[int, Place]:

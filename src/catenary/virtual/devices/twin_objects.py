@@ -167,7 +167,8 @@ class TwinObjects:
         if is_axis and (entry.value is None or slot % _segment.SLOTS_PER_AXIS in WRITTEN):
             return made
         signed = made.signed or entry.bits == SLOT_BITS_MAX
-        value = int.from_bytes(self._fitted(entry), "little", signed=signed)
+        data = self._fitted(entry)[: (entry.bits + 7) // 8]  # a device may send more
+        value = int.from_bytes(data, "little", signed=signed)
         if not value and self._presets.get(slot):
             return _unset(made, self._presets[slot])
         self.values[slot] = value

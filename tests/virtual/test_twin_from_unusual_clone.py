@@ -1,0 +1,85 @@
+"""Twins of devices that differ from the usual: without descriptions, long values, switches."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+import catenary as cat
+from catenary.procedure.alias import write_alias
+from catenary.procedure.sii_owner import with_eeprom
+from catenary.virtual import Coupler, Segment, Servo
+from catenary.virtual.coe.information import InformationServer
+from catenary.virtual.scheduler import Scheduler
+from tests.virtual.test_twin_from_clone import TURN, and_again, edited, twin_of, with_entry
+
+
+class Undescribed(Servo):
+    """A servo that neither lists nor describes its objects."""
+
+    def started(self, scheduler: Scheduler) -> None:
+        super().started(scheduler)
+        dictionary = self.application.dictionary
+        self.application._information = InformationServer(dictionary, size=122, supported=False)
+
+
+def test_a_drive_without_descriptions_moves_and_maps(tmp_path: Path) -> None:
+    """Its clone has no object of CiA 402, and only the entries of its PDOs that are in use."""
+    first, second = and_again(Segment([Undescribed(serial=1)]), tmp_path)
+    assert first.devices[0].object(0x6041) is None
+    assert first == second
+    segment = Segment.from_clone(tmp_path / "first")
+    with cat.MainDevice(segment) as main:
+        arm = cat.Drives(main.scan().drives, counts_per_turn=TURN, velocity_limit=1.0)
+        with cat.Loop(arm, period=1e-3) as loop:
+            loop.wait(arm.move_by(0.2))
+            assert twin_of(segment, 0).axis_position() == pytest.approx(0.2, abs=5e-3)
+    with cat.MainDevice(segment) as main:
+        [sub] = main.scan()
+        for index, values in ((0x1600, (0x6040_0010, 0x607A_0020)), (0x1C12, (0x1600, 0x1602))):
+            size = 4 if index == 0x1600 else 2
+            sub.sdo.write(index, 0, b"\0")
+            for subindex, value in enumerate(values, start=1):
+                sub.sdo.write(index, subindex, value.to_bytes(size, "little"))
+            sub.sdo.write(index, 0, b"\2")
+            assert sub.sdo.read(index, 0) == b"\2"
+
+
+@pytest.mark.parametrize("index", [0x6072, 0x607A])
+def test_a_value_longer_than_its_description_is_cut(tmp_path: Path, index: int) -> None:
+    """Both objects have at most 32 bits, and the clone has 12 bytes."""
+    cat.clone(Segment([Coupler(), Servo(serial=1)]), tmp_path / "first", pre_op=True)
+    value = b"\1\2" + bytes(9) + b"\xff"
+    edited(
+        tmp_path / "first",
+        tmp_path / "line",
+        lambda device: with_entry(device, index, 0, value=value),
+    )
+    twin = twin_of(Segment.from_clone(tmp_path / "line"), 1)
+    found = twin.read_object(index)
+    assert found == value[: len(found)]
+
+
+def test_a_new_alias_is_used_after_a_power_cycle(tmp_path: Path) -> None:
+    cat.clone(Segment([Servo(serial=1, alias=3)]), tmp_path / "line", pre_op=True)
+    segment = Segment.from_clone(tmp_path / "line")
+    with cat.MainDevice(segment) as main:
+        [sub] = main.scan()
+        main.converse(with_eeprom(sub.station, write_alias(sub.station, 9)))
+    segment[0].power_off()
+    segment[0].power_on()
+    with cat.MainDevice(segment) as main:
+        assert main.scan()[0].alias == 9
+
+
+def test_the_alias_of_a_switch_is_kept(tmp_path: Path) -> None:
+    """A switch sets the register, but not the EEPROM."""
+    source = Segment([Servo(serial=1, alias=3)])
+    source[0].write_alias(5)
+    cat.clone(source, tmp_path / "line", pre_op=True)
+    segment = Segment.from_clone(tmp_path / "line")
+    segment[0].power_off()
+    segment[0].power_on()
+    with cat.MainDevice(segment) as main:
+        assert main.scan()[0].alias == 5
