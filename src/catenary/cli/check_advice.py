@@ -6,8 +6,10 @@ import argparse
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
+from catenary.bus.clone_device import IN_INIT
 from catenary.errors import DecodeError
 from catenary.line.change import Change, ChangedEntry, Comparison, Part, Severity
+from catenary.line.compare import IN_REGISTER
 from catenary.types import by_name
 
 SHOWN = 3  # commands of one kind
@@ -36,13 +38,14 @@ def next_steps(found: Comparison, arguments: argparse.Namespace) -> Iterator[str
         yield f"find the cable or device at fault: catenary diag {target} --seconds 10"
     if Part.STATE in parts:
         yield f"read the reason of the error: catenary state {target}"
-    if found.unread and not arguments.pre_op and not Path(arguments.file).is_dir():
+    in_init = any(each.expected and each.reason == IN_INIT for each in found.uncompared)
+    if in_init and not Path(arguments.file).is_dir():
         yield "to compare the objects of devices in INIT, add --pre-op"
     if parts - {Part.ERRORS, Part.STATE}:
-        folder = arguments.against
+        fresh = "" if found.unread else " --fresh"  # without it, complete devices are kept
         yield (
             "if everything is as intended, replace the clone: "
-            f"catenary clone {target} -o {folder} --fresh --pre-op"
+            f"catenary clone {target} -o {arguments.against}{fresh} --pre-op"
         )
 
 
@@ -67,6 +70,8 @@ def _command(change: Change, target: str) -> str:
     if position is None:
         return ""
     if change.part is Part.ALIAS:
+        if change.what == IN_REGISTER:
+            return ""
         return f"catenary alias {target} {position} {change.old}"
     return _sdo_write(change.entry, f"{target} {position}") if change.entry is not None else ""
 

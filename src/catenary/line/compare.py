@@ -15,12 +15,14 @@ from catenary.line.change import Change, Comparison, Part, Uncompared
 from catenary.line.compare_mapping import compare_mapping
 from catenary.line.compare_objects import compare_objects, missing_values
 from catenary.line.compare_registers import compare_registers
-from catenary.line.compare_sii import compare_sii
+from catenary.line.compare_sii import compare_sii, stored_alias
 from catenary.line.compare_topology import compare_topology, identity_text
 from catenary.line.pairing import pair_devices
 from catenary.line.sides import Sides
 from catenary.line.values import Line
 
+IN_REGISTER = "register"
+_SWITCHED = "not in the EEPROM: a switch was turned, or a new alias needed a power cycle"
 _PARTS = {"sii": "EEPROM", "objects": "objects"}
 
 
@@ -58,11 +60,21 @@ def _device(sides: Sides) -> Iterator[Change]:
             yield sides.change(Part.SERIAL, "", texts, note="the device was exchanged")
     if sides.old.sii is not None and sides.new.sii is not None:
         yield from compare_sii(sides)
-    elif sides.old.alias != sides.new.alias:
-        yield sides.change(Part.ALIAS, "", (str(sides.old.alias), str(sides.new.alias)))
+    yield from _alias(sides)
     yield from compare_registers(sides)
     yield from compare_mapping(sides)
     yield from compare_objects(sides)
+
+
+def _alias(sides: Sides) -> Iterator[Change]:
+    """Yield a changed alias in the register, unless `compare_sii` reports that of the EEPROM."""
+    texts = str(sides.old.alias), str(sides.new.alias)
+    if texts[0] == texts[1]:
+        return
+    if sides.old.sii is None or sides.new.sii is None:
+        yield sides.change(Part.ALIAS, "", texts)
+    elif stored_alias(sides.old.sii) == stored_alias(sides.new.sii):
+        yield sides.change(Part.ALIAS, IN_REGISTER, texts, note=_SWITCHED)
 
 
 def _uncompared(sides: Sides) -> Iterator[Uncompared]:

@@ -51,6 +51,9 @@ def mapped_places(*devices: ClonedDevice) -> set[tuple[int, int]]:
 def _assignments(sides: Sides) -> Iterator[Change]:
     old, new = ({} if _from_sii(each) else _by_manager(each) for each in (sides.old, sides.new))
     for manager in sorted({*old, *new}):
+        place = ASSIGNMENTS.start + manager
+        if not (_was_tried(sides.old, place) and _was_tried(sides.new, place)):
+            continue
         texts = _numbers(old.get(manager, ())), _numbers(new.get(manager, ()))
         if texts[0] != texts[1]:
             yield sides.change(Part.ASSIGNMENT, f"SyncManager {manager}", texts)
@@ -78,9 +81,25 @@ def _mappings(device: ClonedDevice) -> dict[int, list[int]]:
     }
 
 
-def _was_read(mapping: ClonedObject) -> bool:
-    count = mapping.entry(0)
-    return count is not None and count.value is not None
+def _was_tried(device: ClonedDevice, index: int) -> bool:
+    """Return True if an object was read or refused, or the device does not have it."""
+    found = device.object(index)
+    if found is None:
+        return "objects" not in device.missing
+    count = found.entry(0)
+    return _was_read(found) or (count is not None and count.abort is not None)
+
+
+def _was_read(listing: ClonedObject) -> bool:
+    """Return True if all entries that the listing counts were read or refused."""
+    count = listing.entry(0)
+    if count is None or count.value is None:
+        return False
+    entries = (listing.entry(number) for number in range(1, int.from_bytes(count.value[:1]) + 1))
+    return all(
+        not listing.reason if each is None else (each.value, each.abort) != (None, None)
+        for each in entries
+    )
 
 
 def _numbers(indices: Sequence[int]) -> str:

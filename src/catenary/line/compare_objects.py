@@ -59,14 +59,15 @@ def _object(
 ) -> Iterator[Change]:
     entries = ({each.subindex: each for each in of.entries} for of in (old, new))
     before, now = next(entries), next(entries)
-    if old.name != new.name:
+    if old.code and new.code and old.name != new.name:
         texts = f'"{old.name}"', f'"{new.name}"'
         yield sides.change(Part.OBJECT, f"0x{new.index:04X} name", texts, Severity.INFO)
     listing = new.index in ASSIGNMENTS or new.index in MAPPINGS  # see compare_mapping
     for subindex in sorted({*before, *now}):
         one, other = before.get(subindex), now.get(subindex)
         if one is None or other is None:
-            if not listing:
+            tried = not (old.reason if one is None else new.reason)  # else not read
+            if tried and not listing:
                 yield from _entry_presence(sides, new, one, other)
             continue
         yield from _description(sides, new, one, other)
@@ -126,17 +127,19 @@ def _value(
 ) -> Iterator[Change]:
     if (old.value, old.abort) == (new.value, new.abort) or _explained(sides, new):
         return
-    severity = _severity(new, mapped)
+    described = new if new.access else old
+    severity = _severity(described, mapped)
     if old.value is not None and new.value is not None:
-        texts = value_texts(new.data_type, old.value, new.value)
+        texts = value_texts(described.data_type, old.value, new.value)
     elif old.reason or new.reason or _unread(old) or _unread(new):
         return  # not read on one side: see `missing_values`
     else:
         severity = Severity.INFO if severity is Severity.VARIABLE else severity
         texts = _outcome(old), _outcome(new)
     part = Part.SERIAL if of.index == MANUFACTURER_SERIAL else Part.OBJECT
-    writable = bool(new.access & Access.WRITE_PRE_OP)
-    entry = ChangedEntry(new.index, new.subindex, type_name(new.data_type), old.value, writable)
+    writable = bool(described.access & Access.WRITE_PRE_OP)
+    kind = type_name(described.data_type)
+    entry = ChangedEntry(new.index, new.subindex, kind, old.value, writable)
     yield sides.change(part, _name(of, new), texts, severity, _note(severity), entry)
 
 
@@ -194,11 +197,14 @@ def missing_values(old: ClonedDevice, new: ClonedDevice) -> tuple[int, str]:
         for entry in each.entries
         if entry.value is not None
     }
-    reasons = [
-        f"0x{entry.index:04X}:{entry.subindex:02X}: {entry.reason}"
-        for each in new.objects
-        for entry in each.entries
-        if _unread(entry) and entry.reason not in ("", SERIAL_WITHHELD)
-        if (entry.index, entry.subindex) in known
-    ]
+    reasons = []
+    for each in new.objects:
+        for entry in each.entries:
+            place = (entry.index, entry.subindex)
+            if place in known and _unread(entry) and entry.reason not in ("", SERIAL_WITHHELD):
+                reasons.append(f"0x{entry.index:04X}:{entry.subindex:02X}: {entry.reason}")
+        if each.reason:
+            read = {entry.subindex for entry in each.entries}
+            lost = [at for at in known if at[0] == each.index and at[1] not in read]
+            reasons += [f"0x{each.index:04X}: {each.reason}"] * len(lost)
     return len(reasons), reasons[0] if reasons else ""

@@ -75,6 +75,11 @@ def compare_sii(sides: Sides) -> Iterator[Change]:
         yield sides.change(Part.SII, "bytes after the categories", texts, Severity.INFO)
 
 
+def stored_alias(image: bytes) -> bytes:
+    """Return the station alias in an image."""
+    return _words(image, *_ALIAS[:2])
+
+
 def _header(sides: Sides, old: bytes, new: bytes) -> Iterator[Change]:
     found = []
     for first, count, name in (_ALIAS, *_FIELDS):
