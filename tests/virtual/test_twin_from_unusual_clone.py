@@ -7,11 +7,13 @@ from pathlib import Path
 import pytest
 
 import catenary as cat
+from catenary.errors import SdoAbort
 from catenary.procedure.alias import write_alias
 from catenary.procedure.sii_owner import with_eeprom
 from catenary.virtual import Coupler, Segment, Servo
 from catenary.virtual.coe.information import InformationServer
 from catenary.virtual.scheduler import Scheduler
+from catenary.wire.sdo_information import Access
 from tests.virtual.test_twin_from_clone import TURN, and_again, edited, twin_of, with_entry
 
 
@@ -83,3 +85,24 @@ def test_the_alias_of_a_switch_is_kept(tmp_path: Path) -> None:
     segment[0].power_on()
     with cat.MainDevice(segment) as main:
         assert main.scan()[0].alias == 5
+
+
+def test_objects_are_readable_in_the_states_of_the_clone(tmp_path: Path) -> None:
+    """0x2102 is readable in PRE-OP only. 0x1009 has a value, although no right is stated."""
+    cat.clone(Segment([Coupler(), Servo(serial=1)]), tmp_path / "first", pre_op=True)
+    edited(
+        tmp_path / "first",
+        tmp_path / "line",
+        lambda device: with_entry(
+            with_entry(device, 0x2102, 0, access=Access.READ_PRE_OP), 0x1009, 0, access=Access(0)
+        ),
+    )
+    with cat.MainDevice(Segment.from_clone(tmp_path / "line")) as main:
+        sub = main.scan()[1]
+        assert sub.sdo.read(0x2102) == bytes(2)
+        assert sub.sdo.read(0x1009) == b"1"
+        sub.request_state("SAFE_OP")
+        assert sub.sdo.read(0x1009) == b"1"
+        with pytest.raises(SdoAbort) as caught:
+            sub.sdo.read(0x2102)
+        assert caught.value.code == 0x0800_0022

@@ -78,6 +78,21 @@ def test_reset_sequence_resets_the_device(main: MainDevice) -> None:
     assert main.segment.core.peek(1, REGISTER, 2) == b"\0\0"
 
 
+@pytest.mark.parametrize("when", [0, 5])
+def test_a_device_that_is_switched_off_during_its_reset_stays_off(
+    main: MainDevice, when: int
+) -> None:
+    """Switch it off right after the request, or while the reset keeps it off [ms]."""
+    for letter in b"RES":
+        main.write(STATION + 1, RESET, bytes([letter]))
+    main.let_pass(when)
+    main.segment[1].power_off()
+    main.let_pass(40)
+    assert main.segment[1].state == 0
+    main.segment[1].power_on()
+    assert main.segment[1].state == 1
+
+
 @pytest.mark.parametrize("letters", [b"RRS", b"REX", b"ES", b"SER"])
 def test_wrong_sequence_does_not_reset_the_device(main: MainDevice, letters: bytes) -> None:
     for letter in letters:

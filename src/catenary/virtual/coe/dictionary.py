@@ -182,8 +182,11 @@ class Dictionary:
 
     def read(self, index: int, subindex: int) -> bytes:
         entry = self.entry(index, subindex)
-        if not entry.access & READ_ANY:
+        rights = entry.access & (READ_ANY | WRITE_ANY)  # some devices state none
+        if rights and not rights & READ_ANY:
             raise Abort(WRITE_ONLY)
+        if rights and not rights & self._state_bit():
+            raise Abort(WRONG_STATE)
         return entry.read()
 
     def write(self, index: int, subindex: int, data: bytes) -> None:

@@ -58,6 +58,7 @@ class Device:
         self._core: Core | None = None
         self._agenda: Agenda | None = None
         self._scheduler: Scheduler | None = None
+        self._resets = False  # True while a reset keeps the device off
         self.position = -1
 
     @staticmethod
@@ -205,6 +206,7 @@ class Device:
 
     def switch_off(self) -> None:
         """Switch the power off. Pending actions are dropped and volatile values are lost."""
+        self._resets = False
         if self._scheduler is None:
             return
         self._scheduler.end()
@@ -230,10 +232,18 @@ class Device:
 
         A no-op if the device has no power.
         """
-        if self._scheduler is None or self._agenda is None:
-            return
-        self._scheduler.after(RESET_DELAY_NS, self.switch_off)
-        self._agenda.after(RESET_DELAY_NS + RESET_NS, self.switch_on)
+        if self._scheduler is not None:
+            self._scheduler.after(RESET_DELAY_NS, self._begin_reset)
+
+    def _begin_reset(self) -> None:
+        self.switch_off()
+        if self._agenda is not None:
+            self._resets = True
+            self._agenda.after(RESET_NS, self._end_reset)
+
+    def _end_reset(self) -> None:
+        if self._resets:
+            self.switch_on()
 
     def started(self, scheduler: Scheduler) -> None:
         """Initialise the device after power-on. Subclasses add their part."""
