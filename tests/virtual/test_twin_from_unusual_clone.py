@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 import catenary as cat
-from catenary.errors import SdoAbort
+from catenary.errors import ConfigurationError, SdoAbort
 from catenary.procedure.alias import write_alias
 from catenary.procedure.sii_owner import with_eeprom
 from catenary.virtual import Coupler, Segment, Servo
@@ -106,3 +107,13 @@ def test_objects_are_readable_in_the_states_of_the_clone(tmp_path: Path) -> None
         with pytest.raises(SdoAbort) as caught:
             sub.sdo.read(0x2102)
         assert caught.value.code == 0x0800_0022
+
+
+def test_a_device_behind_a_port_that_its_parent_does_not_have(tmp_path: Path) -> None:
+    cat.clone(Segment([Coupler(), Servo(serial=1)]), tmp_path / "first", pre_op=True)
+    folder = edited(
+        tmp_path / "first", tmp_path / "line", lambda device: replace(device, parent_port=2)
+    )
+    with pytest.raises(ConfigurationError, match="device 0 has no port 2") as caught:
+        Segment.from_clone(folder)
+    assert "clone the segment again" in caught.value.hint

@@ -11,7 +11,9 @@ from catenary.errors import ConfigurationError
 from catenary.line import read_line
 from catenary.virtual.devices.twin import NO_OPTIONS, Twin, TwinOptions
 from catenary.virtual.line_blueprint import cloned_blueprint, parents
-from catenary.virtual.wiring import Place
+from catenary.virtual.wiring import Place, Wiring
+
+AGAIN = "clone the segment again, without loose cables"
 
 
 class ClonedLine(NamedTuple):
@@ -32,7 +34,8 @@ def cloned_line(
 
     Raises:
         CloneError: A file of the folder is missing or not valid.
-        ConfigurationError: The SII of a device was not read, or an option names no device.
+        ConfigurationError: The SII of a device was not read, the devices cannot be connected, or an
+            option names no device.
     """
     line = read_line(Path(folder))
     given = options or {}
@@ -50,4 +53,9 @@ def cloned_line(
         )
         for device in line.devices
     ]
-    return ClonedLine(twins, parents(line.devices))
+    behind = parents(line.devices)
+    try:
+        Wiring([twin.ports for twin in twins], behind, ring=False)
+    except ValueError as error:
+        raise ConfigurationError(f"{folder}: {error}", hint=AGAIN) from error
+    return ClonedLine(twins, behind)

@@ -76,8 +76,6 @@ HINT = (
     "docs/how_to/faults.md those of faults"
 )
 
-AGAIN = "clone the segment again, without loose cables"
-
 
 @contextmanager
 def _named(where: str) -> Iterator[None]:
@@ -105,10 +103,7 @@ def _read_clone(path: str | Path, *, clock: ClockKind, ring: bool) -> Segment:
         raise ConfigurationError(
             f"{path}: a clone cannot be a ring", hint="serve it without the second interface"
         )
-    try:
-        return Segment.from_clone(path, clock=clock)
-    except OUT_OF_RANGE as error:  # of the wiring
-        raise ConfigurationError(f"{path}: {error}", hint=AGAIN) from error
+    return Segment.from_clone(path, clock=clock)
 
 
 def _read(path: str | Path) -> SegmentFile:
