@@ -9,7 +9,9 @@ from pathlib import Path
 import pytest
 
 import catenary as cat
+from catenary.cli.check_roles import as_text
 from catenary.cli.main import main
+from catenary.machine import Comparison
 
 SEGMENT = """
 [[device]]
@@ -245,3 +247,9 @@ def test_a_machine_file_gives_the_target_of_a_clone(
 ) -> None:
     words = ("check", "machine.toml", "--against", "line", "--pre-op")
     assert call(capsys, *words)[:2] == (0, "3 devices compared: as in line\n")
+
+
+def test_one_device_is_not_called_devices() -> None:
+    assert as_text([Comparison("absent")], {}, "machine.toml").endswith(
+        "\n1 device as in machine.toml"
+    )

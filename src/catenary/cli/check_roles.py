@@ -58,7 +58,7 @@ def as_text(found: Comparisons, roles: Mapping[str, Sequence[str]], file: str) -
     for each in different:
         if needed := affected(each, roles):
             lines.append(f"{each.name} is {each.verdict}: it is needed by {', '.join(needed)}")
-    same = f"{len(found)} devices as in {file}"
+    same = f"{len(found)} {'device' if len(found) == 1 else 'devices'} as in {file}"
     lines.append(f"{len(different)} of {len(found)} devices differ" if different else same)
     return "\n".join(lines)
 
