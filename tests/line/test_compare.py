@@ -272,10 +272,17 @@ def test_a_full_counter_says_so() -> None:
 
 
 def test_restarted_counters_are_no_fault() -> None:
-    change = only(counters(PortErrors(3)), counters(NONE, PortErrors(1)))
+    change = only(counters(PortErrors(3)), counters(PortErrors(1)))
     assert (change.severity, change.what) == (Severity.INFO, "")
     assert change.note.startswith("the counters restarted")
-    assert "port 1: 1 invalid frames" in change.new
+    assert "port 0: 1 invalid frames" in change.new
+
+
+def test_errors_after_a_restart_are_a_fault() -> None:
+    restart, grown = changed(counters(PortErrors(3)), counters(NONE, PortErrors(200)))
+    assert restart.severity is Severity.INFO
+    assert seen(grown) == ("error counters", "port 1 broken frames", "0", "200", "fault")
+    assert grown.note == "200 since then"
 
 
 def test_the_counters_of_an_exchanged_device_are_not_compared() -> None:

@@ -158,18 +158,17 @@ def _counters(sides: Sides) -> Iterator[Change]:
     if data[0] is None or data[1] is None or sides.exchanged:
         return
     old, new = decode_error_counters(data[0]), decode_error_counters(data[1])
-    if new.restarted(old):
+    restarted = new.restarted(old)
+    if restarted:
         texts = _total(old), _total(new)
         note = "the counters restarted: the device was switched off, or they were cleared"
         yield sides.change(Part.ERRORS, "", texts, Severity.INFO, note)
-        return
     for name, before, now in _pairs(old, new):
         if now > before:
             full = "; the counter is full" if now == FULL else ""
+            more = f"{now} since then" if restarted else f"{now - before} more"
             texts = str(before), str(now)
-            yield sides.change(
-                Part.ERRORS, name, texts, Severity.FAULT, f"{now - before} more{full}"
-            )
+            yield sides.change(Part.ERRORS, name, texts, Severity.FAULT, more + full)
 
 
 def _pairs(old: ErrorCounters, new: ErrorCounters) -> Iterator[tuple[str, int, int]]:
