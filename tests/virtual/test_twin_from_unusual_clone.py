@@ -49,6 +49,39 @@ def test_a_drive_without_descriptions_moves_and_maps(tmp_path: Path) -> None:
             assert sub.sdo.read(index, 0) == b"\2"
 
 
+@pytest.mark.parametrize(("subindex", "data"), [(0, b""), (0, bytes(2)), (1, bytes(3))])
+def test_a_wrong_length_for_a_mapping_is_refused(
+    tmp_path: Path, subindex: int, data: bytes
+) -> None:
+    """Without a description, the length of the entry in the clone is not that of its type."""
+    cat.clone(Segment([Coupler(), Servo(serial=1)]), tmp_path / "first", pre_op=True)
+    edited(
+        tmp_path / "first",
+        tmp_path / "line",
+        lambda device: with_entry(device, 0x1600, subindex, data_type=0),
+    )
+    with cat.MainDevice(Segment.from_clone(tmp_path / "line")) as main:
+        sub = main.scan()[1]
+        sub.sdo.write(0x1600, 0, b"\0")
+        with pytest.raises(SdoAbort) as caught:
+            sub.sdo.write(0x1600, subindex, data)
+        assert caught.value.code == 0x0607_0010
+
+
+def test_complete_access_cuts_a_value_that_is_too_long(tmp_path: Path) -> None:
+    cat.clone(Segment([Coupler(), Servo(serial=1)]), tmp_path / "first", pre_op=True)
+    edited(
+        tmp_path / "first",
+        tmp_path / "line",
+        lambda device: with_entry(device, 0x1018, 4, value=b"\xff" * 8),
+    )
+    with cat.MainDevice(Segment.from_clone(tmp_path / "line")) as main:
+        sdo = main.scan()[1].sdo
+        assert sdo.read(0x1018, 4) == b"\xff" * 8
+        whole = sdo.read(0x1018, 0, complete=True)
+    assert (len(whole), whole[-4:]) == (18, b"\xff" * 4)
+
+
 @pytest.mark.parametrize("index", [0x6072, 0x607A])
 def test_a_value_longer_than_its_description_is_cut(tmp_path: Path, index: int) -> None:
     """Both objects have at most 32 bits, and the clone has 12 bytes."""

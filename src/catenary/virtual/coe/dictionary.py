@@ -220,8 +220,9 @@ class Dictionary:
                 continue
             entry = entries[subindex]
             raw = entry.read() if entry.access & READ_ANY else bytes((entry.bits + 7) // 8)
-            value |= int.from_bytes(raw, "little") << bit
-            bit += 16 if subindex == 0 else entry.bits
+            width = 16 if subindex == 0 else entry.bits
+            value |= (int.from_bytes(raw, "little") & (1 << width) - 1) << bit
+            bit += width
         return value.to_bytes((bit + 7) // 8, "little")
 
     def write_complete(self, index: int, first: int, data: bytes) -> None:

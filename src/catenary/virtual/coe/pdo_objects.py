@@ -25,6 +25,7 @@ from catenary.virtual.coe.dictionary import (
     UNSIGNED16,
     UNSIGNED32,
     WRITE_PRE_OP,
+    WRONG_LENGTH,
     Abort,
     Dictionary,
     Entry,
@@ -70,6 +71,8 @@ class _Table:
         return struct.pack(self._form, self.places[place])
 
     def unpack(self, data: bytes) -> int:
+        if len(data) != struct.calcsize(self._form):
+            raise Abort(WRONG_LENGTH)
         return int(struct.unpack(self._form, data)[0])
 
 
@@ -158,6 +161,8 @@ class PdoObjects:
     def _write_count(self, table: _Table, data: bytes) -> None:
         if self._fixed(table) != "no":
             raise Abort(self._quirks.abort_code)
+        if len(data) != 1:
+            raise Abort(WRONG_LENGTH)
         count = data[0]
         if count > len(table.places):
             raise Abort(MAPPING_TOO_LONG if table.is_mapping else OUT_OF_RANGE)

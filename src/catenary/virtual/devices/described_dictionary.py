@@ -79,16 +79,18 @@ def _dressed(
     recorded = {entry.subindex: entry for entry in facts.entries}
     unused = {} if facts.code else {k: each for k, each in live.items() if k not in stored}
     return unused | {
-        subindex: _with_behaviour(recorded[subindex], entry, live[subindex])
+        subindex: _with_behaviour(
+            recorded[subindex], entry if facts.code else live[subindex], live[subindex]
+        )
         if subindex in live
         else entry
         for subindex, entry in stored.items()
     }
 
 
-def _with_behaviour(facts: EntryFacts, stored: Entry, live: Entry) -> Entry:
+def _with_behaviour(facts: EntryFacts, described: Entry, live: Entry) -> Entry:
     read = _read_unless_empty(live, facts.abort) if facts.abort else live.read
-    return replace(stored, read=read, write=live.write)
+    return replace(described, read=read, write=live.write)
 
 
 def _read_unless_empty(live: Entry, abort: int) -> Callable[[], bytes]:
