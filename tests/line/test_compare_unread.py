@@ -26,7 +26,7 @@ from tests.line.test_compare import (
 
 
 def not_compared(old: ClonedDevice, new: ClonedDevice) -> str:
-    """Return the only part that was not compared, after the device. There is no change."""
+    """Return the only part that was not compared, after the device. Nothing has changed."""
     found = compare_lines(clone(old), clone(new))
     assert (found.changes, found.unread) == ((), True)
     [part] = found.uncompared

@@ -192,19 +192,17 @@ def missing_values(old: ClonedDevice, new: ClonedDevice) -> tuple[int, str]:
         new: The device in the present clone.
     """
     known = {
-        (entry.index, entry.subindex)
+        each.index: {entry.subindex for entry in each.entries if entry.value is not None}
         for each in old.objects
-        for entry in each.entries
-        if entry.value is not None
     }
     reasons = []
     for each in new.objects:
+        lost = known.get(each.index, set())
         for entry in each.entries:
-            place = (entry.index, entry.subindex)
-            if place in known and _unread(entry) and entry.reason not in ("", SERIAL_WITHHELD):
+            failed = _unread(entry) and entry.reason not in ("", SERIAL_WITHHELD)
+            if failed and entry.subindex in lost:
                 reasons.append(f"0x{entry.index:04X}:{entry.subindex:02X}: {entry.reason}")
         if each.reason:
-            read = {entry.subindex for entry in each.entries}
-            lost = [at for at in known if at[0] == each.index and at[1] not in read]
-            reasons += [f"0x{each.index:04X}: {each.reason}"] * len(lost)
+            absent = lost - {entry.subindex for entry in each.entries}
+            reasons += [f"0x{each.index:04X}: {each.reason}"] * len(absent)
     return len(reasons), reasons[0] if reasons else ""
