@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import json
 import shlex
 import signal
@@ -17,6 +18,7 @@ import pytest
 import catenary as cat
 from catenary.capture import read_timeline
 from catenary.cli.main import main
+from catenary.errors import LinkError
 from catenary.link import Interface, passive
 from catenary.link.passive import PassiveSocket
 from catenary.realtime import private_network
@@ -113,12 +115,16 @@ def test_the_socket_passes_ethercat_only_and_never_blocks(veth: tuple[str, str])
         there.send(passed[0])
         assert link.wait(START)
         [answer] = link.receive()
+        there.send(passed[1])
+        assert link.wait(START)
+        [tagged] = link.receive()
         assert link.dropped == 0
     assert [(packet.data, packet.direction) for packet in packets] == [
         (each, Direction.OUTBOUND) for each in passed
     ]
     assert (answer.data, answer.direction) == (passed[0], Direction.INBOUND)
-    times = [packet.time_ns for packet in (*packets, answer)]
+    assert (tagged.data, tagged.direction) == (passed[1], Direction.INBOUND)
+    times = [packet.time_ns for packet in (*packets, answer, tagged)]
     assert times == sorted(times)
 
 
@@ -137,6 +143,25 @@ def test_a_full_socket_reports_the_dropped_frames(
         received = len(link.receive())
         assert received > 0
         assert received + link.dropped == 200
+
+
+def test_frames_before_an_error_are_kept(
+    veth: tuple[str, str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    frames = [(bytes(60), [], 0, (veth[0], 0, 0))]
+
+    def recvmsg(*_: int) -> object:
+        if frames:
+            return frames.pop()
+        raise OSError(errno.ENODEV, "No such device")
+
+    with PassiveSocket(veth[0]) as link:
+        monkeypatch.setattr(link, "_socket", SimpleNamespace(recvmsg=recvmsg))
+        [packet] = link.receive()
+        with pytest.raises(LinkError, match="No such device"):
+            link.receive()
+        monkeypatch.undo()
+    assert packet.data == bytes(60)
 
 
 def test_a_removed_interface_ends_the_recording_with_complete_files(tmp_path: Path) -> None:
