@@ -155,12 +155,11 @@ def test_frames_before_an_error_are_kept(
             return frames.pop()
         raise OSError(errno.ENODEV, "No such device")
 
-    with PassiveSocket(veth[0]) as link:
-        monkeypatch.setattr(link, "_socket", SimpleNamespace(recvmsg=recvmsg))
+    with PassiveSocket(veth[0]) as link, monkeypatch.context() as patch:
+        patch.setattr(link, "_socket", SimpleNamespace(recvmsg=recvmsg))
         [packet] = link.receive()
         with pytest.raises(LinkError, match="No such device"):
             link.receive()
-        monkeypatch.undo()
     assert packet.data == bytes(60)
 
 
