@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import itertools
-from dataclasses import replace
 from pathlib import Path
 from random import Random
 from typing import get_args
@@ -18,6 +17,7 @@ from catenary.capture import (
     StateRefused,
     StateRequest,
     Step,
+    SyncManagerWrite,
     Timeline,
     read_timeline,
 )
@@ -117,7 +117,7 @@ def test_adjacent_fmmus_map_the_same_area_as_one() -> None:
 
 
 def test_only_the_last_value_of_a_register_counts() -> None:
-    cleared = (TO_SAFE_OP, replace(sync_manager(2, 0, 0)[1], address=0, enabled=False))  # type: ignore[type-var]
+    cleared = (TO_SAFE_OP, SyncManagerWrite(2, 0, 0, 0, enabled=False))
     assert rows(to_op(sync_manager(2, 6, 0x64)), to_op(cleared, sync_manager(2, 6, 0x64))) == []
     assert rows(to_op(), to_op(cleared)) == []
 
@@ -230,6 +230,28 @@ def test_the_attempt_that_reached_most_is_compared() -> None:
     again = (Step(PRE_OP, INIT), StateRequest(INIT))
     scan = [reached(PRE_OP), sdo(0x2000, 0, b"\1"), again]
     assert rows([*scan, *to_op(sdo(0x2001, 0, b"\2"))], to_op(sdo(0x2001, 0, b"\2"))) == []
+
+
+def test_writes_after_the_master_gave_up_do_not_count() -> None:
+    """B waits for OP in vain, returns to PRE-OP and turns the SyncManager off."""
+    configured = [reached(PRE_OP), sync_manager(2, 6, 0x64), reached(SAFE_OP)]
+    request = (TO_OP, StateRequest(OP))
+    off = (TO_SAFE_OP, SyncManagerWrite(2, 0, 0, 0, enabled=False))
+    down = (Step(SAFE_OP, PRE_OP), StateRequest(PRE_OP))
+    (row,) = rows([*configured, request, reached(OP)], [*configured, request, down, off])
+    assert (row.b, row.remark) == ("OP requested, not reached", "B stops here")
+    assert rows([*configured, down, off], configured) == []
+
+
+def test_a_capture_that_begins_in_pre_op() -> None:
+    later = to_op(sync_manager(2, 6, 0x64))[1:]
+    assert rows(to_op(sync_manager(2, 6, 0x64)), later) == []
+
+
+def test_another_error_on_the_way_to_the_same_state() -> None:
+    again = [reached(PRE_OP), *refused(SAFE_OP, 0x001E), *to_op()[1:]]
+    (row,) = rows(to_op(), again)
+    assert (row.b, row.remark) == ("refused 0x001E, then SAFE-OP after 12 ms", "another result")
 
 
 def test_devices_are_paired_by_serial_number_then_by_order() -> None:

@@ -153,15 +153,17 @@ def _missing(pair: DevicePair) -> Difference:
 def _results(a: Sequence[Outcome], b: Sequence[Outcome]) -> Iterator[Difference]:
     """Yield the transitions with different results. Later ones follow from the first."""
     for left, right in zip(a, b, strict=True):
+        ends = _ends(left, a), _ends(right, b)
         one, other = (
-            (each.reached is not None, each.codes, each.is_known) for each in (left, right)
+            (end, each.codes, each.is_known or not end)
+            for end, each in zip(ends, (left, right), strict=True)
         )
         if one == other:
             continue
         stops = [
             name
-            for name, each, capture in (("A", left, a), ("B", right, b))
-            if each.error is not None or _ends(each, capture)
+            for name, each, end in zip("AB", (left, right), ends, strict=True)
+            if end or each.error is not None
         ]
         yield Difference(
             *(Mark.RESULT, Topic.STATE, str(left.step.after), left.step, str(left), str(right)),
@@ -169,19 +171,22 @@ def _results(a: Sequence[Outcome], b: Sequence[Outcome]) -> Iterator[Difference]
             packet_a=_packet(left),
             packet_b=_packet(right),
         )
-        if left.reached is None or right.reached is None:
+        if any(ends):
             return
 
 
 def _note(a: Outcome, b: Outcome, stops: Sequence[str]) -> str:
     if len(stops) != 1:
-        return ""
+        return "another result"
     outcome = a if stops[0] == "A" else b
     return f"{stops[0]} stops here" if outcome.is_known else f"not requested in {stops[0]}"
 
 
 def _ends(outcome: Outcome, outcomes: Sequence[Outcome]) -> bool:
-    """Return True if a bring-up does not continue after a transition that it did not complete."""
+    """Return True if a bring-up does not continue after a transition that it did not complete.
+
+    A capture may lack the transition itself, for example if it begins later.
+    """
     later = outcomes[outcomes.index(outcome) :]
     return not any(each.reached is not None for each in later)
 
