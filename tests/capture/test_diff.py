@@ -246,6 +246,8 @@ def test_writes_after_the_master_gave_up_do_not_count() -> None:
 def test_a_capture_that_begins_in_pre_op() -> None:
     later = to_op(sync_manager(2, 6, 0x64))[1:]
     assert rows(to_op(sync_manager(2, 6, 0x64)), later) == []
+    (row,) = rows([], later)
+    assert (row.a, row.b, row.remark) == ("", "not in the capture", "not requested in A")
 
 
 def test_another_error_on_the_way_to_the_same_state() -> None:

@@ -153,26 +153,32 @@ def _missing(pair: DevicePair) -> Difference:
 def _results(a: Sequence[Outcome], b: Sequence[Outcome]) -> Iterator[Difference]:
     """Yield the transitions with different results. Later ones follow from the first."""
     for left, right in zip(a, b, strict=True):
-        ends = _ends(left, a), _ends(right, b)
-        one, other = (
-            (end, each.codes, each.is_known or not end)
-            for end, each in zip(ends, (left, right), strict=True)
-        )
-        if one == other:
+        left_ends, right_ends = _ends(left, a), _ends(right, b)
+        if _result(left, left_ends) == _result(right, right_ends):
             continue
         stops = [
             name
-            for name, each, end in zip("AB", (left, right), ends, strict=True)
-            if end or each.error is not None
+            for name, each, ends in (("A", left, left_ends), ("B", right, right_ends))
+            if ends or each.error is not None
         ]
         yield Difference(
-            *(Mark.RESULT, Topic.STATE, str(left.step.after), left.step, str(left), str(right)),
+            *(Mark.RESULT, Topic.STATE, str(left.step.after), left.step),
+            *(_text(left, left_ends), _text(right, right_ends)),
             note=_note(left, right, stops),
             packet_a=_packet(left),
             packet_b=_packet(right),
         )
-        if any(ends):
+        if left_ends or right_ends:
             return
+
+
+def _result(outcome: Outcome, ends: bool) -> tuple[object, ...]:
+    """Return what is compared of a transition. `ends` is the result of `_ends`."""
+    return ends, outcome.codes, outcome.is_known or not ends
+
+
+def _text(outcome: Outcome, ends: bool) -> str:
+    return str(outcome) or ("" if ends else "not in the capture")
 
 
 def _note(a: Outcome, b: Outcome, stops: Sequence[str]) -> str:
