@@ -167,6 +167,12 @@ def test_a_written_value_that_the_other_master_read_has_no_effect() -> None:
     assert (row.effect, row.remark) == (True, "only in A")
 
 
+def test_an_object_that_reads_another_value_than_was_written() -> None:
+    command = [sdo(0x2000, 1, b"\5"), sdo_read(0x2000, 1, b"\0")]
+    (row,) = rows(to_op(*command), to_op())
+    assert (row.effect, row.remark) == (True, "only in A")
+
+
 def test_complete_access_of_the_mapping_equals_single_writes() -> None:
     complete = bytes.fromhex("0200 0116 0216")
     single = [
