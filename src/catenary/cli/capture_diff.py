@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import json
 import sys
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TextIO
 
 from catenary.cli.failure import report
 from catenary.cli.parsers import Commands, add_command, add_json
@@ -76,17 +76,19 @@ def read(name: str) -> Timeline | None:
     return timeline
 
 
-def print_notes(name: str, timeline: Timeline) -> None:
+def print_notes(name: str, timeline: Timeline, file: TextIO | None = None) -> None:
     """Print the remarks on a capture.
 
     Args:
         name: "A", "B" or the name of the file.
         timeline: The capture.
+        file: Where to print; None: stdout.
     """
     from catenary.capture.notes import notes
     from catenary.cli.text import escaped
 
     for note in notes(timeline.counts, timeline.masters):
-        print(f"note on {escaped(name)}: {escaped(note)}")
+        print(f"note on {escaped(name)}: {escaped(note)}", file=file)
     if not timeline.complete:
-        print(f"note on {escaped(name)}: only the first {len(timeline.events)} events were used")
+        first = f"only the first {len(timeline.events)} events were used"
+        print(f"note on {escaped(name)}: {first}", file=file)
