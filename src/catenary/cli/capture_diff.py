@@ -63,7 +63,10 @@ def read(name: str) -> Timeline | None:
 
     try:
         timeline = read_timeline(name)
-    except (DecodeError, OSError) as error:
+    except DecodeError as error:
+        report(DecodeError(f"{name}: {error.message}", hint=error.hint))
+        return None
+    except OSError as error:
         report(error)
         return None
     if not timeline.counts.ethercat:
