@@ -118,6 +118,16 @@ def test_an_unreadable_file(
     assert output.out == ""
 
 
+def test_notes_are_no_part_of_the_json(
+    a: Path, b: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    b.write_bytes(a.read_bytes()[:-5])
+    assert main(["capture", "diff", str(a), str(b), "--json"]) == 0
+    output = capsys.readouterr()
+    assert json.loads(output.out)["equal"]
+    assert output.err.startswith("note on B: the file ends in the middle of a packet")
+
+
 def test_the_next_command_selects_a_device_without_a_position() -> None:
     """A capture that begins late shows station addresses only."""
     known = replace(device(1), position=None)

@@ -52,8 +52,8 @@ def run(arguments: argparse.Namespace) -> int:
         from catenary.cli.capture_diff_text import print_comparison
 
         print_comparison(comparison, arguments.a, arguments.b)
-        for name, timeline in (("A", a), ("B", b)):
-            print_notes(name, timeline)
+    for name, timeline in (("A", a), ("B", b)):
+        print_notes(name, timeline, sys.stderr if arguments.json else sys.stdout)
     return EQUAL if comparison.equal else DIFFERENT
 
 
@@ -79,13 +79,13 @@ def read(name: str) -> Timeline | None:
     return timeline
 
 
-def print_notes(name: str, timeline: Timeline, file: TextIO | None = None) -> None:
+def print_notes(name: str, timeline: Timeline, file: TextIO) -> None:
     """Print the remarks on a capture.
 
     Args:
         name: "A", "B" or the name of the file.
         timeline: The capture.
-        file: Where to print; None: stdout.
+        file: Stream to print to.
     """
     from catenary.capture.notes import notes
     from catenary.cli.text import escaped
