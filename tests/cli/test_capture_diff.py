@@ -118,7 +118,7 @@ def test_an_unreadable_file(
     assert output.out == ""
 
 
-def test_notes_are_no_part_of_the_json(
+def test_notes_are_not_part_of_the_json(
     a: Path, b: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     b.write_bytes(a.read_bytes()[:-5])

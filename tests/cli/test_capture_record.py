@@ -17,6 +17,7 @@ import pytest
 
 import catenary as cat
 from catenary.capture import read_timeline
+from catenary.capture.file_ring import FileRing
 from catenary.cli.main import main
 from catenary.errors import LinkError
 from catenary.link import Interface, passive
@@ -217,6 +218,7 @@ def test_missing_permission_names_the_capability(
         ("--size 0", "not positive"),
         ("--minutes -1", "minutes"),
         ("-o /none/x.pcapng", "does not exist"),
+        ("-o /tmp", "is a folder"),
     ],
 )
 def test_refuses_impossible_bounds(
@@ -227,6 +229,20 @@ def test_refuses_impossible_bounds(
     except SystemExit as ended_by_parser:
         status = int(str(ended_by_parser.code))
     assert (status, message in capsys.readouterr().err) == (2, True)
+
+
+def test_a_full_disk_names_the_file(
+    veth: tuple[str, str],
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def full(*_: object) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(FileRing, "flush", full)
+    status, _, err = call(f"capture record {veth[0]} -o {tmp_path}/x.pcapng --seconds 0.01", capsys)
+    assert (status, err) == (2, f"catenary: {tmp_path}/x.pcapng: No space left on device\n")
 
 
 def test_refuses_a_disk_without_space(

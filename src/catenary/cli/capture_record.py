@@ -98,18 +98,22 @@ def run(arguments: argparse.Namespace) -> int:
                 sys.stdout.flush()
             lost = record(link, ring, stop, arguments.seconds)
     except (CatenaryError, OSError) as error:
+        if isinstance(error, OSError) and error.filename is None:  # such as a full disk
+            error.filename = str(path)
         report(error)
         return UNREADABLE
     return show_result(ring, lost, as_json=arguments.json)
 
 
 def check_space(path: Path, size: int) -> None:
-    """Raise UsageError if the folder does not exist or has too little free space.
+    """Raise UsageError if the path is a folder, or its folder is missing or too full.
 
     Args:
         path: Path of the files.
         size: Maximum size of all files [bytes].
     """
+    if path.is_dir():
+        raise UsageError(f"{path} is a folder, not a file", hint="-o FOLDER/NAME.pcapng")
     if not path.parent.is_dir():
         raise UsageError(f"the folder {path.parent} does not exist", hint=f"mkdir {path.parent}")
     if size > MAXIMUM_MEGABYTES * 1_000_000:
