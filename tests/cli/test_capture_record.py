@@ -62,7 +62,7 @@ def test_a_loop_starts_while_a_recorder_runs(
         with looping(veth[0], tmp_path) as loop:
             assert goes_on(loop)
         status, last = ended(recorder, number)
-    path = tmp_path / "line-0001.pcapng"
+    path = tmp_path / "line-000001.pcapng"
     packets = decode_capture(path.read_bytes()).packets
     assert (status, last) == (0, f"{path}: {len(packets)} frames recorded, 0 dropped by the kernel")
     assert len(packets) > 100
@@ -71,7 +71,7 @@ def test_a_loop_starts_while_a_recorder_runs(
 def test_records_both_directions_of_a_visible_master(
     veth: tuple[str, str], tmp_path: Path, tshark: str
 ) -> None:
-    path = tmp_path / "line-0001.pcapng"
+    path = tmp_path / "line-000001.pcapng"
     with served(veth[1], tmp_path), recording(veth[0], tmp_path / "line.pcapng") as recorder:
         with cat.MainDevice(Interface(veth[0], visible=True)) as main_device:
             assert main_device.other_masters == ()
@@ -174,7 +174,7 @@ def test_a_removed_interface_ends_the_recording_with_complete_files(tmp_path: Pa
     with kept:
         last = recorder.read_line(START)
         assert recorder.process.wait(START) == 1
-    path = tmp_path / "line-0001.pcapng"
+    path = tmp_path / "line-000001.pcapng"
     assert last == f"{path}: 1 frames recorded, 0 dropped by the kernel"
     assert decode_capture(path.read_bytes()).cut == 0
 
@@ -184,7 +184,7 @@ def test_an_idle_interface_gives_status_1_and_json(
 ) -> None:
     line = f"capture record {veth[0]} -o {tmp_path}/x.pcapng --seconds 0.01 --json"
     status, out, err = call(line, capsys)
-    files = [f"{tmp_path}/x-0001.pcapng"]
+    files = [f"{tmp_path}/x-000001.pcapng"]
     assert (status, json.loads(out)) == (1, {"files": files, "frames": 0, "dropped": 0})
     assert "no EtherCAT frame" in err
     status, _, err = call(line, capsys)

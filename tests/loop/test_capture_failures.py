@@ -121,7 +121,7 @@ def test_impossible_options_are_refused(wrong: dict[str, float]) -> None:
         cat.CaptureOptions(folder="x", **wrong)  # type: ignore[arg-type]
 
 
-def test_a_capture_that_is_no_folder_is_refused(tmp_path: Path) -> None:
+def test_a_capture_that_is_not_a_folder_is_refused(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("kept")
     with cat.MainDevice(two_servos()) as main:
         arm = arm_of(main)

@@ -42,8 +42,8 @@ def add_to(group: Commands) -> None:
         help="keep the last minutes of the frames of an interface",
         description="Records the EtherCAT frames of an interface while any master uses it. Never "
         "sends a frame. Writes a ring of pcapng files, and deletes the oldest file. Ends on Ctrl-C "
-        "or SIGTERM. Exit status 1 if frames were dropped or none arrived, 2 if the interface "
-        "cannot be read or the files cannot be written.",
+        "or SIGTERM. Exit status 1 if frames were dropped, none arrived, or the interface was "
+        "removed; 2 if the interface cannot be read or the files cannot be written.",
         example=EXAMPLE,
     )
     parser.add_argument("interface", metavar="NIC", help="network interface, such as eth0")
@@ -66,7 +66,7 @@ def add_to(group: Commands) -> None:
         dest="file",
         metavar="FILE",
         type=Path,
-        help="name of the files, which get numbers (default: NIC.pcapng: NIC-0001.pcapng ...)",
+        help="name of the files, which get numbers (default: NIC.pcapng: NIC-000001.pcapng ...)",
     )
     parser.add_argument("--seconds", metavar="N", type=positive_seconds, help="end after N seconds")
     parser.add_argument("--force", action="store_true", help="replace an earlier recording")
