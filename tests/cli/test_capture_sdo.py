@@ -160,7 +160,7 @@ def test_what_a_list_cannot_contain_is_a_comment(tmp_path: Path) -> None:
     )
     assert objects == []
     assert "# omitted: 0x2000:00 = 1 aborted 0x06020000: the device did not accept it" in text
-    assert "# omitted: 0x2001:00 = 1 not answered: the capture has no answer" in text
+    assert "# omitted: 0x2001:00 = 1 not answered: the capture lacks its answer" in text
     assert "# omitted: 0xF030:02 complete = 1: complete access must begin at" in text
 
 

@@ -98,7 +98,7 @@ def _reason_to_omit(write: ObjectWrite) -> str:
     if write.text:
         return "not CoE"
     if not write.answered:
-        return "the capture has no answer"
+        return "the capture lacks its answer or a segment"
     if not write.succeeded:
         return "the device did not accept it"
     if write.complete and write.subindex > 1:
