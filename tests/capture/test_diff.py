@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+from dataclasses import replace
 from pathlib import Path
 from random import Random
 from typing import get_args
@@ -270,6 +271,19 @@ def test_devices_are_paired_by_serial_number_then_by_order() -> None:
     assert [row.subject for each in found.devices for row in each.rows] == ["position", "position"]
     unknown = timeline((device(0), to_op()), (device(1), to_op(sync(0x0300))))
     assert compare(a, unknown).equal
+
+
+def test_a_device_without_an_identity_is_paired_with_one_that_is_left() -> None:
+    unknown = replace(device(0), position=None, vendor=None)
+    a = timeline((device(0, product=1), to_op()), (device(1, product=2), to_op()))
+    b = timeline((unknown, to_op()), (replace(device(1, product=2), position=5), to_op()))
+    assert [(each.pair.a, each.pair.b) for each in compare(a, b).devices] == [
+        (device(0, product=1), unknown),
+        (device(1, product=2), replace(device(1, product=2), position=5)),
+    ]
+    c = timeline((device(0, product=3), to_op()), (replace(unknown, number=1), to_op()))
+    (first, *_) = compare(timeline((device(0, product=1), to_op())), c).devices
+    assert first.pair.b == replace(unknown, number=1)
 
 
 def test_a_device_that_only_one_capture_has() -> None:

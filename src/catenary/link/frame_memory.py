@@ -82,7 +82,7 @@ class FrameMemory:
             os.close(file)
 
     def write(self, path: Path, from_ns: int, to_ns: int) -> tuple[int, int]:
-        """Write the frames of a time into a new pcapng file. After an error, there is no file.
+        """Write the frames of a time into a new pcapng file. An error leaves no file.
 
         Args:
             path: Path of the file.
