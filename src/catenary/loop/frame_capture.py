@@ -89,7 +89,7 @@ class FrameCapture:
         if self._thread.is_alive():
             self._thread.join(END_TIMEOUT)
         is_writing = self._thread.is_alive()  # it still uses the memory
-        to_ns = max(self._memory.link.now(), *(mark.time_ns for mark in self._marks), 0)
+        to_ns = max([self._memory.link.now(), *(mark.time_ns for mark in list(self._marks))])
         try:
             self._return_link()
             if is_writing:
@@ -138,7 +138,7 @@ class FrameCapture:
         Args:
             to_ns: Time of the last frame [ns].
         """
-        marks: list[Mark] = []
+        marks = [self._marks.popleft()]
         while self._marks and self._marks[0].time_ns <= to_ns:
             marks.append(self._marks.popleft())
         first = marks[0]
