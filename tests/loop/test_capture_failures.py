@@ -140,3 +140,18 @@ def test_names_are_never_reused(tmp_path: Path) -> None:
         paths[-1].touch()
     assert len(set(paths)) == 3
     assert all(re.fullmatch(r"[\w.-]+\.pcapng", path.name) for path in paths)
+
+
+def test_an_error_after_the_end_is_not_kept(tmp_path: Path) -> None:
+    """A loop that cannot be opened again reports its error to the ended capture."""
+    folder = tmp_path / "captures"
+    with cat.MainDevice(two_servos()) as main:
+        loop = cat.Loop(arm_of(main), capture=folder)
+        with loop:
+            capture = loop.networks[0].session.capture
+        folder.rmdir()
+        folder.write_text("a file")
+        with pytest.raises(ConfigurationError):
+            loop.open()
+    assert capture is not None
+    assert capture._error is None

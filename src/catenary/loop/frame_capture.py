@@ -70,9 +70,10 @@ class FrameCapture:
     def fail(self, error: BaseException) -> None:
         """Keep the frames around the error that ends the loop. Its notes will name the file.
 
-        The first error counts. Ctrl-C and the end of the program are not errors.
+        The first error counts. Ctrl-C and the end of the program are not errors. After `end`, a
+        call has no effect.
         """
-        if self._error is None and isinstance(error, Exception):
+        if not self._is_over and self._error is None and isinstance(error, Exception):
             self._error = error
             self._marks.append(Mark(self._memory.link.now(), type(error).__name__))
 
