@@ -18,6 +18,7 @@ from catenary.capture import (
     StateRefused,
     StateRequest,
     Step,
+    SyncManagerWrite,
     Timeline,
     read_timeline,
 )
@@ -117,7 +118,7 @@ def test_adjacent_fmmus_map_the_same_area_as_one() -> None:
 
 
 def test_only_the_last_value_of_a_register_counts() -> None:
-    cleared = (TO_SAFE_OP, replace(sync_manager(2, 0, 0)[1], address=0, enabled=False))  # type: ignore[type-var]
+    cleared = (TO_SAFE_OP, SyncManagerWrite(2, 0, 0, 0, enabled=False))
     assert rows(to_op(sync_manager(2, 6, 0x64)), to_op(cleared, sync_manager(2, 6, 0x64))) == []
     assert rows(to_op(), to_op(cleared)) == []
 
@@ -164,6 +165,12 @@ def test_a_written_value_that_the_other_master_read_has_no_effect() -> None:
     (row,) = rows(to_op(sdo(0x6065, 0, b"\5")), to_op(sdo_read(0x6065, 0, b"\6")))
     assert (row.effect, row.remark) == (True, "only in A: B read 6")
     (row,) = rows(to_op(sdo(0x6065, 0, b"\5")), to_op())
+    assert (row.effect, row.remark) == (True, "only in A")
+
+
+def test_an_object_that_reads_another_value_than_was_written() -> None:
+    command = [sdo(0x2000, 1, b"\5"), sdo_read(0x2000, 1, b"\0")]
+    (row,) = rows(to_op(*command), to_op())
     assert (row.effect, row.remark) == (True, "only in A")
 
 
@@ -232,6 +239,30 @@ def test_the_attempt_that_reached_most_is_compared() -> None:
     assert rows([*scan, *to_op(sdo(0x2001, 0, b"\2"))], to_op(sdo(0x2001, 0, b"\2"))) == []
 
 
+def test_writes_after_the_master_gave_up_do_not_count() -> None:
+    """B waits for OP in vain, returns to PRE-OP and turns the SyncManager off."""
+    configured = [reached(PRE_OP), sync_manager(2, 6, 0x64), reached(SAFE_OP)]
+    request = (TO_OP, StateRequest(OP))
+    off = (TO_SAFE_OP, SyncManagerWrite(2, 0, 0, 0, enabled=False))
+    down = (Step(SAFE_OP, PRE_OP), StateRequest(PRE_OP))
+    (row,) = rows([*configured, request, reached(OP)], [*configured, request, down, off])
+    assert (row.b, row.remark) == ("OP requested, not reached", "B stops here")
+    assert rows([*configured, down, off], configured) == []
+
+
+def test_a_capture_that_begins_in_pre_op() -> None:
+    later = to_op(sync_manager(2, 6, 0x64))[1:]
+    assert rows(to_op(sync_manager(2, 6, 0x64)), later) == []
+    (row,) = rows([], later)
+    assert (row.a, row.b, row.remark) == ("", "not in the capture", "not requested in A")
+
+
+def test_another_error_on_the_way_to_the_same_state() -> None:
+    again = [reached(PRE_OP), *refused(SAFE_OP, 0x001E), *to_op()[1:]]
+    (row,) = rows(to_op(), again)
+    assert (row.b, row.remark) == ("refused 0x001E, then SAFE-OP after 12 ms", "another result")
+
+
 def test_devices_are_paired_by_serial_number_then_by_order() -> None:
     a = timeline((device(0, serial=7), to_op()), (device(1, serial=8), to_op(sync(0x0300))))
     b = timeline((device(0, serial=8), to_op(sync(0x0300))), (device(1, serial=7), to_op()))
@@ -240,6 +271,19 @@ def test_devices_are_paired_by_serial_number_then_by_order() -> None:
     assert [row.subject for each in found.devices for row in each.rows] == ["position", "position"]
     unknown = timeline((device(0), to_op()), (device(1), to_op(sync(0x0300))))
     assert compare(a, unknown).equal
+
+
+def test_a_device_without_an_identity_is_paired_with_one_that_is_left() -> None:
+    unknown = replace(device(0), position=None, vendor=None)
+    a = timeline((device(0, product=1), to_op()), (device(1, product=2), to_op()))
+    b = timeline((unknown, to_op()), (replace(device(1, product=2), position=5), to_op()))
+    assert [(each.pair.a, each.pair.b) for each in compare(a, b).devices] == [
+        (device(0, product=1), unknown),
+        (device(1, product=2), replace(device(1, product=2), position=5)),
+    ]
+    c = timeline((device(0, product=3), to_op()), (replace(unknown, number=1), to_op()))
+    (first, *_) = compare(timeline((device(0, product=1), to_op())), c).devices
+    assert first.pair.b == replace(unknown, number=1)
 
 
 def test_a_device_that_only_one_capture_has() -> None:

@@ -60,20 +60,22 @@ def test_each_file_reports_its_dropped_packets(tmp_path: Path) -> None:
     assert ring.dropped == 4
     received = [read_statistics(path) for path in ring.files]
     assert received == [3, 1]
-    assert [path.name for path in ring.files] == ["line-0001.pcapng", "line-0002.pcapng"]
+    assert [path.name for path in ring.files] == ["line-000001.pcapng", "line-000002.pcapng"]
 
 
 def test_an_earlier_recording_is_replaced_only_by_force(tmp_path: Path) -> None:
     path = tmp_path / "line.pcapng"
     with made_ring(path) as ring:
         ring.write([packet(1), packet(2 * SECOND)])
-    (tmp_path / "line-notes.pcapng").write_text("of the user")
-    with pytest.raises(RecordingError, match=r"line-0001.* to .*line-0002") as caught:
+    for name in ("notes", "20261123"):
+        (tmp_path / f"line-{name}.pcapng").write_text("of the user")
+    with pytest.raises(RecordingError, match=r"line-000001.* to .*line-000002") as caught:
         made_ring(path)
     assert "--force" in caught.value.hint
     FileRing(path, interface="eth0", duration_ns=SECOND, size=10**6, force=True).close()
     assert [each.name for each in sorted(tmp_path.iterdir())] == [
-        "line-0001.pcapng",
+        "line-000001.pcapng",
+        "line-20261123.pcapng",
         "line-notes.pcapng",
     ]
 

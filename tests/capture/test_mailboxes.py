@@ -77,6 +77,16 @@ def test_segmented_write(made: Conversation) -> None:
     assert (found.writes, found.data, found.segments) == (True, LONG, 2)
 
 
+def test_a_write_with_a_segment_that_was_not_captured(made: Conversation) -> None:
+    made.request(DownloadRequest(0x2000, 0, LONG[:10], 30))
+    made.response(DownloadResponse(0x2000, 0))
+    made.request(DownloadSegment(True, True, LONG[20:]))
+    made.response(DownloadSegmentResponse(True))
+    [found] = messages(made)
+    assert isinstance(found, SdoTransfer)
+    assert not found.succeeded  # its value is not known
+
+
 def test_segmented_read_and_complete_access(made: Conversation) -> None:
     made.request(UploadRequest(0x1600, 0, complete_access=True))
     made.response(UploadResponse(0x1600, 0, LONG[:12], 30, complete_access=True))

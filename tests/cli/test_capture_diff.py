@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
+from catenary.capture.diff import compare
+from catenary.cli.capture_diff_text import _summary
 from catenary.cli.main import main
 from catenary.virtual import ServoQuirks
+from tests.capture.events import device, sdo, timeline, to_op
 from tests.capture.recordings import (
     FOLLOWING_ERROR,
     SYNC0,
@@ -110,8 +114,28 @@ def test_an_unreadable_file(
     assert main(["capture", "diff", str(a), str(b)]) == 2
     assert main(["capture", "diff", str(b), str(a), "--json"]) == 2
     output = capsys.readouterr()
-    assert output.err.startswith("catenary: ")
+    assert output.err.startswith(f"catenary: {b}: ")
     assert output.out == ""
+
+
+def test_notes_are_not_part_of_the_json(
+    a: Path, b: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    b.write_bytes(a.read_bytes()[:-5])
+    assert main(["capture", "diff", str(a), str(b), "--json"]) == 0
+    output = capsys.readouterr()
+    assert json.loads(output.out)["equal"]
+    assert output.err.startswith("note on B: the file ends in the middle of a packet")
+
+
+def test_the_next_command_selects_a_device_without_a_position() -> None:
+    """A capture that begins late shows station addresses only."""
+    known = replace(device(1), position=None)
+    a = timeline((known, to_op(sdo(0x2000, 0, b"\1"))))
+    found = compare(a, timeline((known, to_op())))
+    assert list(_summary(found, "a b", "b"))[-1] == (
+        "  try: catenary capture sdo 'a b' --device 0x1002 --format machine"
+    )
 
 
 def test_real_captures(shared_data: Path, capsys: pytest.CaptureFixture[str]) -> None:

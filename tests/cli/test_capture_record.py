@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import json
 import shlex
 import signal
@@ -16,7 +17,9 @@ import pytest
 
 import catenary as cat
 from catenary.capture import read_timeline
+from catenary.capture.file_ring import FileRing
 from catenary.cli.main import main
+from catenary.errors import LinkError
 from catenary.link import Interface, passive
 from catenary.link.passive import PassiveSocket
 from catenary.realtime import private_network
@@ -59,7 +62,7 @@ def test_a_loop_starts_while_a_recorder_runs(
         with looping(veth[0], tmp_path) as loop:
             assert goes_on(loop)
         status, last = ended(recorder, number)
-    path = tmp_path / "line-0001.pcapng"
+    path = tmp_path / "line-000001.pcapng"
     packets = decode_capture(path.read_bytes()).packets
     assert (status, last) == (0, f"{path}: {len(packets)} frames recorded, 0 dropped by the kernel")
     assert len(packets) > 100
@@ -68,7 +71,7 @@ def test_a_loop_starts_while_a_recorder_runs(
 def test_records_both_directions_of_a_visible_master(
     veth: tuple[str, str], tmp_path: Path, tshark: str
 ) -> None:
-    path = tmp_path / "line-0001.pcapng"
+    path = tmp_path / "line-000001.pcapng"
     with served(veth[1], tmp_path), recording(veth[0], tmp_path / "line.pcapng") as recorder:
         with cat.MainDevice(Interface(veth[0], visible=True)) as main_device:
             assert main_device.other_masters == ()
@@ -113,12 +116,16 @@ def test_the_socket_passes_ethercat_only_and_never_blocks(veth: tuple[str, str])
         there.send(passed[0])
         assert link.wait(START)
         [answer] = link.receive()
+        there.send(passed[1])
+        assert link.wait(START)
+        [tagged] = link.receive()
         assert link.dropped == 0
     assert [(packet.data, packet.direction) for packet in packets] == [
         (each, Direction.OUTBOUND) for each in passed
     ]
     assert (answer.data, answer.direction) == (passed[0], Direction.INBOUND)
-    times = [packet.time_ns for packet in (*packets, answer)]
+    assert (tagged.data, tagged.direction) == (passed[1], Direction.INBOUND)
+    times = [packet.time_ns for packet in (*packets, answer, tagged)]
     assert times == sorted(times)
 
 
@@ -139,6 +146,24 @@ def test_a_full_socket_reports_the_dropped_frames(
         assert received + link.dropped == 200
 
 
+def test_frames_before_an_error_are_kept(
+    veth: tuple[str, str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    frames = [(bytes(60), [], 0, (veth[0], 0, 0))]
+
+    def recvmsg(*_: int) -> object:
+        if frames:
+            return frames.pop()
+        raise OSError(errno.ENODEV, "No such device")
+
+    with PassiveSocket(veth[0]) as link, monkeypatch.context() as patch:
+        patch.setattr(link, "_socket", SimpleNamespace(recvmsg=recvmsg))
+        [packet] = link.receive()
+        with pytest.raises(LinkError, match="No such device"):
+            link.receive()
+    assert packet.data == bytes(60)
+
+
 def test_a_removed_interface_ends_the_recording_with_complete_files(tmp_path: Path) -> None:
     with private_network.veth_pair() as names, ExitStack() as stack:
         recorder = stack.enter_context(recording(names[0], tmp_path / "line.pcapng"))
@@ -149,7 +174,7 @@ def test_a_removed_interface_ends_the_recording_with_complete_files(tmp_path: Pa
     with kept:
         last = recorder.read_line(START)
         assert recorder.process.wait(START) == 1
-    path = tmp_path / "line-0001.pcapng"
+    path = tmp_path / "line-000001.pcapng"
     assert last == f"{path}: 1 frames recorded, 0 dropped by the kernel"
     assert decode_capture(path.read_bytes()).cut == 0
 
@@ -159,7 +184,7 @@ def test_an_idle_interface_gives_status_1_and_json(
 ) -> None:
     line = f"capture record {veth[0]} -o {tmp_path}/x.pcapng --seconds 0.01 --json"
     status, out, err = call(line, capsys)
-    files = [f"{tmp_path}/x-0001.pcapng"]
+    files = [f"{tmp_path}/x-000001.pcapng"]
     assert (status, json.loads(out)) == (1, {"files": files, "frames": 0, "dropped": 0})
     assert "no EtherCAT frame" in err
     status, _, err = call(line, capsys)
@@ -193,6 +218,7 @@ def test_missing_permission_names_the_capability(
         ("--size 0", "not positive"),
         ("--minutes -1", "minutes"),
         ("-o /none/x.pcapng", "does not exist"),
+        ("-o /tmp", "is a folder"),
     ],
 )
 def test_refuses_impossible_bounds(
@@ -203,6 +229,20 @@ def test_refuses_impossible_bounds(
     except SystemExit as ended_by_parser:
         status = int(str(ended_by_parser.code))
     assert (status, message in capsys.readouterr().err) == (2, True)
+
+
+def test_a_full_disk_names_the_file(
+    veth: tuple[str, str],
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def full(*_: object) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(FileRing, "flush", full)
+    status, _, err = call(f"capture record {veth[0]} -o {tmp_path}/x.pcapng --seconds 0.01", capsys)
+    assert (status, err) == (2, f"catenary: {tmp_path}/x.pcapng: No space left on device\n")
 
 
 def test_refuses_a_disk_without_space(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -11,7 +12,7 @@ import catenary as cat
 from catenary.capture import SdoTransfer
 from catenary.capture.compared_master import ComparedMaster
 from catenary.capture.start_up_list import start_up_list
-from catenary.capture.start_up_text import machine_text
+from catenary.capture.start_up_text import machine_text, python_text
 from catenary.cli.main import main
 from catenary.machine.device_request import start_up_objects
 from catenary.machine.read import read_machine
@@ -118,6 +119,10 @@ def test_bytes_repeated_objects_and_parameters_that_are_stored(tmp_path: Path) -
             sdo(0x2001, 0, b"\x07\x00"),
             sdo(0xF000, 0, b"\x02"),
             sdo(0x1010, 1, b"save"),
+            sdo(0x2002, 0, b"\x01"),  # a pulse
+            sdo(0x2002, 0, b"\x00"),
+            sdo(0x2003, 0, b"\x80"),
+            sdo(0x2003, 0, b"\x80"),
         ),
         tmp_path,
     )
@@ -127,17 +132,44 @@ def test_bytes_repeated_objects_and_parameters_that_are_stored(tmp_path: Path) -
         cat.StartUp(0x2001, 0, 7, type=UINT),
         cat.StartUp(0xF000, 0, 2, type=USINT),
         cat.StartUp(0x1010, 1, 0x65766173, type=UDINT, verify=False),
+        cat.StartUp(0x2002, 0, 1, type=USINT, verify=False),
+        cat.StartUp(0x2002, 0, 0, type=USINT),
+        cat.StartUp(0x2003, 0, 0x80, type=USINT),
     ]
 
 
+def test_complete_access(tmp_path: Path) -> None:
+    data = bytes.fromhex("02000100")  # not a number, although it has 4 bytes
+    steps = to_op((IN_PRE_OP, SdoTransfer(True, 0xF030, 0, data, complete_access=True)))
+    expected = [cat.StartUp(0xF030, 0, data, type=OCTET_STRING, complete_access=True)]
+    assert listed(steps, tmp_path)[0] == expected
+    master = ComparedMaster(timeline((device(1), steps)))
+    names: dict[str, list[cat.StartUp]] = {}
+    exec(python_text(start_up_list(master, master.devices[0]), "a.pcapng"), names)
+    assert [replace(each, type=OCTET_STRING) for each in names["start_up"]] == expected
+
+
 def test_what_a_list_cannot_contain_is_a_comment(tmp_path: Path) -> None:
-    complete = SdoTransfer(True, 0xF030, 0, b"\2\0\1\0\0\0", complete_access=True)
     objects, text = listed(
-        to_op(sdo(0x2000, 0, b"\1", abort=0x06020000), (IN_PRE_OP, complete)), tmp_path
+        to_op(
+            sdo(0x2000, 0, b"\1", abort=0x06020000),
+            sdo(0x2001, 0, b"\1", answered=False),
+            sdo(0xF030, 2, b"\1", complete_access=True),
+        ),
+        tmp_path,
     )
     assert objects == []
     assert "# omitted: 0x2000:00 = 1 aborted 0x06020000: the device did not accept it" in text
-    assert "# omitted: 0xF030:00 complete = 020001000000: complete access; write its" in text
+    assert "# omitted: 0x2001:00 = 1 not answered: the capture lacks its answer" in text
+    assert "# omitted: 0xF030:02 complete = 1: complete access must begin at" in text
+
+
+def test_a_truncated_capture_is_named(capture: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    capture.write_bytes(capture.read_bytes()[:-5])
+    assert main(["capture", "sdo", str(capture), "--device", "1"]) == 0
+    output = capsys.readouterr()
+    assert "the file ends in the middle of a packet" in output.err
+    assert "note on" not in output.out
 
 
 def test_a_device_that_is_not_there(capture: Path, capsys: pytest.CaptureFixture[str]) -> None:

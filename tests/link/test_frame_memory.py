@@ -123,6 +123,19 @@ def test_an_existing_file_is_kept(tmp_path: Path) -> None:
     assert path.read_text() == "kept"
 
 
+def test_a_full_disk_leaves_no_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def full(*_: object) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(frame_memory, "copy_bytes", full)
+    memory = memory_of(PythonLink())
+    memory.close()
+    with pytest.raises(OSError, match="No space left"):
+        memory.write(tmp_path / "x.pcapng", 0, 1)
+    memory.release()
+    assert list(tmp_path.iterdir()) == []
+
+
 def test_refuses_more_than_half_of_the_available_memory(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

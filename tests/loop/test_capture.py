@@ -13,9 +13,7 @@ import pytest
 
 import catenary as cat
 from catenary.capture import SdoTransfer, StateReached, read_timeline
-from catenary.errors import CatenaryError, ConfigurationError, DriveError
-from catenary.link.frame_memory import FrameMemory
-from catenary.loop.frame_capture import free_path
+from catenary.errors import CatenaryError, DriveError
 from catenary.realtime import VirtualClock
 from catenary.virtual import Segment, Servo
 from catenary.wire.capture import decode_capture
@@ -221,34 +219,6 @@ def test_a_stopped_axis_of_a_loop_in_real_time_is_written_while_it_runs(
     assert files_of(tmp_path) == [path]
 
 
-def test_the_number_of_files_is_bounded(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
-    options = cat.CaptureOptions(folder=tmp_path, files=1)
-    with cat.MainDevice(two_servos()) as main:
-        arm = arm_of(main)
-        with cat.Loop(arm, capture=options) as loop:
-            capture = loop.networks[0].session.capture
-            assert capture is not None
-            capture.files.append(tmp_path / "earlier.pcapng")
-            capture.fail(error := ValueError("made by the test"))
-    assert files_of(tmp_path) == []
-    assert error.__notes__ == ["no capture of the frames: CaptureOptions.files=1"]
-
-
-def test_a_full_disk_does_not_replace_the_error(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    def refused(*_: object) -> tuple[int, int]:
-        raise OSError(28, "No space left on device")
-
-    monkeypatch.setattr(FrameMemory, "write", refused)
-    with cat.MainDevice(two_servos()) as main:
-        arm = arm_of(main)
-        with pytest.raises(ZeroDivisionError) as caught, cat.Loop(arm, capture=tmp_path):
-            raise ZeroDivisionError
-    [note] = caught.value.__notes__
-    assert note == f"no capture of the frames in {tmp_path}: No space left on device"
-
-
 def test_lost_frames_in_the_background_name_their_file(tmp_path: Path) -> None:
     segment = two_servos()
     with cat.MainDevice(segment) as main:
@@ -277,39 +247,3 @@ def test_each_network_has_its_own_file(tmp_path: Path) -> None:
     assert sorted(re.findall(r"\S+\.pcapng$", "\n".join(caught.value.__notes__), re.M)) == [
         str(path) for path in files_of(tmp_path)
     ]
-
-
-@pytest.mark.parametrize(
-    "wrong",
-    [
-        {"before": -1.0},
-        {"after": float("inf")},
-        {"memory": 1000},
-        {"memory": 1 << 40},
-        {"files": 0},
-    ],
-)
-def test_impossible_options_are_refused(wrong: dict[str, float]) -> None:
-    with pytest.raises(ValueError, match=next(iter(wrong))):
-        cat.CaptureOptions(folder="x", **wrong)  # type: ignore[arg-type]
-
-
-def test_a_capture_that_is_no_folder_is_refused(tmp_path: Path) -> None:
-    (tmp_path / "file").write_text("kept")
-    with cat.MainDevice(two_servos()) as main:
-        arm = arm_of(main)
-        with pytest.raises(TypeError, match="must be a folder"):
-            cat.Loop(arm, capture=True)  # type: ignore[arg-type]
-        link = main.link
-        with pytest.raises(ConfigurationError, match="cannot be made"):
-            cat.Loop(arm, capture=tmp_path / "file").open()
-        assert main.link is link
-
-
-def test_names_are_never_reused(tmp_path: Path) -> None:
-    paths = []
-    for _ in range(3):
-        paths.append(free_path(tmp_path, "eth0", "axis 1/2 stopped"))
-        paths[-1].touch()
-    assert len(set(paths)) == 3
-    assert all(re.fullmatch(r"[\w.-]+\.pcapng", path.name) for path in paths)

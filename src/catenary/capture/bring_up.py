@@ -116,16 +116,26 @@ def _attempts(events: Sequence[Event]) -> Iterator[tuple[int, int, int]]:
 
 
 def _end(attempt: Sequence[Event], highest: int) -> int:
-    """Return the index after the last event that belongs to the bring-up."""
+    """Return the index after the last event that belongs to the bring-up.
+
+    It ends with OP, with the refusal of a state above the highest one, or when the master gives up.
+    """
+    aimed = None  # rank that the master aims at, once the highest state is reached
     for index, event in enumerate(attempt):
         content = event.content
         if isinstance(content, StateReached):
-            if level(content.state) == highest and state_of(highest) is AlState.OP:
-                return index + 1
+            if level(content.state) == highest:
+                if state_of(highest) is AlState.OP:
+                    return index + 1
+                aimed = max(aimed or 0, highest)
         elif isinstance(content, StateRefused) and not content.fell:
             requested = content.requested
             if requested is not None and level(requested) > highest:
                 return index + 1
+        elif isinstance(content, StateRequest) and aimed is not None:
+            if level(content.state) < aimed:
+                return index
+            aimed = level(content.state)
     return len(attempt)
 
 

@@ -24,8 +24,10 @@ def pair_devices(a: Iterable[Device], b: Iterable[Device]) -> tuple[DevicePair, 
     """
     left, right = sorted(a, key=_place), sorted(b, key=_place)
     partner: dict[int, Device] = {}
-    for key in (_serial_key, _product_key, _position_key, _any_key):
+    for key in (_serial_key, _product_key, _position_key):
         _match(left, right, partner, key)
+    _match(left, [each for each in right if each.vendor is None], partner, _any_key)
+    _match([each for each in left if each.vendor is None], right, partner, _any_key)
     taken = {each.number for each in partner.values()}
     pairs = [DevicePair(each, partner.get(each.number)) for each in left]
     return (*pairs, *(DevicePair(None, each) for each in right if each.number not in taken))

@@ -153,35 +153,46 @@ def _missing(pair: DevicePair) -> Difference:
 def _results(a: Sequence[Outcome], b: Sequence[Outcome]) -> Iterator[Difference]:
     """Yield the transitions with different results. Later ones follow from the first."""
     for left, right in zip(a, b, strict=True):
-        one, other = (
-            (each.reached is not None, each.codes, each.is_known) for each in (left, right)
-        )
-        if one == other:
+        left_ends, right_ends = _ends(left, a), _ends(right, b)
+        if _result(left, left_ends) == _result(right, right_ends):
             continue
         stops = [
             name
-            for name, each, capture in (("A", left, a), ("B", right, b))
-            if each.error is not None or _ends(each, capture)
+            for name, each, ends in (("A", left, left_ends), ("B", right, right_ends))
+            if ends or each.error is not None
         ]
         yield Difference(
-            *(Mark.RESULT, Topic.STATE, str(left.step.after), left.step, str(left), str(right)),
+            *(Mark.RESULT, Topic.STATE, str(left.step.after), left.step),
+            *(_text(left, left_ends), _text(right, right_ends)),
             note=_note(left, right, stops),
             packet_a=_packet(left),
             packet_b=_packet(right),
         )
-        if left.reached is None or right.reached is None:
+        if left_ends or right_ends:
             return
+
+
+def _result(outcome: Outcome, ends: bool) -> tuple[object, ...]:
+    """Return what is compared of a transition. `ends` is the result of `_ends`."""
+    return ends, outcome.codes, outcome.is_known or not ends
+
+
+def _text(outcome: Outcome, ends: bool) -> str:
+    return str(outcome) or ("" if ends else "not in the capture")
 
 
 def _note(a: Outcome, b: Outcome, stops: Sequence[str]) -> str:
     if len(stops) != 1:
-        return ""
+        return "another result"
     outcome = a if stops[0] == "A" else b
     return f"{stops[0]} stops here" if outcome.is_known else f"not requested in {stops[0]}"
 
 
 def _ends(outcome: Outcome, outcomes: Sequence[Outcome]) -> bool:
-    """Return True if a bring-up does not continue after a transition that it did not complete."""
+    """Return True if a bring-up does not continue after a transition that it did not complete.
+
+    A capture may lack the transition itself, for example if it begins later.
+    """
     later = outcomes[outcomes.index(outcome) :]
     return not any(each.reached is not None for each in later)
 

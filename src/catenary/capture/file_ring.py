@@ -1,7 +1,7 @@
 """Ring of pcapng files: it keeps the newest packets, within a bound of time and a bound of size.
 
-A ring for `line.pcapng` has the files `line-0001.pcapng`, `line-0002.pcapng`, and so on. Each is a
-complete capture. The oldest file is deleted when the others contain enough.
+A ring for `line.pcapng` has the files `line-000001.pcapng`, `line-000002.pcapng`, and so on. Each
+is a complete capture. The oldest file is deleted when the others contain enough.
 """
 
 from __future__ import annotations
@@ -20,6 +20,7 @@ from catenary.wire.pcapng import Packet, encode_header, encode_packet, encode_st
 
 PARTS = 10  # complete files that together hold the requested time or size
 SUFFIX = ".pcapng"
+DIGITS = 6  # of the number: names sort for months, and a date of 8 digits is not a number of a ring
 MINIMUM_SIZE = 64 * 1024  # [bytes] of a ring
 
 
@@ -169,12 +170,12 @@ def numbered(name: Path, number: int) -> Path:
         name: Path of the ring, without suffix.
         number: Number of the file, from 1.
     """
-    return name.with_name(f"{name.name}-{number:04}{SUFFIX}")
+    return name.with_name(f"{name.name}-{number:0{DIGITS}}{SUFFIX}")
 
 
 def earlier_files(name: Path) -> list[Path]:
     """Return the existing files of a ring, oldest first."""
-    pattern = re.compile(re.escape(name.name) + r"-(\d{4,})" + re.escape(SUFFIX))
+    pattern = re.compile(re.escape(name.name) + rf"-(\d{{{DIGITS}}})" + re.escape(SUFFIX))
     found = {
         int(match[1]): each
         for each in name.parent.iterdir()

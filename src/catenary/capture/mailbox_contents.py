@@ -18,7 +18,8 @@ class SdoTransfer:
     """A complete SDO transfer: a download (`writes`) or an upload.
 
     `data` is the transferred value, joined from all segments. `abort` is the abort code; None if
-    the transfer was not aborted. `answered` is False if the capture has no answer.
+    the transfer was not aborted. `answered` is False if the capture has no answer, or lacks a
+    segment of a download.
     """
 
     writes: bool

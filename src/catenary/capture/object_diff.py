@@ -138,14 +138,14 @@ def _alone(write: ObjectWrite, own: Objects, other: Objects, name: str) -> tuple
         name: "A" or "B", the other capture.
     """
     if not write.succeeded:
-        return False, "refused"
-    last, found = own.known.get(write.place), other.known.get(write.place)
-    if write.data != last:
+        return False, "not answered" if write.abort is None else "refused"
+    if write.data != own.written[write.place]:
         return False, "overwritten later"
+    found = other.known.get(write.place)
     if found is None:
         return True, ""
-    verb = "wrote" if any(each.place == write.place for each in other.writes) else "read"
-    if found == last:
+    verb = "wrote" if other.written.get(write.place) == found else "read"
+    if found == write.data:
         return False, f"{name} {verb} this value"
     return True, f"{name} {verb} {value_of(found)}"
 

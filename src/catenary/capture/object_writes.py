@@ -87,9 +87,13 @@ class ObjectWrite:
 
 @dataclass(frozen=True, slots=True)
 class Objects:
-    """The writes in their order, and the last known value of each object."""
+    """The writes in their order, and the last values of each object.
+
+    `written` has the values that the device accepted, `known` also those that it returned.
+    """
 
     writes: tuple[ObjectWrite, ...]
+    written: dict[Place, bytes]
     known: dict[Place, bytes]
 
 
@@ -113,7 +117,8 @@ def objects_of(bring_up: BringUp, limit: int) -> Objects:
                 writes += found
         elif isinstance(content, MailboxMessage) and in_bring_up:
             writes += _other(content, event.step, event.packet)
-    return Objects(tuple(writes), known)
+    written = {each.place: each.data for each in writes if each.succeeded}
+    return Objects(tuple(writes), written, known)
 
 
 def _written(transfer: SdoTransfer, step: Step, packet: int) -> Iterable[ObjectWrite]:

@@ -44,6 +44,7 @@ class _Pending:
     def finished(self, time_ns: int | None, abort: int | None = None) -> SdoTransfer:
         """Return the transfer; without a time, it was not answered."""
         writes = isinstance(self.request, DownloadRequest)
+        lacks_segments = writes and abort is None and len(self.data) < self.size
         return SdoTransfer(
             writes,
             self.request.index,
@@ -51,7 +52,7 @@ class _Pending:
             bytes(self.data),
             self.request.complete_access,
             abort,
-            answered=time_ns is not None,
+            answered=time_ns is not None and not lacks_segments,
             segments=self.segments,
             duration_ns=None if time_ns is None else time_ns - self.started_ns,
         )

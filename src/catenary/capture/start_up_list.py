@@ -16,7 +16,10 @@ _NOT_READ_BACK = (0x1010, 0x1011)  # store and restore parameters: a read return
 
 @dataclass(frozen=True, slots=True)
 class StartUpEntry:
-    """One object. `value` is a number if the data has 1, 2, 4 or 8 bytes, else None."""
+    """One object. `value` is a number if the data has 1, 2, 4 or 8 bytes, else None.
+
+    With complete access, the data belongs to several subindices, and `value` is None.
+    """
 
     index: int
     subindex: int
@@ -25,11 +28,13 @@ class StartUpEntry:
     packet: int
     before_mapping: bool = False
     verify: bool = True
+    complete_access: bool = False
 
     @property
     def value(self) -> int | None:
-        """The unsigned number; None for another length."""
-        return int.from_bytes(self.data, "little") if len(self.data) in (1, 2, 4, 8) else None
+        """The unsigned number; None for another length and for complete access."""
+        is_number = len(self.data) in (1, 2, 4, 8) and not self.complete_access
+        return int.from_bytes(self.data, "little") if is_number else None
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,10 +74,10 @@ def start_up_list(master: ComparedMaster, device: Device) -> StartUpList:
         reason = _reason_to_omit(write)
         if reason:
             omitted.append(f"{write}: {reason}")
-        elif not is_mapping(write.index) and not (chosen and chosen[-1].place == write.place):
-            chosen.append(write)
         elif not is_mapping(write.index):
-            chosen[-1] = write  # the same object twice in a row: the last value counts
+            if chosen and (chosen[-1].place, chosen[-1].data) == (write.place, write.data):
+                chosen.pop()  # the master has repeated the write
+            chosen.append(write)
     mapping = [each.packet for each in objects.writes if is_mapping(each.index)]
     first_mapping = min(mapping, default=0)
     last = {each.place: number for number, each in enumerate(chosen)}
@@ -81,6 +86,7 @@ def start_up_list(master: ComparedMaster, device: Device) -> StartUpList:
             *(each.index, each.subindex, each.data, each.step, each.packet),
             before_mapping=each.packet < first_mapping,
             verify=last[each.place] == number and each.index not in _NOT_READ_BACK,
+            complete_access=each.complete,
         )
         for number, each in enumerate(chosen)
     )
@@ -91,10 +97,12 @@ def _reason_to_omit(write: ObjectWrite) -> str:
     """Return why a write is not part of a list; empty if it is."""
     if write.text:
         return "not CoE"
+    if not write.answered:
+        return "the capture lacks its answer or a segment"
     if not write.succeeded:
         return "the device did not accept it"
-    if write.complete:
-        return "complete access; write its subindices one by one"
+    if write.complete and write.subindex > 1:
+        return "complete access must begin at subindex 0 or 1"
     return "" if write.data else "no data"
 
 

@@ -61,6 +61,7 @@ def _toml(found: StartUpList) -> Iterator[str]:
         value = f'"{each.data.hex()}"' if each.value is None else str(each.value)
         options = ", before_mapping = true" if each.before_mapping else ""
         options += "" if each.verify else ", verify = false"
+        options += ", complete_access = true" if each.complete_access else ""
         yield (
             f'    {{ object = "0x{each.index:04X}:{each.subindex:02X}", value = {value}, '
             f'type = "{_type(each)}"{options} }},  # {each.step}, packet {each.packet}'
@@ -74,6 +75,7 @@ def _python(found: StartUpList) -> Iterator[str]:
             value = f"{each.value}, type=types.{_type(each)}"
         options = ", before_mapping=True" if each.before_mapping else ""
         options += "" if each.verify else ", verify=False"
+        options += ", complete_access=True" if each.complete_access else ""
         yield (
             f"    cat.StartUp(0x{each.index:04X}, {each.subindex}, {value}{options}),"
             f"  # {each.step}, packet {each.packet}"
@@ -81,7 +83,7 @@ def _python(found: StartUpList) -> Iterator[str]:
 
 
 def _type(entry: StartUpEntry) -> str:
-    return _TYPES.get(len(entry.data), "OCTET_STRING")
+    return "OCTET_STRING" if entry.value is None else _TYPES[len(entry.data)]
 
 
 def _printable(text: str) -> str:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import json
 import sys
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TextIO
 
 from catenary.cli.failure import report
 from catenary.cli.parsers import Commands, add_command, add_json
@@ -52,8 +52,8 @@ def run(arguments: argparse.Namespace) -> int:
         from catenary.cli.capture_diff_text import print_comparison
 
         print_comparison(comparison, arguments.a, arguments.b)
-        for name, timeline in (("A", a), ("B", b)):
-            print_notes(name, timeline)
+    for name, timeline in (("A", a), ("B", b)):
+        print_notes(name, timeline, sys.stderr if arguments.json else sys.stdout)
     return EQUAL if comparison.equal else DIFFERENT
 
 
@@ -63,7 +63,10 @@ def read(name: str) -> Timeline | None:
 
     try:
         timeline = read_timeline(name)
-    except (DecodeError, OSError) as error:
+    except DecodeError as error:
+        report(DecodeError(f"{name}: {error.message}", hint=error.hint))
+        return None
+    except OSError as error:
         report(error)
         return None
     if not timeline.counts.ethercat:
@@ -76,17 +79,19 @@ def read(name: str) -> Timeline | None:
     return timeline
 
 
-def print_notes(name: str, timeline: Timeline) -> None:
+def print_notes(name: str, timeline: Timeline, file: TextIO) -> None:
     """Print the remarks on a capture.
 
     Args:
         name: "A", "B" or the name of the file.
         timeline: The capture.
+        file: Stream to print to.
     """
     from catenary.capture.notes import notes
     from catenary.cli.text import escaped
 
     for note in notes(timeline.counts, timeline.masters):
-        print(f"note on {escaped(name)}: {escaped(note)}")
+        print(f"note on {escaped(name)}: {escaped(note)}", file=file)
     if not timeline.complete:
-        print(f"note on {escaped(name)}: only the first {len(timeline.events)} events were used")
+        first = f"only the first {len(timeline.events)} events were used"
+        print(f"note on {escaped(name)}: {first}", file=file)

@@ -9,6 +9,7 @@ from pathlib import Path
 from catenary.capture.compared_master import Side
 from catenary.capture.diff import CaptureComparison
 from catenary.capture.difference import DeviceComparison, Difference, Mark, Topic
+from catenary.capture.events import Device
 from catenary.cli.text import escaped
 
 ABSENT = "—"
@@ -167,10 +168,15 @@ def _next_command(comparison: CaptureComparison, a: str, b: str) -> str:
     device = first.device
     writes = any(row.topic in (Topic.OBJECT, Topic.MAPPING) for row in device.rows)
     if writes and device.pair.a is not None and device.objects:
-        arguments = ["sdo", shlex.quote(a), "--device", str(_place(device)), "--format", "machine"]
+        arguments = ["sdo", shlex.quote(a), "--device", _number(device.pair.a)]
+        arguments += ["--format", "machine"]
     else:
         name = a if device.pair.b is None else b
         found = device.pair.b or device.pair.device
-        place = found.number if found.position is None else found.position
-        arguments = ["show", shlex.quote(name), "--device", str(place)]
+        arguments = ["show", shlex.quote(name), "--device", _number(found)]
     return f"catenary capture {' '.join(arguments)}"
+
+
+def _number(device: Device) -> str:
+    """Return the value of --device: the position, else the station address."""
+    return f"0x{device.station or 0:04X}" if device.position is None else str(device.position)

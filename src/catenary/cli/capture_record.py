@@ -42,8 +42,8 @@ def add_to(group: Commands) -> None:
         help="keep the last minutes of the frames of an interface",
         description="Records the EtherCAT frames of an interface while any master uses it. Never "
         "sends a frame. Writes a ring of pcapng files, and deletes the oldest file. Ends on Ctrl-C "
-        "or SIGTERM. Exit status 1 if frames were dropped or none arrived, 2 if the interface "
-        "cannot be read or the files cannot be written.",
+        "or SIGTERM. Exit status 1 if frames were dropped, none arrived, or the interface was "
+        "removed; 2 if the interface cannot be read or the files cannot be written.",
         example=EXAMPLE,
     )
     parser.add_argument("interface", metavar="NIC", help="network interface, such as eth0")
@@ -66,7 +66,7 @@ def add_to(group: Commands) -> None:
         dest="file",
         metavar="FILE",
         type=Path,
-        help="name of the files, which get numbers (default: NIC.pcapng: NIC-0001.pcapng ...)",
+        help="name of the files, which get numbers (default: NIC.pcapng: NIC-000001.pcapng ...)",
     )
     parser.add_argument("--seconds", metavar="N", type=positive_seconds, help="end after N seconds")
     parser.add_argument("--force", action="store_true", help="replace an earlier recording")
@@ -98,18 +98,22 @@ def run(arguments: argparse.Namespace) -> int:
                 sys.stdout.flush()
             lost = record(link, ring, stop, arguments.seconds)
     except (CatenaryError, OSError) as error:
+        if isinstance(error, OSError) and error.filename is None:  # such as a full disk
+            error.filename = str(path)
         report(error)
         return UNREADABLE
     return show_result(ring, lost, as_json=arguments.json)
 
 
 def check_space(path: Path, size: int) -> None:
-    """Raise UsageError if the folder does not exist or has too little free space.
+    """Raise UsageError if the path is a folder, or its folder is missing or too full.
 
     Args:
         path: Path of the files.
         size: Maximum size of all files [bytes].
     """
+    if path.is_dir():
+        raise UsageError(f"{path} is a folder, not a file", hint="-o FOLDER/NAME.pcapng")
     if not path.parent.is_dir():
         raise UsageError(f"the folder {path.parent} does not exist", hint=f"mkdir {path.parent}")
     if size > MAXIMUM_MEGABYTES * 1_000_000:

@@ -55,7 +55,7 @@ def run(arguments: argparse.Namespace) -> int:
     from catenary.capture.compared_master import ComparedMaster
     from catenary.capture.start_up_list import start_up_list
     from catenary.capture.start_up_text import machine_text, python_text
-    from catenary.cli.capture_diff import read
+    from catenary.cli.capture_diff import print_notes, read
 
     timeline = read(arguments.file)
     if timeline is None:
@@ -67,6 +67,7 @@ def run(arguments: argparse.Namespace) -> int:
         known = ", ".join(map(str, master.devices)) or "none"
         print(f"catenary: {arguments.file}: no device {wanted}; devices: {known}", file=sys.stderr)
         return NOT_FOUND
+    print_notes(arguments.file, timeline, sys.stderr)
     found = start_up_list(master, device)
     if arguments.json:
         print(json.dumps(_as_object(found), indent=2))
@@ -93,6 +94,7 @@ def _as_object(found: StartUpList) -> dict[str, Json]:
                 "value": each.value,
                 "before_mapping": each.before_mapping,
                 "verify": each.verify,
+                "complete_access": each.complete_access,
                 "step": str(each.step),
                 "packet": each.packet,
             }

@@ -82,7 +82,7 @@ class FrameMemory:
             os.close(file)
 
     def write(self, path: Path, from_ns: int, to_ns: int) -> tuple[int, int]:
-        """Write the frames of a time into a new pcapng file.
+        """Write the frames of a time into a new pcapng file. An error leaves no file.
 
         Args:
             path: Path of the file.
@@ -99,14 +99,18 @@ class FrameMemory:
         first = self._find(from_ns, end)
         last = self._find(to_ns + 1, end)
         dropped = self.link.dropped
-        with path.open("xb") as file:
-            file.write(self._header)
-            file.flush()
-            copy_bytes(self._file, file, first, last - first)
-            statistics = encode_statistics(
-                to_ns + self.offset_ns, received=self.link.recorded + dropped, dropped=dropped
-            )
-            file.write(statistics)
+        statistics = encode_statistics(
+            to_ns + self.offset_ns, received=self.link.recorded + dropped, dropped=dropped
+        )
+        file = path.open("xb")
+        try:
+            with file:
+                file.write(self._header)
+                copy_bytes(self._file, file, first, last - first)
+                file.write(statistics)
+        except BaseException:  # such as a full disk
+            path.unlink(missing_ok=True)
+            raise
         found = self._block_from(first, end) if first < last else None
         return (to_ns, to_ns) if found is None else (found[1] - self.offset_ns, to_ns)
 

@@ -24,10 +24,11 @@ from catenary.link.interface import ETHERTYPE, SOL_PACKET, check
 from catenary.wire.pcapng import Direction, Packet
 
 ETH_P_ALL = 0x0003
-PACKET_STATISTICS = 6  # linux/if_packet.h
+PACKET_STATISTICS, PACKET_AUXDATA = 6, 8  # linux/if_packet.h
+VLAN_VALID, VLAN_TYPE_VALID = 0x10, 0x40  # status of `struct tpacket_auxdata`
 SO_ATTACH_FILTER, SO_RCVBUFFORCE, SO_TIMESTAMPNS = 26, 33, 35  # asm-generic/socket.h
 RECEIVE_BUFFER = 16 * 1024 * 1024  # about 4 s of the frames of three drives at 1 kHz
-FRAME_SIZE = 2048
+FRAME_SIZE, CONTROL_SIZE = 2048, 128
 BATCH = 256  # frames of one `receive`, so that its time is bounded
 
 VLAN_TYPES = (0x8100, 0x88A8)  # IEEE 802.1Q, 802.1ad
@@ -103,10 +104,12 @@ class PassiveSocket:
         packets: list[Packet] = []
         while len(packets) < BATCH:
             try:
-                data, controls, _, address = self._socket.recvmsg(FRAME_SIZE, 64)
+                data, controls, _, address = self._socket.recvmsg(FRAME_SIZE, CONTROL_SIZE)
             except BlockingIOError:
                 break
             except OSError as error:
+                if packets:
+                    break  # they are kept; a later call raises the error
                 if error.errno != errno.ENETDOWN:
                     raise LinkError(f"cannot receive on {self.name}: {error.strerror}") from error
                 self.require_interface()
@@ -166,13 +169,14 @@ def open_all_protocols(name: str) -> socket.socket:
 
 
 def prepare(opened: socket.socket) -> None:
-    """Attach the filter, request time stamps in ns, and enlarge the receive buffer."""
+    """Attach the filter, request time stamps in ns and VLAN tags, and enlarge the buffer."""
     opened.setblocking(False)
     code = b"".join(struct.pack("=HBBI", *each) for each in FILTER)
     program = ctypes.create_string_buffer(code, len(code))  # the kernel copies it
     header = struct.pack("@HP", len(FILTER), ctypes.addressof(program))  # struct sock_fprog
     opened.setsockopt(socket.SOL_SOCKET, SO_ATTACH_FILTER, header)
     opened.setsockopt(socket.SOL_SOCKET, SO_TIMESTAMPNS, 1)
+    opened.setsockopt(SOL_PACKET, PACKET_AUXDATA, 1)
     try:
         opened.setsockopt(socket.SOL_SOCKET, SO_RCVBUFFORCE, RECEIVE_BUFFER)
     except PermissionError:  # CAP_NET_ADMIN is missing: net.core.rmem_max limits the size
@@ -183,13 +187,24 @@ def made_packet(data: bytes, controls: list[tuple[int, int, bytes]], kind: int) 
     """Return a frame as a packet of a capture.
 
     Args:
-        data: Bytes of the frame.
-        controls: Control messages of `recvmsg`: the time stamp.
+        data: Bytes of the frame. The kernel removes the VLAN tag of a received frame.
+        controls: Control messages of `recvmsg`: the time stamp and the VLAN tag.
         kind: Packet type of `sockaddr_ll`, packet(7).
     """
     direction = Direction.OUTBOUND if kind == socket.PACKET_OUTGOING else Direction.INBOUND
+    time_ns = None
     for level, number, content in controls:
         if (level, number) == (socket.SOL_SOCKET, SO_TIMESTAMPNS):
             seconds, nanoseconds = struct.unpack_from("=qq", content)
-            return Packet(seconds * 1_000_000_000 + nanoseconds, data, direction=direction)
-    return Packet(time.time_ns(), data, direction=direction)
+            time_ns = seconds * 1_000_000_000 + nanoseconds
+        elif (level, number) == (SOL_PACKET, PACKET_AUXDATA):
+            data = data[:12] + vlan_tag(content) + data[12:]
+    return Packet(time.time_ns() if time_ns is None else time_ns, data, direction=direction)
+
+
+def vlan_tag(auxiliary: bytes) -> bytes:
+    """Return the removed VLAN tag from a `struct tpacket_auxdata`; empty without a tag."""
+    status, tag, kind = struct.unpack("=I12xHH", auxiliary)
+    if not status & VLAN_VALID:
+        return b""
+    return struct.pack(">HH", kind if status & VLAN_TYPE_VALID else VLAN_TYPES[0], tag)

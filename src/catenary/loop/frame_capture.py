@@ -53,7 +53,6 @@ class FrameCapture:
         self._main = main
         self._link = main.link
         self._memory = FrameMemory(main.link, options.memory)
-        main.replace_link(self._memory.link)
         self._marks: deque[Mark] = deque(maxlen=MARKS)
         self._error: BaseException | None = None
         self._ended = threading.Event()
@@ -61,14 +60,20 @@ class FrameCapture:
         self._process = os.getpid()
         self._unsubscribe = main.events.listen(self._on_event)
         self._thread = threading.Thread(target=self._serve, name="catenary capture", daemon=True)
-        self._thread.start()
+        try:
+            self._thread.start()
+            main.replace_link(self._memory.link)
+        except BaseException:
+            self.end()
+            raise
 
     def fail(self, error: BaseException) -> None:
         """Keep the frames around the error that ends the loop. Its notes will name the file.
 
-        The first error counts. Ctrl-C and the end of the program are not errors.
+        The first error counts. Ctrl-C and the end of the program are not errors. After `end`, a
+        call has no effect.
         """
-        if self._error is None and isinstance(error, Exception):
+        if not self._is_over and self._error is None and isinstance(error, Exception):
             self._error = error
             self._marks.append(Mark(self._memory.link.now(), type(error).__name__))
 
@@ -82,20 +87,28 @@ class FrameCapture:
         self._is_over = True
         self._unsubscribe()
         self._ended.set()
-        self._thread.join(END_TIMEOUT)
-        now_ns = self._memory.link.now()
-        if self._main.is_open:
-            self._main.replace_link(self._link)
-        self._memory.close()
-        if self._thread.is_alive():  # it still uses the memory
-            self._report(f"a capture in {self._folder} is not complete after {END_TIMEOUT:g} s")
-            return
+        if self._thread.is_alive():
+            self._thread.join(END_TIMEOUT)
+        is_writing = self._thread.is_alive()  # it still uses the memory
+        to_ns = max([self._memory.link.now(), *(mark.time_ns for mark in list(self._marks))])
         try:
-            if self._marks:
-                self._write(now_ns)
+            self._return_link()
+            if is_writing:
+                self._report(f"a capture in {self._folder} is not complete after {END_TIMEOUT:g} s")
+            elif self._marks:
+                self._write(to_ns)
         finally:
-            self._memory.release()
+            if not is_writing:
+                self._memory.release()
             self._error = None  # its traceback refers to the program
+
+    def _return_link(self) -> None:
+        """Use the link without the recorder again, and end the recording."""
+        try:
+            if self._main.is_open and self._main.link is self._memory.link:
+                self._main.replace_link(self._link)
+        finally:
+            self._memory.close()
 
     def _on_event(self, event: Event) -> None:
         if isinstance(event, AxisStopped):
@@ -105,29 +118,33 @@ class FrameCapture:
         step_behind()
         while not self._ended.wait(TRIM):
             self._memory.trim()
-            if self._is_due():
-                self._write(self._marks[-1].time_ns + self._after_ns)
+            if (to_ns := self._due()) is not None:
+                self._write(to_ns)
 
-    @property
-    def _after_ns(self) -> int:
-        return round(self._options.after * 1e9)
+    def _due(self) -> int | None:
+        """Return the end of the pending file [ns]; None if its frames are not in the memory yet.
 
-    def _is_due(self) -> bool:
-        """Return True if the frames after the last mark are in the memory."""
+        Axes may stop again and again. A file then ends before the memory frees its first frames.
+        """
         if not self._marks or self._error is not None or self._memory.is_virtual:
-            return False
-        return self._memory.link.now() >= self._marks[-1].time_ns + self._after_ns + DRAIN_NS
+            return None
+        first_ns, last_ns = self._marks[0].time_ns, self._marks[-1].time_ns
+        to_ns = min(last_ns, first_ns + nanoseconds(self._options.before))
+        to_ns += nanoseconds(self._options.after)
+        return to_ns if self._memory.link.now() >= to_ns + DRAIN_NS else None
 
     def _write(self, to_ns: int) -> None:
-        """Write one file for all marks, and report its name. A failure is reported, too.
+        """Write one file for all marks until a time, and report its name or a failure.
 
         Args:
             to_ns: Time of the last frame [ns].
         """
-        first = self._marks[0]
-        from_ns = first.time_ns - round(self._options.before * 1e9)
-        reason = self._marks[-1].reason if self._error is not None else first.reason
-        self._marks.clear()
+        marks = [self._marks.popleft()]
+        while self._marks and self._marks[0].time_ns <= to_ns:
+            marks.append(self._marks.popleft())
+        first = marks[0]
+        from_ns = first.time_ns - nanoseconds(self._options.before)
+        reason = marks[-1].reason if self._error is not None else first.reason
         if len(self.files) >= self._options.files:
             self._report(f"no capture of the frames: CaptureOptions.files={self._options.files}")
             return
@@ -139,7 +156,8 @@ class FrameCapture:
             return
         self.files.append(path)
         before = (first.time_ns - held_ns) * 1e-9
-        self._report(f"frames from {before:.3f} s before: {path}", reason)
+        side = "before" if before >= 0.0 else "after"  # older frames were freed
+        self._report(f"frames from {abs(before):.3f} s {side}: {path}", reason)
 
     def _report(self, text: str, reason: str = "") -> None:
         """Add a note to the error of the loop. Without an error, write to the log."""
@@ -147,6 +165,11 @@ class FrameCapture:
             self._error.add_note(text)
         else:
             log.warning("%s", f"{reason}: {text}" if reason else text)
+
+
+def nanoseconds(seconds: float) -> int:
+    """Return a time in ns."""
+    return round(seconds * 1e9)
 
 
 def free_path(folder: Path, name: str, reason: str) -> Path:

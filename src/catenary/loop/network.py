@@ -301,8 +301,11 @@ class Network:
         if self.current_session is not None:
             return []
         problems = take_down(self.main)
-        if self._capture is not None:
-            self._capture.end()
+        try:
+            if self._capture is not None:
+                self._capture.end()
+        except Exception as problem:  # it must not hide the error of the loop
+            problems.append(problem)
         return problems
 
     def _compile_laws(self, session: Session) -> None:
