@@ -8,7 +8,6 @@ virtual time, the end of the loop writes all files.
 from __future__ import annotations
 
 import itertools
-import logging
 import os
 import re
 import threading
@@ -27,8 +26,6 @@ END_TIMEOUT = 30.0  # [s] for a file that is being written; a disk may be slow
 TRIM = 0.25  # [s] between two calls of `FrameMemory.trim`
 DRAIN_NS = 50_000_000  # time until a frame is in the memory: the thread of the Recorder takes 10 ms
 MARKS = 100  # stopped axes that wait for their file
-
-log = logging.getLogger("catenary")
 
 
 class Mark(NamedTuple):
@@ -164,7 +161,9 @@ class FrameCapture:
         if self._error is not None:
             self._error.add_note(text)
         else:
-            log.warning("%s", f"{reason}: {text}" if reason else text)
+            import logging  # registers a fork hook in Python, in which a signal is lost
+
+            logging.getLogger("catenary").warning("%s", f"{reason}: {text}" if reason else text)
 
 
 def nanoseconds(seconds: float) -> int:
