@@ -6,8 +6,8 @@ import ctypes
 import gc
 import os
 import subprocess
-import time
 import threading
+import time
 from pathlib import Path
 
 import pytest
@@ -144,6 +144,12 @@ def test_a_network_gone_down_is_an_error_and_coming_back_is_not(pair, veth):
     assert receive_within(far, 5) == frame(bytes(46))
 
 
+def send_until(link: Link, deadline: float) -> None:
+    while time.monotonic() < deadline:
+        link.send(frame(bytes(46)))
+        time.sleep(0.01)
+
+
 @pytest.mark.parametrize("wrapped", ["raw", "recorded", "ring"])
 def test_an_interface_without_a_carrier_is_reported(veth, wrapped, tmp_path):
     """The kernel's word for it is ENOBUFS, "No buffer space available"."""
@@ -157,9 +163,7 @@ def test_an_interface_without_a_carrier_is_reported(veth, wrapped, tmp_path):
         subprocess.run(["ip", "link", "set", other, "down"], check=True)
         deadline = time.monotonic() + 5.0  # the kernel reports a lost carrier up to 1 s later
         with pytest.raises(LinkError, match=f"{name} has no link: the cable") as refused:
-            while time.monotonic() < deadline:
-                link.send(frame(bytes(46)))
-                time.sleep(0.01)
+            send_until(link, deadline)
         assert "No buffer space" not in str(refused.value)
         assert "first device" in str(refused.value)
         subprocess.run(["ip", "link", "set", other, "up"], check=True)

@@ -11,7 +11,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 
 from catenary.virtual.coe.dictionary import RECORD, VARIABLE, Abort, Entry, Object
-from catenary.virtual.coe.object_facts import EntryFacts, ObjectFacts
+from catenary.virtual.coe.object_facts import ObjectFacts
 from catenary.virtual.devices.application import Application
 
 TEXTS = (0x1008, 0x1009, 0x100A)  # name and versions
@@ -76,11 +76,11 @@ def _dressed(
 
     If the file has no description of the object, it has only the entries that were in use.
     """
-    recorded = {entry.subindex: entry for entry in facts.entries}
+    aborts = {entry.subindex: entry.abort for entry in facts.entries}
     unused = {} if facts.code else {k: each for k, each in live.items() if k not in stored}
     return unused | {
         subindex: _with_behaviour(
-            recorded[subindex], entry if facts.code else live[subindex], live[subindex]
+            aborts.get(subindex), entry if facts.code else live[subindex], live[subindex]
         )
         if subindex in live
         else entry
@@ -88,8 +88,8 @@ def _dressed(
     }
 
 
-def _with_behaviour(facts: EntryFacts, described: Entry, live: Entry) -> Entry:
-    read = _read_unless_empty(live, facts.abort) if facts.abort else live.read
+def _with_behaviour(abort: int | None, described: Entry, live: Entry) -> Entry:
+    read = _read_unless_empty(live, abort) if abort else live.read
     return replace(described, read=read, write=live.write)
 
 
