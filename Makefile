@@ -62,7 +62,7 @@ rtlab: $(VENV)/.with-test
 	@$(VENV)/bin/python -m tools.rtlab $(TABLE) $(if $(IGH),--igh $(abspath $(IGH))) $(if $(GPIO),--gpio $(abspath $(GPIO))) $(RTLAB)
 
 test: $(VENV)/.with-test
-	@$(VENV)/bin/python -m catenary.realtime.private_network -m pytest $(TEST)
+	@$(VENV)/bin/python tools/run_tests.py $(TEST)
 
 lint: $(VENV)/.with-lint
 	@$(VENV)/bin/ruff check $(wildcard $(CHECKED))

@@ -41,6 +41,7 @@ hypothesis.settings.load_profile("catenary")
 
 REQUIRED = pytest.StashKey[set[str]]()
 PASSED = pytest.StashKey[set[str]]()
+COLLECTED = pytest.StashKey[set[str]]()
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
@@ -53,6 +54,11 @@ def pytest_addoption(parser: pytest.Parser) -> None:
         help="fail unless tests with this marker ran "
         "(shared_data, wire, tshark, rtlab, browser, ros2)",
     )
+    parser.addoption(
+        "--part",
+        action="store_true",
+        help="another process runs the other tests: ignore required markers without a test here",
+    )
 
 
 def pytest_configure(config: pytest.Config) -> None:
@@ -60,12 +66,14 @@ def pytest_configure(config: pytest.Config) -> None:
     signal.signal(signal.SIGINT, signal.default_int_handler)
     config.stash[REQUIRED] = set(config.getoption("--require"))
     config.stash[PASSED] = set()
+    config.stash[COLLECTED] = set()
 
 
 def pytest_itemcollected(item: pytest.Item) -> None:
     for marker, fixture in FIXTURE_OF.items():
         if fixture in getattr(item, "fixturenames", ()):
             item.add_marker(marker)
+            item.config.stash[COLLECTED].add(marker)
 
 
 @pytest.hookimpl(wrapper=True)
@@ -76,16 +84,26 @@ def pytest_runtest_makereport(item: pytest.Item) -> Iterator[None]:
     return report
 
 
+def not_passed(config: pytest.Config) -> set[str]:
+    """Return the required markers without a test that passed."""
+    required = config.stash[REQUIRED]
+    if config.getoption("--part"):
+        required = required & config.stash[COLLECTED]
+    return required - config.stash[PASSED]
+
+
 def pytest_sessionfinish(session: pytest.Session) -> None:
-    missing = session.config.stash[REQUIRED] - session.config.stash[PASSED]
-    if missing and session.exitstatus in (pytest.ExitCode.OK, pytest.ExitCode.NO_TESTS_COLLECTED):
+    if not_passed(session.config) and session.exitstatus in (
+        pytest.ExitCode.OK,
+        pytest.ExitCode.NO_TESTS_COLLECTED,
+    ):
         session.exitstatus = pytest.ExitCode.TESTS_FAILED
 
 
 def pytest_terminal_summary(
     terminalreporter: pytest.TerminalReporter, config: pytest.Config
 ) -> None:
-    for marker in sorted(config.stash[REQUIRED] - config.stash[PASSED]):
+    for marker in sorted(not_passed(config)):
         terminalreporter.write_line(f"REQUIRED: no test marked {marker} passed", red=True)
 
 
