@@ -16,10 +16,8 @@ from collections.abc import Sequence
 from pathlib import Path
 
 TESTS = Path(__file__).resolve().parent.parent / "tests"
-VIRTUAL = (
-    "bus capture cli control core docs drive esi examples fuzz igh line machine model plan"
-    " procedure programs pyigh quirk record virtual wire"
-).split()
+VIRTUAL = "bus capture cli control core docs drive esi examples fuzz igh line machine model"
+VIRTUAL += " plan procedure programs pyigh quirk record virtual wire"
 PYTEST = (sys.executable, "-m", "catenary.realtime.private_network", "-m", "pytest")
 LOW_PRIORITY = 10  # nice(1)
 SLOWEST = "--durations=25"
@@ -31,7 +29,7 @@ def main(arguments: Sequence[str]) -> int:
     if not only_requires(arguments):
         return subprocess.call([*PYTEST, *arguments])
     colour = ["--color=yes"] if sys.stdout.isatty() else []
-    folders = [f"tests/{name}" for name in VIRTUAL]
+    folders = [f"tests/{name}" for name in VIRTUAL.split()]
     options = [SLOWEST, *colour, *arguments]
     virtual = Run("virtual: ", [*options, "--part", *folders], LOW_PRIORITY)
     real = Run("", [*options, *(f"--ignore={folder}" for folder in folders)])
