@@ -26,6 +26,7 @@ UNSIGNED8, UNSIGNED16, UNSIGNED32, REAL32 = 5, 6, 7, 8
 VISIBLE_STRING, OCTET_STRING = 9, 10
 SIGNED = {INTEGER8, INTEGER16, INTEGER32, 0x0015}
 
+SLOT_BITS = 64  # of a slot of the model
 READ_ANY, WRITE_ANY, WRITE_PRE_OP = 0x07, 0x38, 0x08
 MAP_RX, MAP_TX = 0x40, 0x80
 
@@ -40,6 +41,17 @@ WRONG_LENGTH, TOO_LONG, TOO_SHORT = 0x06070010, 0x06070012, 0x06070013
 NO_SUBINDEX = 0x06090011
 OUT_OF_RANGE = 0x06090030
 WRONG_STATE = 0x08000022
+
+
+def slot_value(data: bytes, bits: int, signed: bool) -> int:
+    """Return the number in the lowest `bits` of the data, as a slot of the model stores it.
+
+    Slots are signed and have 64 bits. A number of 64 bits therefore always has a sign.
+    """
+    bits = min(bits, SLOT_BITS)
+    value = int.from_bytes(data, "little") & ((1 << bits) - 1)
+    sign = 1 << bits >> 1 if signed or bits == SLOT_BITS else 0
+    return value - (1 << bits) if value & sign else value
 
 
 class Abort(Exception):

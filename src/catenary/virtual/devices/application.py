@@ -28,6 +28,7 @@ from catenary.virtual.coe.dictionary import (
     Entry,
     constant,
     number,
+    slot_value,
     stored,
     text,
 )
@@ -448,8 +449,7 @@ class Application:
         def write(data: bytes) -> None:
             if len(data) != size:
                 raise Abort(TOO_LONG if len(data) > size else TOO_SHORT)
-            value = int.from_bytes(data, "little", signed=signed or bits == 64)
-            self._core.put_slot(self._position, slot, value)
+            self._core.put_slot(self._position, slot, slot_value(data, bits, signed))
 
         writable = access & WRITE_ANY
         return Entry(name, data_type, bits, access, read, write if writable else None, slot, signed)

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 
 from catenary.virtual import _segment
 from catenary.virtual.blueprint import Blueprint
-from catenary.virtual.coe.dictionary import Abort, Entry
+from catenary.virtual.coe.dictionary import Abort, Entry, slot_value
 from catenary.virtual.coe.object_facts import by_place
 from catenary.virtual.coe.quirks import NO_MAILBOX_QUIRKS, MailboxQuirks
 from catenary.virtual.crystal import EXACT, ClockBits, Crystal
@@ -232,8 +232,7 @@ class Twin(MotorDevice):
             raise LookupError(
                 f"{self.name}: 0x{index:04X}:{subindex:02X} is not in a PDO, or exceeds 64 bits"
             )
-        signed = entry.signed or len(data) == 8
-        value = int.from_bytes(data, "little", signed=signed)
+        value = slot_value(data, entry.bits, entry.signed)
         self.core.put_slot(self.position, entry.slot, value)
         self.core.refresh_inputs(self.position)
 

@@ -12,17 +12,18 @@ from catenary.virtual.coe.dictionary import (
     MAP_RX,
     MAP_TX,
     READ_ANY,
+    SLOT_BITS,
     UNSIGNED8,
     WRITE_ANY,
     Abort,
     Entry,
     Variable,
+    slot_value,
 )
 from catenary.virtual.coe.object_facts import EntryFacts, ObjectFacts, Place
 from catenary.virtual.description import MappedEntry, Pdo
 from catenary.virtual.devices.axis_places import WRITTEN, axis_offsets, axis_slots, has_sign
 
-SLOT_BITS_MAX = 64
 SLOTS_MAX = 0xFFFF  # of a device
 TEXTS = (types.VISIBLE_STRING.index, types.OCTET_STRING.index, types.UNICODE_STRING.index)
 BY_SIZE = {1: 0x01, 8: 0x05, 16: 0x06, 32: 0x07, 64: 0x1B}  # types of objects without a type
@@ -49,7 +50,7 @@ def layout_of(objects: Sequence[ObjectFacts], pdos: Sequence[Pdo], *, moves: boo
     for place, entry in _mapped(pdos):
         sizes[place] = max(sizes.get(place, 0), entry.bits)
     known = {(each.index, entry.subindex): entry.bits for each in objects for entry in each.entries}
-    present = {place: bits for place, bits in (sizes | known).items() if 0 < bits <= SLOT_BITS_MAX}
+    present = {place: bits for place, bits in (sizes | known).items() if 0 < bits <= SLOT_BITS}
     records = {index for index, subindex in present if subindex}
     for index in records:  # subindex 0 is the number of entries
         present.pop((index, 0), None)
@@ -60,7 +61,7 @@ def layout_of(objects: Sequence[ObjectFacts], pdos: Sequence[Pdo], *, moves: boo
     others = [
         place
         for place in carried
-        if 0 < sizes.get(place, known.get(place, 0)) <= SLOT_BITS_MAX and place not in slots
+        if 0 < sizes.get(place, known.get(place, 0)) <= SLOT_BITS and place not in slots
     ]
     others = others[: SLOTS_MAX - first]
     slots |= {place: slot for slot, place in enumerate(others, start=first)}
@@ -139,7 +140,7 @@ class TwinObjects:
             if data_type in FORMATS and FORMATS[data_type][0] != bits:
                 data_type = 0  # a contradiction in the file: its length counts
         slot = self._layout.slots.get(place)
-        if slot is not None and 0 < bits <= SLOT_BITS_MAX:
+        if slot is not None and 0 < bits <= SLOT_BITS:
             made = self._of_slot(place, replace(entry, access=access, data_type=data_type), slot)
         else:
             made = self._stored(replace(entry, access=access, data_type=data_type))
@@ -166,9 +167,7 @@ class TwinObjects:
         )
         if is_axis and (entry.value is None or slot % _segment.SLOTS_PER_AXIS in WRITTEN):
             return made
-        signed = made.signed or entry.bits == SLOT_BITS_MAX
-        data = self._fitted(entry)[: (entry.bits + 7) // 8]  # a device may send more
-        value = int.from_bytes(data, "little", signed=signed)
+        value = slot_value(self._fitted(entry), entry.bits, made.signed)
         if not value and self._presets.get(slot):
             return _unset(made, self._presets[slot])
         self.values[slot] = value
