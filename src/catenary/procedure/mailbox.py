@@ -187,13 +187,17 @@ def _no_answer(
     )
 
 
-def send_only(channel: MailboxChannel, kind: Type, data: bytes) -> Procedure[bool]:
+def send_only(
+    channel: MailboxChannel, kind: Type, data: bytes, *, attempts: int = 1
+) -> Procedure[bool]:
     """Send one message that the device does not answer.
 
     Args:
         channel: The mailbox of the device.
         kind: The protocol of the message.
         data: The data of the message.
+        attempts: Number of times that the message is sent while its frame is lost. The counter
+            stays the same, so that the device recognises a repetition.
 
     Returns:
         False if the frame was lost. The device may still have received the message.
@@ -203,7 +207,10 @@ def send_only(channel: MailboxChannel, kind: Type, data: bytes) -> Procedure[boo
     """
     channel.counter = next_counter(channel.counter)
     message = Mailbox(kind, data, channel.counter).encode(channel.layout.receive_size)
-    return (yield from _post(channel, message))[0]
+    for _ in range(attempts):
+        if (yield from _post(channel, message))[0]:
+            return True
+    return False
 
 
 def drain(channel: MailboxChannel, accept: Callable[[Mailbox], T | None]) -> Procedure[list[T]]:
