@@ -169,6 +169,11 @@ class FoeError(CatenaryError):
         self.text = text
 
 
+class FirmwareError(CatenaryError):
+    """A firmware update failed: it was interrupted, or the device does not report the expected
+    firmware afterwards."""
+
+
 class StateError(CatenaryError):
     """A device refused an EtherCAT state, did not reach it in time, or left it.
 

@@ -123,7 +123,8 @@ class AcyclicRunner:
             procedure.close()
             raise RuntimeError(
                 "a blocking call in the loop's thread would stop the loop: use a request, such "
-                "as sub.sdo.request(), and poll its `done`, or make the call in another thread or before the loop"
+                "as sub.sdo.request(), and poll its `done`, or make the call in another thread or "
+                "before the loop"
             )
         pending = self.submit(procedure)
         while not pending.wait(None if watch is None else WATCH_INTERVAL):

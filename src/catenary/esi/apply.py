@@ -54,7 +54,7 @@ def applied(description: DeviceDescription, esi: EsiDevice) -> DeviceDescription
 
 
 def _bootstrap(esi: EsiDevice) -> MailboxLayout | None:
-    """Return the bootstrap mailbox of the ESI, for a device whose SII has none."""
+    """Return the bootstrap mailbox of the ESI, for a device without one in its SII."""
     if esi.eeprom is None:
         return None
     return bootstrap_mailbox(*bootstrap_areas(esi.eeprom.bootstrap), str(esi.source))

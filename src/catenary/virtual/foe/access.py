@@ -11,7 +11,7 @@ from catenary.virtual.mailbox import ERROR_TOO_SHORT, ERROR_UNSUPPORTED_PROTOCOL
 from catenary.virtual.mailbox import HEADER as MAILBOX_HEADER
 from catenary.virtual.state_machine import BOOT
 
-FIRST_VERSION = "1.0"  # 0x100A of a device whose firmware cannot be replaced
+FIRST_VERSION = "1.0"  # 0x100A if the firmware cannot be replaced
 
 
 class FileAccess:
