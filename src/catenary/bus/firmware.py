@@ -30,7 +30,7 @@ from catenary.errors import (
 )
 from catenary.model.device import Identity
 from catenary.model.text import printable
-from catenary.procedure.al_state import read_state
+from catenary.procedure.al_state import read_state, request_state
 from catenary.procedure.exchange import Procedure, after
 from catenary.wire.al import AlState
 
@@ -246,7 +246,7 @@ class FirmwareUpdate:
             state = self._present_state()
             return End(state, self._before, "nothing was changed: correct the cause and try again")
         with suppress(CatenaryError):
-            self._sub.request_state(AlState.INIT)
+            self._main.converse(request_state(self._sub.station, AlState.INIT))
         try:
             self._await_return(RECOVERY_TIMEOUT)
         except StateError as error:

@@ -131,7 +131,9 @@ def print_result(device: SubDevice, size: int, result: FirmwareResult) -> None:
 
 
 def _state(result: FirmwareResult) -> str:
-    return "no answer" if result.end.state is None else str(result.end.state)
+    if result.end.state is None:
+        return "it does not answer"
+    return f"it reached {result.end.state}; this command leaves all devices in INIT"
 
 
 def as_json(device: SubDevice, size: int, result: FirmwareResult) -> dict[str, object]:
