@@ -21,6 +21,7 @@ from catenary.wire.foe import (
 )
 from catenary.wire.mailbox import ErrorReply, Mailbox, Type
 from tests.procedure.player import LAYOUT, MailboxDevice, channel, play
+from tests.wire.strategies import u32
 
 ROOM = LAYOUT.send_size - OVERHEAD
 SIZES = [0, 1, ROOM - 1, ROOM, ROOM + 1, 2 * ROOM, 10 * ROOM + 7]
@@ -281,6 +282,34 @@ def test_a_late_answer_of_the_last_transfer_is_dropped() -> None:
     play(write(mailbox, "a", b"abc"), device)
     assert server.files == {"a": b"abc"}
     assert mailbox.dropped == 1
+
+
+arbitrary = st.one_of(
+    st.binary(max_size=20),
+    st.builds(
+        lambda packet, size: Data(packet, bytes(size)).encode(), u32, st.sampled_from(SIZES[:4])
+    ),
+    st.builds(lambda packet: Acknowledge(packet).encode(), st.integers(0, 3)),
+    st.builds(lambda code: Error(code).encode(), u32),
+    st.just(Busy(1, 2).encode()),
+)
+
+
+@settings(max_examples=150, deadline=None)
+@given(st.lists(st.tuples(st.sampled_from(Type), arbitrary), max_size=12), st.booleans())
+def test_arbitrary_answers_end_with_a_result_or_a_specific_error(
+    answers: list[tuple[Type, bytes]], writes: bool
+) -> None:
+    left = iter(answers)
+    device = MailboxDevice(lambda _: [Mailbox(*each) for each in [next(left, None)] if each])
+    patience = Patience(answer=1.0, busy=2.0)
+    try:
+        if writes:
+            play(write(channel(), "a", content(2 * ROOM), patience=patience), device)
+        else:
+            assert len(play(read(channel(), "a", max_size=1000, patience=patience), device)) <= 1000
+    except (FoeError, MailboxError, ResponseTimeout):
+        return
 
 
 @settings(max_examples=100, deadline=None)

@@ -36,6 +36,17 @@ def add_parser(commands: Commands) -> None:
     add_position(parser)
     parser.add_argument("file", metavar="FILE", help="firmware file of the vendor")
     add_transfer_options(parser)
+    _add_checks(parser)
+    parser.add_argument(
+        "--force",
+        action="store_true",
+        help="continue even if another master uses the interface, or a device is in OP",
+    )
+    add_json(parser)
+    parser.set_defaults(run=run)
+
+
+def _add_checks(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--vendor", metavar="N", type=number, help="vendor ID that the device must have"
     )
@@ -55,13 +66,6 @@ def add_parser(commands: Commands) -> None:
         default=60.0,
         help="longest time until the device returns with its new firmware (default: 60)",
     )
-    parser.add_argument(
-        "--force",
-        action="store_true",
-        help="continue even if another master uses the interface, or a device is in OP",
-    )
-    add_json(parser)
-    parser.set_defaults(run=run)
 
 
 def run(arguments: argparse.Namespace) -> int:
