@@ -7,6 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from catenary.errors import FoeError, MailboxError, ResponseTimeout
+from catenary.procedure.exchange import Procedure, Step
 from catenary.procedure.foe import OVERHEAD, Patience, Progress, read, write
 from catenary.wire.foe import (
     Acknowledge,
@@ -336,3 +337,26 @@ def test_a_lost_last_acknowledgement_is_sent_again() -> None:
     device.lose_out = {2, 3}  # 0 is the request, 1 its answer
     assert play(read(channel(), "a"), device) == b"abc"
     assert server.received == [ReadRequest("a"), Acknowledge(1)]
+
+
+def counted(procedure: Procedure[bytes], steps: list[Step]) -> Procedure[bytes]:
+    """Run a procedure, and add its exchanges to `steps`."""
+    try:
+        step = next(procedure)
+        while True:
+            if isinstance(step, list):
+                steps.append(step)
+            step = procedure.send((yield step))
+    except StopIteration as stop:
+        return bytes(stop.value)
+
+
+@pytest.mark.parametrize("eager_max", [LAYOUT.send_size, LAYOUT.send_size - 1])
+def test_a_packet_takes_two_exchanges_if_the_device_is_punctual(
+    eager_max: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("catenary.procedure.mailbox.EAGER_MAX", eager_max)
+    steps: list[Step] = []
+    device = MailboxDevice(Server({"a": content(60 * ROOM)}))
+    assert play(counted(read(channel(), "a"), steps), device) == content(60 * ROOM)
+    assert len(steps) <= 2 * 61 + 5
