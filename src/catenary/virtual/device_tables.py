@@ -220,6 +220,7 @@ class EsiTable(_ClockedTable, tag="esi", frozen=True, kw_only=True):
     mapping_quirks: MappingQuirks | None = None
     quirks: ServoQuirks = NO_QUIRKS
     motor: Motor = STANDARD_MOTOR
+    files: DeviceFiles | None = None
     modules: tuple[str | int, ...] | None = None  # "" for an empty slot
 
     def device(self) -> Device:
@@ -237,6 +238,7 @@ class EsiTable(_ClockedTable, tag="esi", frozen=True, kw_only=True):
                 quirks=self.quirks,
                 mapping_quirks=self.mapping_quirks,
                 mailbox_quirks=self.mailbox_quirks,
+                files=self.files,
             ),
         )
 
@@ -253,6 +255,7 @@ class SiiTable(_PlacedTable, tag="sii", frozen=True, kw_only=True):
     mapping_quirks: MappingQuirks | None = None
     quirks: ServoQuirks = NO_QUIRKS
     motor: Motor = STANDARD_MOTOR
+    files: DeviceFiles | None = None
 
     def device(self) -> Device:
         return Device.from_sii(
@@ -269,6 +272,7 @@ class SiiTable(_PlacedTable, tag="sii", frozen=True, kw_only=True):
                 quirks=self.quirks,
                 mapping_quirks=self.mapping_quirks,
                 mailbox_quirks=self.mailbox_quirks,
+                files=self.files,
             ),
         )
 

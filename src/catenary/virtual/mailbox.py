@@ -102,7 +102,7 @@ class Mailbox:
         protocol = kind & 0x0F
         if length > len(request) - HEADER.size:
             return [(ERROR_PROTOCOL, struct.pack("<HH", 1, ERROR_SIZE))]
-        if self._quirks.error_reply != "none":
+        if self._quirks.error_reply != "none" and protocol == COE_PROTOCOL:
             reply = struct.pack("<HH", 1, ERROR_UNSUPPORTED_PROTOCOL)
             return [(ERROR_PROTOCOL, reply[: 2 if self._quirks.error_reply == "short" else 4])]
         served = self._serve(protocol, payload)
