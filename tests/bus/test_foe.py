@@ -128,6 +128,16 @@ def test_boot_uses_the_bootstrap_mailbox(sub: SubDevice, terminal: AnalogInputs)
     assert terminal.store.flash is not None
 
 
+def test_a_device_that_restarts_after_boot_needs_another_scan() -> None:
+    restarting = device(firmware=DeviceFirmware(restart="power"))
+    with MainDevice(line(restarting)) as main:
+        sub = main.scan()[1]
+        with pytest.raises(ResponseTimeout, match="scan again"), sub.boot() as foe:
+            foe.write("app.efw", IMAGE)
+        main.link.wait_until(main.link.now() + 50_000_000, False)
+        assert main.scan()[1].sdo.read(0x100A, type=VISIBLE_STRING) == "2.0"
+
+
 def test_boot_twice(sub: SubDevice) -> None:
     sub.request_state("BOOT")
     with sub.boot() as foe:  # through INIT, which restarts the counters of the mailbox

@@ -40,8 +40,10 @@ PRE_OP, INIT, OFF = 2, 1, 0
 class Cell:
     """Line of a coupler, the terminal that is updated, and a servo."""
 
-    def __init__(self, *, restart: str = "state", **files: object) -> None:
-        firmware = DeviceFirmware(restart=restart)  # type: ignore[arg-type]
+    def __init__(
+        self, *, restart: str = "state", reading: str = "refused", **files: object
+    ) -> None:
+        firmware = DeviceFirmware(restart=restart, reading=reading)  # type: ignore[arg-type]
         self.terminal = AnalogInputs(
             serial=7,
             files=DeviceFiles(firmware=firmware, **files),  # type: ignore[arg-type]
@@ -268,6 +270,19 @@ def test_a_file_that_cannot_be_read_back_is_noted() -> None:
     result = cell.update(read_back=True)
     assert result.error is None
     assert "cannot be read back" in result.notes[0]
+
+
+def test_a_file_is_read_back() -> None:
+    result = Cell(reading="same").update(read_back=True)
+    assert (result.error, result.notes) == (None, ())
+
+
+def test_another_file_is_read_back() -> None:
+    cell = Cell(reading="coded")
+    result = cell.update(read_back=True)
+    assert isinstance(result.error, FirmwareError)
+    assert (result.step, result.end.state) == (Step.READ_BACK, AlState.PRE_OP)
+    assert cell.version == "2.0"
 
 
 def test_lost_frames_do_not_end_the_update() -> None:

@@ -48,6 +48,7 @@ class Flash:
     def __init__(self, product: int, version: str) -> None:
         self._product = product
         self.image: Image | None = Image(version, 0)  # None: erased, only the boot loader runs
+        self.file = b""  # last valid file
         self.running: Image | None = self.image  # image that the device runs; None: the boot loader
 
     def erase(self) -> None:
@@ -63,6 +64,7 @@ class Flash:
             return CHECKSUM
         if product != self._product:
             return WRONG_FIRMWARE
+        self.file = data
         self.image = Image(version.rstrip(b"\0").decode("ascii", "replace"), revision)
         return 0
 

@@ -25,6 +25,9 @@ class DeviceFirmware(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw
     # Start of a new image at the end of BOOT. "state": with the transition to INIT. "power": with a
     # power cycle, so that the device leaves the segment for a moment.
     restart: Literal["state", "power"] = "state"
+    # Answer to a read of the firmware. "refused": error 0x8002. "same": the written file. "coded":
+    # a file of the same size with other contents. No device with "coded" has been reported.
+    reading: Literal["refused", "same", "coded"] = "refused"
 
 
 class DeviceFiles(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):

@@ -44,10 +44,16 @@ class FileStore:
         """
         self._check(name, password, boot=boot)
         if self._is_firmware(name):
-            raise Refusal(ACCESS_DENIED)
+            return self._firmware_file()
         if name not in self.files:
             raise Refusal(NOT_FOUND)
         return self.files[name]
+
+    def _firmware_file(self) -> bytes:
+        firmware, flash = self.options.firmware, self.flash
+        if firmware is None or flash is None or firmware.reading == "refused":
+            raise Refusal(ACCESS_DENIED)
+        return flash.file if firmware.reading == "same" else bytes(len(flash.file))
 
     def begin(self, name: str, password: int, *, boot: bool) -> None:
         """Prepare the write of a file. The firmware is erased.
