@@ -6,6 +6,8 @@ import struct
 from pathlib import Path
 
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from catenary.virtual import (
     AnalogInputs,
@@ -15,6 +17,9 @@ from catenary.virtual import (
     make_firmware,
     read_segment,
 )
+from catenary.virtual.foe.server import FileServer
+from catenary.virtual.foe.store import FileStore
+from catenary.wire.foe import decode_foe
 from tests.virtual.main_device import STATION, MainDevice
 
 INIT, PRE_OP, BOOT, SAFE_OP, OP = 1, 2, 3, 4, 8
@@ -389,3 +394,34 @@ firmware = { name = "app.efw", version = "1.2" }
     assert isinstance(device, AnalogInputs)
     assert device.store.files == {"log.txt": b"started"}
     assert device.application.dictionary.entry(0x100A, 0).read() == b"1.2"
+
+
+@settings(max_examples=200, deadline=None)
+@given(
+    st.lists(
+        st.one_of(
+            st.binary(min_size=6, max_size=ROOM + 6),
+            st.builds(
+                lambda code, number, rest: struct.pack("<BxI", code, number) + rest,
+                st.integers(0, 7),
+                st.integers(0, 4),
+                st.sampled_from((b"", b"a", b"app.efw", bytes(ROOM))),
+            ),
+        ),
+        max_size=20,
+    ),
+    st.booleans(),
+)
+def test_any_messages_get_valid_answers(messages: list[bytes], boot: bool) -> None:
+    """Let our codec judge the answers of the server to arbitrary messages."""
+    contents, firmware = {"a": bytes(ROOM)}, DeviceFirmware()
+    options = DeviceFiles(contents=contents, size_limit=2 * ROOM, firmware=firmware)
+    store = FileStore(options, PRODUCT)
+    server = FileServer(store, rooms=lambda: (ROOM, ROOM), boot=lambda: boot)
+    for message in messages:
+        answers = server.serve(message)
+        assert len(answers) <= 1
+        for answer in answers:
+            assert decode_foe(answer).encode() == answer
+            assert len(answer) <= ROOM + 6
+    assert sum(map(len, store.files.values())) <= 2 * ROOM
