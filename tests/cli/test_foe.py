@@ -177,6 +177,11 @@ def test_progress_in_a_terminal(
     with TransferProgress("writing", lambda: next(times)) as progress:
         progress.report(0, 2048)
         progress.report(1024, 2048)
-    assert "\rwriting: 1.0 of 2.0 KiB, 50 %, 0.5 KiB/s, 2 s left".replace("\r", "\r\x1b[K") in (
-        capsys.readouterr().err
-    )
+        progress.show("restart")
+    lines = capsys.readouterr().err.split("\r\x1b[K")[1:]
+    assert lines == [
+        "writing: 0.0 of 2.0 KiB, 0 %",
+        "writing: 1.0 of 2.0 KiB, 50 %, 0.5 KiB/s, 2 s left",
+        "restart ...",
+        "",
+    ]

@@ -84,7 +84,12 @@ def run(arguments: argparse.Namespace) -> int:
             require_idle(main)
         device = device_at(main.scan(strict=False), arguments.position)
         result = FirmwareUpdate(
-            main, device.position, data, options, progress=progress.report
+            main,
+            device.position,
+            data,
+            options,
+            progress=progress.report,
+            on_step=progress.show,
         ).run()
     if arguments.json:
         print(json.dumps(as_json(device, len(data), result), indent=2))

@@ -65,6 +65,11 @@ class TransferProgress(Progress):
             line = f"{self._verb}: {transfer_text(done, total, now - self._start)}"
             print(f"\r\033[K{line}", end="", file=sys.stderr, flush=True)
 
+    def show(self, text: str) -> None:
+        """Show a text, such as the name of a step."""
+        if self._shown:
+            print(f"\r\033[K{escaped(text)} ...", end="", file=sys.stderr, flush=True)
+
 
 def transfer_text(done: int, total: int | None, seconds: float) -> str:
     """Return the progress of a transfer, such as "12.0 of 48.0 KiB, 25 %, 6.0 KiB/s, 6 s left".
