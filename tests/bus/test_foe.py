@@ -29,7 +29,7 @@ CONTENT = bytes(k * 13 & 0xFF for k in range(20 * ROOM))
 
 
 def device(**options: object) -> AnalogInputs:
-    return AnalogInputs(files=DeviceFiles(**options))  # type: ignore[arg-type]
+    return AnalogInputs(files=DeviceFiles(bootstrap_bytes=256, **options))  # type: ignore[arg-type]
 
 
 def line(*devices: AnalogInputs | Servo | Coupler) -> Segment:

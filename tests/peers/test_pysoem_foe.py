@@ -46,6 +46,7 @@ kind = "analog_inputs"
 [device.files]
 contents = { "log.txt" = "started" }
 password = 0x1234
+bootstrap_bytes = 256
 firmware = { name = "app.efw", version = "1.2" }
 """
 
@@ -124,7 +125,8 @@ def set_state(slave: Any, state: int) -> None:
 def recording(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Record our transfers: files of several packets, refusals, BUSY, and a firmware update."""
     path = tmp_path_factory.mktemp("foe") / "foe.pcapng"
-    files = DeviceFiles(contents={"log.txt": content(400)}, busy=1, firmware=DeviceFirmware())
+    contents, firmware = {"log.txt": content(400)}, DeviceFirmware()
+    files = DeviceFiles(contents=contents, busy=1, bootstrap_bytes=256, firmware=firmware)
     segment = Segment([Coupler(), AnalogInputs(files=files)])
     with Recorder(segment, path) as link, cat.MainDevice(link) as main:
         sub = main.scan()[TERMINAL]

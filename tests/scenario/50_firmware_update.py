@@ -46,7 +46,7 @@ class Cell:
         firmware = DeviceFirmware(restart=restart, reading=reading)  # type: ignore[arg-type]
         self.terminal = AnalogInputs(
             serial=7,
-            files=DeviceFiles(firmware=firmware, **files),  # type: ignore[arg-type]
+            files=DeviceFiles(firmware=firmware, bootstrap_bytes=256, **files),  # type: ignore[arg-type]
         )
         self.segment = Segment([Coupler(), self.terminal, Servo()])
         self.faults: list[Fault] = []  # of the next update

@@ -5,6 +5,7 @@ from __future__ import annotations
 import struct
 from pathlib import Path
 
+import msgspec
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -82,6 +83,9 @@ class Client:
 
 
 def client(files: DeviceFiles) -> Client:
+    """Return a client of a device with mailboxes of 256 bytes in BOOT, unless `files` differs."""
+    if files.bootstrap_bytes is None:
+        files = msgspec.structs.replace(files, bootstrap_bytes=256)
     return Client(AnalogInputs(files=files))
 
 
@@ -255,6 +259,11 @@ def test_boot_requires_the_bootstrap_mailbox(size: int) -> None:
 def test_pre_op_refuses_the_bootstrap_mailbox() -> None:
     made = client(DeviceFiles())
     assert made.configure(256, PRE_OP) == (INIT | ERROR, 0x0016)
+
+
+def test_the_bootstrap_mailbox_is_that_of_the_device_by_default() -> None:
+    made = Client(AnalogInputs(mailbox_bytes=200, files=DeviceFiles()))
+    assert made.configure(200, BOOT) == (BOOT, 0)
 
 
 def test_a_device_without_bootstrap_mailbox_refuses_boot() -> None:

@@ -80,7 +80,8 @@ class AppliedDevice(Device):
         found = super().whole_description()
         if self.files is None:
             return found
-        size = self.files.bootstrap_bytes
+        chosen = self.files.bootstrap_bytes
+        size = self.mailbox_bytes if chosen is None else chosen
         return replace(
             found,
             serves_files=True,

@@ -40,7 +40,8 @@ class DeviceFiles(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_on
     write_protected: tuple[str, ...] = ()
     bootstrap_only: tuple[str, ...] = ()  # the other files are accessible only outside of BOOT
     busy: int = 0  # number of BUSY answers to each request and packet
-    bootstrap_bytes: int = 256  # size of each bootstrap mailbox; 0: the device has no BOOT
+    # Size of each bootstrap mailbox [bytes]; None: that of the standard mailbox; 0: no BOOT.
+    bootstrap_bytes: int | None = None
     firmware: DeviceFirmware | None = None
 
     # False: errors have no text (SOES, esc_foe.c, FOE_abort).
@@ -61,5 +62,5 @@ class DeviceFiles(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_on
             )
         if not 0 <= self.password <= 0xFFFF_FFFF:
             raise ValueError(f"password must be 0 to 0xFFFFFFFF, not {self.password:#x}")
-        if self.firmware is not None and not self.bootstrap_bytes:
+        if self.firmware is not None and self.bootstrap_bytes == 0:
             raise ValueError("a device with firmware needs a bootstrap mailbox: bootstrap_bytes")
