@@ -78,6 +78,16 @@ def test_progress_is_reported_in_the_calling_thread(sub: SubDevice) -> None:
     assert threads == {threading.get_ident()}
 
 
+def test_a_busy_device_reports_its_own_progress() -> None:
+    seen: list[tuple[int, str]] = []
+    with MainDevice(line(device(busy=2))) as main:
+        sub = main.scan()[1]
+        sub.foe.write("new", b"abc", progress=lambda done, _: seen.append((done, sub.foe.busy)))
+        assert sub.foe.busy == ""
+    request = [(0, ""), (0, "0/2 busy"), (0, "1/2 busy")]
+    assert seen == [*request, *request, (3, "")]
+
+
 def test_an_error_in_the_report_ends_the_transfer(sub: SubDevice) -> None:
     def report(done: int, total: int | None) -> None:
         if done:

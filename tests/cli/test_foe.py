@@ -173,15 +173,17 @@ def test_progress_in_a_terminal(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setattr("sys.stderr.isatty", lambda: True)
-    times = iter([10.0, 12.0])
+    times = iter([10.0, 12.0, 14.0])
     with TransferProgress("writing", lambda: next(times)) as progress:
         progress.report(0, 2048)
         progress.report(1024, 2048)
+        progress.report(1024, 2048, "30/100 erase")
         progress.show("restart")
     lines = capsys.readouterr().err.split("\r\x1b[K")[1:]
     assert lines == [
         "writing: 0.0 of 2.0 KiB, 0 %",
         "writing: 1.0 of 2.0 KiB, 50 %, 0.5 KiB/s, 2 s left",
+        "writing: 1.0 of 2.0 KiB, 50 %, 0.2 KiB/s, 4 s left, busy 30/100 erase",
         "restart ...",
         "",
     ]

@@ -23,6 +23,7 @@ from catenary.procedure.foe import (
 )
 from catenary.procedure.mailbox import MailboxChannel
 from catenary.procedure.station import Station
+from catenary.wire.foe import Busy
 
 ProgressReport: TypeAlias = Callable[[int, int | None], object]
 Contents: TypeAlias = bytes | bytearray | memoryview | PathLike[str]
@@ -63,6 +64,13 @@ class Foe:
         """
         self._sub = sub
         self._unavailable = unavailable
+        self._state = Progress()  # of the last transfer
+
+    @property
+    def busy(self) -> str:
+        """Progress that a busy device reports, such as "30/100 erase"; empty if it is not busy."""
+        busy = self._state.busy
+        return f"{busy.done}/{busy.entire} {busy.text}".strip() if busy is not None else ""
 
     def read(
         self,
@@ -81,7 +89,7 @@ class Foe:
             password: Password, 32 bits; 0 if the device does not require one.
             max_size: Largest accepted size [bytes]. FoE does not announce the size of a file.
             progress: Function that is called with the number of bytes, and None, in the calling
-                thread. It must not use the device.
+                thread: after each packet, and if the device is busy. It must not use the device.
             timeout: Longest time until the device answers a packet [s].
             busy_timeout: Longest time for which the device may be busy with one packet [s].
 
@@ -93,7 +101,7 @@ class Foe:
             ValueError: The name, the password or a time is out of range.
             RuntimeError: The caller is the iterating thread of a loop.
         """
-        state = Progress()
+        state = self._state = Progress()
         asked = self._read(name, password, max_size, state, _patience(timeout, busy_timeout))
         return self._sub.main.converse(asked, _watch(state, progress))
 
@@ -114,7 +122,8 @@ class Foe:
             data: Contents: bytes, or the `Path` of a file.
             password: Password, 32 bits; 0 if the device does not require one.
             progress: Function that is called with the number of acknowledged bytes, and the number
-                of all bytes, in the calling thread. It must not use the device.
+                of all bytes, in the calling thread: after each packet, and if the device is busy.
+                It must not use the device.
             timeout: Longest time until the device answers a packet [s].
             busy_timeout: Longest time for which the device may be busy with one packet [s].
 
@@ -127,7 +136,7 @@ class Foe:
             ValueError: The name, the password, a time or the size of the file is out of range.
             RuntimeError: The caller is the iterating thread of a loop.
         """
-        state = Progress()
+        state = self._state = Progress()
         asked = self._write(name, data, password, state, _patience(timeout, busy_timeout))
         self._sub.main.converse(asked, _watch(state, progress))
 
@@ -217,12 +226,12 @@ def _watch(state: Progress, progress: ProgressReport | None) -> Watch | None:
     """Return the function that reports each change of the progress; None without a report."""
     if progress is None:
         return None
-    reported = -1
+    reported: tuple[int, Busy | None] | None = None
 
     def watch() -> None:
         nonlocal reported
-        if state.done != reported:
-            reported = state.done
+        if (state.done, state.busy) != reported:
+            reported = state.done, state.busy
             progress(state.done, state.total)
 
     return watch

@@ -88,7 +88,7 @@ def run(arguments: argparse.Namespace) -> int:
             device.position,
             data,
             options,
-            progress=progress.report,
+            progress=lambda done, total: progress.report(done, total, device.foe.busy),
             on_step=progress.show,
         ).run()
     if arguments.json:

@@ -145,7 +145,7 @@ def run_read(arguments: argparse.Namespace) -> int:
                 name,
                 password=arguments.password,
                 max_size=arguments.max_size or MAX_SIZE,
-                progress=progress.report,
+                progress=lambda done, total: progress.report(done, total, device.foe.busy),
                 timeout=arguments.timeout,
                 busy_timeout=arguments.busy_timeout,
             )
@@ -173,7 +173,7 @@ def run_write(arguments: argparse.Namespace) -> int:
                 name,
                 data,
                 password=arguments.password,
-                progress=progress.report,
+                progress=lambda done, total: progress.report(done, total, device.foe.busy),
                 timeout=arguments.timeout,
                 busy_timeout=arguments.busy_timeout,
             )

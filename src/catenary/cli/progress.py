@@ -51,18 +51,20 @@ class TransferProgress(Progress):
         self._clock = clock
         self._start: float | None = None
 
-    def report(self, done: int, total: int | None) -> None:
+    def report(self, done: int, total: int | None, busy: str = "") -> None:
         """Show the progress.
 
         Args:
             done: Number of bytes that were transferred.
             total: Number of all bytes; None if it is not known.
+            busy: Progress that a busy device reports.
         """
         now = self._clock()
         if self._start is None:
             self._start = now
         if self._shown:
             line = f"{self._verb}: {transfer_text(done, total, now - self._start)}"
+            line += f", busy {escaped(busy)}" if busy else ""
             print(f"\r\033[K{line}", end="", file=sys.stderr, flush=True)
 
     def show(self, text: str) -> None:
