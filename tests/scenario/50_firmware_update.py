@@ -138,6 +138,14 @@ def test_file_not_found() -> None:
     assert_old_firmware_runs(cell, result)
 
 
+def test_a_name_that_does_not_fit_into_the_bootstrap_mailbox() -> None:
+    cell = Cell()
+    result = cell.update(name="x" * 300)
+    assert isinstance(result.error, ConfigurationError)
+    assert "accepts 1 to 244" in result.error.message
+    assert_old_firmware_runs(cell, result)
+
+
 def test_disk_full() -> None:
     cell = Cell(size_limit=15_000)
     result = cell.update()

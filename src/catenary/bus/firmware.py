@@ -148,14 +148,17 @@ class FirmwareUpdate:
 
     def _write(self) -> None:
         options, start = self._options, self._main.link.now()
-        self._sub.foe.write(
-            options.name,
-            self._data,
-            password=options.password,
-            progress=self._progress,
-            timeout=options.timeout,
-            busy_timeout=options.busy_timeout,
-        )
+        try:
+            self._sub.foe.write(
+                options.name,
+                self._data,
+                password=options.password,
+                progress=self._progress,
+                timeout=options.timeout,
+                busy_timeout=options.busy_timeout,
+            )
+        except ValueError as error:  # such as a name that does not fit into the bootstrap mailbox
+            raise ConfigurationError(str(error), hint="use --name with a shorter name") from error
         self._seconds = (self._main.link.now() - start) * 1e-9
 
     def _read_back(self) -> None:
