@@ -72,6 +72,19 @@ def measure_storm(*, drives: int, rate: int, seconds: float, file: Path | None =
     storm.measure(drives=drives, rate=rate, seconds=seconds, file=file)
 
 
+def measure_foe(*, size: int, rounds: int, file: Path | None = None) -> None:
+    """Print the rate of file transfers: on an idle bus next to PySOEM, and next to a loop.
+
+    Args:
+        size: Size of the file [bytes].
+        rounds: Rounds in which the programs take turns.
+        file: File for the figures.
+    """
+    from benchmarks import foe
+
+    foe.measure(size=size, rounds=rounds, file=file)
+
+
 def measure_share(*, drives: int, rate: int, seconds: float, file: Path | None = None) -> None:
     """Print the time to read a cycle from a share, and the cost of readers for the loop.
 

@@ -31,6 +31,7 @@ def make_parser() -> argparse.ArgumentParser:
     group = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
     with_wires.add_loop(group)
     with_wires.add_storm(group)
+    with_wires.add_foe(group)
     with_wires.add_share(group)
     with_wires.add_remote(group)
     with_wires.add_cost(group)

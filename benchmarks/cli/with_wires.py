@@ -47,6 +47,34 @@ def add_storm(group: Commands) -> None:
     parser.set_defaults(run=run_storm)
 
 
+def add_foe(group: Commands) -> None:
+    parser = add_command(
+        group,
+        "foe",
+        help="measure the rate of file transfers",
+        description="Write and read a file with Catenary and with PySOEM on an idle bus, in turn, "
+        "then with Catenary next to a loop of 1 kHz. Print the rates, and their ratios to PySOEM "
+        "and to the bound that follows from the mailbox and the acyclic queue.",
+        example="python -m benchmarks foe --size 1048576 --rounds 5 --json foe.json",
+    )
+    parser.add_argument(
+        "--size",
+        type=positive_number,
+        default=1 << 20,
+        metavar="BYTES",
+        help="size of the file (default: 1 MiB)",
+    )
+    parser.add_argument(
+        "--rounds",
+        type=positive_number,
+        default=5,
+        metavar="N",
+        help="rounds in which the programs take turns, each in a new process (default: 5)",
+    )
+    add_file(parser)
+    parser.set_defaults(run=run_foe)
+
+
 def add_share(group: Commands) -> None:
     parser = add_command(
         group,
@@ -166,6 +194,15 @@ def run_storm(arguments: argparse.Namespace) -> int:
         seconds=arguments.seconds,
         file=arguments.json,
     )
+    return 0
+
+
+def run_foe(arguments: argparse.Namespace) -> int:
+    import benchmarks
+    from catenary import bench
+
+    bench.enter_private_network()
+    benchmarks.measure_foe(size=arguments.size, rounds=arguments.rounds, file=arguments.json)
     return 0
 
 

@@ -156,6 +156,24 @@ class SdoAbort(CatenaryError):
         self.code = code
 
 
+class FoeError(CatenaryError):
+    """A device refused a file (ETG.1000.6 §5.8.6). `text` is the text that it sent, if any."""
+
+    def __init__(
+        self, message: str, *, position: int, name: str, code: int, text: str = "", hint: str = ""
+    ) -> None:
+        super().__init__(message, hint=hint)
+        self.position = position
+        self.name = name
+        self.code = code
+        self.text = text
+
+
+class FirmwareError(CatenaryError):
+    """A firmware update failed: it was interrupted, or the device does not report the expected
+    firmware afterwards."""
+
+
 class StateError(CatenaryError):
     """A device refused an EtherCAT state, did not reach it in time, or left it.
 

@@ -168,7 +168,12 @@ def test_an_emergency_between_request_and_answer(made: Conversation) -> None:
     ("kind", "data", "text"),
     [
         (Type.FOE, b"\x02\x00\x00\x00\x00\x00app.efw\x00", "FoE write request 'app.efw'"),
-        (Type.FOE, b"\x05\x00\x02\x80\x00\x00", "FoE error 0x8002"),
+        (Type.FOE, b"\x05\x00\x02\x80\x00\x00", "FoE error 0x8002: access denied"),
+        (Type.FOE, b"\x05\x00\x01\x80\x00\x00app", "FoE error 0x8001: file not found (app)"),
+        (Type.FOE, b"\x03\x00\x07\x00\x00\x00abcd", "FoE data 7, 4 bytes"),
+        (Type.FOE, b"\x04\x00\x07\x00\x00\x00", "FoE acknowledge 7"),
+        (Type.FOE, b"\x06\x00\x05\x00\x64\x00", "FoE busy 5/100"),
+        (Type.FOE, b"\x09\x00\x00\x00\x00\x00", "FoE service 9"),
         (Type.SOE, struct.pack("<BBH", 0x23, 0x40, 0x8001), "SoE write request P-0-0001 drive 1"),
         (Type.EOE, b"\x00\x01\x00\x00", "EoE frame fragment"),
         (Type.AOE, b"\x00" * 8, "AoE"),

@@ -33,6 +33,7 @@ from catenary.wire import (
     error_counters,
     features,
     fmmu,
+    foe,
     frame,
     mailbox,
     pcap,
@@ -272,6 +273,18 @@ TARGETS = (
     ),
     Target("mailbox.decode_error", mailbox.decode_error, _method, (b"\x01\x00\x04\x00",)),
     Target("coe.decode_coe", coe.decode_coe, _method, COE),
+    Target(
+        "foe.decode_foe",
+        foe.decode_foe,
+        _method,
+        (
+            foe.WriteRequest("app.efw", 0x1234).encode(),
+            foe.Data(1, bytes(range(40))).encode(),
+            foe.Acknowledge(1).encode(),
+            foe.Error(0x8003, "full").encode(),
+            foe.Busy(3, 100, "erase").encode(),
+        ),
+    ),
     Target(
         "sdo_information.decode_sdo_information",
         sdo_information.decode_sdo_information,

@@ -105,6 +105,13 @@ def test_unsupported_calls_are_errors_with_a_hint(main: cat.MainDevice) -> None:
         assert command in str(caught.value)
 
 
+def test_files_need_the_tool_of_the_master(main: cat.MainDevice) -> None:
+    with pytest.raises(ConfigurationError, match="libethercat has no FoE: use ethercat foe_write"):
+        main.subs[0].foe.read("log.txt")
+    with pytest.raises(ConfigurationError, match="ethercat states"), main.subs[0].boot():
+        pass
+
+
 def test_a_device_without_objects(main: cat.MainDevice, double: Double) -> None:
     sub = main.subs[0]
     sub.description = type(sub.description)(

@@ -13,6 +13,7 @@ from catenary.drive import DistributedClock
 from catenary.virtual import (
     Coupler,
     Device,
+    DeviceFiles,
     DigitalOutputs,
     MailboxQuirks,
     MappingQuirks,
@@ -121,4 +122,8 @@ QUIRKS: dict[str, Quirk] = {
     "slow mailbox": Quirk(device(mailbox_delay=0.05)),
     "mailbox of 32 bytes": Quirk(device(mailbox_bytes=32)),
     "mailbox of 1024 bytes": Quirk(device(mailbox_bytes=1024)),
+    "files": Quirk(device(files=DeviceFiles())),
+    "files as SOES serves them": Quirk(
+        device(files=DeviceFiles(error_texts=False, second_request="refused", new_files=False))
+    ),
 }

@@ -2,6 +2,7 @@
 
 from catenary.bus.acyclic_runner import AcyclicQueue, AcyclicRunner
 from catenary.bus.external_master import Carrier, CycleClock
+from catenary.bus.foe import Foe
 from catenary.bus.main_device import MainDevice
 from catenary.bus.pending import Pending
 from catenary.bus.runner import BlockingRunner, FrameCounts, Runner
@@ -16,6 +17,7 @@ __all__ = [
     "BlockingRunner",
     "Carrier",
     "CycleClock",
+    "Foe",
     "FrameCounts",
     "ListType",
     "MainDevice",

@@ -14,7 +14,7 @@ from typing import Any, Protocol, TypeVar
 from catenary.bus.packing import Parcel, batches, indices, make_parcel, replies_of
 from catenary.bus.pending import Pending
 from catenary.bus.procedure_run import Task
-from catenary.bus.runner import ATTEMPTS, FRAME_TIMEOUT, FrameCounts
+from catenary.bus.runner import ATTEMPTS, FRAME_TIMEOUT, FrameCounts, Watch
 from catenary.errors import DecodeError, LoopError
 from catenary.procedure.exchange import Procedure, Reply, Request
 from catenary.wire.frame import decode_frame
@@ -23,6 +23,7 @@ T = TypeVar("T")
 
 NEVER_NS = 1 << 62
 FRAMES_PER_STEP = 4  # acyclic frames per cycle
+WATCH_INTERVAL = 0.1  # [s] between two calls of `watch`
 
 
 class AcyclicQueue(Protocol):
@@ -107,8 +108,12 @@ class AcyclicRunner:
         self.asked.set()
         return pending
 
-    def run(self, procedure: Procedure[T]) -> T:
+    def run(self, procedure: Procedure[T], watch: Watch | None = None) -> T:
         """Queue a procedure, wait for its end, and return its result or raise its error.
+
+        Args:
+            procedure: The procedure to run.
+            watch: Function that is called every WATCH_INTERVAL while this call waits.
 
         Raises:
             RuntimeError: The caller is the loop's thread, which would deadlock.
@@ -117,11 +122,16 @@ class AcyclicRunner:
         if threading.get_ident() == self._owner:
             procedure.close()
             raise RuntimeError(
-                "a blocking call in the loop's thread would stop the loop: use sub.sdo.request() "
-                "and poll its `done`, or make the call in another thread or before the loop"
+                "a blocking call in the loop's thread would stop the loop: use a request, such "
+                "as sub.sdo.request(), and poll its `done`, or make the call in another thread or "
+                "before the loop"
             )
         pending = self.submit(procedure)
-        pending.wait()
+        while not pending.wait(None if watch is None else WATCH_INTERVAL):
+            if watch is not None:
+                watch()
+        if watch is not None:
+            watch()
         return pending.result()
 
     @property

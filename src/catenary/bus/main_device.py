@@ -15,7 +15,7 @@ from catenary.bus.external_master import Carrier
 from catenary.bus.frame_master import FrameMaster
 from catenary.bus.master import Complete, Master, MasterSource
 from catenary.bus.pending import Pending
-from catenary.bus.runner import BlockingRunner, FrameCounts, LinkLent, Runner
+from catenary.bus.runner import BlockingRunner, FrameCounts, LinkLent, Runner, Watch
 from catenary.bus.sdo import Objects
 from catenary.bus.segment_scan import check_identity
 from catenary.bus.sub_device import SubDevice
@@ -446,11 +446,15 @@ class MainDevice:
         """
         return self.master.read_objects(wanted)
 
-    def converse(self, procedure: Procedure[T]) -> T:
+    def converse(self, procedure: Procedure[T], watch: Watch | None = None) -> T:
         """Run a procedure, wait for its end, and return its result or raise its error.
 
         While a loop runs, use its acyclic queue. Without a loop, events are delivered afterwards
         (`deliver_events`).
+
+        Args:
+            procedure: The procedure to run.
+            watch: Function that is called in this thread while it waits. It must not send requests.
 
         Raises:
             RuntimeError: The caller is the thread of the loop, or the MainDevice is not open.
@@ -458,7 +462,7 @@ class MainDevice:
         while True:
             runner = self._any_runner
             try:
-                return runner.run(procedure)
+                return runner.run(procedure, watch)
             except LinkLent:
                 continue  # a loop has begun in another thread: use its queue
             finally:

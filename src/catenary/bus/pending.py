@@ -62,9 +62,14 @@ class Pending(Generic[T]):
         if not self._finished.is_set():
             self._cancelled = True
 
-    def wait(self) -> None:
-        """Wait for the end. Do not call this in the loop's thread."""
-        self._finished.wait()  # bounded by the procedure's deadlines and the runner's close()
+    def wait(self, seconds: float | None = None) -> bool:
+        """Wait for the end, and return `done`. Do not call this in the loop's thread.
+
+        Args:
+            seconds: Longest time [s]; None: until the procedure ends.
+        """
+        # Without `seconds`, bounded by the procedure's deadlines and the runner's close().
+        return self._finished.wait(seconds)
 
     def finish(self, error: CatenaryError | None = None) -> None:
         """Mark the procedure as ended, or end it with an error. The runner calls this."""

@@ -9,9 +9,9 @@ from __future__ import annotations
 
 import contextlib
 import threading
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any, Protocol, TypeVar
+from typing import Any, Protocol, TypeAlias, TypeVar
 
 from catenary.bus.packing import Parcel, batches, indices, make_parcel, replies_of
 from catenary.bus.pending import Pending
@@ -22,6 +22,7 @@ from catenary.procedure.exchange import Procedure, Reply, Request
 from catenary.wire.frame import decode_frame, is_alien
 
 T = TypeVar("T")
+Watch: TypeAlias = Callable[[], object]  # called in the thread that waits for a procedure
 
 FRAME_TIMEOUT = 0.05  # [s]; a frame takes microseconds, scheduling on a busy machine much longer
 ATTEMPTS = 4  # attempts of a repeatable request
@@ -32,7 +33,7 @@ WINDOW = 16  # frames in flight; less than the capacity of any receive ring
 class Runner(Protocol):
     """Interface to run a procedure to its end, or to start it and poll the result."""
 
-    def run(self, procedure: Procedure[T]) -> T: ...
+    def run(self, procedure: Procedure[T], watch: Watch | None = None) -> T: ...
 
     def submit(self, procedure: Procedure[T]) -> Pending[T]: ...
 
@@ -67,13 +68,17 @@ class BlockingRunner:
         self._lock = threading.Lock()
         self._lent = False
 
-    def run(self, procedure: Procedure[T]) -> T:
+    def run(self, procedure: Procedure[T], watch: Watch | None = None) -> T:
         """Run a procedure to its end, and return its result or raise its error.
+
+        Args:
+            procedure: The procedure to run.
+            watch: Function that is called after each exchange. It must not use the link.
 
         Raises:
             LinkLent: A loop uses the link.
         """
-        return self.run_all([procedure])[0]
+        return self.run_all([procedure], watch)[0]
 
     def submit(self, procedure: Procedure[T]) -> Pending[T]:
         """Run a procedure to its end, and return its handle, which has the result or the error.
@@ -90,11 +95,15 @@ class BlockingRunner:
                 pending.finish()
         return pending
 
-    def run_all(self, procedures: Sequence[Procedure[T]]) -> list[T]:
+    def run_all(self, procedures: Sequence[Procedure[T]], watch: Watch | None = None) -> list[T]:
         """Run procedures at the same time, and return their results.
 
         If some fail, the others run to their ends. Then the first error is raised, with the other
         errors as notes.
+
+        Args:
+            procedures: The procedures to run.
+            watch: Function that is called after each exchange. It must not use the link.
 
         Raises:
             LinkLent: A loop uses the link.
@@ -102,7 +111,7 @@ class BlockingRunner:
         with self._mine():
             tasks = [Task(procedure) for procedure in procedures]
             try:
-                self._run(tasks)
+                self._run(tasks, watch)
             finally:
                 for task in tasks:
                     task.cancel()
@@ -139,7 +148,7 @@ class BlockingRunner:
         while self._link.receive() is not None:
             self.counts.stale += 1
 
-    def _run(self, tasks: Sequence[Task[Any]]) -> None:
+    def _run(self, tasks: Sequence[Task[Any]], watch: Watch | None = None) -> None:
         now = self._link.now()
         for task in tasks:
             task.start(now)
@@ -151,6 +160,8 @@ class BlockingRunner:
             else:
                 self._round(ready)
             self._wake(running)
+            if watch is not None:
+                watch()
 
     def _sleep_until(self, deadline_ns: int) -> None:
         while self._link.now() < deadline_ns:

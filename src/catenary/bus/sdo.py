@@ -7,6 +7,7 @@ from contextlib import suppress
 from typing import TYPE_CHECKING, Protocol, TypeAlias, TypeVar, overload
 
 from catenary.bus.pending import Pending
+from catenary.bus.runner import Watch
 from catenary.errors import CatenaryError, MailboxError, SdoAbort
 from catenary.procedure.exchange import Procedure
 from catenary.procedure.mailbox import MailboxChannel
@@ -29,8 +30,13 @@ Objects: TypeAlias = dict[tuple[int, int], bytes]  # by index and subindex
 class Conversations(Protocol):
     """Interface to run procedures; `MainDevice` implements it."""
 
-    def converse(self, procedure: Procedure[T]) -> T:
-        """Run a procedure to its end, with or without a running loop."""
+    def converse(self, procedure: Procedure[T], watch: Watch | None = None) -> T:
+        """Run a procedure to its end, with or without a running loop.
+
+        Args:
+            procedure: The procedure to run.
+            watch: Function that is called in this thread while it waits.
+        """
         ...
 
     def request(self, procedure: Procedure[T]) -> Pending[T]:
@@ -49,6 +55,9 @@ class ObjectOwner(Protocol):
 
     @property
     def channel(self) -> MailboxChannel | None: ...
+
+    @property
+    def in_boot(self) -> bool: ...
 
     @property
     def error(self) -> CatenaryError | None: ...
@@ -285,6 +294,11 @@ class Sdo:
         if complete and subindex > 1:
             raise ValueError(f"complete access begins with subindex 0 or 1, not {subindex}")
         channel = self._sub.channel
+        if self._sub.in_boot:
+            raise MailboxError(
+                f"{self._sub.station} is in BOOT, which has no object dictionary",
+                hint='bring it to PRE-OP: sub.request_state("PREOP")',
+            )
         if self._sub.error is not None:
             raise self._sub.error
         if channel is None or not channel.layout.coe:

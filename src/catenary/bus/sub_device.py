@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
 from dataclasses import replace
 from typing import TYPE_CHECKING, Protocol
 
+from catenary.bus.foe import Foe
 from catenary.bus.pdo_table import PdoTable
 from catenary.bus.sdo import Conversations, Objects, Sdo
 from catenary.errors import CatenaryError
@@ -27,6 +29,8 @@ class DeviceOwner(Conversations, Protocol):
     @property
     def subs(self) -> Sequence[SubDevice]: ...
 
+    def require_no_loop(self) -> None: ...
+
     def request_states(
         self, subs: Sequence[SubDevice], positions: Sequence[int], state: AlState
     ) -> Mapping[int, Outcome]: ...
@@ -39,7 +43,8 @@ class DeviceOwner(Conversations, Protocol):
 class SubDevice:
     """Handle of one device, such as `main.scan()[2]`. It stays valid across scans.
 
-    Attributes never cause traffic; calls with a verb do. `sub.sdo` reads and writes its objects.
+    Attributes never cause traffic; calls with a verb do. `sub.sdo` reads and writes its objects,
+    `sub.foe` its files.
     """
 
     def __init__(
@@ -48,12 +53,14 @@ class SubDevice:
         self.main = main
         self.description = description
         self.channel = channel  # None if it has no mailbox
+        self._boot_channel: MailboxChannel | None = None  # its mailbox in BOOT
         self.state: AlState | None = None  # last known state; None if unknown
         self.error: CatenaryError | None = None  # of the last scan, if PRE-OP was not reached
         # 0x1C32:01 and 0x1C33:01 before the first loop with clocks, to restore them
         self.sync_types: dict[int, bytes] = {}
         self.esi: EsiDevice | None = None  # ESI that the last scan used for it
         self.sdo = Sdo(self)
+        self.foe = Foe(self)
 
     @property
     def position(self) -> int:
@@ -110,6 +117,18 @@ class SubDevice:
         """Station address, with position and name for messages."""
         return station_of(self.description)
 
+    @property
+    def in_boot(self) -> bool:
+        """True if the device is in BOOT, as far as known."""
+        return self.state is AlState.BOOT
+
+    @property
+    def file_channel(self) -> MailboxChannel | None:
+        """Mailbox for files in the present state; None if the device has none."""
+        if self.in_boot:
+            return self._boot_channel
+        return self.channel if self.error is None else None
+
     def give_name(self, name: str) -> None:
         """Use the name of a machine file in messages, before the name in the SII."""
         self.description = replace(self.description, given_name=name)
@@ -126,8 +145,9 @@ class SubDevice:
         """Bring this device to a state, leave it there, and update the attribute `state`.
 
         The device passes through all intermediate states. For SAFE-OP and OP, a device below
-        SAFE-OP passes through INIT and is configured with its current mapping. Do not call this
-        while a loop runs, because the loop configures its devices itself.
+        SAFE-OP passes through INIT and is configured with its current mapping. For BOOT, it passes
+        through INIT, and gets its bootstrap mailbox. Do not call this while a loop runs, because
+        the loop configures its devices itself.
 
         Args:
             state: `State.SAFE_OP`, or its name: "SAFE_OP".
@@ -137,14 +157,57 @@ class SubDevice:
 
         Raises:
             StateError: The device refuses the state. The error gives the reason.
+            EepromError: The bootstrap mailbox of the device is not known.
             ValueError: The text or the number is not a state.
         """
         target = AlState.from_name(state) if isinstance(state, str) else AlState(state)
+        if target is AlState.BOOT:
+            self._prepare_boot()
         outcome = self.main.request_states(self.main.subs, [self.position], target)[self.position]
         if isinstance(outcome, CatenaryError):
             raise outcome
         self.state = outcome.state
         return outcome
+
+    @contextmanager
+    def boot(self) -> Iterator[Foe]:
+        """Bring this device to BOOT within the block, and to PRE-OP afterwards.
+
+            with sub.boot() as foe:
+                foe.write("app.efw", Path("app.efw"), password=0x1234)
+
+        In BOOT, a device has no other mailbox services than FoE. If the block raises an error, the
+        device is left in INIT. A device that restarts with its new firmware leaves the segment for
+        a moment: a StateError or ResponseTimeout at the end then requires another scan.
+
+        Raises:
+            StateError: The device refuses a state.
+            EepromError: The bootstrap mailbox of the device is not known.
+            RuntimeError: A loop runs.
+        """
+        self.main.require_no_loop()
+        self.request_state(AlState.INIT)  # also restarts the mailbox of a device in BOOT
+        self.request_state(AlState.BOOT)
+        try:
+            yield self.foe
+        except BaseException:
+            with suppress(CatenaryError):
+                self.request_state(AlState.INIT)
+            raise
+        self.request_state(AlState.INIT)
+        self.request_state(AlState.PRE_OP)
+        if self.channel is not None:
+            self.channel.reset()
+
+    def _prepare_boot(self) -> None:
+        """Make the mailbox for BOOT. Its counter restarts with that of the device."""
+        known = self.description.bootstrap
+        if known is None:
+            from catenary.procedure.state_path import read_bootstrap
+
+            known = self.main.converse(read_bootstrap(self.station))
+            self.description = replace(self.description, bootstrap=known)
+        self._boot_channel = MailboxChannel(self.station, known)
 
     def __repr__(self) -> str:
         return f"<SubDevice {self.position} {self.name!r} {self.state or 'state unknown'}>"

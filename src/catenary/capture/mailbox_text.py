@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
+from catenary.errors import DecodeError
+from catenary.wire import foe
 from catenary.wire.mailbox import Mailbox, Type
 
 _FOE_SERVICES = {
-    1: "read request",
-    2: "write request",
-    3: "data",
-    4: "acknowledge",
-    5: "error",
-    6: "busy",
+    foe.ReadRequest: "read request",
+    foe.WriteRequest: "write request",
+    foe.Data: "data",
+    foe.Acknowledge: "acknowledge",
+    foe.Error: "error",
+    foe.Busy: "busy",
 }
-_FOE_NAMED = (1, 2)  # a file name follows the password
-_FOE_ERROR = 5
-_FOE_HEADER_SIZE = 6
 _SOE_SERVICES = {
     1: "read request",
     2: "read response",
@@ -40,7 +39,7 @@ _EOE_SERVICES = {
 
 def service_text(mailbox: Mailbox) -> str:
     """Return the service of a message, as far as it is known; empty if it is not."""
-    if mailbox.type is Type.FOE and len(mailbox.data) >= _FOE_HEADER_SIZE:
+    if mailbox.type is Type.FOE and len(mailbox.data) >= foe.HEADER_SIZE:
         return _foe(mailbox.data)
     if mailbox.type is Type.SOE and len(mailbox.data) >= 4:
         return _soe(mailbox.data)
@@ -50,14 +49,23 @@ def service_text(mailbox: Mailbox) -> str:
 
 
 def _foe(data: bytes) -> str:
-    service = data[0]
-    text = _FOE_SERVICES.get(service, f"service {service}")
-    if service in _FOE_NAMED:
-        name = data[_FOE_HEADER_SIZE:].split(b"\x00", 1)[0].decode("latin-1")
-        return f"{text} {name!r}"
-    if service == _FOE_ERROR:
-        return f"{text} 0x{int.from_bytes(data[2:6], 'little'):04X}"
-    return text
+    try:
+        message = foe.decode_foe(data)
+    except DecodeError:
+        return f"service {data[0]}"
+    text = _FOE_SERVICES[type(message)]
+    match message:
+        case foe.ReadRequest(name) | foe.WriteRequest(name):
+            return f"{text} {name!r}"
+        case foe.Data(packet, data):
+            return f"{text} {packet}, {len(data)} bytes"
+        case foe.Acknowledge(packet):
+            return f"{text} {packet}"
+        case foe.Error(code, words):
+            meaning = foe.error_meaning(code).text
+            return f"{text} 0x{code:04X}: {meaning}" + (f" ({words})" if words else "")
+        case foe.Busy(done, entire):
+            return f"{text} {done}/{entire}"
 
 
 def _soe(data: bytes) -> str:

@@ -34,6 +34,13 @@ def position(text: str) -> int:
     return value
 
 
+def password(text: str) -> int:
+    value = number(text)
+    if not 0 <= value <= 0xFFFF_FFFF:
+        raise argparse.ArgumentTypeError(f"password {text} does not fit into 32 bits")
+    return value
+
+
 def entry(text: str) -> Entry:
     """Parse an entry such as `0x6041` or `0x1018:1`."""
     index_text, _, subindex_text = text.partition(":")

@@ -18,6 +18,8 @@ from catenary.cli import (
     diag,
     doctor,
     esi,
+    firmware,
+    foe,
     foxglove,
     graph,
     include,
@@ -41,7 +43,7 @@ VIRTUAL_TIME = "times are virtual: they come from the segment's clock, not from 
 PROGRAM = "catenary"
 DESCRIPTION = "Real-time EtherCAT for Python."
 COMMANDS = (
-    *(scan, state, graph, diag, sdo, reg, alias, sii, esi),
+    *(scan, state, graph, diag, sdo, foe, firmware, reg, alias, sii, esi),
     *(init, check, clone, capture),
     *(demo, dashboard, top, doctor, bench, virtual, realtime),
     *(record, merge, plot, foxglove, ros2, include),

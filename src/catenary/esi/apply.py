@@ -21,7 +21,9 @@ from catenary.esi.lookup import accepts
 from catenary.esi.object_descriptions import documented_objects
 from catenary.esi.process_data import with_process_data
 from catenary.esi.settings import with_settings
-from catenary.model.device import DeviceDescription
+from catenary.esi.sii import bootstrap_areas
+from catenary.model.describe import bootstrap_mailbox
+from catenary.model.device import DeviceDescription, MailboxLayout
 
 
 def applied(description: DeviceDescription, esi: EsiDevice) -> DeviceDescription:
@@ -44,10 +46,18 @@ def applied(description: DeviceDescription, esi: EsiDevice) -> DeviceDescription
         order=device.order or esi.type,
         group=device.group or esi.group,
         documented=documented_objects(esi.dictionary),
+        bootstrap=device.bootstrap or _bootstrap(esi),
         esi=str(esi.source),
         notes=(*device.notes, *_revision_note(device, esi)),
     )
     return with_slots(device, esi)
+
+
+def _bootstrap(esi: EsiDevice) -> MailboxLayout | None:
+    """Return the bootstrap mailbox of the ESI, for a device without one in its SII."""
+    if esi.eeprom is None:
+        return None
+    return bootstrap_mailbox(*bootstrap_areas(esi.eeprom.bootstrap), str(esi.source))
 
 
 def check_key(description: DeviceDescription, esi: EsiDevice) -> None:

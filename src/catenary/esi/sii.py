@@ -171,7 +171,7 @@ def _header(device: EsiDevice, eeprom: EsiEeprom, notes: list[str]) -> Header:
     control, configuration, pulse, configuration_2, alias = (
         int.from_bytes(words[place : place + 2], "little") for place in range(0, 10, 2)
     )
-    bootstrap_receive, bootstrap_send = _bootstrap(eeprom.bootstrap)
+    bootstrap_receive, bootstrap_send = bootstrap_areas(eeprom.bootstrap)
     return Header(
         *(device.key.vendor, device.key.product, device.key.revision),
         pdi_control=control,
@@ -188,7 +188,12 @@ def _header(device: EsiDevice, eeprom: EsiEeprom, notes: list[str]) -> Header:
     )
 
 
-def _bootstrap(words: bytes) -> tuple[MailboxArea, MailboxArea]:
+def bootstrap_areas(words: bytes) -> tuple[MailboxArea, MailboxArea]:
+    """Return the areas of `BootStrap`, which the device receives and sends; a missing one is empty.
+
+    Args:
+        words: Words 0x14 to 0x17 of the EEPROM.
+    """
     numbers = [int.from_bytes(words[place : place + 2], "little") for place in range(0, 8, 2)]
     return MailboxArea(*numbers[:2]), MailboxArea(*numbers[2:])
 

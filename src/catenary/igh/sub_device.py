@@ -39,6 +39,7 @@ class SubDevice(bus.SubDevice):
     ) -> None:
         super().__init__(main, description, None)
         self.sdo: Sdo = Sdo(self)
+        self.foe = bus.Foe(self, unavailable="libethercat has no FoE: use ethercat foe_write")
         self.kernel = kernel
         self._emergencies: deque[Emergency] = deque(maxlen=EMERGENCIES_KEPT)
         self._register_busy = False  # True while the register request is in use

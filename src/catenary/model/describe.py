@@ -133,6 +133,7 @@ def _filled(bare: DeviceDescription, sii: Sii, notes: list[str]) -> DeviceDescri
         identity=Identity(header.vendor, header.product, header.revision, header.serial),
         name=name or order or nameless,  # as in SOEM and IgH
         mailbox=_mailbox(sii, notes),
+        bootstrap=bootstrap_mailbox(header.bootstrap_receive, header.bootstrap_send, "SII"),
         sync_managers=managers,
         outputs=assignments(outputs),
         inputs=assignments(inputs),
@@ -182,6 +183,20 @@ def _mailbox(sii: Sii, notes: list[str]) -> MailboxLayout | None:
         pdo_configuration=unknown or CoeDetails.PDO_CONFIGURATION in coe,
         stated=not unknown,
     )
+
+
+def bootstrap_mailbox(receive: MailboxArea, send: MailboxArea, source: str) -> MailboxLayout | None:
+    """Return the mailbox of a device in BOOT; None if it has none, or one that is not possible.
+
+    Args:
+        receive: The memory that the MainDevice writes.
+        send: The memory that the MainDevice reads.
+        source: Origin of the two areas, such as "SII".
+    """
+    if not (_is_possible(receive) and _is_possible(send)):
+        return None
+    areas = (receive.offset, receive.size, send.offset, send.size)
+    return MailboxLayout(*areas, MailboxProtocol.FOE, source=source)
 
 
 def _is_possible(area: MailboxArea) -> bool:

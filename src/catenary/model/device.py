@@ -72,7 +72,7 @@ class Identity(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class MailboxLayout:
-    """The standard mailbox, as seen from the SubDevice: the MainDevice writes `receive`."""
+    """A mailbox, as seen from the SubDevice: the MainDevice writes `receive`."""
 
     receive_offset: int
     receive_size: int
@@ -147,7 +147,7 @@ class DeviceDescription:
     identity: Identity
     name: str
     controller: Information
-    mailbox: MailboxLayout | None
+    mailbox: MailboxLayout | None  # outside of BOOT
     sync_managers: tuple[SyncManager, ...]
     outputs: tuple[Assignment, ...]  # present assignment, by SyncManager
     inputs: tuple[Assignment, ...]
@@ -177,6 +177,7 @@ class DeviceDescription:
     watchdog: WatchdogValues = NO_WATCHDOG_VALUES
     modular: ModularDevice | None = None  # slots and modules, from an ESI file
     given_name: str = ""  # name in a machine file
+    bootstrap: MailboxLayout | None = None  # mailbox in BOOT; None: not stated
 
     @property
     def full_name(self) -> str:

@@ -82,6 +82,7 @@ def state_timeout(station: Station, target: AlState) -> float:
     stated = {
         AlState.INIT: given.back_to_init,
         AlState.PRE_OP: given.pre_op,
+        AlState.BOOT: given.pre_op,  # ETG.2000, PreopTimeout: INIT to PRE-OP or BOOT
         AlState.SAFE_OP: given.safe_op_and_op,
         AlState.OP: given.safe_op_and_op,
     }

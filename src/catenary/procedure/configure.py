@@ -60,6 +60,15 @@ def configure_mailbox_areas(
     )
 
 
+def disable_mailbox(station: Station) -> Procedure[None]:
+    """Disable SyncManagers 0 and 1, so that another mailbox can be configured.
+
+    An enabled SyncManager keeps its address and length (ET1100 datasheet, 0x0800).
+    """
+    requests = [_switched_off(station, OUT), _switched_off(station, IN)]
+    yield from _write_all(station, requests, "mailbox SyncManagers")
+
+
 def configure_process_data(
     station: Station, device: DeviceDescription, plan: DevicePlan
 ) -> Procedure[None]:

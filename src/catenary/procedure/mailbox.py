@@ -52,7 +52,7 @@ OUT, IN = 0, 1  # SyncManagers of the mailbox, as defined by the standard
 WRITE_TIMEOUT = 1.0  # [s] until the device has emptied its mailbox
 READ_TIMEOUT = 2.0  # [s] until it answers; AKD drives take long for 0x1010
 REPEAT_TIMEOUT = 0.2  # [s] until it acknowledges a repeat request
-EAGER_MAX = 256  # [bytes]; a larger mailbox is read only after a status check
+EAGER_MAX = 256  # [bytes]; a larger mailbox is read after a status check, or if it should be full
 POLL = 100e-6  # [s] between the first two polls for an answer
 TURN = 0.5e-3  # [s] between two checks for a free mailbox
 GRACE = 0.1  # [s] for an answer to a message whose frame was lost
@@ -187,13 +187,17 @@ def _no_answer(
     )
 
 
-def send_only(channel: MailboxChannel, kind: Type, data: bytes) -> Procedure[bool]:
+def send_only(
+    channel: MailboxChannel, kind: Type, data: bytes, *, attempts: int = 1
+) -> Procedure[bool]:
     """Send one message that the device does not answer.
 
     Args:
         channel: The mailbox of the device.
         kind: The protocol of the message.
         data: The data of the message.
+        attempts: Number of times that the message is sent while its frame is lost. The counter
+            stays the same, so that the device recognises a repetition.
 
     Returns:
         False if the frame was lost. The device may still have received the message.
@@ -203,7 +207,10 @@ def send_only(channel: MailboxChannel, kind: Type, data: bytes) -> Procedure[boo
     """
     channel.counter = next_counter(channel.counter)
     message = Mailbox(kind, data, channel.counter).encode(channel.layout.receive_size)
-    return (yield from _post(channel, message))[0]
+    for _ in range(attempts):
+        if (yield from _post(channel, message))[0]:
+            return True
+    return False
 
 
 def drain(channel: MailboxChannel, accept: Callable[[Mailbox], T | None]) -> Procedure[list[T]]:
@@ -316,16 +323,20 @@ def _fetch(channel: MailboxChannel, deadline: Deadline) -> Procedure[Mailbox | N
 def _poll(channel: MailboxChannel) -> Procedure[tuple[bool, Mailbox | None, int]]:
     """Read the next message, if there is one.
 
-    A small mailbox is read in the same frame as its status, if counters identify repetitions. The
-    read has no effect on an empty mailbox, and returns a working counter of 0. If the frame is
-    lost, the mailbox may have been emptied. Its status is then polled. A repetition is requested
-    only if nothing arrives within a grace period, because some stacks cannot repeat a message.
+    A small mailbox is read in the same frame as its status, if counters identify repetitions. So
+    is a large one, if the last answer was there at the first poll: each packet of a file then takes
+    two exchanges. The read has no effect on an empty mailbox, and returns a working counter of 0.
+
+    If the frame is lost, the mailbox may have been emptied. Its status is then polled. A repetition
+    is requested only if nothing arrives within a grace period, because some stacks cannot repeat a
+    message.
 
     Returns:
         True if there was a message, the message, and the time [ns]. The message is None if there
         was none, or if it was a repetition.
     """
-    careful = not channel.counts or channel.layout.send_size > EAGER_MAX
+    empty = not channel.punctual and channel.layout.send_size > EAGER_MAX  # probably
+    careful = not channel.counts or empty
     if careful or channel.unsure_ns is not None:
         return (yield from _poll_status_first(channel))
     station = channel.station
@@ -338,6 +349,7 @@ def _poll(channel: MailboxChannel) -> Procedure[tuple[bool, Mailbox | None, int]
         return False, None, reply.time_ns
     answered(status, station, "mailbox status")
     if not reply.working_counter:
+        channel.punctual = False
         return False, None, reply.time_ns
     channel.received_ns = reply.time_ns
     return True, _decoded(channel, reply.data), reply.time_ns

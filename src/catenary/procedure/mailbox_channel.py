@@ -52,6 +52,7 @@ class MailboxChannel:
     turns: deque[object] = field(default_factory=deque)
     posted_ns: int | None = None  # time of the last request, until its answer arrives
     answer_delay_ns: int = 0  # expected time until the device answers
+    punctual: bool = False  # the last answer was there at the first poll
     unsure_ns: int | None = None  # time of a lost frame that may have emptied the mailbox
     owed: bool = False  # an answer may still arrive: a request is pending or has timed out
     undescribed: int = 0  # number of missing or malformed SDO information answers in a row
@@ -87,6 +88,7 @@ class MailboxChannel:
         Args:
             empty_ns: Time of the last poll without an answer; None if the first poll succeeded.
         """
+        self.punctual = empty_ns is None
         if empty_ns is None:
             self.answer_delay_ns = self.answer_delay_ns * 9 // 10
         elif self.posted_ns is not None:

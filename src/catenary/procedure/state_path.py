@@ -9,13 +9,15 @@ from __future__ import annotations
 import struct
 
 from catenary.errors import EepromError
-from catenary.model.device import DeviceDescription
+from catenary.model.describe import bootstrap_mailbox
+from catenary.model.device import DeviceDescription, MailboxLayout
 from catenary.plan.start_up import DevicePlan
 from catenary.procedure.al_state import DeviceState, read_state, request_state
 from catenary.procedure.configure import (
     configure_mailbox,
     configure_mailbox_areas,
     configure_process_data,
+    disable_mailbox,
 )
 from catenary.procedure.exchange import Procedure
 from catenary.procedure.mailbox import MailboxChannel
@@ -78,7 +80,7 @@ def climb(
 
     Raises:
         StateError: The device refuses a state or takes too long.
-        EepromError: The device has no bootstrap mailbox, which BOOT requires.
+        EepromError: The bootstrap mailbox, which BOOT requires, is not known.
     """
     channel = None
     before = (yield from read_state(station)).state
@@ -88,7 +90,7 @@ def climb(
             yield from hand_over(station)
             yield from run_commands(station, device.register_commands, "IP")
         elif state is AlState.BOOT and before is not AlState.BOOT:
-            yield from _open_bootstrap(station)
+            yield from _open_bootstrap(station, device)
         yield from request_state(station, state)
         before = state
     return channel
@@ -131,18 +133,46 @@ def _open_mailbox(station: Station, device: DeviceDescription) -> Procedure[Mail
     if device.mailbox is None:
         return None
     channel = MailboxChannel(station, device.mailbox)
+    yield from disable_mailbox(station)  # it may still be that of BOOT
     yield from configure_mailbox(channel)
     return channel
 
 
-def _open_bootstrap(station: Station) -> Procedure[None]:
-    """Configure SyncManagers 0 and 1 with the bootstrap mailbox of the EEPROM."""
+def _open_bootstrap(station: Station, device: DeviceDescription) -> Procedure[None]:
+    """Configure SyncManagers 0 and 1 with the bootstrap mailbox."""
+    layout = device.bootstrap or (yield from read_bootstrap(station))
+    yield from disable_mailbox(station)
+    yield from configure_mailbox_areas(
+        station,
+        MailboxArea(layout.receive_offset, layout.receive_size),
+        MailboxArea(layout.send_offset, layout.send_size),
+    )
+
+
+def read_bootstrap(station: Station) -> Procedure[MailboxLayout]:
+    """Read the bootstrap mailbox from the EEPROM.
+
+    Args:
+        station: The device.
+
+    Raises:
+        EepromError: The EEPROM has none, or one that is not possible.
+    """
     data = yield from with_eeprom(station, read_words(station, BOOTSTRAP_WORD, 4))
     numbers = struct.unpack("<4H", data)
     receive, send = MailboxArea(*numbers[:2]), MailboxArea(*numbers[2:])
+    layout = bootstrap_mailbox(receive, send, "SII")
+    if layout is not None:
+        return layout
     if not (receive.size and send.size):
-        raise EepromError(
-            f"{station} has no bootstrap mailbox in its EEPROM: it does not support BOOT",
-            hint="only devices with firmware update over EtherCAT have one",
+        what = "has no bootstrap mailbox in its EEPROM: it does not support BOOT"
+    else:
+        what = (
+            f"has an invalid bootstrap mailbox in its EEPROM: {receive.size} bytes at "
+            f"0x{receive.offset:04X} and {send.size} bytes at 0x{send.offset:04X}"
         )
-    yield from configure_mailbox_areas(station, receive, send)
+    raise EepromError(
+        f"{station} {what}",
+        hint="only devices with firmware update over EtherCAT have one. If its manual describes "
+        "BOOT, add the vendor's ESI file to the library: catenary esi add FILE",
+    )

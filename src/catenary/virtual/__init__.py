@@ -20,6 +20,8 @@ from catenary.virtual.devices.servo_quirks import ServoQuirks
 from catenary.virtual.devices.twin import Twin, TwinOptions
 from catenary.virtual.fault_player import FaultEvent, Loss
 from catenary.virtual.faults import Fault
+from catenary.virtual.foe.firmware import make_firmware
+from catenary.virtual.foe.options import DeviceFiles, DeviceFirmware
 from catenary.virtual.joint import Joint
 from catenary.virtual.mapping_quirks import MappingQuirks
 from catenary.virtual.plant import Plant, PlantPart
@@ -33,6 +35,8 @@ __all__ = [
     "Crystal",
     "DescribedDevice",
     "Device",
+    "DeviceFiles",
+    "DeviceFirmware",
     "DigitalInputs",
     "DigitalOutputs",
     "Fault",
@@ -58,6 +62,7 @@ __all__ = [
     "demo_segment",
     "faults",
     "from_esi",
+    "make_firmware",
     "read_segment",
     "serve",
     "serve_all",

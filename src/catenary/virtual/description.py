@@ -49,13 +49,18 @@ class SyncManagerDefault:
 
 @dataclass(frozen=True, slots=True)
 class MailboxDefault:
-    """Offsets and sizes of the standard mailbox, named as in the SII: `receive` is SM0."""
+    """Offsets and sizes of a mailbox, named as in the SII: `receive` is SM0."""
 
     receive_offset: int
     receive_size: int
     send_offset: int
     send_size: int
     coe_details: int  # bit 0 SDO, 1 SDO information, 2 assignment, 3 mapping, 5 complete access
+
+    @property
+    def areas(self) -> tuple[int, int, int, int]:
+        """Offset and size of both directions, in the order of the SII."""
+        return self.receive_offset, self.receive_size, self.send_offset, self.send_size
 
 
 @dataclass(frozen=True, slots=True)
@@ -121,6 +126,8 @@ class Description:
     fmmu_count: int = field(default=8, repr=False)  # not repr: the revision depends on it
     sync_manager_count: int = field(default=8, repr=False)
     facts: FileFacts | None = field(default=None, repr=False)  # None: one of our own kinds
+    bootstrap: MailboxDefault | None = field(default=None, repr=False)  # mailbox in BOOT
+    serves_files: bool = field(default=False, repr=False)  # FoE
 
     @property
     def vendor(self) -> int:

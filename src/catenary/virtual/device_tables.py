@@ -20,6 +20,7 @@ from catenary.virtual.devices.motor import Motor
 from catenary.virtual.devices.servo import Servo
 from catenary.virtual.devices.servo_quirks import NO_QUIRKS, ServoQuirks
 from catenary.virtual.devices.twin import STANDARD_MOTOR, TwinOptions
+from catenary.virtual.foe.options import DeviceFiles
 from catenary.virtual.mapping_quirks import NO_MAPPING_QUIRKS, MappingQuirks
 from catenary.virtual.sii_quirks import NO_SII_QUIRKS, SiiQuirks
 
@@ -116,6 +117,7 @@ class AnalogInputsTable(_AppliedTable, tag="analog_inputs", frozen=True, kw_only
     channels: int = 2
     second_pdo: SecondPdo = "none"
     mapping_quirks: MappingQuirks = NO_MAPPING_QUIRKS
+    files: DeviceFiles | None = None
 
     def device(self) -> Device:
         return AnalogInputs(
@@ -132,6 +134,7 @@ class AnalogInputsTable(_AppliedTable, tag="analog_inputs", frozen=True, kw_only
             mapping_quirks=self.mapping_quirks,
             mailbox_quirks=self.mailbox_quirks,
             sii_quirks=self.sii_quirks,
+            files=self.files,
         )
 
 
@@ -177,6 +180,7 @@ class ServoTable(_AppliedTable, tag="servo", frozen=True, kw_only=True):
     sync_missed_limit: int = 3
     quirks: ServoQuirks = NO_QUIRKS
     mapping_quirks: MappingQuirks = NO_MAPPING_QUIRKS
+    files: DeviceFiles | None = None
 
     def device(self) -> Device:
         return Servo(
@@ -204,6 +208,7 @@ class ServoTable(_AppliedTable, tag="servo", frozen=True, kw_only=True):
             mapping_quirks=self.mapping_quirks,
             mailbox_quirks=self.mailbox_quirks,
             sii_quirks=self.sii_quirks,
+            files=self.files,
         )
 
 
@@ -215,6 +220,7 @@ class EsiTable(_ClockedTable, tag="esi", frozen=True, kw_only=True):
     mapping_quirks: MappingQuirks | None = None
     quirks: ServoQuirks = NO_QUIRKS
     motor: Motor = STANDARD_MOTOR
+    files: DeviceFiles | None = None
     modules: tuple[str | int, ...] | None = None  # "" for an empty slot
 
     def device(self) -> Device:
@@ -232,6 +238,7 @@ class EsiTable(_ClockedTable, tag="esi", frozen=True, kw_only=True):
                 quirks=self.quirks,
                 mapping_quirks=self.mapping_quirks,
                 mailbox_quirks=self.mailbox_quirks,
+                files=self.files,
             ),
         )
 
@@ -248,6 +255,7 @@ class SiiTable(_PlacedTable, tag="sii", frozen=True, kw_only=True):
     mapping_quirks: MappingQuirks | None = None
     quirks: ServoQuirks = NO_QUIRKS
     motor: Motor = STANDARD_MOTOR
+    files: DeviceFiles | None = None
 
     def device(self) -> Device:
         return Device.from_sii(
@@ -264,6 +272,7 @@ class SiiTable(_PlacedTable, tag="sii", frozen=True, kw_only=True):
                 quirks=self.quirks,
                 mapping_quirks=self.mapping_quirks,
                 mailbox_quirks=self.mailbox_quirks,
+                files=self.files,
             ),
         )
 

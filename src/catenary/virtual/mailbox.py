@@ -14,7 +14,7 @@ from catenary.virtual.coe.quirks import NO_MAILBOX_QUIRKS, MailboxQuirks
 from catenary.virtual.scheduler import Scheduler
 
 HEADER = struct.Struct("<HHBB")  # length, address, channel and priority, type and counter
-ERROR_PROTOCOL, COE_PROTOCOL = 0, 3
+ERROR_PROTOCOL, COE_PROTOCOL, FOE_PROTOCOL = 0, 3, 4
 ERROR_SYNTAX, ERROR_UNSUPPORTED_PROTOCOL, ERROR_TOO_SHORT, ERROR_SIZE = 0x01, 0x02, 0x06, 0x08
 
 
@@ -37,11 +37,21 @@ class Mailbox:
         self,
         ports: MailboxPorts,
         scheduler: Scheduler,
-        serve: Callable[[bytes], Iterable[bytes]],
+        serve: Callable[[int, bytes], Iterable[bytes] | int],
         *,
         delay_ns: int,
         quirks: MailboxQuirks = NO_MAILBOX_QUIRKS,
     ) -> None:
+        """Initialise the mailbox.
+
+        Args:
+            ports: PDI side of the SyncManagers.
+            scheduler: Delayed actions of the device.
+            serve: Function that returns the answers to a message, from its protocol and data, or
+                the code of a mailbox error.
+            delay_ns: Time until a request is fetched [ns].
+            quirks: Differences from the standard.
+        """
         self._ports = ports
         self._scheduler = scheduler
         self._serve = serve
@@ -52,7 +62,7 @@ class Mailbox:
         self.reset()
 
     def reset(self) -> None:
-        """Discard all pending messages and restart the counter. Called on entry to PRE-OP."""
+        """Discard all messages and restart the counter. Called on entry to PRE-OP or BOOT."""
         self._waiting: deque[bytes] = deque()
         self._in_buffer: bytes | None = None
         self._last_read: bytes | None = None
@@ -92,14 +102,13 @@ class Mailbox:
         protocol = kind & 0x0F
         if length > len(request) - HEADER.size:
             return [(ERROR_PROTOCOL, struct.pack("<HH", 1, ERROR_SIZE))]
-        if self._quirks.error_reply != "none":
+        if self._quirks.error_reply != "none" and protocol == COE_PROTOCOL:
             reply = struct.pack("<HH", 1, ERROR_UNSUPPORTED_PROTOCOL)
             return [(ERROR_PROTOCOL, reply[: 2 if self._quirks.error_reply == "short" else 4])]
-        if protocol != COE_PROTOCOL:
-            return [(ERROR_PROTOCOL, struct.pack("<HH", 1, ERROR_UNSUPPORTED_PROTOCOL))]
-        if length < 3:
-            return [(ERROR_PROTOCOL, struct.pack("<HH", 1, ERROR_TOO_SHORT))]
-        return [(COE_PROTOCOL, answer) for answer in self._serve(payload)]
+        served = self._serve(protocol, payload)
+        if isinstance(served, int):
+            return [(ERROR_PROTOCOL, struct.pack("<HH", 1, served))]
+        return [(protocol, answer) for answer in served]
 
     def _queue(self, answer: tuple[int, bytes]) -> None:
         protocol, payload = answer

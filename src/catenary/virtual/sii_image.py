@@ -23,7 +23,7 @@ STRINGS, GENERAL, FMMU, SYNC_MANAGER, TX_PDO, RX_PDO, CLOCK, END = (
     0xFFFF,
 )
 FIXED_CONTENT = 0x0010  # PDO flag
-COE_PROTOCOL = 0x0004
+COE_PROTOCOL, FOE_PROTOCOL = 0x0004, 0x0008
 # Flags in byte 0x0B of the general category
 NO_LRW, IDENTIFICATION_IN_MEMORY = 0x02, 0x10
 HEADER_BYTES = 128
@@ -64,7 +64,9 @@ def _header(device: Description, size: int, mailbox_size: int | None) -> bytes:
     configuration = struct.pack("<HHHHH4x", pdi_control, 0, 100, 0, device.alias)
     words = configuration + struct.pack("<H", checksum(configuration))
     words += struct.pack("<4I", VENDOR_ID, device.product_code, device.revision, device.serial)
-    words += bytes(8 + 8)  # delays and bootstrap mailbox
+    words += bytes(8)  # delays
+    boot = device.bootstrap
+    words += bytes(8) if boot is None else struct.pack("<4H", *boot.areas)
     box = device.mailbox
     if box is None:
         words += bytes(10)
@@ -75,7 +77,7 @@ def _header(device: Description, size: int, mailbox_size: int | None) -> bytes:
             box.receive_size if mailbox_size is None else mailbox_size,
             box.send_offset,
             box.send_size if mailbox_size is None else mailbox_size,
-            COE_PROTOCOL,
+            COE_PROTOCOL | (FOE_PROTOCOL if device.serves_files else 0),
         )
     words = words.ljust(124, b"\0")
     return words + struct.pack("<HH", max(size * 8 // 1024 - 1, 0), 1)
@@ -90,7 +92,7 @@ def _general(device: Description, strings: _Strings) -> bytes:
     ports = sum(1 << 4 * port for port in device.ports)  # 1: MII
     return struct.pack(
         "<BBBBxBBBBBBBhBxHH12x",
-        *(group, 0, order, name, details, 0, 0, 0, device.axes, 0, flags),
+        *(group, 0, order, name, details, device.serves_files, 0, 0, device.axes, 0, flags),
         *(device.current_milliampere, group, ports, 0x0012 if device.identification else 0),
     )
 

@@ -26,6 +26,8 @@ SYNC_MANAGER_WATCHDOG = 0x001B
 INVALID_OUTPUT_CONFIGURATION = 0x001D
 INVALID_INPUT_CONFIGURATION = 0x001E
 INVALID_WATCHDOG_CONFIGURATION = 0x001F
+NO_VALID_FIRMWARE = 0x0014
+INVALID_BOOT_MAILBOX_CONFIGURATION = 0x0015
 MODULES_DIFFER = 0x0070  # configured and detected idents
 INVALID_INPUT_MAPPING = 0x0024
 INVALID_OUTPUT_MAPPING = 0x0025
@@ -36,6 +38,7 @@ DC_CYCLE_TIME = 0x0035
 DC_SYNC0_CYCLE_TIME = 0x0036
 
 UPWARDS = {(INIT, PRE_OP), (PRE_OP, SAFE_OP), (SAFE_OP, OP)}
+WITH_BOOT = {(INIT, BOOT), (BOOT, BOOT), (BOOT, INIT)}  # all transitions from and to BOOT
 MILLISECOND = 1_000_000
 # Time limits of SAFE-OP → OP, by the AL status code of the missing condition. With SOEM and IgH,
 # SYNC pulses start 100 ms after activation; other masters need longer.
@@ -63,8 +66,16 @@ class Controlled(Protocol):
 class StateMachine:
     """AL state of one device, and the state faults injected into it."""
 
-    def __init__(self, device: Controlled, scheduler: Scheduler, identification: int) -> None:
+    def __init__(
+        self,
+        device: Controlled,
+        scheduler: Scheduler,
+        identification: int,
+        *,
+        supports_boot: bool = False,
+    ) -> None:
         self._device = device
+        self._supports_boot = supports_boot
         self._scheduler = scheduler
         self._identification = identification
         self._request = 0  # number of the last request, which cancels earlier ones
@@ -102,11 +113,11 @@ class StateMachine:
     def _check_request(self, requested: int) -> int:
         if requested in self.refused:
             return self._refuse(requested)
-        if requested == BOOT:
+        if requested == BOOT and not self._supports_boot:
             return BOOTSTRAP_NOT_SUPPORTED
-        if requested not in (INIT, PRE_OP, SAFE_OP, OP):
+        if requested not in (INIT, PRE_OP, BOOT, SAFE_OP, OP):
             return UNKNOWN_STATE
-        if requested > self.state and (self.state, requested) not in UPWARDS:
+        if not _is_allowed(self.state, requested):
             return INVALID_STATE_CHANGE
         return self._device.check_state(requested)
 
@@ -158,3 +169,11 @@ class StateMachine:
         if before != state:
             self._device.enter_state(before, state)
         self._device.show_al_status(state | ERROR, code)
+
+
+def _is_allowed(state: int, requested: int) -> bool:
+    """Return True if the standard has a transition from `state` to `requested`."""
+    change = state, requested
+    if BOOT in change:
+        return change in WITH_BOOT
+    return requested <= state or change in UPWARDS

@@ -36,8 +36,8 @@ class MailboxQuirks(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_
     # Objects whose descriptions are never sent. No such device has been reported.
     missing_descriptions: tuple[int, ...] = ()
 
-    # Answer to every request. "unsupported": mailbox error 2, as if the SII listed CoE by mistake.
-    # "short": a mailbox error without its code. No device with "short" has been reported.
+    # Answer to every CoE request. "unsupported": mailbox error 2, as if the SII listed CoE by
+    # mistake. "short": a mailbox error without its code. No device with "short" has been reported.
     error_reply: Literal["none", "unsupported", "short"] = "none"
 
     # True: each segment of an upload contains one byte. No such device has been reported.

@@ -23,6 +23,7 @@ from catenary.virtual.crystal import EXACT, ClockBits, Crystal
 from catenary.virtual.description import Description, MappedEntry, Pdo
 from catenary.virtual.devices.application import Application, mailbox_of, sync_managers_of
 from catenary.virtual.devices.applied import AppliedDevice, MailboxOptions
+from catenary.virtual.foe.options import DeviceFiles
 from catenary.virtual.mapping_quirks import NO_MAPPING_QUIRKS, MappingQuirks
 from catenary.virtual.scheduler import Scheduler
 from catenary.virtual.sii_quirks import NO_SII_QUIRKS, SiiQuirks
@@ -56,6 +57,7 @@ class AnalogInputs(AppliedDevice):
         mapping_quirks: MappingQuirks = NO_MAPPING_QUIRKS,
         mailbox_quirks: MailboxQuirks = NO_MAILBOX_QUIRKS,
         sii_quirks: SiiQuirks = NO_SII_QUIRKS,
+        files: DeviceFiles | None = None,
     ) -> None:
         """Initialise the terminal.
 
@@ -75,6 +77,7 @@ class AnalogInputs(AppliedDevice):
             mapping_quirks: Quirks of the PDOs.
             mailbox_quirks: Quirks of the mailbox.
             sii_quirks: Quirks of the SII.
+            files: Files that FoE reads and writes; None: the device does not support FoE.
 
         Raises:
             ValueError: A value is out of range.
@@ -89,7 +92,7 @@ class AnalogInputs(AppliedDevice):
             crystal=crystal,
             clock_bits=clock_bits,
             sii_quirks=sii_quirks,
-            mailbox=MailboxOptions(mailbox_bytes, mailbox_delay, mailbox_quirks),
+            mailbox=MailboxOptions(mailbox_bytes, mailbox_delay, mailbox_quirks, files),
         )
         self.channels = channels
         self.second_pdo = second_pdo

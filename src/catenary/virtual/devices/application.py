@@ -6,7 +6,7 @@ It runs in the service of the segment, not in the frame path.
 from __future__ import annotations
 
 import struct
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 
 from catenary.virtual import _segment
 from catenary.virtual._buffers import Buffers
@@ -45,11 +45,22 @@ from catenary.virtual.description import (
     SyncManagerDefault,
 )
 from catenary.virtual.devices.synchronisation import Synchronisation
-from catenary.virtual.mailbox import HEADER, Mailbox
+from catenary.virtual.foe.access import FileAccess
+from catenary.virtual.foe.store import FileStore
+from catenary.virtual.mailbox import (
+    COE_PROTOCOL,
+    ERROR_TOO_SHORT,
+    ERROR_UNSUPPORTED_PROTOCOL,
+    FOE_PROTOCOL,
+    HEADER,
+    Mailbox,
+)
 from catenary.virtual.scheduler import Scheduler
 from catenary.virtual.state_machine import (
+    BOOT,
     FATAL_SYNC_ERROR,
     INIT,
+    INVALID_BOOT_MAILBOX_CONFIGURATION,
     INVALID_INPUT_CONFIGURATION,
     INVALID_INPUT_MAPPING,
     INVALID_MAILBOX_CONFIGURATION,
@@ -58,6 +69,7 @@ from catenary.virtual.state_machine import (
     INVALID_WATCHDOG_CONFIGURATION,
     MODULES_DIFFER,
     NO_SYNC_ERROR,
+    NO_VALID_FIRMWARE,
     NO_VALID_OUTPUTS,
     OP,
     PRE_OP,
@@ -76,7 +88,12 @@ BLOB_BYTES = 2048  # an object larger than any usual mailbox
 
 
 def mailbox_of(size: int, coe_details: int = 0x2F) -> MailboxDefault:
-    """Return the description of two mailboxes of `size` bytes, one after the other."""
+    """Return the description of two mailboxes of `size` bytes, one after the other.
+
+    Args:
+        size: Size of each mailbox [bytes].
+        coe_details: CoE details of the SII.
+    """
     return MailboxDefault(RAM_START, size, RAM_START + size, size, coe_details)
 
 
@@ -137,16 +154,21 @@ class Application:
         *,
         delay_ns: int,
         quirks: MailboxQuirks = NO_MAILBOX_QUIRKS,
+        store: FileStore | None = None,
     ) -> None:
         self._core = core
+        self._description = description
         self._buffers = Buffers(core)
         self._position = position
-        self._box = description.mailbox
+        self._box, self._bootstrap = description.mailbox, description.bootstrap
         self._emulation = description.emulation
         self.synchronisation: Synchronisation | None = None  # only for devices that support SYNC0
         self.checks_watchdog = False  # see ServoQuirks
         self.module_lists: ModuleLists | None = None  # only of modular devices
-        self.states = StateMachine(self, scheduler, description.identification)
+        boots, identification = self._bootstrap is not None, description.identification
+        self.states = StateMachine(self, scheduler, identification, supports_boot=boots)
+        self._files = FileAccess(store, self._box, self._bootstrap, self._state)
+        self.on_restart: Callable[[], None] | None = None  # called if a new firmware is to start
         self.dictionary = Dictionary(self._state)
         self._add_communication_objects(description, quirks.text_prefix)
         size = description.mailbox.receive_size if description.mailbox else 0
@@ -161,7 +183,7 @@ class Application:
             description.mapping_quirks,
         )
         self._add_servers(description, quirks)
-        self.mailbox = Mailbox(self, scheduler, self._serve_coe, delay_ns=delay_ns, quirks=quirks)
+        self.mailbox = Mailbox(self, scheduler, self._serve, delay_ns=delay_ns, quirks=quirks)
         self._gate(mailbox=self._emulation, process_data=self._emulation)
 
     def _add_servers(self, description: Description, quirks: MailboxQuirks) -> None:
@@ -194,14 +216,8 @@ class Application:
         add(0x1001, Entry("Error register", UNSIGNED8, 8, 0x07, self._error_register))
         add(0x1008, text("Manufacturer device name", text_prefix + d.name))
         add(0x1009, text("Manufacturer hardware version", "1"))
-        add(0x100A, text("Manufacturer software version", "1.0"))
-        identity = zip(
-            ("Vendor ID", "Product code", "Revision number", "Serial number"),
-            (d.vendor, d.product_code, d.revision, d.serial),
-            strict=True,
-        )
+        self._add_version(d)
         record = self.dictionary.add_record
-        record(0x1018, "Identity", [number(name, UNSIGNED32, value) for name, value in identity])
         kinds = [
             number(f"Subindex {n:03d}", UNSIGNED8, each.kind)
             for n, each in enumerate(d.sync_managers, start=1)
@@ -209,6 +225,18 @@ class Application:
         record(0x1C00, "Sync manager type", kinds, code=ARRAY)
         if d.facts is None:
             self._add_test_objects()
+
+    def _add_version(self, d: Description) -> None:
+        """Add or replace the objects that depend on the firmware."""
+        version, revision = self._files.version
+        self.dictionary.add_variable(0x100A, text("Manufacturer software version", version))
+        identity = zip(
+            ("Vendor ID", "Product code", "Revision number", "Serial number"),
+            (d.vendor, d.product_code, revision or d.revision, d.serial),
+            strict=True,
+        )
+        entries = [number(name, UNSIGNED32, value) for name, value in identity]
+        self.dictionary.add_record(0x1018, "Identity", entries)
 
     def _add_test_objects(self) -> None:
         """Add objects of our own kinds of devices that exercise long and writable transfers."""
@@ -256,17 +284,25 @@ class Application:
             self.states.fail(SAFE_OP, code)
 
     def send_emergency(self, code: int, data: bytes = b"") -> None:
-        """Send an emergency message, ETG.1000.6 §5.6.4. A no-op in INIT.
+        """Send an emergency message, ETG.1000.6 §5.6.4. A no-op in INIT and BOOT.
 
         Args:
             code: Error code; 0: the error was reset.
             data: Up to 5 manufacturer-specific bytes.
         """
-        if self.states.state == INIT:
+        if self.states.state in (INIT, BOOT):
             return
         register = 1 if code else 0
         head = struct.pack("<HHB", EMERGENCY << 12, code, register)
         self.mailbox.send(head + data[:5].ljust(5, b"\0"))
+
+    def _serve(self, protocol: int, payload: bytes) -> Iterable[bytes] | int:
+        """Return the answers to a mailbox message, or the code of a mailbox error."""
+        if protocol == FOE_PROTOCOL:
+            return self._files.serve(payload)
+        if protocol != COE_PROTOCOL or self._state() == BOOT:  # BOOT has no CoE, §6.4.1
+            return ERROR_UNSUPPORTED_PROTOCOL
+        return ERROR_TOO_SHORT if len(payload) < 3 else self._serve_coe(payload)
 
     def _serve_coe(self, payload: bytes) -> Iterable[bytes]:
         [header] = struct.unpack_from("<H", payload)
@@ -300,7 +336,12 @@ class Application:
 
     def check_state(self, state: int) -> int:
         before = self.states.state
-        if state >= PRE_OP and before == INIT and not self._mailbox_is_configured():
+        if state == BOOT:
+            configured = before == BOOT or self._mailbox_is_configured(self._bootstrap)
+            return 0 if configured else INVALID_BOOT_MAILBOX_CONFIGURATION
+        if state >= PRE_OP and before == INIT and self._files.lacks_firmware:
+            return NO_VALID_FIRMWARE
+        if state >= PRE_OP and before == INIT and not self._mailbox_is_configured(self._box):
             return INVALID_MAILBOX_CONFIGURATION
         if state >= SAFE_OP and before == PRE_OP:
             if self.module_lists is not None and self.module_lists.differ:
@@ -333,8 +374,7 @@ class Application:
         _start, _length, control, _enabled, _full = self._buffers.settings(self._position, 2)
         return on is bool(control & WATCHDOG_TRIGGER)
 
-    def _mailbox_is_configured(self) -> bool:
-        box = self._box
+    def _mailbox_is_configured(self, box: MailboxDefault | None) -> bool:
         if box is None:
             return True
         expected = (
@@ -368,8 +408,11 @@ class Application:
         return 0
 
     def enter_state(self, before: int, state: int) -> None:
-        if before == INIT and state == PRE_OP:
+        if before == INIT and state in (PRE_OP, BOOT):
             self.mailbox.reset()
+            self._files.reset()
+        if before == BOOT and state == INIT:
+            self._leave_boot()
         if before < SAFE_OP <= state:
             self.map_process_data()
             if self.synchronisation is not None:
@@ -382,6 +425,17 @@ class Application:
             self._core.expect_outputs(self._position)
             self._core.refresh_inputs(self._position)
         self._core.enable_outputs(self._position, state == OP and self._takes_outputs())
+
+    def _leave_boot(self) -> None:
+        """End a transfer, and start another firmware, if there is one."""
+        self._files.reset()
+        if not self._files.restart_is_due:
+            return
+        if self.on_restart is not None:
+            self.on_restart()
+            return
+        self._files.restart()
+        self._add_version(self._description)
 
     def _takes_outputs(self) -> bool:
         """Return False for a device from a file without outputs: a pulse then misses none."""

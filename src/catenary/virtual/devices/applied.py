@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from catenary.virtual.coe.quirks import NO_MAILBOX_QUIRKS, MailboxQuirks
 from catenary.virtual.crystal import ClockBits, Crystal
-from catenary.virtual.devices.application import Application
+from catenary.virtual.description import Description
+from catenary.virtual.devices.application import Application, mailbox_of
 from catenary.virtual.devices.device import Device
+from catenary.virtual.foe.options import DeviceFiles
+from catenary.virtual.foe.store import FileStore
 from catenary.virtual.scheduler import Scheduler
 from catenary.virtual.sii_quirks import SiiQuirks
 
@@ -19,6 +22,7 @@ class MailboxOptions:
     size: int = 128  # size of the mailbox in each direction [bytes]
     delay: float = 300e-6  # time until a request is answered [s]
     quirks: MailboxQuirks = NO_MAILBOX_QUIRKS
+    files: DeviceFiles | None = None  # None: the device does not support FoE
 
     def __post_init__(self) -> None:
         if not 32 <= self.size <= 1024 or self.size % 2:
@@ -54,6 +58,8 @@ class AppliedDevice(Device):
         self.mailbox_bytes = mailbox.size
         self.mailbox_quirks = mailbox.quirks
         self._mailbox_delay_ns = round(mailbox.delay * 1e9)
+        self.files = mailbox.files
+        self._store: FileStore | None = None  # made when the device starts for the first time
         self._application: Application | None = None
 
     @property
@@ -62,15 +68,49 @@ class AppliedDevice(Device):
             raise ValueError(f"{self.name} is not in a segment; add it with Segment([...])")
         return self._application
 
+    @property
+    def store(self) -> FileStore:
+        """Stored files. Raises ValueError if the device has none, or is not in a segment."""
+        if self._store is None:
+            raise ValueError(f"{self.name} has no files, or is not in a segment")
+        return self._store
+
+    def whole_description(self) -> Description:
+        """Return the description with the bootstrap mailbox of a device with files."""
+        found = super().whole_description()
+        if self.files is None:
+            return found
+        chosen = self.files.bootstrap_bytes
+        size = self.mailbox_bytes if chosen is None else chosen
+        return replace(
+            found,
+            serves_files=True,
+            bootstrap=mailbox_of(size) if size else None,
+            sii_variant=f"{found.sii_variant} files, bootstrap mailbox of {size} bytes",
+        )
+
+    def _start_store(self, product: int) -> None:
+        if self.files is None:
+            return
+        if self._store is None:
+            self._store = FileStore(self.files, product)
+        if self._store.flash is not None:
+            self._store.flash.restart()
+
     def started(self, scheduler: Scheduler) -> None:
+        description = self.whole_description()
+        self._start_store(description.product_code)
         self._application = Application(
             self.core,
             self.position,
             scheduler,
-            self.whole_description(),
+            description,
             delay_ns=self._mailbox_delay_ns,
             quirks=self.mailbox_quirks,
+            store=self._store,
         )
+        if self.files and self.files.firmware and self.files.firmware.restart == "power":
+            self._application.on_restart = self.reset
         self.add_objects(self._application)
 
     def add_objects(self, application: Application) -> None:

@@ -43,6 +43,7 @@ from catenary.virtual.devices.servo_objects import (
 )
 from catenary.virtual.devices.servo_quirks import NO_QUIRKS, ServoQuirks
 from catenary.virtual.devices.synchronisation import DC_SYNC0, DC_SYNC1, Synchronisation
+from catenary.virtual.foe.options import DeviceFiles
 from catenary.virtual.mapping_quirks import NO_MAPPING_QUIRKS, MappingQuirks
 from catenary.virtual.sii_quirks import NO_SII_QUIRKS, SiiQuirks
 
@@ -99,6 +100,7 @@ class Servo(MotorDevice):
         mapping_quirks: MappingQuirks = NO_MAPPING_QUIRKS,
         mailbox_quirks: MailboxQuirks = NO_MAILBOX_QUIRKS,
         sii_quirks: SiiQuirks = NO_SII_QUIRKS,
+        files: DeviceFiles | None = None,
     ) -> None:
         """Initialise the drive.
 
@@ -129,6 +131,7 @@ class Servo(MotorDevice):
             mapping_quirks: Quirks of the PDOs.
             mailbox_quirks: Quirks of the mailbox.
             sii_quirks: Quirks of the SII.
+            files: Files that FoE reads and writes; None: the device does not support FoE.
 
         Raises:
             ValueError: A value is out of range.
@@ -157,7 +160,7 @@ class Servo(MotorDevice):
             crystal=crystal,
             clock_bits=clock_bits,
             sii_quirks=sii_quirks,
-            mailbox=MailboxOptions(mailbox_bytes, mailbox_delay, mailbox_quirks),
+            mailbox=MailboxOptions(mailbox_bytes, mailbox_delay, mailbox_quirks, files),
         )
         self.install_motors([motor] * axes, quirks)
         self.counts_per_turn = counts_per_turn

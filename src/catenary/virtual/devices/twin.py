@@ -6,6 +6,7 @@ Its CiA 402 axes move, as those of a `Servo`. Other outputs and inputs are objec
 
 from __future__ import annotations
 
+import struct
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -15,7 +16,7 @@ from catenary.virtual.coe.dictionary import Abort, Entry, slot_value
 from catenary.virtual.coe.object_facts import by_place
 from catenary.virtual.coe.quirks import NO_MAILBOX_QUIRKS, MailboxQuirks
 from catenary.virtual.crystal import EXACT, ClockBits, Crystal
-from catenary.virtual.description import Description
+from catenary.virtual.description import Description, MailboxDefault
 from catenary.virtual.devices.application import Application
 from catenary.virtual.devices.applied import MailboxOptions
 from catenary.virtual.devices.described_dictionary import add_described
@@ -29,6 +30,7 @@ from catenary.virtual.devices.motor_device import STEP_NS, MotorDevice
 from catenary.virtual.devices.servo_quirks import NO_QUIRKS, ServoQuirks
 from catenary.virtual.devices.synchronisation import Synchronisation
 from catenary.virtual.devices.twin_objects import TwinObjects, layout_of
+from catenary.virtual.foe.options import DeviceFiles
 from catenary.virtual.mapping_quirks import MappingQuirks
 from catenary.virtual.scheduler import Scheduler
 from catenary.virtual.sii_quirks import NO_SII_QUIRKS
@@ -38,6 +40,7 @@ MINIMUM_CYCLE_NS = 10_000  # shortest cycle of SYNC pulses
 MISSED_LIMIT = 3  # pulses without new outputs that are an error
 STANDARD_MOTOR = Motor()
 OF_THE_FILE = ("op_modes", "sync_signal", "watchdog_trigger")  # quirks that the SII determines
+BOOTSTRAP_BYTE = 0x28  # words 0x14 to 0x17 of the EEPROM
 REFUSES_COE = MailboxQuirks(error_reply="unsupported")
 
 
@@ -56,6 +59,8 @@ class TwinOptions:
         mapping_quirks: Quirks of the PDOs, instead of what the file permits; None: as the file
             permits.
         mailbox_quirks: Quirks of the mailbox.
+        files: Files that FoE reads and writes; None: the twin does not support FoE. It supports
+            BOOT if its EEPROM has a bootstrap mailbox.
     """
 
     motor: Motor | None = STANDARD_MOTOR
@@ -66,6 +71,7 @@ class TwinOptions:
     quirks: ServoQuirks = NO_QUIRKS
     mapping_quirks: MappingQuirks | None = None
     mailbox_quirks: MailboxQuirks = NO_MAILBOX_QUIRKS
+    files: DeviceFiles | None = None
 
     def __post_init__(self) -> None:
         for name in OF_THE_FILE:
@@ -118,6 +124,7 @@ class Twin(MotorDevice):
             mailbox=MailboxOptions(
                 delay=options.mailbox_delay,
                 quirks=options.mailbox_quirks if blueprint.serves_coe else REFUSES_COE,
+                files=options.files,
             ),
         )
         self.install_motors(motors, options.quirks)
@@ -143,6 +150,17 @@ class Twin(MotorDevice):
             mapping_quirks=self.mapping_quirks,
             loop_control=self.quirks.closes_ports,
         )
+
+    def whole_description(self) -> Description:
+        """Return the description with the bootstrap mailbox of the EEPROM."""
+        found = super().whole_description()
+        if self.files is None:
+            return found
+        receive, receive_size, send, send_size = struct.unpack_from(
+            "<4H", self._blueprint.image, BOOTSTRAP_BYTE
+        )
+        box = MailboxDefault(receive, receive_size, send, send_size, coe_details=0)
+        return replace(found, bootstrap=box if receive_size and send_size else None)
 
     def started(self, scheduler: Scheduler) -> None:
         super().started(scheduler)
