@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import json
+import sys
 from collections.abc import Sequence
 
 from catenary.bus import SubDevice
-from catenary.cli.failure import UsageError
+from catenary.cli.failure import UsageError, with_hint
 from catenary.cli.tables import table
 
 HEADINGS = ("pos", "name", "order", "vendor", "product", "revision", "serial", "state")
@@ -64,3 +65,11 @@ def device_at(devices: Sequence[SubDevice], position: int) -> SubDevice:
             hint=f"use a position from 0 to {len(devices) - 1}; `catenary scan` lists the devices",
         )
     return devices[position]
+
+
+def report_failures(devices: Sequence[SubDevice]) -> int:
+    """Print the errors of devices that a scan could not bring up. Return the exit status."""
+    errors = [device.error for device in devices if device.error is not None]
+    for error in errors:
+        print(f"error: {with_hint(error)}", file=sys.stderr)
+    return 1 if errors else 0

@@ -82,7 +82,7 @@ def convert(path: str, output: Path) -> int:
 
 def write(target: str, output: Path) -> int:
     """Write the file and print the lines to fill in. Return the exit status."""
-    from catenary.cli.failure import with_hint
+    from catenary.cli.devices import report_failures
     from catenary.machine.text import machine_text
     from catenary.target import MainDevice
 
@@ -95,10 +95,7 @@ def write(target: str, output: Path) -> int:
     output.write_text(text, encoding="utf-8")
     print(f"{output}: {len(devices)} devices")
     print_open_lines(text, output)
-    errors = [device.error for device in devices if device.error is not None]
-    for error in errors:
-        print(f"error: {with_hint(error)}", file=sys.stderr)
-    return 1 if errors else 0
+    return report_failures(devices)
 
 
 def print_open_lines(text: str, output: Path) -> None:

@@ -14,6 +14,7 @@ from catenary.cli import (
     check,
     clone,
     dashboard,
+    data,
     demo,
     diag,
     doctor,
@@ -23,6 +24,7 @@ from catenary.cli import (
     include,
     init,
     merge,
+    pdos,
     plot,
     realtime,
     record,
@@ -41,10 +43,10 @@ VIRTUAL_TIME = "times are virtual: they come from the segment's clock, not from 
 PROGRAM = "catenary"
 DESCRIPTION = "Real-time EtherCAT for Python."
 COMMANDS = (
-    *(scan, state, graph, diag, sdo, reg, alias, sii, esi),
+    *(scan, state, graph, diag, pdos, sdo, reg, alias, sii, esi),
     *(init, check, clone, capture),
     *(demo, dashboard, top, doctor, bench, virtual, realtime),
-    *(record, merge, plot, foxglove, ros2, include),
+    *(data, record, merge, plot, foxglove, ros2, include),
 )
 EPILOG = """\
 TARGET is one of
