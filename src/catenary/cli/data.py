@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import argparse
 import json
-import math
 from typing import TYPE_CHECKING
 
 from catenary.cli.parsers import Commands, add_command, add_json, add_uid
+from catenary.cli.plain import plain
 
 if TYPE_CHECKING:
     from catenary.share import Reader
@@ -49,13 +49,6 @@ def newest(reader: Reader) -> dict[str, object]:
     """Return the fields of the newest cycle as plain numbers and lists, by name."""
     row = reader.read()
     return {field.name: plain(row[field.name].tolist()) for field in reader.layout.fields}
-
-
-def plain(value: object) -> object:
-    """Return a value that JSON can represent: NaN and infinity become None."""
-    if isinstance(value, list):
-        return [plain(each) for each in value]
-    return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 def as_values(reader: Reader, values: dict[str, object]) -> dict[str, object]:

@@ -51,6 +51,7 @@ def _add_add(group: Commands) -> None:
         "paths", metavar="FOLDER|FILE|ZIP", nargs="+", type=Path, help="what to add"
     )
     _add_library(adding, files=False)
+    add_json(adding)
     adding.set_defaults(run=run_add)
 
 
@@ -120,6 +121,7 @@ def _add_remove(group: Commands) -> None:
         "paths", metavar="PATH", nargs="+", type=Path, help="path, as `esi list --files` shows it"
     )
     _add_library(removing, files=False)
+    add_json(removing)
     removing.set_defaults(run=run_remove)
 
 
