@@ -22,6 +22,7 @@ OUTPUT_IS_NOT_DATA = {
     "bench loop": "--json FILE writes the figures; the report is printed while rounds run",
     "bench latency": "--json FILE, as `bench loop`",
     "bench report": "prints a file that is JSON",
+    "completion": "prints a script",
     "capture record": "needs a network interface: tests/cli/test_capture_record.py",
     "dashboard": "a server",
     "demo": "writes demo.json",

@@ -13,6 +13,7 @@ from catenary.cli import (
     capture,
     check,
     clone,
+    completion,
     dashboard,
     data,
     demo,
@@ -46,7 +47,7 @@ COMMANDS = (
     *(scan, state, graph, diag, pdos, sdo, reg, alias, sii, esi),
     *(init, check, clone, capture),
     *(demo, dashboard, top, doctor, bench, virtual, realtime),
-    *(data, record, merge, plot, foxglove, ros2, include),
+    *(data, record, merge, plot, foxglove, ros2, include, completion),
 )
 EPILOG = """\
 TARGET is one of
