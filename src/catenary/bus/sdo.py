@@ -284,16 +284,30 @@ class Sdo:
             raise ValueError(f"object 0x{index:X}:{subindex:X}: an index has 16 bits, a subindex 8")
         if complete and subindex > 1:
             raise ValueError(f"complete access begins with subindex 0 or 1, not {subindex}")
-        channel = self._sub.channel
-        if self._sub.error is not None:
-            raise self._sub.error
-        if channel is None or not channel.layout.coe:
-            what = "has no mailbox" if channel is None else "does not support CoE"
-            raise MailboxError(
-                f"{self._sub.station} {what}: cannot access object 0x{index:04X}:{subindex:02X}",
-                hint="couplers and simple terminals have no object dictionary",
-            )
-        return channel
+        return require_objects(self._sub, f"object 0x{index:04X}:{subindex:02X}")
+
+
+def require_objects(sub: ObjectOwner, what: str) -> MailboxChannel:
+    """Return the mailbox of a device with an object dictionary.
+
+    Args:
+        sub: The device.
+        what: What it is needed for, for the message.
+
+    Raises:
+        CatenaryError: The last scan did not bring the device to PRE-OP.
+        MailboxError: The device has no object dictionary.
+    """
+    channel = sub.channel
+    if sub.error is not None:
+        raise sub.error
+    if channel is None or not channel.layout.coe:
+        missing = "has no mailbox" if channel is None else "does not support CoE"
+        raise MailboxError(
+            f"{sub.station} {missing}: cannot access {what}",
+            hint="couplers and simple terminals have no object dictionary",
+        )
+    return channel
 
 
 def read_each(sdo: Sdo, places: Sequence[tuple[int, int]]) -> Procedure[Objects]:

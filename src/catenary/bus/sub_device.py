@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Protocol
 
+from catenary.bus.device_diagnosis import DeviceDiagnosis
 from catenary.bus.pdo_table import PdoTable
 from catenary.bus.sdo import Conversations, Objects, Sdo
 from catenary.errors import CatenaryError
@@ -40,6 +41,7 @@ class SubDevice:
     """Handle of one device, such as `main.scan()[2]`. It stays valid across scans.
 
     Attributes never cause traffic; calls with a verb do. `sub.sdo` reads and writes its objects.
+    `sub.diagnosis` reads the messages that it stores.
     """
 
     def __init__(
@@ -54,6 +56,7 @@ class SubDevice:
         self.sync_types: dict[int, bytes] = {}
         self.esi: EsiDevice | None = None  # ESI that the last scan used for it
         self.sdo = Sdo(self)
+        self.diagnosis = DeviceDiagnosis(self)
 
     @property
     def position(self) -> int:
