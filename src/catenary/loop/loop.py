@@ -87,6 +87,9 @@ class Loop:
         log_axes: True to also log the values of every axis (docs/how_to/recording.md).
         capture: Folder for pcapng files with the frames around an error or a stopped axis, or
             `CaptureOptions` (docs/how_to/capture.md). None: no files.
+        diagnosis: Time between two readings of each device's diagnosis messages and
+            synchronisation counters [s]; new ones become events (docs/how_to/diagnosis.md). None:
+            never.
 
     Raises:
         ValueError: An option is impossible, or a request names devices of several MainDevices.
@@ -112,6 +115,7 @@ class Loop:
         trigger: Trigger | None = None,
         log_axes: bool = False,
         capture: CaptureOptions | str | os.PathLike[str] | None = None,
+        diagnosis: float | None = None,
     ) -> None:
         settings = Settings(
             period=period,
@@ -125,6 +129,7 @@ class Loop:
             clocks=clocks,
             trigger=trigger,
             capture=capture_options(capture),
+            diagnosis=diagnosis,
         )
         self._networks = make_networks(requests, settings, cpu, sink, laws)
         self._quorum = checked_quorum(scheduling.quorum, len(self._networks))

@@ -37,6 +37,7 @@ from catenary.loop.publishing import Publisher
 from catenary.loop.safe_outputs import confirm_safe, make_safe
 from catenary.loop.signals import SignalGuard
 from catenary.loop.timing import Timing
+from catenary.loop.watches.diagnosis import DiagnosisWatch
 from catenary.loop.watches.external_clock import ExternalClockWatch
 from catenary.loop.watches.trigger import TriggerWatch
 from catenary.plan.planner import Plan
@@ -79,6 +80,7 @@ class Session:
         self.exchange.attend()
         self.watch = self.exchange.watch
         self.switch_interval: float | None = None  # [s] of the interpreter; used by an inline loop
+        self.diagnosis: DiagnosisWatch | None = None
         self.external: ExternalClockWatch | None = None
         self.capture: FrameCapture | None = None
         self.trigger: TriggerWatch | None = None

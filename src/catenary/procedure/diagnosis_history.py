@@ -74,18 +74,21 @@ def read_newest(upload: Upload) -> Procedure[int]:
     return (yield from _number(upload, NEWEST))
 
 
-def read_history(upload: Upload, last: RawMessage | None = None) -> Procedure[RawHistory]:
+def read_history(
+    upload: Upload, last: RawMessage | None = None, *, limit: int = MESSAGES_MAX
+) -> Procedure[RawHistory]:
     """Read the history with its messages, oldest first.
 
     Args:
         upload: Function that reads an entry.
         last: Last known message. Only newer messages are read; None: all messages.
+        limit: Largest number of messages; the newest ones are read.
 
     Raises:
         SdoAbort: The device has no diagnosis history.
     """
     state = yield from read_state(upload)
-    messages = yield from _messages(upload, state, last)
+    messages = yield from _messages(upload, state, last, limit)
     now_ns = (yield from _time(upload)) if messages else None
     return replace(state, messages=acknowledged_up_to(messages, state.acknowledged), now_ns=now_ns)
 
@@ -121,7 +124,7 @@ def acknowledged_up_to(
 
 
 def _messages(
-    upload: Upload, state: RawHistory, last: RawMessage | None
+    upload: Upload, state: RawHistory, last: RawMessage | None, limit: int
 ) -> Procedure[tuple[RawMessage, ...]]:
     """Read the messages backwards from the newest one, and return them oldest first."""
     newest = state.newest
@@ -129,7 +132,7 @@ def _messages(
         return ()
     room = min(max(state.maximum, newest - FIRST_MESSAGE + 1), MESSAGES_MAX)
     found: list[RawMessage] = []
-    for back in range(room):
+    for back in range(min(room, limit)):
         subindex = FIRST_MESSAGE + (newest - FIRST_MESSAGE - back) % room
         try:
             data = yield from upload(HISTORY, subindex)
