@@ -38,6 +38,7 @@ state virtual
 graph virtual
 diag virtual
 pdos virtual
+messages virtual
 sdo read virtual 2 0x1018:1
 sdo write virtual 2 0x6065 5000 --type UDINT
 sdo list virtual 2

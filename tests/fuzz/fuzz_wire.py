@@ -29,6 +29,7 @@ from catenary.wire import (
     clock,
     coe,
     datagram,
+    diagnosis_history,
     dl,
     error_counters,
     features,
@@ -272,6 +273,15 @@ TARGETS = (
     ),
     Target("mailbox.decode_error", mailbox.decode_error, _method, (b"\x01\x00\x04\x00",)),
     Target("coe.decode_coe", coe.decode_coe, _method, COE),
+    Target(
+        "diagnosis_history.decode_diagnosis_message",
+        diagnosis_history.decode_diagnosis_message,
+        diagnosis_history.DiagnosisMessage.encode,
+        (
+            bytes.fromhex("020000e1020202371fc59d6131000000050002050080"),
+            bytes.fromhex("01e0000001040000000000000000000003100102030220") + b"OK",
+        ),
+    ),
     Target(
         "sdo_information.decode_sdo_information",
         sdo_information.decode_sdo_information,

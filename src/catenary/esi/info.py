@@ -136,6 +136,7 @@ def read_diagnosis_texts(device: Element, findings: Findings) -> dict[int, str]:
         for messages in profile.all("DiagMessages"):
             for message in messages.all("DiagMessage"):
                 number = findings.required(message, "TextId", bits=16)
-                if number is not None:
-                    texts.setdefault(number, text_of(message, "MessageText"))
+                text = text_of(message, "MessageText")
+                if number is not None and text:
+                    texts.setdefault(number, text)
     return texts

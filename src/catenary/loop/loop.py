@@ -97,6 +97,10 @@ class Loop:
         LawError: A law has an argument with an unknown name.
     """
 
+    _iteration: Iteration | NetworksIteration | None
+    _background: Background | None
+    _finalizer: weakref.finalize[..., Loop] | None
+
     def __init__(
         self,
         *requests: LoopRequest,
@@ -135,9 +139,7 @@ class Loop:
         self._quorum = checked_quorum(scheduling.quorum, len(self._networks))
         self._enable, self._guard = enable, make_guard()
         self._leaving = threading.RLock()
-        self._iteration: Iteration | NetworksIteration | None = None
-        self._background: Background | None = None
-        self._finalizer: weakref.finalize[..., Loop] | None = None
+        self._iteration = self._background = self._finalizer = None
 
     def __enter__(self) -> Loop:
         if any(session.is_open for session in self._sessions):

@@ -70,7 +70,7 @@ class Session:
         self.exchange: Exchange = exchange(self)
         self.engine = self.exchange.make_engine()
         self.views = self._bind(requests)
-        self.stop = stop
+        self.stop, self._abandon = stop, abandon  # `abandon`: if the MainDevice is closed first
         self.laws = LawRunner(self.engine, plan)
         self.faults = FaultReport(
             main, plan.cycle, self.engine, self.views, self.exchange, self.laws, stop
@@ -86,7 +86,6 @@ class Session:
         self.trigger: TriggerWatch | None = None
         self._attached = ExitStack()
         self._opened = self._left = False
-        self._abandon = abandon  # leaves the loop if the MainDevice is closed first
         self._process = os.getpid()
         forget_in_child(self)
         self._companions: Sequence[Session] = ()
