@@ -29,6 +29,7 @@ OUTPUT_IS_NOT_DATA = {
     "foxglove": "a server",
     "include": "prints one path, for a compiler's command line",
     "ros2": "a server",
+    "shell": "interactive",
     "top": "interactive",
     "virtual serve": "a server",
 }

@@ -71,7 +71,7 @@ class DeviceDiagnosis:
         self._write(CLEAR)
 
     def synchronisation(self) -> tuple[SyncCounters, ...]:
-        """Read the counters of synchronisation errors, outputs first; empty if there are none.
+        """Read the counters of synchronisation errors, outputs first; empty without counters.
 
         Raises:
             MailboxError: The device has no object dictionary.

@@ -34,6 +34,7 @@ from catenary.cli import (
     ros2,
     scan,
     sdo,
+    shell,
     sii,
     state,
     top,
@@ -47,7 +48,7 @@ DESCRIPTION = "Real-time EtherCAT for Python."
 COMMANDS = (
     *(scan, state, graph, diag, messages, pdos, sdo, reg, alias, sii, esi),
     *(init, check, clone, capture),
-    *(demo, dashboard, top, doctor, bench, virtual, realtime),
+    *(demo, shell, dashboard, top, doctor, bench, virtual, realtime),
     *(data, record, merge, plot, foxglove, ros2, include, completion),
 )
 EPILOG = """\
@@ -59,7 +60,7 @@ TARGET is one of
   virtual:FOLDER/    twins of the devices of a clone (docs/how_to/test_your_machine.md)
   virtual-realtime[:FILE.toml]  the same, on this machine's clock
   machine.toml       the target in a machine file (docs/reference/machine_file.md)
-  share:NAME         the running program that owns a share: scan, state, diag, messages, sdo, reg read
+  share:NAME         the running program that owns a share: scan, state, diag, messages, sdo ...
   igh:0              the IgH kernel master 0 (docs/how_to/igh.md): scan and sdo
 
 example:

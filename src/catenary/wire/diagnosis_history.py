@@ -21,8 +21,7 @@ MESSAGES_MAX = 250  # subindices 6 to 255
 TIMESTAMP = 0x10F8  # present time of the device [ns]
 CLEAR = 0  # value of ACKNOWLEDGED that deletes messages
 
-EMERGENCY_CODE = 0xE800  # low word of a diagnosis code whose high word is an emergency error code
-VENDOR_CODES = range(0xE000, 0xE800)  # low words of codes whose high word is the vendor's
+EMERGENCY_CODE = 0xE800  # low word of a code; the high word is then an emergency error code
 
 _HEADER = struct.Struct("<IHHQ")
 _TYPE_MASK = 0x000F
@@ -91,7 +90,7 @@ class Parameter:
 
     @property
     def value(self) -> int | float | str | bytes:
-        """Value of the parameter; the bytes if there is no other form."""
+        """Value of the parameter; the bytes if no other form is known."""
         if self.kind is ParameterKind.ASCII:
             return self.data.rstrip(b"\0").decode("latin-1")
         if self.kind is ParameterKind.UNICODE:

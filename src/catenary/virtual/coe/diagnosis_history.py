@@ -37,7 +37,7 @@ WRITABLE_FLAGS = 0x1E  # severities that are not stored, and the mode; this devi
 LOCAL_TIME = 0x10
 TOO_HIGH, TOO_LOW = 0x06090031, 0x06090032
 UNSIGNED64 = 0x001B
-ERROR_CODE = 0xE800  # low word of a code whose high word is an emergency error code
+ERROR_CODE = 0xE800  # low word; the high word is an emergency error code
 
 # Texts of our own kinds of devices, for an ESI (`DiagMessage`), by text ID.
 REFUSED, TIMED_OUT, SYNC_LOST, FAULT = range(1, 5)
