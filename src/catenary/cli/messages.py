@@ -7,9 +7,15 @@ import json
 from typing import TYPE_CHECKING
 
 from catenary.cli import share_target
-from catenary.cli.arguments import position
 from catenary.cli.failure import UsageError
-from catenary.cli.parsers import Commands, add_command, add_force, add_json, add_target
+from catenary.cli.parsers import (
+    Commands,
+    add_command,
+    add_force,
+    add_json,
+    add_optional_position,
+    add_target,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
@@ -32,13 +38,7 @@ def add_parser(commands: Commands) -> None:
         "catenary messages eth0 2 --acknowledge\ncatenary messages share:arm",
     )
     add_target(parser)
-    parser.add_argument(
-        "position",
-        metavar="POSITION",
-        nargs="?",
-        type=position,
-        help="position of the device, from 0 (default: all devices)",
-    )
+    add_optional_position(parser)
     action = parser.add_mutually_exclusive_group()
     action.add_argument(
         "--acknowledge", action="store_true", help="acknowledge the messages after reading"
@@ -133,10 +133,11 @@ def of_share(arguments: argparse.Namespace) -> list[Report]:
 
     with share_target.connect_to(arguments.target) as program:
         devices = program.devices()
-        chosen = [each for each in devices if arguments.position in (None, each.position)]
+        position = share_target.position_in(program, arguments.position)
+        chosen = [each for each in devices if position in (None, each.position)]
         if not chosen:
             raise UsageError(
-                f"there is no device {arguments.position}; the program has {len(devices)} devices"
+                f"there is no device {position}; the program has {len(devices)} devices"
             )
         found = ((each, read(program, each.position)) for each in chosen)
         return [

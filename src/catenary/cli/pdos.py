@@ -6,8 +6,14 @@ import argparse
 import json
 from typing import TYPE_CHECKING
 
-from catenary.cli.arguments import position
-from catenary.cli.parsers import Commands, add_command, add_force, add_json, add_target
+from catenary.cli.parsers import (
+    Commands,
+    add_command,
+    add_force,
+    add_json,
+    add_optional_position,
+    add_target,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -27,13 +33,7 @@ def add_parser(commands: Commands) -> None:
         example="catenary pdos eth0 2\ncatenary pdos eth0 2 --all\ncatenary pdos virtual --json",
     )
     add_target(parser)
-    parser.add_argument(
-        "position",
-        metavar="POSITION",
-        nargs="?",
-        type=position,
-        help="position of the device, from 0 (default: all devices)",
-    )
+    add_optional_position(parser)
     parser.add_argument("--all", action="store_true", help="also show PDOs that are not assigned")
     add_force(parser)
     add_json(parser)

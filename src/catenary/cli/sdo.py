@@ -8,9 +8,16 @@ import sys
 from typing import TYPE_CHECKING
 
 from catenary.cli import share_target
-from catenary.cli.arguments import Entry, entry, position
+from catenary.cli.arguments import Entry, entry
 from catenary.cli.failure import UsageError, one_line
-from catenary.cli.parsers import Commands, add_command, add_force, add_json, add_target
+from catenary.cli.parsers import (
+    Commands,
+    add_command,
+    add_force,
+    add_json,
+    add_position,
+    add_target,
+)
 from catenary.cli.sdo_value import (
     as_text,
     data_type,
@@ -111,9 +118,7 @@ def _add_list(group: Commands) -> None:
 
 def _add_device(parser: argparse.ArgumentParser) -> None:
     add_target(parser)
-    parser.add_argument(
-        "position", metavar="POSITION", type=position, help="position of the device, from 0"
-    )
+    add_position(parser)
     add_force(parser)
 
 
@@ -147,6 +152,7 @@ def run_read(arguments: argparse.Namespace) -> int:
         return _show(arguments, share_target.sdo_read(arguments))
     with MainDevice(arguments.target, force=arguments.force) as main:
         device = device_at(main.scan(strict=False), arguments.position)
+        arguments.position = device.position
         data = device.sdo.read(at.index, at.subindex, complete=arguments.complete)
         known = device.description.documented_object(at.index, at.subindex)
     if arguments.output is not None:
@@ -179,9 +185,9 @@ def run_write(arguments: argparse.Namespace) -> int:
     at: Entry = arguments.entry
     data = kind.encode(value)
     with MainDevice(arguments.target, force=arguments.force) as main:
-        device_at(main.scan(strict=False), arguments.position).sdo.write(
-            at.index, at.subindex, data, complete=arguments.complete
-        )
+        device = device_at(main.scan(strict=False), arguments.position)
+        arguments.position = device.position
+        device.sdo.write(at.index, at.subindex, data, complete=arguments.complete)
     if arguments.json:
         print(_as_json(arguments, data, value))
     return 0
