@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from catenary.cli.completion import script
-from catenary.cli.main import main
+from catenary.cli.main import main, make_parser
 from catenary.share import folder
 from tests.remote.programs import program
 
@@ -26,7 +26,7 @@ printf '%s\\n' "${COMPREPLY[@]}"
 @pytest.fixture(scope="module")
 def bash_script(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("completion") / "catenary.bash"
-    path.write_text(script("bash"))
+    path.write_text(script("bash", make_parser()))
     return path
 
 
@@ -79,7 +79,7 @@ def test_bash_offers_the_shares_of_the_user(bash_script: Path, tmp_path: Path) -
 @pytest.mark.skipif(shutil.which("zsh") is None, reason="needs zsh")
 def test_zsh_accepts_the_script(tmp_path: Path) -> None:
     path = tmp_path / "_catenary"
-    path.write_text(script("zsh"))
+    path.write_text(script("zsh", make_parser()))
     load = f'autoload -Uz compinit; compinit -D -d {tmp_path}/dump; eval "$(<{path})"'
     check = "print -l ${(k)functions[(I)_catenary_*|_shtab_catenary_sdo_read]}"
     done = subprocess.run(

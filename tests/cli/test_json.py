@@ -55,6 +55,7 @@ esi find DR20 --library library
 esi show DR20 --library library
 esi list --library library
 esi remove drives.xml --library library
+esi make virtual 2 -o made.xml
 init virtual -o machine.toml
 check machine.toml
 clone virtual -o line

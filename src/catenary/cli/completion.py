@@ -75,21 +75,23 @@ def add_parser(commands: Commands) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    print(script(arguments.shell))
+    print(script(arguments.shell, arguments.make_parser()))
     return 0
 
 
-def script(shell: str) -> str:
+def script(shell: str, parser: argparse.ArgumentParser) -> str:
     """Return the completion script of all commands for a shell.
+
+    Args:
+        shell: "bash" or "zsh".
+        parser: Parser of all commands, which is changed.
 
     Raises:
         ConfigurationError: The package shtab is not installed.
     """
-    from catenary.cli.main import make_parser
     from catenary.monitor.extra import require
 
     library = require("shtab", "completion")
-    parser = make_parser()
     for action in arguments_of(parser):
         functions = completion_of(action)
         if functions is not None:
