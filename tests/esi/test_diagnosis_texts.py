@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import pytest
+
+from catenary.cli.main import main
 from catenary.esi.device import EsiDevice
 from catenary.esi.reader import read_esi
 from tests.esi import servo_file
@@ -40,3 +43,11 @@ def test_faulty_texts_are_warnings(tmp_path: Path) -> None:
     texts = [each.message for each in found.warnings]
     assert any("DiagMessage has no TextId" in each for each in texts)
     assert any("does not fit into 16 bits" in each for each in texts)
+
+
+def test_esi_show_lists_the_texts(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    found = device(tmp_path, GOOD)
+    assert main(["esi", "show", str(found.key), "--library", str(tmp_path)]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    at = lines.index("diagnosis messages: 2")
+    assert lines[at + 1 : at + 3] == ["  0x0011 100 %% of %u", "  0x1001 Output %d short-circuited"]

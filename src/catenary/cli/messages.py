@@ -54,7 +54,7 @@ def add_parser(commands: Commands) -> None:
 
 
 class Report:
-    """Messages and counters of one device. `history` is None without object 0x10F3."""
+    """Messages and counters of one device. `history`: None without object 0x10F3."""
 
     def __init__(
         self,
