@@ -3,20 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from functools import partial
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING, Protocol, TypeVar
 
-from catenary.bus.sdo import ObjectOwner, require_objects
+from catenary.bus.sdo import ObjectOwner, Sdo
 from catenary.errors import MailboxError, SdoAbort
 from catenary.procedure.exchange import Procedure
-from catenary.procedure.mailbox import MailboxChannel
-from catenary.procedure.sdo import OBJECT_MISSING, download, upload_small
+from catenary.procedure.sdo import OBJECT_MISSING
 from catenary.wire.diagnosis_history import ACKNOWLEDGED, CLEAR, HISTORY
 
 if TYPE_CHECKING:
     from catenary.model.diagnosis_history import HistoryMessage, RawHistory, SyncCounters
 
 T = TypeVar("T")
+
+
+class DiagnosedDevice(ObjectOwner, Protocol):
+    """Interface to the device of a diagnosis; `SubDevice` implements it."""
+
+    @property
+    def sdo(self) -> Sdo: ...
 
 
 class DeviceDiagnosis:
@@ -30,7 +35,7 @@ class DeviceDiagnosis:
     like `sub.sdo.read`. Texts come from the ESI file of the device.
     """
 
-    def __init__(self, sub: ObjectOwner) -> None:
+    def __init__(self, sub: DiagnosedDevice) -> None:
         self._sub = sub
 
     def messages(self) -> tuple[HistoryMessage, ...]:
@@ -57,7 +62,7 @@ class DeviceDiagnosis:
         """
         from catenary.procedure.diagnosis_history import read_newest
 
-        newest = self._converse(read_newest(partial(upload_small, self._channel())))
+        newest = self._converse(read_newest(self._sub.sdo.upload_small))
         if newest:
             self._write(newest)
 
@@ -78,7 +83,7 @@ class DeviceDiagnosis:
         """
         from catenary.procedure.diagnosis_history import read_sync_counters
 
-        return self._sub.main.converse(read_sync_counters(partial(upload_small, self._channel())))
+        return self._sub.main.converse(read_sync_counters(self._sub.sdo.upload_small))
 
     @property
     def texts(self) -> Mapping[int, str]:
@@ -89,10 +94,10 @@ class DeviceDiagnosis:
     def _history(self) -> RawHistory:
         from catenary.procedure.diagnosis_history import read_history
 
-        return self._converse(read_history(partial(upload_small, self._channel())))
+        return self._converse(read_history(self._sub.sdo.upload_small))
 
     def _write(self, value: int) -> None:
-        self._converse(download(self._channel(), HISTORY, ACKNOWLEDGED, bytes((value,))))
+        self._converse(self._sub.sdo.download(HISTORY, ACKNOWLEDGED, bytes((value,))))
 
     def _converse(self, procedure: Procedure[T]) -> T:
         """Run a procedure. Raises MailboxError if the device does not have the object."""
@@ -105,6 +110,3 @@ class DeviceDiagnosis:
                     hint="emergencies and `catenary diag` report faults of other devices",
                 ) from error
             raise
-
-    def _channel(self) -> MailboxChannel:
-        return require_objects(self._sub, f"object 0x{HISTORY:04X}")

@@ -10,7 +10,14 @@ from catenary.bus.pending import Pending
 from catenary.errors import CatenaryError, MailboxError, SdoAbort
 from catenary.procedure.exchange import Procedure
 from catenary.procedure.mailbox import MailboxChannel
-from catenary.procedure.sdo import UPLOAD_LIMIT, UPLOAD_TIMEOUT, download, upload
+from catenary.procedure.sdo import (
+    SMALL_LIMIT,
+    SMALL_TIMEOUT,
+    UPLOAD_LIMIT,
+    UPLOAD_TIMEOUT,
+    download,
+    upload,
+)
 from catenary.procedure.sdo_information import DescribedObject, describe_object, list_objects
 from catenary.procedure.station import Station, within
 from catenary.types import DataType
@@ -262,6 +269,14 @@ class Sdo:
                 return known
         return self._sub.main.converse(describe_object(channel, index))
 
+    def upload_small(self, index: int, subindex: int) -> Procedure[bytes]:
+        """Return the procedure that reads an object with few bytes, for other procedures."""
+        return self._upload(index, subindex, False, SMALL_LIMIT, SMALL_TIMEOUT)
+
+    def download(self, index: int, subindex: int, data: bytes) -> Procedure[None]:
+        """Return the procedure that writes an object, for other procedures."""
+        return self._download(index, subindex, data, None, False)
+
     def _upload(
         self, index: int, subindex: int, complete: bool, limit: int, timeout: float
     ) -> Procedure[bytes]:
@@ -284,30 +299,16 @@ class Sdo:
             raise ValueError(f"object 0x{index:X}:{subindex:X}: an index has 16 bits, a subindex 8")
         if complete and subindex > 1:
             raise ValueError(f"complete access begins with subindex 0 or 1, not {subindex}")
-        return require_objects(self._sub, f"object 0x{index:04X}:{subindex:02X}")
-
-
-def require_objects(sub: ObjectOwner, what: str) -> MailboxChannel:
-    """Return the mailbox of a device with an object dictionary.
-
-    Args:
-        sub: The device.
-        what: What it is needed for, for the message.
-
-    Raises:
-        CatenaryError: The last scan did not bring the device to PRE-OP.
-        MailboxError: The device has no object dictionary.
-    """
-    channel = sub.channel
-    if sub.error is not None:
-        raise sub.error
-    if channel is None or not channel.layout.coe:
-        missing = "has no mailbox" if channel is None else "does not support CoE"
-        raise MailboxError(
-            f"{sub.station} {missing}: cannot access {what}",
-            hint="couplers and simple terminals have no object dictionary",
-        )
-    return channel
+        channel = self._sub.channel
+        if self._sub.error is not None:
+            raise self._sub.error
+        if channel is None or not channel.layout.coe:
+            what = "has no mailbox" if channel is None else "does not support CoE"
+            raise MailboxError(
+                f"{self._sub.station} {what}: cannot access object 0x{index:04X}:{subindex:02X}",
+                hint="couplers and simple terminals have no object dictionary",
+            )
+        return channel
 
 
 def read_each(sdo: Sdo, places: Sequence[tuple[int, int]]) -> Procedure[Objects]:

@@ -61,7 +61,7 @@ TARGET is one of
   virtual-realtime[:FILE.toml]  the same, on this machine's clock
   machine.toml       the target in a machine file (docs/reference/machine_file.md)
   share:NAME         the running program that owns a share: scan, state, diag, messages, sdo ...
-  igh:0              the IgH kernel master 0 (docs/how_to/igh.md): scan and sdo
+  igh:0              the IgH kernel master 0 (docs/how_to/igh.md): scan, pdos, messages and sdo
 
 example:
   catenary demo

@@ -106,7 +106,7 @@ def of_devices(arguments: argparse.Namespace) -> tuple[list[Report], int]:
 
 
 def has_objects(device: SubDevice) -> bool:
-    return device.channel is not None and device.channel.layout.coe
+    return device.description.coe
 
 
 def read_device(device: SubDevice) -> Report:

@@ -295,19 +295,10 @@ class Network:
         return FrameCapture(options, self.main)
 
     def _make_diagnosis(self, session: Session) -> DiagnosisWatch | None:
-        """Return the watch of the devices' own diagnosis; None without the option.
-
-        Raises:
-            ConfigurationError: Another master makes the frames.
-        """
+        """Return the watch of the devices' own diagnosis; None without the option."""
         interval = self._settings.diagnosis
         if interval is None:
             return None
-        if self.main.carrier is not None:
-            raise ConfigurationError(
-                "diagnosis= is not possible: an external master makes the frames",
-                hint="omit the option, or open the network interface directly",
-            )
         engine = session.engine
         return DiagnosisWatch(
             self.main.subs,

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from functools import partial
 
 from catenary.bus import SubDevice
 from catenary.bus.event_types import DiagnosisReported, Event, SynchronisationFault
@@ -22,8 +21,6 @@ from catenary.procedure.diagnosis_history import (
     read_sync_counters,
 )
 from catenary.procedure.exchange import Procedure, after
-from catenary.procedure.mailbox import MailboxChannel
-from catenary.procedure.sdo import upload_small
 from catenary.wire.al import AlState
 
 MESSAGES_PER_READING = 20  # of one device; older ones stay on the device
@@ -40,7 +37,6 @@ class _Subject:
     """State of one device in the watch."""
 
     sub: SubDevice
-    channel: MailboxChannel
     begun: bool = False
     has_history: bool = True
     has_counters: bool = True
@@ -69,11 +65,7 @@ class DiagnosisWatch:
         put: Callable[[Event], None],
         now: Callable[[], float],
     ) -> None:
-        self._subjects = [
-            _Subject(sub, sub.channel)
-            for sub in subs
-            if sub.channel is not None and sub.channel.layout.coe
-        ]
+        self._subjects = [_Subject(sub) for sub in subs if sub.description.coe]
         self._interval = interval
         self._put = put
         self._now = now
@@ -92,7 +84,9 @@ class DiagnosisWatch:
         if subject.left_out:
             subject.left_out -= 1
             return
-        if subject.sub.state is not AlState.OP or subject.channel.turns:
+        channel = subject.sub.channel  # None with an external master
+        is_busy = channel is not None and bool(channel.turns)
+        if subject.sub.state is not AlState.OP or is_busy:
             return  # it is lost or returning, or another request uses its mailbox
         try:
             if subject.has_history:
@@ -109,7 +103,7 @@ class DiagnosisWatch:
     # Messages
 
     def _read_messages(self, subject: _Subject) -> Procedure[None]:
-        upload: Upload = partial(upload_small, subject.channel)
+        upload: Upload = subject.sub.sdo.upload_small
         try:
             state = yield from read_state(upload)
         except SdoAbort:
@@ -148,7 +142,7 @@ class DiagnosisWatch:
     # Synchronisation
 
     def _read_counters(self, subject: _Subject) -> Procedure[None]:
-        upload: Upload = partial(upload_small, subject.channel)
+        upload: Upload = subject.sub.sdo.upload_small
         found = yield from read_sync_counters(upload)
         counts = {
             (each.index, counter): number
