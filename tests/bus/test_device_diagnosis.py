@@ -134,7 +134,7 @@ def test_a_severity_can_be_disabled(servo: Servo, sub: cat.SubDevice) -> None:
 def test_a_message_has_a_type_a_code_and_an_age(servo: Servo, sub: cat.SubDevice) -> None:
     servo.store_diagnosis(9, [4711, 5], severity="warning", code=0x1234_E001)
     (message,) = sub.diagnosis.messages()
-    assert (message.type, message.code, message.text_id) == ("warning", 0x1234_E001, 9)
+    assert (message.severity, message.code, message.text_id) == ("warning", 0x1234_E001, 9)
     assert message.parameters == (4711, 5)
     assert message.local_time
     assert message.age is not None

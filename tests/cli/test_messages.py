@@ -58,7 +58,7 @@ def test_messages_as_json(machine: Machine, capsys: Capture) -> None:
     assert main(["messages", "virtual", "--json"]) == 1
     left, right = json.loads(capsys.readouterr().out)
     (message,) = left["messages"]
-    assert (message["type"], message["text_id"], message["parameters"]) == ("error", 3, [7])
+    assert (message["severity"], message["text_id"], message["parameters"]) == ("error", 3, [7])
     assert message["age"] > 0
     assert (left["position"], right["messages"]) == (1, None)
     assert left["synchronisation"][0]["direction"] == "outputs"

@@ -114,7 +114,7 @@ def test_the_flags_and_the_time_of_the_device() -> None:
 def test_a_malformed_message_is_shown() -> None:
     found = run(read_history(from_objects(history(6, {6: b"\x01\x02"}))))
     shown = described(found.messages[0], {}, None)
-    assert (shown.type, shown.text) == ("error", "malformed message of 2 bytes: 01 02")
+    assert (shown.severity, shown.text) == ("error", "malformed message of 2 bytes: 01 02")
 
 
 @given(st.integers(0, 255), st.integers(0, 255), st.binary(min_size=1, max_size=40))

@@ -71,7 +71,7 @@ class Report:
     @property
     def faults(self) -> int:
         """Number of errors that are not acknowledged."""
-        return sum(not m.acknowledged and m.type == "error" for m in self.history or ())
+        return sum(not m.acknowledged and m.severity == "error" for m in self.history or ())
 
 
 def run(arguments: argparse.Namespace) -> int:

@@ -50,7 +50,7 @@ class SyncCounters:
 
     @property
     def direction(self) -> str:
-        """ "outputs" or "inputs"."""
+        """Direction of the process data: "outputs" or "inputs"."""
         return "outputs" if self.index == OUTPUT_PARAMETERS else "inputs"
 
     @property
@@ -71,7 +71,7 @@ class HistoryMessage:
     """
 
     subindex: int  # place in 0x10F3
-    type: str  # "info", "warning", "error", or "type N" for a reserved number
+    severity: str  # "info", "warning", "error", or "type N" for a reserved number
     text: str
     code: int  # diagnosis code, 32 bits
     error_code: int | None  # emergency error code in `code`, if any
@@ -85,7 +85,7 @@ class HistoryMessage:
 
     def __str__(self) -> str:
         age = "" if self.age is None else f", {self.age:.3f} s ago"
-        return f"{self.type}: {self.text} (code 0x{self.code:08X}{age})"
+        return f"{self.severity}: {self.text} (code 0x{self.code:08X}{age})"
 
 
 @dataclass(frozen=True, slots=True)
@@ -129,7 +129,7 @@ def described(raw: RawMessage, texts: Mapping[int, str], now_ns: int | None) -> 
         age = (now_ns - message.time_ns) * 1e-9
     return HistoryMessage(
         subindex=raw.subindex,
-        type=type_name(message.type),
+        severity=severity_name(message.type),
         text=message_text(message, texts),
         code=message.code,
         error_code=message.error_code,
@@ -143,7 +143,7 @@ def described(raw: RawMessage, texts: Mapping[int, str], now_ns: int | None) -> 
     )
 
 
-def type_name(number: int) -> str:
+def severity_name(number: int) -> str:
     """Return the name of a severity."""
     try:
         return DiagnosisType(number).name.lower()

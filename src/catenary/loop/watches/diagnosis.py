@@ -130,8 +130,8 @@ class DiagnosisWatch:
                 DiagnosisReported(
                     self._now(),
                     sub,
-                    f"{sub.station}: {message.type}: {message.text}",
-                    message.type,
+                    f"{sub.station}: {message.severity}: {message.text}",
+                    message.severity,
                     message.text,
                     message.code,
                     message.text_id,
