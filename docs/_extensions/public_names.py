@@ -19,6 +19,7 @@ INTERNAL = {"catenary.events.emergency", "catenary.virtual.faults.number_of_stat
 # Types of what public methods return; programs do not import them.
 RETURNED = {
     "catenary.bus": ("SubDevices", "Sdo", "Foe", "Pending", "ListType"),
+    "catenary.bus.device_diagnosis": ("DeviceDiagnosis",),
     "catenary.bus.diagnosis": ("Diagnosis",),
     "catenary.bus.event_queue": ("Events",),
     "catenary.drive.values": ("AxisValues",),
@@ -31,6 +32,7 @@ RETURNED = {
     "catenary.loop.watches.trigger": ("TriggerWatch",),
     "catenary.machine.variables": ("Variables",),
     "catenary.model.device": ("Identity",),
+    "catenary.model.diagnosis_history": ("HistoryMessage", "SyncCounters", "SyncCounter"),
     "catenary.model.finding": ("Finding",),
     "catenary.plan.stop_reason": ("StopReason",),
     "catenary.procedure.al_state": ("DeviceState",),

@@ -22,7 +22,7 @@ CALL = re.compile(
 )
 PARSERS = {"catenary": catenary.make_parser, "python -m benchmarks": benchmarks.make_parser}
 PLACEHOLDER = re.compile(r"[\[|]|\b(COMMAND|TARGET|POSITION|FILE|NAME|N|S)\b")
-BEHIND = re.compile(r"\s{2,}| \\?\| | && |\s#|&$")  # a comment, or shell syntax after the command
+BEHIND = re.compile(r"\s{2,}| \\?\| | > | && |\s#|&$")  # a comment or shell syntax
 
 
 def calls() -> Iterator[tuple[str, str]]:

@@ -38,3 +38,10 @@ def test_unsupported_commands(
 ) -> None:
     assert main(command.split()) == 1
     assert instead in capsys.readouterr().err
+
+
+def test_messages_and_pdos(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["messages", "igh:0"]) == 0
+    assert capsys.readouterr().out.count("no diagnosis history") == 2
+    assert main(["pdos", "igh:0", "1"]) == 0
+    assert "0x607A:00" in capsys.readouterr().out

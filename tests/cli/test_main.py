@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import os
+import re
 import shlex
 import subprocess
 import sys
@@ -57,7 +58,8 @@ def test_every_help_has_an_example_that_parses(name: str) -> None:
     calls = [line.strip() for line in examples.splitlines() if line.strip().startswith("catenary")]
     assert calls
     for call in calls:
-        make_parser().parse_args(shlex.split(call.removesuffix("&").partition(" | ")[0])[1:])
+        words = re.split(r" [|>] ", call.removesuffix("&"))[0]
+        make_parser().parse_args(shlex.split(words)[1:])
 
 
 @pytest.mark.parametrize(

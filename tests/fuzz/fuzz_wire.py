@@ -29,6 +29,7 @@ from catenary.wire import (
     clock,
     coe,
     datagram,
+    diagnosis_history,
     dl,
     error_counters,
     features,
@@ -283,6 +284,15 @@ TARGETS = (
             foe.Acknowledge(1).encode(),
             foe.Error(0x8003, "full").encode(),
             foe.Busy(3, 100, "erase").encode(),
+        ),
+    ),
+    Target(
+        "diagnosis_history.decode_diagnosis_message",
+        diagnosis_history.decode_diagnosis_message,
+        diagnosis_history.DiagnosisMessage.encode,
+        (
+            bytes.fromhex("020000e1020202371fc59d6131000000050002050080"),
+            bytes.fromhex("01e0000001040000000000000000000003100102030220") + b"OK",
         ),
     ),
     Target(

@@ -157,6 +157,7 @@ static void make_drive(slave *s, int position)
     add(s, 0x1018, 1, 32, 0x000000AA);
     add(s, 0x1C32, 1, 16, 1);
     add(s, 0x1C32, 2, 32, 0);
+    add(s, 0x1C32, 0x0B, 16, 0);
     add(s, 0x603F, 0, 16, 0);
     add(s, 0x6040, 0, 16, 0);
     add(s, 0x6041, 0, 16, 0x0240);

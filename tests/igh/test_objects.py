@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 import catenary as cat
+from catenary.bus.event_types import SynchronisationFault
 from catenary.errors import ConfigurationError, MailboxError, SdoAbort
 from catenary.igh import Master, SubDevice
 from catenary.types import UDINT, UINT
@@ -215,3 +216,24 @@ def test_a_late_thread_makes_no_call(double: Double) -> None:
     with pytest.raises(RuntimeError, match="no longer reserved"):
         reservation.download(0, 0x6060, 0, b"\x08")
     assert double.calls() == []
+
+
+def test_counters_of_the_synchronisation_become_events(
+    main: cat.MainDevice, double: Double
+) -> None:
+    with loop_of(main, diagnosis=0.02) as loop:
+        for _ in range(300):
+            next(loop)
+        list(main.events)
+        double.set(1, 0x1C32, 0x0B, 3)
+        for _ in range(300):
+            next(loop)
+        (event,) = [e for e in main.events if isinstance(e, SynchronisationFault)]
+        assert (event.sub, event.counter, event.count) == (main.subs[1], "missed", 3)
+
+
+def test_a_device_without_a_diagnosis_history(main: cat.MainDevice) -> None:
+    with pytest.raises(MailboxError, match="has no diagnosis history"):
+        main.subs[1].diagnosis.messages()
+    (outputs,) = main.subs[1].diagnosis.synchronisation()
+    assert (outputs.direction, outputs.missed, outputs.exceeded) == ("outputs", 0, None)

@@ -53,6 +53,34 @@ class Emergency(Event):
 
 
 @dataclass(frozen=True, slots=True)
+class DiagnosisReported(Event):
+    """New message in the diagnosis history of a device (object 0x10F3); see `Loop(diagnosis=...)`.
+
+    `text` is that of the device's ESI file, or a description of the numbers.
+    """
+
+    severity: str  # "info", "warning", "error", or "type N"
+    text: str
+    code: int  # diagnosis code, 32 bits
+    text_id: int  # 0: none
+    parameters: tuple[int | float | str | bytes, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class SynchronisationFault(Event):
+    """Increase of a device's counter of synchronisation errors; see `Loop(diagnosis=...)`.
+
+    `counter` is "missed", "exceeded", "shift_too_short" or "error" (ETG.1020, subindices 0x0B,
+    0x0C, 0x0D and 0x20).
+    """
+
+    index: int  # 0x1C32: outputs; 0x1C33: inputs
+    counter: str
+    count: int  # increase since the last reading
+    total: int  # value of the counter
+
+
+@dataclass(frozen=True, slots=True)
 class DeviceLost(Event):
     """Loss of a device: it no longer answers."""
 

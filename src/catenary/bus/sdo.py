@@ -11,7 +11,14 @@ from catenary.bus.runner import Watch
 from catenary.errors import CatenaryError, MailboxError, SdoAbort
 from catenary.procedure.exchange import Procedure
 from catenary.procedure.mailbox import MailboxChannel
-from catenary.procedure.sdo import UPLOAD_LIMIT, UPLOAD_TIMEOUT, download, upload
+from catenary.procedure.sdo import (
+    SMALL_LIMIT,
+    SMALL_TIMEOUT,
+    UPLOAD_LIMIT,
+    UPLOAD_TIMEOUT,
+    download,
+    upload,
+)
 from catenary.procedure.sdo_information import DescribedObject, describe_object, list_objects
 from catenary.procedure.station import Station, within
 from catenary.types import DataType
@@ -270,6 +277,14 @@ class Sdo:
             if known is not None:
                 return known
         return self._sub.main.converse(describe_object(channel, index))
+
+    def upload_small(self, index: int, subindex: int) -> Procedure[bytes]:
+        """Return the procedure that reads an object with few bytes, for other procedures."""
+        return self._upload(index, subindex, False, SMALL_LIMIT, SMALL_TIMEOUT)
+
+    def download(self, index: int, subindex: int, data: bytes) -> Procedure[None]:
+        """Return the procedure that writes an object, for other procedures."""
+        return self._download(index, subindex, data, None, False)
 
     def _upload(
         self, index: int, subindex: int, complete: bool, limit: int, timeout: float

@@ -7,6 +7,7 @@ from contextlib import contextmanager, suppress
 from dataclasses import replace
 from typing import TYPE_CHECKING, Protocol
 
+from catenary.bus.device_diagnosis import DeviceDiagnosis
 from catenary.bus.foe import Foe
 from catenary.bus.pdo_table import PdoTable
 from catenary.bus.sdo import Conversations, Objects, Sdo
@@ -44,7 +45,7 @@ class SubDevice:
     """Handle of one device, such as `main.scan()[2]`. It stays valid across scans.
 
     Attributes never cause traffic; calls with a verb do. `sub.sdo` reads and writes its objects,
-    `sub.foe` its files.
+    `sub.foe` its files. `sub.diagnosis` reads the messages that it stores.
     """
 
     def __init__(
@@ -61,6 +62,7 @@ class SubDevice:
         self.esi: EsiDevice | None = None  # ESI that the last scan used for it
         self.sdo = Sdo(self)
         self.foe = Foe(self)
+        self.diagnosis = DeviceDiagnosis(self)
 
     @property
     def position(self) -> int:

@@ -6,6 +6,7 @@ import argparse
 import os
 from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 FIRST_OBJECT = 0x1000  # lower indices are data types, ETG.1000.6 §5.6.7.1
 
@@ -18,6 +19,16 @@ class Entry:
     subindex: int
 
 
+class AliasPlace(NamedTuple):
+    """Place of a device: `offset` devices after the one with a station alias."""
+
+    alias: int
+    offset: int = 0
+
+    def __str__(self) -> str:
+        return f"@{self.alias}:{self.offset}" if self.offset else f"@{self.alias}"
+
+
 def number(text: str) -> int:
     try:
         return int(text, 0)
@@ -25,6 +36,17 @@ def number(text: str) -> int:
         raise argparse.ArgumentTypeError(
             f"{text!r} is not a number (decimal, or hexadecimal as 0x1F)"
         ) from None
+
+
+def place(text: str) -> int | AliasPlace:
+    """Parse a position such as `2`, or a place by station alias such as `@10` or `@10:1`."""
+    if not text.startswith("@"):
+        return position(text)
+    alias, _, offset = text[1:].partition(":")
+    found = AliasPlace(number(alias), position(offset or "0"))
+    if not 1 <= found.alias <= 0xFFFF:
+        raise argparse.ArgumentTypeError(f"alias {found.alias} is outside 1 to 65535")
+    return found
 
 
 def position(text: str) -> int:

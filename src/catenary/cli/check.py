@@ -6,7 +6,7 @@ import argparse
 from enum import Enum, auto
 from pathlib import Path
 
-from catenary.cli.arguments import position
+from catenary.cli.arguments import place
 from catenary.cli.failure import UsageError
 from catenary.cli.parsers import Commands, add_command, add_json
 
@@ -85,7 +85,7 @@ def _add_esi_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--position",
         metavar="N",
-        type=position,
+        type=place,
         help="compare only the device at this position with its ESI",
     )
     parser.add_argument(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from catenary.cli.plain import plain
 from catenary.cli.tables import table
 from catenary.model.topology import Topology
 from catenary.wire.error_counters import ErrorCounters, PortErrors
@@ -45,6 +46,32 @@ def as_text(drawing: Drawing) -> str:
     ]
     notes = [f"! {text}" for text in drawing.topology.contradictions]
     return "\n".join([table([HEADINGS, *rows]), *notes])
+
+
+def as_values(drawing: Drawing) -> dict[str, object]:
+    """Return the drawing for JSON."""
+    topology = drawing.topology
+    return {
+        "target": drawing.target,
+        "devices": [
+            {
+                "position": position,
+                "name": node.name,
+                "alias": node.alias,
+                "state": node.state,
+                "parent": topology.places[position].parent,
+                "parent_port": topology.places[position].parent_port,
+                "open_ports": [
+                    port for port, open_ in enumerate(topology.ports[position]) if open_
+                ],
+                "delay_ns": node.delay_ns,
+                "errors": plain(node.errors),
+            }
+            for position, node in enumerate(drawing.nodes)
+        ],
+        "cables": [each._asdict() for each in topology.cables],
+        "contradictions": list(topology.contradictions),
+    }
 
 
 def indents(topology: Topology) -> tuple[str, ...]:

@@ -1,10 +1,11 @@
-"""`catenary esi add|find|show|list|remove`: vendors' device descriptions (ESI files)."""
+"""`catenary esi add|find|show|list|remove|make`: vendors' device descriptions (ESI files)."""
 
 from __future__ import annotations
 
 import argparse
 from pathlib import Path
 
+from catenary.cli.esi_make import add_make
 from catenary.cli.parsers import Commands, add_command, add_json
 
 NAME_HELP = "order code, part of a name, or VENDOR:PRODUCT[:REVISION] in decimal or as 0x1F"
@@ -28,6 +29,7 @@ def add_parser(commands: Commands) -> None:
     _add_show(group)
     _add_list(group)
     _add_remove(group)
+    add_make(group)
 
 
 def _add_library(parser: argparse.ArgumentParser, *, files: bool = True) -> None:
@@ -51,6 +53,7 @@ def _add_add(group: Commands) -> None:
         "paths", metavar="FOLDER|FILE|ZIP", nargs="+", type=Path, help="what to add"
     )
     _add_library(adding, files=False)
+    add_json(adding)
     adding.set_defaults(run=run_add)
 
 
@@ -120,6 +123,7 @@ def _add_remove(group: Commands) -> None:
         "paths", metavar="PATH", nargs="+", type=Path, help="path, as `esi list --files` shows it"
     )
     _add_library(removing, files=False)
+    add_json(removing)
     removing.set_defaults(run=run_remove)
 
 

@@ -33,22 +33,43 @@ def open_library(path: str | None) -> Library:
 
 
 def add(arguments: argparse.Namespace) -> int:
-    status = 0
+    status, done = 0, []
     with Library(arguments.library) as library:
         for path in arguments.paths:
             try:
-                status |= print_added(library.add(path))
+                added = library.add(path)
             except EsiError as error:  # the other paths are added
                 status = report(error)
+                continue
+            done.append(added_values(added))
+            status |= print_added(added, as_json=arguments.json)
+    if arguments.json:
+        print(json.dumps(done, indent=2))
     return status
 
 
-def print_added(added: Added) -> int:
-    """Print the result of one path, and return the exit status."""
+def added_values(added: Added) -> dict[str, object]:
+    return {
+        "path": added.path,
+        "files": [each.path for each in added.files],
+        "devices": added.devices,
+        "modules": added.modules,
+        "dictionaries": added.dictionaries,
+    }
+
+
+def print_added(added: Added, *, as_json: bool) -> int:
+    """Print the result of one path, and return the exit status.
+
+    Args:
+        added: The result.
+        as_json: True prints only warnings; the caller prints the result as JSON.
+    """
     counts = [(len(added.files), "file"), (added.devices, "device"), (added.modules, "module")]
     counts.append((added.dictionaries, "dictionary file"))
     text = ", ".join(f"{n} {noun}{'s' * (n != 1)}" for n, noun in counts if n or noun == "device")
-    print(escaped(f"{added.path}: {text}"))
+    if not as_json:
+        print(escaped(f"{added.path}: {text}"))
     for problem in (*added.problems, *(w for file in added.files for w in file.warnings)):
         print(f"catenary: {escaped(str(problem))}", file=sys.stderr)
     if added.devices + added.modules + added.dictionaries:
@@ -218,5 +239,8 @@ def remove(arguments: argparse.Namespace) -> int:
     with Library(arguments.library) as library:
         for path in arguments.paths:
             library.remove(path)
-            print(f"removed {path}")
+            if not arguments.json:
+                print(f"removed {path}")
+    if arguments.json:
+        print(json.dumps({"removed": list(map(str, arguments.paths))}, indent=2))
     return 0

@@ -47,6 +47,7 @@ def device_lines(device: EsiDevice, *, pdos: bool, objects: bool) -> list[str]:
     lines += [*_mailbox(device.mailbox), *_op_modes(device), *_slots(device)]
     lines += _modules(device.modules, entries=pdos)
     lines += _dictionary(device.dictionary, entries=objects)
+    lines += _list("diagnosis messages", _diagnosis_texts(device))
     lines += _list("elements that Catenary ignores", device.unknown)
     lines += _list("warnings", tuple(str(each) for each in device.warnings))
     return lines
@@ -81,6 +82,10 @@ def _list(title: str, lines: Sequence[str]) -> list[str]:
     shown = [f"  {escaped(line)}" for line in lines[:UNKNOWN_SHOWN]]
     more = [f"  and {len(lines) - len(shown)} more"] if len(lines) > len(shown) else []
     return ["", f"{title}: {len(lines)}", *shown, *more]
+
+
+def _diagnosis_texts(device: EsiDevice) -> list[str]:
+    return [f"0x{number:04X} {text}" for number, text in sorted(device.diagnosis_texts.items())]
 
 
 def _sync_managers(managers: Sequence[EsiSyncManager]) -> list[str]:

@@ -3,11 +3,19 @@
 from __future__ import annotations
 
 import argparse
+import json
 import sys
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from catenary.cli.parsers import Commands, add_command, add_target, note_other_masters
+from catenary.cli.failure import UsageError
+from catenary.cli.parsers import (
+    Commands,
+    add_command,
+    add_json,
+    add_target,
+    note_other_masters,
+)
 
 if TYPE_CHECKING:
     from catenary.bus import MainDevice, SubDevice
@@ -26,23 +34,34 @@ def add_parser(commands: Commands) -> None:
     )
     add_target(parser)
     parser.add_argument("--dot", action="store_true", help="print a graph for Graphviz")
+    add_json(parser)
     parser.set_defaults(run=run)
 
 
 def run(arguments: argparse.Namespace) -> int:
-    from catenary.cli.drawing import as_text
-    from catenary.cli.drawing_dot import as_dot
     from catenary.target import MainDevice, named_target
 
+    if arguments.dot and arguments.json:
+        raise UsageError("--dot and --json exclude each other")
     with MainDevice(arguments.target, force=True) as main:  # this command only reads
         note_other_masters(main)
         subs = main.passive_scan()
         drawing = draw(named_target(arguments.target), main, subs)
-    print(as_dot(drawing) if arguments.dot else as_text(drawing))
+    print(formatted(drawing, arguments))
     if arguments.dot:
         for text in drawing.topology.contradictions:
             print(f"catenary: {text}", file=sys.stderr)
     return int(bool(drawing.topology.contradictions))
+
+
+def formatted(drawing: Drawing, arguments: argparse.Namespace) -> str:
+    """Return the drawing in the format of the options."""
+    from catenary.cli.drawing import as_text, as_values
+    from catenary.cli.drawing_dot import as_dot
+
+    if arguments.json:
+        return json.dumps(as_values(drawing), indent=2)
+    return as_dot(drawing) if arguments.dot else as_text(drawing)
 
 
 def draw(target: str, main: MainDevice, subs: Sequence[SubDevice]) -> Drawing:

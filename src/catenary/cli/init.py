@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from catenary.cli.arguments import result_file
-from catenary.cli.parsers import Commands, add_command
+from catenary.cli.parsers import Commands, add_command, add_json
 
 if TYPE_CHECKING:
     from catenary.bus import SubDevice
@@ -45,6 +45,7 @@ def add_parser(commands: Commands) -> None:
     )
     parser.add_argument("--force", action="store_true", help="overwrite the file")
     parser.add_argument("--schema", action="store_true", help="print the JSON schema and exit")
+    add_json(parser)
     parser.set_defaults(run=run)
 
 
@@ -61,31 +62,31 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.output.exists() and not arguments.force:
         raise UsageError(f"{arguments.output} already exists", hint="use -o FILE or --force")
     if arguments.target.lower().endswith(".xml"):
-        return convert(arguments.target, arguments.output)
-    return write(arguments.target, arguments.output)
+        return convert(arguments)
+    return write(arguments)
 
 
-def convert(path: str, output: Path) -> int:
+def convert(arguments: argparse.Namespace) -> int:
     """Write the machine file of an ENI, and print what it cannot contain. Return the status."""
     from catenary.esi.eni import read_eni
     from catenary.machine.eni.text import eni_text
 
-    eni = read_eni(path)
+    eni = read_eni(arguments.target)
     text, notes = eni_text(eni)
-    output.write_text(text, encoding="utf-8")
-    print(f"{output}: {len(eni.devices)} devices")
-    print_open_lines(text, output)
+    arguments.output.write_text(text, encoding="utf-8")
+    print_result(arguments, text, len(eni.devices))
     for note in (*map(str, eni.warnings), *notes):
         print(f"warning: {note}", file=sys.stderr)
     return 0
 
 
-def write(target: str, output: Path) -> int:
+def write(arguments: argparse.Namespace) -> int:
     """Write the file and print the lines to fill in. Return the exit status."""
-    from catenary.cli.failure import with_hint
+    from catenary.cli.devices import report_failures
     from catenary.machine.text import machine_text
     from catenary.target import MainDevice
 
+    target, output = arguments.target, arguments.output
     with MainDevice(target) as main:
         devices = main.scan(strict=False)
         encoders = read_encoders(devices)
@@ -93,21 +94,28 @@ def write(target: str, output: Path) -> int:
         [device.description for device in devices], target_in_file(target, output), encoders
     )
     output.write_text(text, encoding="utf-8")
-    print(f"{output}: {len(devices)} devices")
-    print_open_lines(text, output)
-    errors = [device.error for device in devices if device.error is not None]
-    for error in errors:
-        print(f"error: {with_hint(error)}", file=sys.stderr)
-    return 1 if errors else 0
+    print_result(arguments, text, len(devices))
+    return report_failures(devices)
 
 
-def print_open_lines(text: str, output: Path) -> None:
-    """Print the lines that need a value."""
+def print_result(arguments: argparse.Namespace, text: str, devices: int) -> None:
+    """Print the number of devices, and the lines that need a value.
+
+    Args:
+        arguments: Arguments of the command.
+        text: Text of the machine file.
+        devices: Number of devices.
+    """
     from catenary.machine.text import FILL_IN
 
-    for number, line in enumerate(text.splitlines(), 1):
-        if f"# {FILL_IN}" in line:
-            print(f"{output}:{number}: {FILL_IN}")
+    output = arguments.output
+    lines = [n for n, line in enumerate(text.splitlines(), 1) if f"# {FILL_IN}" in line]
+    if arguments.json:
+        print(json.dumps({"file": str(output), "devices": devices, "fill_in": lines}, indent=2))
+        return
+    print(f"{output}: {devices} devices")
+    for number in lines:
+        print(f"{output}:{number}: {FILL_IN}")
 
 
 def read_encoders(devices: Sequence[SubDevice]) -> Mapping[tuple[int, int], float]:

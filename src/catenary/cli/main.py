@@ -13,7 +13,9 @@ from catenary.cli import (
     capture,
     check,
     clone,
+    completion,
     dashboard,
+    data,
     demo,
     diag,
     doctor,
@@ -25,6 +27,8 @@ from catenary.cli import (
     include,
     init,
     merge,
+    messages,
+    pdos,
     plot,
     realtime,
     record,
@@ -32,6 +36,7 @@ from catenary.cli import (
     ros2,
     scan,
     sdo,
+    shell,
     sii,
     state,
     top,
@@ -43,10 +48,10 @@ VIRTUAL_TIME = "times are virtual: they come from the segment's clock, not from 
 PROGRAM = "catenary"
 DESCRIPTION = "Real-time EtherCAT for Python."
 COMMANDS = (
-    *(scan, state, graph, diag, sdo, foe, firmware, reg, alias, sii, esi),
+    *(scan, state, graph, diag, messages, pdos, sdo, foe, firmware, reg, alias, sii, esi),
     *(init, check, clone, capture),
-    *(demo, dashboard, top, doctor, bench, virtual, realtime),
-    *(record, merge, plot, foxglove, ros2, include),
+    *(demo, shell, dashboard, top, doctor, bench, virtual, realtime),
+    *(data, record, merge, plot, foxglove, ros2, include, completion),
 )
 EPILOG = """\
 TARGET is one of
@@ -57,8 +62,8 @@ TARGET is one of
   virtual:FOLDER/    twins of the devices of a clone (docs/how_to/test_your_machine.md)
   virtual-realtime[:FILE.toml]  the same, on this machine's clock
   machine.toml       the target in a machine file (docs/reference/machine_file.md)
-  share:NAME         the running program that owns a share: scan, state, diag, sdo and reg read
-  igh:0              the IgH kernel master 0 (docs/how_to/igh.md): scan and sdo
+  share:NAME         the running program that owns a share: scan, state, diag, messages, sdo ...
+  igh:0              the IgH kernel master 0 (docs/how_to/igh.md): scan, pdos, messages and sdo
 
 example:
   catenary demo
@@ -92,6 +97,7 @@ def make_parser() -> argparse.ArgumentParser:
     )
     parser.add_argument("--version", action=ShowVersion, nargs=0, help="print the version")
     parser.add_argument("--debug", action="store_true", help="show the traceback of an error")
+    parser.set_defaults(make_parser=make_parser)  # for `completion`
     commands = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
     for command in COMMANDS:
         command.add_parser(commands)

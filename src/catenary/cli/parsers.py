@@ -8,7 +8,7 @@ import sys
 import textwrap
 from typing import TYPE_CHECKING, TypeAlias
 
-from catenary.cli.arguments import number, position
+from catenary.cli.arguments import number, place
 
 if TYPE_CHECKING:
     from catenary.bus import MainDevice
@@ -16,6 +16,8 @@ if TYPE_CHECKING:
     Commands: TypeAlias = "argparse._SubParsersAction[argparse.ArgumentParser]"
 else:
     Commands = object
+
+POSITION_HELP = "position of the device, from 0; or @ALIAS"
 
 
 def add_command(
@@ -80,6 +82,14 @@ def note_other_masters(main: MainDevice) -> None:
 
 
 def add_position(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("position", metavar="POSITION", type=place, help=POSITION_HELP)
+
+
+def add_optional_position(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
-        "position", metavar="POSITION", type=position, help="position of the device, from 0"
+        "position",
+        metavar="POSITION",
+        nargs="?",
+        type=place,
+        help=f"{POSITION_HELP} (default: all devices)",
     )

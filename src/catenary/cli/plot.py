@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import argparse
+import json
 import math
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from catenary.cli.arguments import seconds
 from catenary.cli.failure import UsageError
-from catenary.cli.parsers import Commands, add_command
+from catenary.cli.parsers import Commands, add_command, add_json
 
 if TYPE_CHECKING:
     from catenary.record import Recording
@@ -49,6 +50,7 @@ def add_parser(commands: Commands) -> None:
     parser.add_argument(
         "--degrees", action="store_true", help="show angles in degrees instead of radians"
     )
+    add_json(parser)
     parser.set_defaults(run=run)
 
 
@@ -86,7 +88,11 @@ def run(arguments: argparse.Namespace) -> int:
         reference=arguments.reference,
         unit="deg" if arguments.degrees else "rad",
     )
-    print(f"{output}: {len(recording)} cycles of {recording.name}, {len(recording.axes)} axes")
+    if arguments.json:
+        found = {"file": str(output), "cycles": len(recording), "loop": recording.name}
+        print(json.dumps(found | {"axes": list(recording.axes)}, indent=2))
+    else:
+        print(f"{output}: {len(recording)} cycles of {recording.name}, {len(recording.axes)} axes")
     return 0
 
 

@@ -111,6 +111,7 @@ def _read(arguments: argparse.Namespace, address: int, size: int) -> bytes:
     with MainDevice(arguments.target, force=True) as main:  # this command only reads
         note_other_masters(main)
         device = device_at(main.passive_scan(names=False), arguments.position)
+        arguments.position = device.position
         return main.converse(read_register(device.station, address, size))
 
 
@@ -124,6 +125,7 @@ def run_write(arguments: argparse.Namespace) -> int:
     _check(address, len(data))
     with MainDevice(arguments.target, force=arguments.force) as main:
         device = device_at(main.passive_scan(names=False), arguments.position)
+        arguments.position = device.position
         main.converse(write_register(device.station, address, data))
     if arguments.json:
         print(as_json(arguments, address, register, data))

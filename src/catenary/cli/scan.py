@@ -24,8 +24,8 @@ def add_parser(commands: Commands) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    from catenary.cli.devices import as_json, as_table
-    from catenary.cli.failure import one_line, with_hint
+    from catenary.cli.devices import as_json, as_table, report_failures
+    from catenary.cli.failure import one_line
     from catenary.target import MainDevice
 
     if share_target.names_share(arguments.target):
@@ -35,7 +35,4 @@ def run(arguments: argparse.Namespace) -> int:
         print(as_json(devices) if arguments.json else as_table(devices))
     for note in main.notes:
         print(f"note: {one_line(note)}", file=sys.stderr)
-    errors = [device.error for device in devices if device.error is not None]
-    for error in errors:
-        print(f"error: {with_hint(error)}", file=sys.stderr)
-    return 1 if errors else 0
+    return report_failures(devices)

@@ -8,18 +8,31 @@ import sys
 from typing import TYPE_CHECKING
 
 from catenary.cli import share_target
-from catenary.cli.arguments import Entry, entry, position
+from catenary.cli.arguments import Entry, entry
 from catenary.cli.failure import UsageError, one_line
-from catenary.cli.parsers import Commands, add_command, add_force, add_json, add_target
+from catenary.cli.parsers import (
+    Commands,
+    add_command,
+    add_force,
+    add_json,
+    add_position,
+    add_target,
+)
+from catenary.cli.sdo_value import (
+    as_text,
+    data_type,
+    documented_value,
+    explain,
+    meaning,
+    parse_value,
+    write_bytes,
+)
 from catenary.cli.share_target import names_share
 from catenary.cli.text import escaped
 
 if TYPE_CHECKING:
-    from catenary.model.device import ObjectInformation
     from catenary.remote.messages import SdoValue
-    from catenary.types import DataType, Value
-
-NUMBER_SIZES = (1, 2, 4, 8)  # sizes of numbers [bytes]
+    from catenary.types import Value
 
 
 def add_parser(commands: Commands) -> None:
@@ -44,12 +57,18 @@ def _add_read(group: Commands) -> None:
         "read",
         help="read an object",
         description="Reads one entry. Without --type, the type comes from the device's ESI file. "
-        "If there is none, prints the bytes and a likely meaning.",
+        "If there is none, prints the bytes and a likely meaning. With --complete, reads all "
+        "subindices of the object in one transfer.",
         example="catenary sdo read eth0 2 0x1018:1 --type UDINT\n"
-        "catenary sdo read virtual 2 0x1008 --type STRING --json",
+        "catenary sdo read virtual 2 0x1008 --type STRING --json\n"
+        "catenary sdo read eth0 2 0x1018 --complete",
     )
     _add_place(reading)
     _add_type(reading)
+    _add_complete(reading, "read")
+    reading.add_argument(
+        "-o", "--output", metavar="FILE", help="write the bytes to FILE; - is stdout"
+    )
     add_json(reading)
     reading.set_defaults(run=run_read)
 
@@ -59,15 +78,21 @@ def _add_write(group: Commands) -> None:
         group,
         "write",
         help="write an object",
-        description="Writes one entry.",
+        description="Writes one entry. With --complete, writes all subindices of the object in "
+        "one transfer. The VALUE - is read from stdin: bytes as they are with --type BYTES, text "
+        "with any other type.",
         example="catenary sdo write eth0 2 0x6065 5000 --type UDINT\n"
-        "catenary sdo write eth0 2 0x1011:1 0x64616f6c --type UDINT",
+        "catenary sdo write eth0 2 0x1011:1 0x64616f6c --type UDINT\n"
+        "catenary sdo write eth0 2 0x1C12 '01 00 00 16' --type BYTES --complete",
     )
     _add_place(writing)
     writing.add_argument(
-        "value", metavar="VALUE", help="value: decimal or 0x... number, text, or hexadecimal bytes"
+        "value",
+        metavar="VALUE",
+        help="value: decimal or 0x... number, text, or hexadecimal bytes; - is stdin",
     )
     _add_type(writing)
+    _add_complete(writing, "write")
     add_json(writing)
     writing.set_defaults(run=run_write)
 
@@ -93,9 +118,7 @@ def _add_list(group: Commands) -> None:
 
 def _add_device(parser: argparse.ArgumentParser) -> None:
     add_target(parser)
-    parser.add_argument(
-        "position", metavar="POSITION", type=position, help="position of the device, from 0"
-    )
+    add_position(parser)
     add_force(parser)
 
 
@@ -112,20 +135,31 @@ def _add_type(parser: argparse.ArgumentParser) -> None:
     )
 
 
+def _add_complete(parser: argparse.ArgumentParser, verb: str) -> None:
+    parser.add_argument(
+        "--complete", action="store_true", help=f"{verb} all subindices (complete access)"
+    )
+
+
 def run_read(arguments: argparse.Namespace) -> int:
     from catenary.cli.devices import device_at
     from catenary.target import MainDevice
 
-    kind = _data_type(arguments.type)
+    kind = data_type(arguments.type)
     at: Entry = arguments.entry
+    _check_complete(arguments)
     if names_share(arguments.target):
         return _show(arguments, share_target.sdo_read(arguments))
     with MainDevice(arguments.target, force=arguments.force) as main:
         device = device_at(main.scan(strict=False), arguments.position)
-        data = device.sdo.read(at.index, at.subindex)
+        arguments.position = device.position
+        data = device.sdo.read(at.index, at.subindex, complete=arguments.complete)
         known = device.description.documented_object(at.index, at.subindex)
+    if arguments.output is not None:
+        write_bytes(arguments.output, data)
+        return 0
     value = kind.decode(data) if kind else None
-    if kind is None and known is not None:
+    if kind is None and known is not None and not arguments.complete:
         value = documented_value(known, data)
     if arguments.json:
         print(_as_json(arguments, data, value))
@@ -138,7 +172,8 @@ def run_write(arguments: argparse.Namespace) -> int:
     from catenary.cli.devices import device_at
     from catenary.target import MainDevice
 
-    kind = _data_type(arguments.type)
+    kind = data_type(arguments.type)
+    _check_complete(arguments)
     if names_share(arguments.target):
         written = share_target.sdo_write(arguments)
         return _show(arguments, written) if arguments.json else 0
@@ -146,19 +181,27 @@ def run_write(arguments: argparse.Namespace) -> int:
         raise UsageError(
             "sdo write needs --type", hint="add --type UDINT, or --type BYTES for hexadecimal bytes"
         )
-    try:
-        value = kind.parse(arguments.value)
-    except ValueError as error:
-        raise UsageError(str(error), hint="write numbers as decimal or 0x...") from error
+    value = parse_value(kind, arguments.value)
     at: Entry = arguments.entry
     data = kind.encode(value)
     with MainDevice(arguments.target, force=arguments.force) as main:
-        device_at(main.scan(strict=False), arguments.position).sdo.write(
-            at.index, at.subindex, data
-        )
+        device = device_at(main.scan(strict=False), arguments.position)
+        arguments.position = device.position
+        device.sdo.write(at.index, at.subindex, data, complete=arguments.complete)
     if arguments.json:
         print(_as_json(arguments, data, value))
     return 0
+
+
+def _check_complete(arguments: argparse.Namespace) -> None:
+    """Raise UsageError for options that need the device itself, or do not fit together."""
+    of_share = names_share(arguments.target)
+    if of_share and (arguments.complete or getattr(arguments, "output", None) is not None):
+        raise UsageError("--complete and --output need the device itself, not a running program")
+    if arguments.complete and arguments.entry.subindex > 1:
+        raise UsageError(
+            f"complete access begins with subindex 0 or 1, not {arguments.entry.subindex}"
+        )
 
 
 def run_list(arguments: argparse.Namespace) -> int:
@@ -190,59 +233,6 @@ def _show(arguments: argparse.Namespace, found: SdoValue) -> int:
     else:
         print(explain(found.data) if found.value is None else escaped(found.text))
     return 0
-
-
-def _data_type(name: str | None) -> DataType[Value] | None:
-    from difflib import get_close_matches
-
-    from catenary.types import ALL, by_name
-
-    if name is None:
-        return None
-    try:
-        return by_name(name)
-    except ValueError as error:
-        near = get_close_matches(name.upper(), [kind.name for kind in ALL], n=1, cutoff=0.5)
-        guess = f"did you mean {near[0]}? " if near else ""
-        hint = f"{guess}types: BOOL, SINT, INT, DINT, USINT, UINT, UDINT, REAL, STRING, BYTES, ..."
-        raise UsageError(f"unknown data type {name!r}", hint=hint) from error
-
-
-def as_text(data: bytes, value: Value | None) -> str:
-    """Return the value as text, with the control characters of a string escaped."""
-    if value is None:
-        return explain(data)
-    return escaped(value) if isinstance(value, str) else str(value)
-
-
-def documented_value(known: ObjectInformation, data: bytes) -> Value | None:
-    """Return the value by the data type in the ESI of the device; None if it does not fit."""
-    from catenary.errors import DecodeError
-    from catenary.types import by_index
-
-    try:
-        return by_index(known.data_type).decode(data)
-    except (ValueError, DecodeError):
-        return None
-
-
-def meaning(known: ObjectInformation | None, value: Value | None) -> str:
-    """Return the unit and the name of a value in the ESI, such as " mV" or "  (CSP)"."""
-    if known is None or value is None:
-        return ""
-    text = dict(known.enumeration).get(value) if isinstance(value, int) else None
-    return f" {known.unit}" * bool(known.unit) + f"  ({text})" * bool(text)
-
-
-def explain(data: bytes) -> str:
-    """Return bytes of unknown type as hexadecimal digits, and as a likely number or text."""
-    if len(data) in NUMBER_SIZES:
-        number = int.from_bytes(data, "little")
-        return f"{data.hex(' ')}  (0x{number:0{2 * len(data)}X}, {number})"
-    text = data.rstrip(b"\x00")
-    if text and all(0x20 <= byte < 0x7F for byte in text):
-        return f"{data.hex(' ')}  ({text.decode()!r})"
-    return data.hex(" ")
 
 
 def _as_json(arguments: argparse.Namespace, data: bytes, value: Value | None) -> str:

@@ -8,6 +8,7 @@ import sys
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
+from catenary.cli.arguments import AliasPlace
 from catenary.cli.failure import UsageError, one_line
 from catenary.cli.tables import table
 from catenary.cli.text import escaped
@@ -31,6 +32,15 @@ def connect_to(target: str) -> Client:
     from catenary.remote import connect
 
     return connect(target.strip().removeprefix(PREFIX), timeout=LONG)
+
+
+def position_in(program: Client, place: int | AliasPlace | None) -> int | None:
+    """Return the position of a place among the devices of a program; None for None."""
+    if not isinstance(place, AliasPlace):
+        return place
+    from catenary.cli.devices import position_of
+
+    return position_of(place, [each.alias for each in program.devices()])
 
 
 # scan, state
@@ -58,13 +68,13 @@ def _scan_fields(device: Device) -> dict[str, object]:
 
 def state(arguments: argparse.Namespace) -> int:
     """Show the states of the devices, or change that of one device."""
-    position = arguments.position
-    if arguments.state is not None and position is None:
+    if arguments.state is not None and arguments.position is None:
         raise UsageError(
             "the state of a running program's devices is changed one by one", hint="add --position"
         )
     with connect_to(arguments.target) as program:
-        if arguments.state is not None:
+        position = position_in(program, arguments.position)
+        if arguments.state is not None and position is not None:
             program.set_state(position, arguments.state, force=arguments.force)
         devices = program.devices()
     chosen = [each for each in devices if position in (None, each.position)]
@@ -128,6 +138,7 @@ def diag(arguments: argparse.Namespace) -> int:
 def read_register(arguments: argparse.Namespace, address: int, size: int) -> bytes:
     """Read a register of a device."""
     with connect_to(arguments.target) as program:
+        arguments.position = position_in(program, arguments.position)
         return program.registers(arguments.position, address, size)
 
 
@@ -138,6 +149,7 @@ def sdo_read(arguments: argparse.Namespace) -> SdoValue:
     """Read an object."""
     at = arguments.entry
     with connect_to(arguments.target) as program:
+        arguments.position = position_in(program, arguments.position)
         return program.sdo_read(arguments.position, at.index, at.subindex, type=arguments.type)
 
 
@@ -145,6 +157,7 @@ def sdo_write(arguments: argparse.Namespace) -> SdoValue:
     """Write an object. Without --type, the type is that of the device's description."""
     at, value = arguments.entry, arguments.value
     with connect_to(arguments.target) as program:
+        arguments.position = position_in(program, arguments.position)
         return program.sdo_write(
             arguments.position, at.index, at.subindex, value, type=arguments.type
         )
@@ -154,6 +167,7 @@ def sdo_list(arguments: argparse.Namespace) -> int:
     """List all objects of a device."""
     notes: list[str] = []
     with connect_to(arguments.target) as program:
+        arguments.position = position_in(program, arguments.position)
         entries = _entries(program, arguments.position, notes)
         values = ((each, _value(program, arguments, each)) for each in entries)
         if arguments.json:

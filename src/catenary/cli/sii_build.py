@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import argparse
+import json
 import sys
 from pathlib import Path
 
 from catenary.cli.arguments import number
-from catenary.cli.parsers import Commands, add_command
+from catenary.cli.failure import UsageError
+from catenary.cli.parsers import Commands, add_command, add_json
 
 
 def add_build(group: Commands) -> None:
@@ -44,6 +46,7 @@ def add_build(group: Commands) -> None:
     building.add_argument(
         "-o", "--output", metavar="OUT", required=True, help="write the image to OUT; - is stdout"
     )
+    add_json(building)
     building.set_defaults(run=run_build)
 
 
@@ -52,6 +55,8 @@ def run_build(arguments: argparse.Namespace) -> int:
     from catenary.esi.selection import select_device
     from catenary.esi.sii import assemble_sii
 
+    if arguments.json and arguments.output == "-":
+        raise UsageError("--json and -o - exclude each other", hint="use -o FILE for the image")
     device = select_device(read_esi(arguments.file), arguments.device)
     build = assemble_sii(
         device,
@@ -66,5 +71,10 @@ def run_build(arguments: argparse.Namespace) -> int:
         return 0
     Path(arguments.output).write_bytes(build.image)
     used = len(build.image.rstrip(b"\xff"))
+    if arguments.json:
+        sizes = {"used": used, "size": len(build.image)}
+        found = {"file": arguments.output, "device": str(device), **sizes}
+        print(json.dumps(found | {"notes": list(map(str, build.notes))}, indent=2))
+        return 0
     print(f"{arguments.output}: {device}\n{used} of {len(build.image)} bytes used")
     return 0

@@ -36,7 +36,7 @@ from catenary.wire.sii_categories import (
 
 ROW = 16  # bytes per line
 GROUP_AGAIN = 1  # place of byte 14 of the general category in General.reserved
-_KNOWN = frozenset(
+KNOWN = frozenset(
     (
         CategoryType.STRINGS,
         CategoryType.GENERAL,
@@ -73,7 +73,7 @@ def text_lines(sii: Sii) -> list[str]:
         *_pdos(sii, "RxPDO", sii.receive_pdos),
         *_pdos(sii, "TxPDO", sii.transmit_pdos),
         *(line for n, mode in enumerate(sii.clock_modes) for line in _clock_mode(sii, n, mode)),
-        *(line for each in sii.categories if each.type not in _KNOWN for line in _other(each)),
+        *(line for each in sii.categories if each.type not in KNOWN for line in _other(each)),
         *_rows("after the categories", sii.trailing),
     ]
 

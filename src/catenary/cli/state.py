@@ -9,7 +9,7 @@ from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
 from catenary.cli import share_target
-from catenary.cli.arguments import position
+from catenary.cli.arguments import place
 from catenary.cli.parsers import (
     Commands,
     add_command,
@@ -42,7 +42,11 @@ def add_parser(commands: Commands) -> None:
     add_target(parser)
     parser.add_argument("state", metavar="STATE", nargs="?", type=state_name, help=STATES)
     parser.add_argument(
-        "--position", "-p", metavar="N", type=position, help="only this device; 0 is the first"
+        "--position",
+        "-p",
+        metavar="N",
+        type=place,
+        help="only this device; 0 is the first; or @ALIAS",
     )
     add_force(parser)
     add_json(parser)
@@ -72,7 +76,7 @@ def run(arguments: argparse.Namespace) -> int:
             note_other_masters(main)
         devices = main.passive_scan()
         if arguments.position is not None:
-            device_at(devices, arguments.position)
+            arguments.position = device_at(devices, arguments.position).position
         chosen = range(len(devices)) if arguments.position is None else [arguments.position]
         errors: dict[int, CatenaryError] = {}
         if arguments.state is not None:

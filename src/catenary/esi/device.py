@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
 from typing import NamedTuple
@@ -354,6 +355,7 @@ class EsiDevice:
     use_lrd_lwr: bool = False  # the device does not support LRW
     config_in_safe_op: bool = False
     e_bus_current_ma: int = 0
+    diagnosis_texts: Mapping[int, str] = field(default_factory=dict)  # `DiagMessage`, by text ID
     identification_register: int | None = None  # `IdentificationReg134` or `IdentificationAdo`
     identifies_by_al_status: bool = False
     unknown: tuple[str, ...] = ()  # paths of elements that the reader does not interpret

@@ -21,6 +21,7 @@ from catenary.esi.findings import Findings, text_of
 from catenary.esi.info import (
     read_controller,
     read_current,
+    read_diagnosis_texts,
     read_identification,
     read_mappings,
     read_timeouts,
@@ -159,6 +160,7 @@ def _with_services(device: EsiDevice, element: Element, findings: Findings) -> E
         watchdog=read_watchdog(element, findings),
         eeprom=read_eeprom(element, findings),
         e_bus_current_ma=read_current(element, findings),
+        diagnosis_texts=read_diagnosis_texts(element, findings),
         identification_register=register,
         identifies_by_al_status=by_al_status,
     )

@@ -120,3 +120,23 @@ def _mapping(element: Element, findings: Findings) -> EsiMapping:
 
 def _number(parent: Element | None, tag: str, findings: Findings, *, bits: int = 32) -> int | None:
     return findings.number(parent.find(tag), bits=bits) if parent is not None else None
+
+
+def read_diagnosis_texts(device: Element, findings: Findings) -> dict[int, str]:
+    """Return the texts of diagnosis messages by text ID (`Profile/DiagMessages/DiagMessage`).
+
+    Of several texts with one ID, the first counts.
+
+    Args:
+        device: The device.
+        findings: The warnings of the reader.
+    """
+    texts: dict[int, str] = {}
+    for profile in device.all("Profile"):
+        for messages in profile.all("DiagMessages"):
+            for message in messages.all("DiagMessage"):
+                number = findings.required(message, "TextId", bits=16)
+                text = text_of(message, "MessageText")
+                if number is not None and text:
+                    texts.setdefault(number, text)
+    return texts

@@ -57,6 +57,7 @@ PROFILE: Known = {
     **dict.fromkeys(("ProfileNo", "AddInfo", "ChannelCount", "DictionaryFile"), NOTHING),
     "ChannelInfo": dict.fromkeys(("ProfileNo", "AddInfo", "DisplayName"), NOTHING),
     "Dictionary": DICTIONARY,
+    "DiagMessages": {"DiagMessage": dict.fromkeys(("TextId", "MessageText"), NOTHING)},
 }
 INIT_COMMAND: Known = dict.fromkeys(
     ("Transition", "Index", "SubIndex", "Data", "Comment", "Timeout"), NOTHING

@@ -70,7 +70,10 @@ class CarriedExchange:
         self._session.settle()
         for sub in self._session.main.subs:
             sub.state = AlState.OP
-        return [self._session.service.runner.submit(self.watch.run())]
+        watches = [self.watch.run()]
+        if self._session.diagnosis is not None:
+            watches.append(self._session.diagnosis.run())
+        return [self._session.service.runner.submit(watch) for watch in watches]
 
     def query_silence(self, suspects: Sequence[int]) -> Evidence:
         """Query all devices through the external master."""

@@ -88,6 +88,8 @@ class FrameExchange:
         for sub in session.main.subs:
             sub.state = AlState.OP
         watches = [self.watch.run(), self.errors.run(), self.frames.run()]
+        if session.diagnosis is not None:
+            watches.append(session.diagnosis.run())
         if session.external is not None:
             watches.append(session.external.run())
         if session.trigger is not None:

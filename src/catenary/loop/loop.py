@@ -87,12 +87,19 @@ class Loop:
         log_axes: True to also log the values of every axis (docs/how_to/recording.md).
         capture: Folder for pcapng files with the frames around an error or a stopped axis, or
             `CaptureOptions` (docs/how_to/capture.md). None: no files.
+        diagnosis: Time between two readings of each device's diagnosis messages and
+            synchronisation counters [s]; new ones become events (docs/how_to/diagnosis.md). None:
+            never.
 
     Raises:
         ValueError: An option is impossible, or a request names devices of several MainDevices.
         TypeError: A request, a law or a group of options has the wrong type.
         LawError: A law has an argument with an unknown name.
     """
+
+    _iteration: Iteration | NetworksIteration | None
+    _background: Background | None
+    _finalizer: weakref.finalize[..., Loop] | None
 
     def __init__(
         self,
@@ -112,6 +119,7 @@ class Loop:
         trigger: Trigger | None = None,
         log_axes: bool = False,
         capture: CaptureOptions | str | os.PathLike[str] | None = None,
+        diagnosis: float | None = None,
     ) -> None:
         settings = Settings(
             period=period,
@@ -125,14 +133,13 @@ class Loop:
             clocks=clocks,
             trigger=trigger,
             capture=capture_options(capture),
+            diagnosis=diagnosis,
         )
         self._networks = make_networks(requests, settings, cpu, sink, laws)
         self._quorum = checked_quorum(scheduling.quorum, len(self._networks))
         self._enable, self._guard = enable, make_guard()
         self._leaving = threading.RLock()
-        self._iteration: Iteration | NetworksIteration | None = None
-        self._background: Background | None = None
-        self._finalizer: weakref.finalize[..., Loop] | None = None
+        self._iteration = self._background = self._finalizer = None
 
     def __enter__(self) -> Loop:
         if any(session.is_open for session in self._sessions):

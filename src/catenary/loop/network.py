@@ -29,6 +29,7 @@ from catenary.loop.options import ClockOptions, Scheduling, StopPolicy, check_gr
 from catenary.loop.session import Session, take_down
 from catenary.loop.stream import Stream
 from catenary.loop.timing import Timing
+from catenary.loop.watches.diagnosis import DiagnosisWatch
 from catenary.loop.watches.external_clock import ExternalClockWatch
 from catenary.loop.watches.trigger import TriggerWatch
 from catenary.plan.cycle import ExecutionMode, ReceiveMode
@@ -41,6 +42,7 @@ from catenary.wire.al import AlState
 ENDING = CYCLE_WORKING_COUNTER | CYCLE_DROPPED | CYCLE_STOPPED | CYCLE_NONE | CYCLE_LAW_FAILED
 TROUBLE = ENDING | CYCLE_CLOCKS
 LAW_SLICE_NS = 10_000_000  # between checks for signals while a law runs
+DIAGNOSIS_MAX = 3600.0  # [s]
 LOG_LIMIT = 2**24  # cycles, about a gigabyte
 
 
@@ -64,6 +66,7 @@ class Settings:
     clocks: ClockOptions
     trigger: Trigger | None
     capture: CaptureOptions | None
+    diagnosis: float | None
 
     def __post_init__(self) -> None:
         one_of("execution", self.execution, ("threaded", "inline"))
@@ -76,6 +79,10 @@ class Settings:
             )
         if not 1 <= self.log <= LOG_LIMIT:
             raise ValueError(f"log={self.log} cycles: must be 1 to {LOG_LIMIT}")
+        if self.diagnosis is not None and not 0.0 < self.diagnosis <= DIAGNOSIS_MAX:
+            raise ValueError(
+                f"diagnosis={self.diagnosis} s: must be above 0, at most {DIAGNOSIS_MAX:g} s"
+            )
         self._check_trigger()
 
     def _check_trigger(self) -> None:
@@ -261,6 +268,7 @@ class Network:
         session.switch_interval = self._settings.scheduling.switch_interval
         self._compile_laws(session)
         session.external = self._make_external(session)
+        session.diagnosis = self._make_diagnosis(session)
         if self._settings.trigger is not None:
             session.attach_trigger(self._make_trigger(self._settings.trigger, session))
         self.current_session = session
@@ -285,6 +293,19 @@ class Network:
                 hint="omit the option, or open the network interface directly",
             )
         return FrameCapture(options, self.main)
+
+    def _make_diagnosis(self, session: Session) -> DiagnosisWatch | None:
+        """Return the watch of the devices' own diagnosis; None without the option."""
+        interval = self._settings.diagnosis
+        if interval is None:
+            return None
+        engine = session.engine
+        return DiagnosisWatch(
+            self.main.subs,
+            interval,
+            put=self.main.events.put,
+            now=lambda: engine.now() * 1e-9,
+        )
 
     def report_end(self, error: BaseException) -> None:
         """Report the error that ends the loop to the sink and to the capture."""

@@ -37,6 +37,7 @@ from catenary.loop.publishing import Publisher
 from catenary.loop.safe_outputs import confirm_safe, make_safe
 from catenary.loop.signals import SignalGuard
 from catenary.loop.timing import Timing
+from catenary.loop.watches.diagnosis import DiagnosisWatch
 from catenary.loop.watches.external_clock import ExternalClockWatch
 from catenary.loop.watches.trigger import TriggerWatch
 from catenary.plan.planner import Plan
@@ -69,7 +70,7 @@ class Session:
         self.exchange: Exchange = exchange(self)
         self.engine = self.exchange.make_engine()
         self.views = self._bind(requests)
-        self.stop = stop
+        self.stop, self._abandon = stop, abandon  # `abandon`: if the MainDevice is closed first
         self.laws = LawRunner(self.engine, plan)
         self.faults = FaultReport(
             main, plan.cycle, self.engine, self.views, self.exchange, self.laws, stop
@@ -79,12 +80,12 @@ class Session:
         self.exchange.attend()
         self.watch = self.exchange.watch
         self.switch_interval: float | None = None  # [s] of the interpreter; used by an inline loop
+        self.diagnosis: DiagnosisWatch | None = None
         self.external: ExternalClockWatch | None = None
         self.capture: FrameCapture | None = None
         self.trigger: TriggerWatch | None = None
         self._attached = ExitStack()
         self._opened = self._left = False
-        self._abandon = abandon  # leaves the loop if the MainDevice is closed first
         self._process = os.getpid()
         forget_in_child(self)
         self._companions: Sequence[Session] = ()

@@ -186,6 +186,7 @@ class Machine:
         clocks: ClockOptions | None = None,
         trigger: Trigger | None = None,
         capture: CaptureOptions | str | os.PathLike[str] | None = None,
+        diagnosis: float | None = None,
     ) -> Loop:
         """Return a loop with all drives and process data of the machine.
 
@@ -212,6 +213,7 @@ class Machine:
             "scheduling": scheduling,
             "clocks": clocks,
             "capture": capture,
+            "diagnosis": diagnosis,
         }
         options |= {name: value for name, value in given.items() if value is not None}
         return Loop(*self.requests, laws=laws, sink=sink, trigger=trigger, **options)

@@ -96,6 +96,7 @@ class LoopTable(Table, frozen=True, kw_only=True):
     priority: Optional[Annotated[int, Meta(description="SCHED_FIFO priority", ge=1, le=99)]] = UNSET
     log: Optional[Annotated[int, Meta(description="number of cycles", ge=1)]] = UNSET
     log_axes: Optional[bool] = UNSET
+    diagnosis: Optional[Time] = UNSET
     stop: StopTable = StopTable()
     scheduling: SchedulingTable = SchedulingTable()
 

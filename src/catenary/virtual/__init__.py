@@ -1,6 +1,7 @@
 """Virtual EtherCAT segments at register level: in virtual time, in real time, or on a NIC."""
 
 from catenary.virtual import faults
+from catenary.virtual.coe.diagnosis_history import HistoryOptions
 from catenary.virtual.coe.quirks import MailboxQuirks
 from catenary.virtual.configuration import read_segment
 from catenary.virtual.crystal import Crystal
@@ -42,6 +43,7 @@ __all__ = [
     "Fault",
     "FaultEvent",
     "FrameCounters",
+    "HistoryOptions",
     "Joint",
     "Junction",
     "Loss",

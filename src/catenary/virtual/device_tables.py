@@ -6,6 +6,7 @@ from pathlib import Path
 
 import msgspec
 
+from catenary.virtual.coe.diagnosis_history import NO_HISTORY, HistoryOptions
 from catenary.virtual.coe.quirks import NO_MAILBOX_QUIRKS, MailboxQuirks
 from catenary.virtual.crystal import ClockBits, Crystal
 from catenary.virtual.devices.analog_inputs import AnalogInputs, SecondPdo
@@ -178,6 +179,7 @@ class ServoTable(_AppliedTable, tag="servo", frozen=True, kw_only=True):
     following_error_turns: float = 0.25
     position_limits: tuple[float, float] | None = None
     sync_missed_limit: int = 3
+    diagnosis: HistoryOptions = NO_HISTORY
     quirks: ServoQuirks = NO_QUIRKS
     mapping_quirks: MappingQuirks = NO_MAPPING_QUIRKS
     files: DeviceFiles | None = None
@@ -204,6 +206,7 @@ class ServoTable(_AppliedTable, tag="servo", frozen=True, kw_only=True):
             crystal=self.crystal.crystal(),
             clock_bits=self.clock_bits,
             sync_missed_limit=self.sync_missed_limit,
+            diagnosis=self.diagnosis,
             quirks=self.quirks,
             mapping_quirks=self.mapping_quirks,
             mailbox_quirks=self.mailbox_quirks,

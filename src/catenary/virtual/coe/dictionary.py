@@ -91,6 +91,7 @@ class Object:
     entries: dict[int, Entry] = field(default_factory=dict)
     maximum: int | None = None  # highest subindex in the description; None: that of the entries
     described: bool = True  # False: requests for its descriptions are refused
+    complete_access: bool = True
 
     @property
     def highest(self) -> int:
@@ -224,7 +225,7 @@ class Dictionary:
         if index not in self.objects:
             raise Abort(NO_OBJECT)
         entries = self.objects[index].entries
-        if self.objects[index].code == VARIABLE:
+        if self.objects[index].code == VARIABLE or not self.objects[index].complete_access:
             raise Abort(NO_COMPLETE_ACCESS)
         value, bit = 0, 0
         for subindex in sorted(entries):
@@ -254,6 +255,7 @@ class Dictionary:
             raise Abort(NO_OBJECT)
         entries = self.objects[index].entries
         is_record = self.objects[index].code != VARIABLE and 0 in entries
+        is_record = is_record and self.objects[index].complete_access
         if not is_record or any(e.bits % 8 for e in entries.values()):
             raise Abort(NO_COMPLETE_ACCESS)
         count = data[:1] if first == 0 else b""

@@ -11,6 +11,17 @@ from collections.abc import Callable, Iterable, Sequence
 from catenary.virtual import _segment
 from catenary.virtual._buffers import Buffers
 from catenary.virtual._segment import Core
+from catenary.virtual.coe.diagnosis_history import (
+    ERROR,
+    FAULT,
+    REFUSED,
+    SYNC_LOST,
+    TIMED_OUT,
+    DiagnosisHistory,
+    Number,
+    error_code_of,
+    word,
+)
 from catenary.virtual.coe.dictionary import (
     ARRAY,
     MAP_RX,
@@ -169,6 +180,7 @@ class Application:
         self.states = StateMachine(self, scheduler, identification, supports_boot=boots)
         self._files = FileAccess(store, self._box, self._bootstrap, self._state)
         self.on_restart: Callable[[], None] | None = None  # called if a new firmware is to start
+        self.history: DiagnosisHistory | None = None  # only of devices with 0x10F3
         self.dictionary = Dictionary(self._state)
         self._add_communication_objects(description, quirks.text_prefix)
         size = description.mailbox.receive_size if description.mailbox else 0
@@ -277,11 +289,25 @@ class Application:
     def _outputs_timed_out(self) -> None:
         self._core.expect_outputs(self._position)
         if self.states.state == OP:
+            self._note(SYNC_MANAGER_WATCHDOG, TIMED_OUT)
             self.states.fail(SAFE_OP, SYNC_MANAGER_WATCHDOG)
 
     def _synchronisation_failed(self, code: int) -> None:
         if self.states.state == OP:
+            self._note(code, SYNC_LOST, word(code))
             self.states.fail(SAFE_OP, code)
+
+    def _note(self, al_status_code: int, text_id: int, *parameters: Number) -> None:
+        """Store an error in the diagnosis history. Its code is an emergency of the state machine.
+
+        Args:
+            al_status_code: Cause. The emergency error code is 0xA000 + this code.
+            text_id: Text of the message.
+            *parameters: Values for the text.
+        """
+        if self.history is not None:
+            code = error_code_of(0xA000 + (al_status_code & 0xFF))
+            self.history.add(ERROR, code, text_id, parameters)
 
     def send_emergency(self, code: int, data: bytes = b"") -> None:
         """Send an emergency message, ETG.1000.6 §5.6.4. A no-op in INIT and BOOT.
@@ -290,6 +316,8 @@ class Application:
             code: Error code; 0: the error was reset.
             data: Up to 5 manufacturer-specific bytes.
         """
+        if self.history is not None and code:
+            self.history.add(ERROR, error_code_of(code), FAULT, [word(code)])
         if self.states.state in (INIT, BOOT):
             return
         register = 1 if code else 0
@@ -335,6 +363,13 @@ class Application:
         self._core.show_al_status(self._position, status, code)
 
     def check_state(self, state: int) -> int:
+        """Return 0, or the AL status code with which the state is refused."""
+        refusal = self._refusal_of(state)
+        if refusal:
+            self._note(refusal, REFUSED, word(state), word(refusal))
+        return refusal
+
+    def _refusal_of(self, state: int) -> int:
         before = self.states.state
         if state == BOOT:
             configured = before == BOOT or self._mailbox_is_configured(self._bootstrap)

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Literal
 
+from catenary.virtual.coe.diagnosis_history import SEVERITIES, double_word
 from catenary.virtual.coe.quirks import NO_MAILBOX_QUIRKS, MailboxQuirks
 from catenary.virtual.crystal import ClockBits, Crystal
 from catenary.virtual.description import Description
@@ -13,6 +16,8 @@ from catenary.virtual.foe.options import DeviceFiles
 from catenary.virtual.foe.store import FileStore
 from catenary.virtual.scheduler import Scheduler
 from catenary.virtual.sii_quirks import SiiQuirks
+
+PARAMETERS_MAX = 8  # of a diagnosis message
 
 
 @dataclass(frozen=True, slots=True)
@@ -159,3 +164,32 @@ class AppliedDevice(Device):
 
     def send_emergency(self, code: int, data: bytes = b"") -> None:
         self.application.send_emergency(code, data)
+
+    def store_diagnosis(
+        self,
+        text_id: int,
+        parameters: Sequence[int] = (),
+        *,
+        severity: Literal["info", "warning", "error"] = "error",
+        code: int = 0xE000,
+    ) -> None:
+        """Store a message in the diagnosis history (0x10F3).
+
+        Args:
+            text_id: Text of the message in the ESI of the device.
+            parameters: Values for the text, sent as numbers of 32 bits.
+            severity: "info", "warning" or "error".
+            code: Diagnosis code.
+
+        Raises:
+            ValueError: The device has no history, or a value is out of range.
+        """
+        history = self.application.history
+        if history is None:
+            raise ValueError(f"{self.name} has no history; add diagnosis=HistoryOptions()")
+        if not 0 <= text_id <= 0xFFFF or not 0 <= code <= 0xFFFF_FFFF:
+            raise ValueError("text_id has 16 bits, and code has 32 bits")
+        if len(parameters) > PARAMETERS_MAX:
+            raise ValueError(f"at most {PARAMETERS_MAX} parameters, not {len(parameters)}")
+        numbers = [double_word(each) for each in parameters]
+        history.add(SEVERITIES.index(severity), code, text_id, numbers)

@@ -11,6 +11,11 @@ from __future__ import annotations
 from dataclasses import replace
 
 from catenary.virtual import _segment
+from catenary.virtual.coe.diagnosis_history import (
+    NO_HISTORY,
+    DiagnosisHistory,
+    HistoryOptions,
+)
 from catenary.virtual.coe.dictionary import (
     ARRAY,
     INTEGER8,
@@ -96,6 +101,7 @@ class Servo(MotorDevice):
         clock_bits: ClockBits = 64,
         lrw: bool = True,
         sync_missed_limit: int = 3,
+        diagnosis: HistoryOptions = NO_HISTORY,
         quirks: ServoQuirks = NO_QUIRKS,
         mapping_quirks: MappingQuirks = NO_MAPPING_QUIRKS,
         mailbox_quirks: MailboxQuirks = NO_MAILBOX_QUIRKS,
@@ -127,6 +133,7 @@ class Servo(MotorDevice):
             lrw: True if the device supports LRW.
             sync_missed_limit: Number of consecutive SYNC pulses without new outputs after which
                 the drive reports a fault.
+            diagnosis: Form of the diagnosis history (0x10F3); the default has none.
             quirks: Differences of the drive from the profile.
             mapping_quirks: Quirks of the PDOs.
             mailbox_quirks: Quirks of the mailbox.
@@ -174,6 +181,7 @@ class Servo(MotorDevice):
         self.following_error_turns = following_error_turns
         self.position_limits = position_limits
         self.sync_missed_limit = sync_missed_limit
+        self.diagnosis = diagnosis
         self.mapping_quirks = mapping_quirks
 
     def _pdos(
@@ -229,6 +237,10 @@ class Servo(MotorDevice):
             synchronous_type=DC_SYNC1 if self.quirks.sync_signal == "sync1" else DC_SYNC0,
         )
         application.checks_watchdog = self.quirks.checks_watchdog
+        if self.diagnosis.messages:
+            application.history = DiagnosisHistory(
+                application.dictionary, lambda: self.core.now, self.diagnosis
+            )
         for axis in range(self.axes):
             self._add_axis(application, axis)
 

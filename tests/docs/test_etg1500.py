@@ -1,0 +1,68 @@
+"""The table of ETG.1500 is complete, and its states agree with its tests."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import NamedTuple
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+PAGE = ROOT / "docs" / "reference" / "etg1500.md"
+# ETG.1500 1.0.2, table 1; 305 has a row for reading and one for writing
+NUMBERS = [
+    *(101, 102, 103, 104, 105, 106, 107, 108, 201, 202, 203, 301, 302, 303, 304, 305, 305),
+    *(401, 402, 403, 404, 501, 502, 503, 504, 505, 506, 601, 602, 603, 701, 702, 703),
+    *(801, 901, 1001, 1101, 1102, 1103, 1201, 1301),
+]
+REQUIREMENT = re.compile(r"(shall|should|may)( \([\w ]+\))?")
+LINK = re.compile(r"\]\(\.\./\.\./(tests/[\w/.]+)\)")
+
+
+class Row(NamedTuple):
+    name: str
+    class_a: str
+    class_b: str
+    state: str
+    remark: str
+    tests: str
+
+
+def rows() -> list[Row]:
+    found = []
+    for line in PAGE.read_text().splitlines():
+        cells = [cell.strip() for cell in line.strip("|").split("|")]
+        if line.startswith("| ") and len(cells) == 7 and cells[0].isdigit():
+            number, name, *rest = cells
+            found.append(Row(f"{number} {name}", *rest))
+        elif line.startswith("| ") and len(cells) == 4 and cells[0] != "pack":
+            name, *rest = cells
+            found.append(Row(name, "may", "may", *rest))
+    return found
+
+
+ROWS = rows()
+
+
+def test_the_table_has_every_feature() -> None:
+    numbers = [int(row.name.split()[0]) for row in ROWS if row.name[0].isdigit()]
+    assert numbers == NUMBERS
+
+
+@pytest.mark.parametrize("row", ROWS, ids=lambda row: row.name)
+def test_a_row_is_consistent(row: Row) -> None:
+    assert REQUIREMENT.fullmatch(row.class_a)
+    assert REQUIREMENT.fullmatch(row.class_b)
+    assert row.state in ("yes", "part", "no")
+    assert bool(LINK.findall(row.tests)) is (row.state != "no")
+    assert row.remark or row.state == "yes" or row.class_a == "may" or row.name.startswith("1301")
+    for path in LINK.findall(row.tests):
+        assert (ROOT / path).is_file(), path
+
+
+def test_a_missing_requirement_names_its_step() -> None:
+    missing = [row for row in ROWS if row.class_a.startswith("shall") and row.state != "yes"]
+    assert [row.name for row in missing if "step 17" not in row.remark] == []
+    numbers = {row.name.split()[0] for row in missing}
+    assert numbers == {"601", "602", "701", "702", "703", "801", "1201"}
