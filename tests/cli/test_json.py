@@ -12,6 +12,7 @@ import pytest
 from msgspec.structs import replace
 
 from catenary.cli.main import main, make_parser
+from catenary.virtual import make_firmware
 from tests.capture.recordings import record
 from tests.cli.test_realtime import EXAMPLE
 from tests.cli.test_sii_build import ESI
@@ -43,6 +44,9 @@ messages virtual
 sdo read virtual 2 0x1018:1
 sdo write virtual 2 0x6065 5000 --type UDINT
 sdo list virtual 2
+foe read virtual:files.toml 1 log.txt
+foe write virtual:files.toml 1 app.efw --boot
+firmware virtual:files.toml 1 app.efw
 reg read virtual 2 AL_STATUS
 reg write virtual 2 0x0310 0 --size 4
 alias virtual 2
@@ -124,6 +128,9 @@ def prepare(command: str) -> None:
     elif command == "check":
         Path("line.toml").write_text('[[device]]\nkind = "coupler"\n')
         assert main(shlex.split("init virtual:line.toml -o machine.toml")) == 0
+    elif command in ("foe read", "foe write", "firmware"):
+        Path("files.toml").write_text(FILES)
+        Path("app.efw").write_bytes(make_firmware(0x0004_0002, "2.0"))
     elif command.startswith("capture"):
         record(Path("a.pcapng"), pdos=PDOS)
     elif command in ("merge", "plot"):
@@ -134,6 +141,17 @@ def prepare(command: str) -> None:
             file.finish({"ended": "the loop ended", "lost": 0})
 
 
+FILES = """
+[[device]]
+kind = "coupler"
+
+[[device]]
+kind = "analog_inputs"
+
+[device.files]
+contents = { "log.txt" = "started" }
+firmware = { name = "app.efw", version = "1.2" }
+"""
 PDOS = {
     0x1600: [(0x6040, 0, 16), (0x607A, 0, 32), (0x6060, 0, 8)],
     0x1A00: [(0x6041, 0, 16), (0x6064, 0, 32), (0x6061, 0, 8)],
