@@ -77,20 +77,22 @@ class MailboxDevice:
             data
         )  # changes the messages of the device
         self.received: list[Mailbox] = []
+        self.repeat_requests = 0
         self._queue: deque[bytes] = deque()
         self._in_buffer: bytes | None = None
         self._out_full = False
         self._last_sent: bytes = b""
         self._last_counter = 0
         self._counter = 0
-        self._toggle = False
-        self._accesses = 0
+        self._activation = 0x01  # enabled
+        self._acknowledged = False
+        self.accesses = 0
 
     def __call__(self, request: Request) -> Reply:
         station, address = request.address & 0xFFFF, request.address >> 16
         assert station == STATION.address
         if address in (LAYOUT.receive_offset, LAYOUT.send_offset):
-            number, self._accesses = self._accesses, self._accesses + 1
+            number, self.accesses = self.accesses, self.accesses + 1
             assert not request.repeatable
             if number in self.lose_out:
                 return Reply(request.data, 0, True)
@@ -140,14 +142,18 @@ class MailboxDevice:
             return Reply(bytes([0x08 if self._out_full else 0]), 1)
         if address == 0x080D:
             return Reply(bytes([0x08 if self._in_buffer is not None else 0]), 1)
+        if address == 0x080E and request.command is EcatCommand.FPRD:
+            return Reply(bytes([self._activation]), 1)
         if address == 0x080E:
-            toggle = bool(request.data[0] & 0x02)
-            if self.repeats and toggle != self._toggle:
+            toggled = (request.data[0] ^ self._activation) & 0x02
+            self._activation = request.data[0]
+            self.repeat_requests += toggled != 0
+            if self.repeats and toggled:
                 self._repeat()
-            self._toggle = self.repeats and toggle
+                self._acknowledged = bool(self._activation & 0x02)
             return Reply(request.data, 1)
         if address == 0x080F:
-            return Reply(bytes([0x02 if self._toggle else 0]), 1)
+            return Reply(bytes([0x02 if self._acknowledged else 0]), 1)
         raise AssertionError(f"unexpected access to 0x{address:04X}")
 
     def _repeat(self) -> None:

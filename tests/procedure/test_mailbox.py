@@ -24,8 +24,18 @@ def test_a_lost_read_reply_is_repeated_by_the_toggle() -> None:
     device.lose_back = {1}  # 0 is the write, 1 the read
     mailbox = channel()
     assert play(upload(mailbox, 0x2000, 0), device) == OBJECT[0x2000, 0]
-    assert mailbox.repeat_requested
+    assert device.repeat_requests == 1
     assert len(device.received) == 1
+
+
+def test_the_toggle_of_an_earlier_channel_does_not_prevent_a_repetition() -> None:
+    device = MailboxDevice(Dictionary(OBJECT))
+    for _ in range(2):
+        device.lose_back = {device.accesses + 1}
+        mailbox = channel()
+        mailbox.counter = len(device.received)  # the device drops a message with the last counter
+        assert play(upload(mailbox, 0x2000, 0), device) == OBJECT[0x2000, 0]
+    assert device.repeat_requests == 2
 
 
 def test_a_lost_read_request_is_read_again() -> None:
@@ -120,7 +130,7 @@ def test_a_lost_poll_that_left_the_message_needs_no_repetition() -> None:
     play(upload(mailbox, 0x2000, 0), device)
     device.lose_out = {3}  # the poll of the second upload: 0 to 2 are write, read, write
     assert play(upload(mailbox, 0x2000, 0), device) == OBJECT[0x2000, 0]
-    assert not mailbox.repeat_requested
+    assert device.repeat_requests == 0
 
 
 def test_a_lost_poll_that_took_the_message_is_repeated() -> None:
@@ -129,7 +139,7 @@ def test_a_lost_poll_that_took_the_message_is_repeated() -> None:
     play(upload(mailbox, 0x2000, 0), device)
     device.lose_back = {3}
     assert play(upload(mailbox, 0x2000, 0), device) == OBJECT[0x2000, 0]
-    assert mailbox.repeat_requested
+    assert device.repeat_requests == 1
     assert len(device.received) == 2
 
 

@@ -225,9 +225,7 @@ def join_mailbox(device: DeviceDescription, registers: Present) -> MailboxChanne
                 hint="bring it to INIT with `catenary state`, then clone with --pre-op",
             )
     layout = _at(device.mailbox, out, back)
-    channel = MailboxChannel(station_of(device), layout)
-    channel.repeat_requested = bool(back.activation & Activation.REPEAT_REQUEST)
-    return channel
+    return MailboxChannel(station_of(device), layout)
 
 
 def _manager(registers: Present, number: int) -> SyncManager | None:

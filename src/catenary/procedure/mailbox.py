@@ -414,7 +414,8 @@ def _decoded(channel: MailboxChannel, data: bytes) -> Mailbox | None:
 def _request_repetition(channel: MailboxChannel) -> Procedure[bool]:
     """Request a repetition with SyncManager 1, ETG.1000.4 §6.7.2, and await the acknowledgement.
 
-    The device then writes its last message to the buffer again.
+    The device then writes its last message to the buffer again. The request is a toggle bit, which
+    is read first: its value may result from an earlier channel of the same mailbox.
 
     Returns:
         True if the buffer contains a message.
@@ -422,20 +423,21 @@ def _request_repetition(channel: MailboxChannel) -> Procedure[bool]:
     Raises:
         MailboxError: The device does not acknowledge the request.
     """
-    channel.repeat_requested = not channel.repeat_requested
     channel.repetitions += 1
-    activation = Activation.ENABLE
-    if channel.repeat_requested:
-        activation |= Activation.REPEAT_REQUEST
     register, answer = sync_manager_activation(IN), sync_manager_pdi_control(IN)
     station = channel.station
-    [reply] = yield [write(EcatCommand.FPWR, station.address, register, int(activation))]
+    [reply] = yield [read(EcatCommand.FPRD, station.address, register)]
+    present = Activation(register.unpack(answered(reply, station, "mailbox repeat request")))
+    toggled = present ^ Activation.REPEAT_REQUEST
+    [reply] = yield [write(EcatCommand.FPWR, station.address, register, int(toggled))]
     answered(reply, station, "mailbox repeat request")
     deadline, pace = Deadline(REPEAT_TIMEOUT), Pace()
     while True:
         [reply] = yield [read(EcatCommand.FPRD, station.address, answer)]
         value = PdiControl(answer.unpack(answered(reply, station, "mailbox repeat acknowledge")))
-        acknowledged = (PdiControl.REPEAT_ACKNOWLEDGE in value) == channel.repeat_requested
+        acknowledged = (PdiControl.REPEAT_ACKNOWLEDGE in value) == (
+            Activation.REPEAT_REQUEST in toggled
+        )
         if acknowledged and (yield from _is_full(channel, IN))[0]:
             return True
         if deadline.passed(reply):

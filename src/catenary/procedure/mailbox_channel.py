@@ -29,7 +29,7 @@ Listener: TypeAlias = Callable[[ReceivedEmergency], None]
 
 @dataclass(slots=True)
 class MailboxChannel:
-    """State of one SubDevice's mailbox: counters, repeat toggle, emergencies.
+    """State of one SubDevice's mailbox: counters, repetitions, emergencies.
 
     Emergencies arrive between the answers to requests. `listener` is called for each of them, in
     any procedure. `listen` also reports those that arrived before there was a listener.
@@ -42,7 +42,6 @@ class MailboxChannel:
     counts: bool = False  # the last counter differed from the previous one and from 0
     repetitions: int = 0  # repetitions requested from the device, but not yet read
     received_ns: int = 0  # time at which the last message was read
-    repeat_requested: bool = False  # state of the toggle bit
     emergencies: deque[ReceivedEmergency] = field(
         default_factory=lambda: deque(maxlen=EMERGENCIES_KEPT)
     )
@@ -62,7 +61,7 @@ class MailboxChannel:
         """Reset the state after the SyncManagers were configured again."""
         self.counter = self.repetitions = 0
         self.received = None
-        self.counts = self.repeat_requested = self.owed = False
+        self.counts = self.owed = False
         self.unsure_ns = None
         self.emptied = True
 
