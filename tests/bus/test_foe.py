@@ -88,6 +88,27 @@ def test_a_busy_device_reports_its_own_progress() -> None:
     assert seen == [*request, *request, (3, "")]
 
 
+@pytest.mark.parametrize("after_busy", ["acknowledgement", "request"])
+def test_a_busy_device_sends_its_file(after_busy: str) -> None:
+    busy = device(busy=3, contents={"log.txt": CONTENT}, after_busy=after_busy)
+    with MainDevice(line(busy)) as main:
+        assert main.scan()[1].foe.read("log.txt") == CONTENT
+
+
+def test_a_transfer_after_an_interrupted_one() -> None:
+    refusing = device(contents={"log.txt": CONTENT}, second_request="refused")
+    with MainDevice(line(refusing)) as main:
+        sub = main.scan()[1]
+
+        def interrupt(done: int, _: int | None) -> None:
+            if done:
+                raise KeyboardInterrupt
+
+        with pytest.raises(KeyboardInterrupt):
+            sub.foe.write("new", CONTENT, progress=interrupt)
+        assert sub.foe.read("log.txt") == CONTENT
+
+
 def test_an_error_in_the_report_ends_the_transfer(sub: SubDevice) -> None:
     def report(done: int, total: int | None) -> None:
         if done:

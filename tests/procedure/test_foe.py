@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from catenary.errors import FoeError, MailboxError, ResponseTimeout
-from catenary.procedure.exchange import Procedure, Step
-from catenary.procedure.foe import OVERHEAD, Patience, Progress, read, write
+from catenary.procedure.exchange import Procedure, Reply, Request, Step
+from catenary.procedure.foe import OVERHEAD, read, write
+from catenary.procedure.foe_exchange import Patience, Progress
 from catenary.wire.foe import (
     Acknowledge,
     Busy,
@@ -74,17 +77,33 @@ class Server:
 
 
 class BusyServer(Server):
-    """Server that answers BUSY `times` times before it accepts each message."""
+    """Server that answers BUSY `times` times before it accepts each message.
 
-    def __init__(self, times: int, files: dict[str, bytes] | None = None) -> None:
+    With `continued`, acknowledgement 0 continues a busy read, as in the SSC since version 5.11.
+    """
+
+    def __init__(
+        self, times: int, files: dict[str, bytes] | None = None, *, continued: bool = True
+    ) -> None:
         super().__init__(files)
         self._times = self._left = times
+        self._continued = continued
+        self._reading: ReadRequest | None = None
 
     def answer(self, request: Message) -> list[Message]:
+        if self._continued and isinstance(request, ReadRequest):
+            if self._reading is not None:
+                self._reading = None
+                return [Error(ErrorCode.ILLEGAL)]
+            self._reading = request
+        elif request == Acknowledge(0) and self._reading is None:
+            return [Error(ErrorCode.ILLEGAL)]
         if self._left:
             self._left -= 1
             return [Busy(self._times - self._left, self._times, "erase")]
         self._left = self._times
+        if request == Acknowledge(0) and self._reading is not None:
+            request = self._reading
         return super().answer(request)
 
 
@@ -161,6 +180,85 @@ def test_after_busy_the_same_message_is_sent_again(times: int) -> None:
     reader = BusyServer(times, {"a": content(2 * ROOM)})
     assert play(read(channel(), "a"), MailboxDevice(reader)) == content(2 * ROOM)
     assert reader.received.count(Acknowledge(1)) == times + 1
+
+
+def test_a_busy_read_request_is_continued_with_acknowledgement_0() -> None:
+    server = BusyServer(2, {"a": b"abc"})
+    assert play(read(channel(), "a"), MailboxDevice(server)) == b"abc"
+    assert server.received == [
+        ReadRequest("a"),
+        Acknowledge(0),
+        Acknowledge(0),
+        Acknowledge(1),
+    ]
+
+
+def test_a_stack_that_expects_the_read_request_again_after_busy() -> None:
+    server = BusyServer(3, {"a": b"abc"}, continued=False)
+    assert play(read(channel(), "a"), MailboxDevice(server)) == b"abc"
+
+
+@pytest.mark.parametrize("writes", [True, False])
+def test_a_request_after_an_interrupted_transfer_is_sent_again(writes: bool) -> None:
+    class Interrupted(Server):
+        """Server with an unfinished transfer, which the next request ends (SSC, SOES)."""
+
+        unfinished = True
+
+        def answer(self, request: Message) -> list[Message]:
+            if self.unfinished:
+                self.unfinished = False
+                return [Error(ErrorCode.ILLEGAL)]
+            return super().answer(request)
+
+    server = Interrupted({"a": b"abc"})
+    if writes:
+        play(write(channel(), "a", b"new"), MailboxDevice(server))
+        assert server.files == {"a": b"new"}
+    else:
+        assert play(read(channel(), "a"), MailboxDevice(server)) == b"abc"
+
+
+@pytest.mark.parametrize("writes", [True, False])
+def test_a_request_that_stays_illegal_is_refused(writes: bool) -> None:
+    server = MailboxDevice(lambda _: [Mailbox(Type.FOE, Error(ErrorCode.ILLEGAL).encode())])
+    procedure = write(channel(), "a", b"") if writes else read(channel(), "a")
+    with pytest.raises(FoeError, match="0x8004"):
+        play(procedure, server)
+    assert len(server.received) <= 3
+
+
+class LateDevice(MailboxDevice):
+    """Device that answers our error message later, with an error of its own, as the SSC may do."""
+
+    def __init__(self, respond: Callable[[Mailbox], list[Mailbox]]) -> None:
+        super().__init__(respond)
+        self._requests_left: int | None = None
+
+    def __call__(self, request: Request) -> Reply:
+        ended = self.received and decode_foe(self.received[-1].data) == Error(
+            ErrorCode.PACKET_NUMBER
+        )
+        if ended and self._requests_left is None:
+            self._requests_left = 4
+        elif self._requests_left:
+            self._requests_left -= 1
+            if not self._requests_left:
+                self.send(Mailbox(Type.FOE, Error(ErrorCode.NOT_DEFINED).encode()))
+        return super().__call__(request)
+
+
+def test_a_late_answer_to_our_error_message_is_dropped() -> None:
+    class Wrong(Server):
+        def answer(self, request: Message) -> list[Message]:
+            wrong = request == ReadRequest("wrong")
+            return [Data(9, b"")] if wrong else super().answer(request)
+
+    device, mailbox = LateDevice(Wrong({"a": b"abc"})), channel()
+    with pytest.raises(MailboxError, match="packet number 9"):
+        play(read(mailbox, "wrong"), device)
+    assert play(read(mailbox, "a"), device) == b"abc"
+    assert mailbox.dropped == 1
 
 
 def test_a_device_that_stays_busy_is_given_up() -> None:

@@ -189,6 +189,35 @@ def test_a_busy_device_answers_when_the_message_is_repeated() -> None:
     assert made.device.store.files == {"a": b"x"}
 
 
+def test_a_busy_read_is_continued_with_acknowledgement_0() -> None:
+    made = in_pre_op(busy=2, contents={"log": b"abc"})
+    assert made.ask(RRQ, 0, b"log")[0] == BUSY
+    assert made.ask(ACK, 0)[0] == BUSY
+    assert made.ask(ACK, 0) == (DATA, 1, b"abc")
+
+
+def test_a_second_read_request_after_busy_is_illegal() -> None:
+    made = in_pre_op(busy=2, contents={"log": b"abc"})
+    assert made.ask(RRQ, 0, b"log")[0] == BUSY
+    assert made.ask(RRQ, 0, b"log")[:2] == (ERR, 0x8004)
+    assert made.ask(RRQ, 0, b"log")[0] == BUSY
+    assert made.ask(BUSY, 0)[:2] == (ERR, 0x8004)  # there is no packet to send again
+
+
+def test_a_busy_read_is_continued_with_the_request() -> None:
+    made = in_pre_op(busy=1, contents={"log": b"abc"}, after_busy="request")
+    assert made.ask(RRQ, 0, b"log")[0] == BUSY
+    assert made.ask(RRQ, 0, b"log") == (DATA, 1, b"abc")
+    made.send(ACK, 1)
+    assert made.silent()
+    assert made.ask(RRQ, 0, b"log")[0] == BUSY
+    assert made.ask(ACK, 0)[:2] == (ERR, 0x8004)
+
+
+def test_a_busy_device_refuses_a_file_that_it_does_not_have() -> None:
+    assert in_pre_op(busy=1).ask(RRQ, 0, b"log")[:2] == (ERR, 0x8001)
+
+
 def test_an_error_of_the_client_ends_a_transfer() -> None:
     made = in_pre_op()
     made.ask(WRQ, 0, b"a")

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 from catenary.errors import CatenaryError
 from catenary.model.device import Identity
-from catenary.procedure.foe import ANSWER_TIMEOUT, BUSY_TIMEOUT
+from catenary.procedure.foe_exchange import ANSWER_TIMEOUT, BUSY_TIMEOUT
 from catenary.wire.al import AlState
 
 RESTART_TIMEOUT = 60.0  # [s] until the device returns with its new firmware

@@ -12,15 +12,8 @@ from catenary.bus.runner import Watch
 from catenary.bus.sdo import Conversations
 from catenary.errors import CatenaryError, ConfigurationError, MailboxError
 from catenary.procedure.exchange import Procedure
-from catenary.procedure.foe import (
-    ANSWER_TIMEOUT,
-    BUSY_TIMEOUT,
-    MAX_SIZE,
-    Patience,
-    Progress,
-    read,
-    write,
-)
+from catenary.procedure.foe import MAX_SIZE, read, write
+from catenary.procedure.foe_exchange import ANSWER_TIMEOUT, BUSY_TIMEOUT, Patience, Progress
 from catenary.procedure.mailbox import MailboxChannel
 from catenary.procedure.station import Station
 from catenary.wire.foe import Busy

@@ -3,84 +3,41 @@
 Packets have numbers from 1; acknowledgement 0 is the answer to a write request. All packets but the
 last fill the mailbox. If the size of a file is a multiple of that, the last packet is empty, as in
 SOEM (ec_foe.c, `dofinalzero`) and the SSC (ecatfoe.h, `pAPPL_FoeRead`).
-
-Where the standard is silent:
-
-- After BUSY, the last message is sent again. SOEM and IgH (fsm_foe.c) do this for data packets,
-  but without a pause and without a limit. Here, this also holds for requests and acknowledgements.
-- A packet or an acknowledgement with the previous number is a duplicate, and is dropped. Any other
-  unexpected number ends the transfer, as in SOEM. IgH does not compare the acknowledgements.
-- A transfer that this side ends is ended with an error message, so that the device can accept the
-  next one. SOEM and IgH send nothing; SOES (esc_foe.c, `FOE_error`) expects the message.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
-from typing import NamedTuple, TypeVar
+from typing import TypeVar
 
-from catenary.errors import DecodeError, FoeError, MailboxError, ResponseTimeout
-from catenary.procedure.exchange import Procedure, after
-from catenary.procedure.mailbox import MailboxChannel, converse, exclusively, send_only
-from catenary.procedure.station import Deadline, Pace
+from catenary.errors import MailboxError
+from catenary.procedure.exchange import Procedure
+from catenary.procedure.foe_exchange import (
+    PATIENCE,
+    Patience,
+    Progress,
+    Transfer,
+    ask,
+    open_file,
+    send_error,
+)
+from catenary.procedure.mailbox import MailboxChannel, exclusively, send_only
 from catenary.wire import mailbox
 from catenary.wire.foe import (
     FIRST_PACKET,
     HEADER_SIZE,
     Acknowledge,
-    Busy,
     Data,
-    Error,
     ErrorCode,
-    Message,
     ReadRequest,
     WriteRequest,
-    decode_foe,
-    error_meaning,
 )
-from catenary.wire.mailbox import Mailbox, Type
+from catenary.wire.mailbox import Type
 
-T = TypeVar("T", Data, Acknowledge)
 Request = TypeVar("Request", ReadRequest, WriteRequest)
 
 OVERHEAD = mailbox.HEADER_SIZE + HEADER_SIZE
 MAX_SIZE = 1 << 28  # [bytes] of a file that is read: larger than the memory of all known devices
-ANSWER_TIMEOUT = 10.0  # [s] for each packet: devices erase flash memory before they answer
-BUSY_TIMEOUT = 120.0  # [s] that a device may be busy with one packet
-BUSY_PAUSE, BUSY_PAUSE_MAX = 1e-3, 50e-3  # [s] before the same message is sent again
 LAST_ATTEMPTS = 5  # for the last acknowledgement, which the device does not answer
-
-
-class Patience(NamedTuple):
-    """Longest waits of one packet [s]."""
-
-    answer: float = ANSWER_TIMEOUT
-    busy: float = BUSY_TIMEOUT
-
-
-PATIENCE = Patience()
-
-
-@dataclass(slots=True)
-class Progress:
-    """Progress of one transfer. The procedure updates it, and other code may read it."""
-
-    total: int | None = None  # bytes of the file; None while a file is read
-    done: int = 0  # bytes that the receiver has acknowledged
-    busy: Busy | None = None  # last message of a busy device; None after any other answer
-
-
-class _Transfer(NamedTuple):
-    """The parameters that all steps of one transfer need."""
-
-    channel: MailboxChannel
-    name: str
-    progress: Progress
-    patience: Patience
-
-    def __str__(self) -> str:
-        return f"{self.channel.station}: file {self.name!r}"
 
 
 def write_capacity(channel: MailboxChannel) -> int:
@@ -121,7 +78,7 @@ def write(
     request = _checked(channel, WriteRequest(name, password))
     followed = progress or Progress()
     followed.total = len(data)
-    transfer = _Transfer(channel, name, followed, patience)
+    transfer = Transfer(channel, name, followed, patience)
     return exclusively(channel, _write(transfer, request, data))
 
 
@@ -152,7 +109,7 @@ def read(
         ValueError: The name or the password does not fit.
     """
     request = _checked(channel, ReadRequest(name, password))
-    transfer = _Transfer(channel, name, progress or Progress(), patience)
+    transfer = Transfer(channel, name, progress or Progress(), patience)
     return exclusively(channel, _read(transfer, request, max_size))
 
 
@@ -167,24 +124,26 @@ def _checked(channel: MailboxChannel, request: Request) -> Request:
     return request
 
 
-def _write(transfer: _Transfer, request: WriteRequest, data: bytes) -> Procedure[None]:
+def _write(transfer: Transfer, request: WriteRequest, data: bytes) -> Procedure[None]:
     capacity = write_capacity(transfer.channel)
-    yield from _ask(transfer, request, Acknowledge, FIRST_PACKET - 1)
+    yield from open_file(transfer, request, Acknowledge, FIRST_PACKET - 1, [request] * 2)
     # One packet more than full ones: a part of the data, or nothing.
     for packet, start in enumerate(range(0, len(data) + 1, capacity), FIRST_PACKET):
         part = data[start : start + capacity]
-        yield from _ask(transfer, Data(packet, part), Acknowledge, packet)
+        yield from ask(transfer, Data(packet, part), Acknowledge, packet)
         transfer.progress.done += len(part)
 
 
-def _read(transfer: _Transfer, request: ReadRequest, max_size: int) -> Procedure[bytes]:
+def _read(transfer: Transfer, request: ReadRequest, max_size: int) -> Procedure[bytes]:
     capacity = read_capacity(transfer.channel)
-    message: Message = request
     data, packet = bytearray(), FIRST_PACKET
+    start = Acknowledge(FIRST_PACKET - 1)
+    # The last attempt is for stacks that expect the request again after BUSY.
+    received = yield from open_file(transfer, request, Data, packet, [start, start, request])
     while True:
-        part = (yield from _ask(transfer, message, Data, packet)).data
+        part = received.data
         if len(data) + len(part) > max_size:
-            yield from _send_error(transfer, ErrorCode.DISK_FULL)
+            yield from send_error(transfer, ErrorCode.DISK_FULL)
             raise MailboxError(
                 f"{transfer} is larger than {max_size} bytes",
                 hint="if the file is that large, increase max_size; else its firmware is at fault",
@@ -195,101 +154,6 @@ def _read(transfer: _Transfer, request: ReadRequest, max_size: int) -> Procedure
         if len(part) < capacity:
             break
         packet += 1
+        received = yield from ask(transfer, message, Data, packet)
     yield from send_only(transfer.channel, Type.FOE, message.encode(), attempts=LAST_ATTEMPTS)
     return bytes(data)
-
-
-def _ask(transfer: _Transfer, message: Message, expected: type[T], packet: int) -> Procedure[T]:
-    """Send a message until the device is not busy, and return its answer.
-
-    Args:
-        transfer: The transfer.
-        message: The message to send.
-        expected: Type of the answer.
-        packet: Packet number of the answer.
-    """
-    channel, patience = transfer.channel, transfer.patience
-    deadline, pace = Deadline(patience.busy), Pace(BUSY_PAUSE, BUSY_PAUSE_MAX)
-    accept = _acceptor(channel, expected, packet - 1)
-    while True:
-        talk: Procedure[Message] = converse(
-            channel, Type.FOE, message.encode(), accept, timeout=patience.answer
-        )
-        answer = yield from talk
-        if isinstance(answer, Error):
-            raise _refused(transfer, answer)
-        if not isinstance(answer, Busy):
-            transfer.progress.busy = None
-            return (yield from _matching(transfer, answer, expected, packet))
-        transfer.progress.busy = answer
-        if deadline.passed_at(channel.received_ns):
-            yield from _send_error(transfer, ErrorCode.NOT_DEFINED)
-            raise _too_busy(transfer, answer, patience.busy)
-        yield after(pace.pause())
-
-
-def _acceptor(
-    channel: MailboxChannel, expected: type[T], duplicate: int
-) -> Callable[[Mailbox], Message | None]:
-    """Return the function that accepts all FoE messages except duplicates."""
-
-    def accept(received: Mailbox) -> Message | None:
-        if received.type is not Type.FOE:
-            return None
-        try:
-            message = decode_foe(received.data)
-        except DecodeError as error:
-            raise MailboxError(
-                f"{channel.station}: invalid FoE message: {error}",
-                hint="its firmware is at fault; record a capture of the transfer to see the bytes",
-            ) from error
-        if isinstance(message, expected) and message.packet == duplicate:
-            return None
-        return message
-
-    return accept
-
-
-def _matching(transfer: _Transfer, answer: Message, expected: type[T], packet: int) -> Procedure[T]:
-    """Return the answer if it is the expected one. Otherwise end the transfer."""
-    if isinstance(answer, expected):
-        if answer.packet == packet:
-            return answer
-        yield from _send_error(transfer, ErrorCode.PACKET_NUMBER)
-        what = f"packet number {answer.packet} instead of {packet}"
-    else:
-        yield from _send_error(transfer, ErrorCode.ILLEGAL)
-        what = f"{type(answer).__name__} instead of {expected.__name__} {packet}"
-    raise MailboxError(
-        f"{transfer}: the device sent {what}, after {transfer.progress.done} bytes",
-        hint="repeat the transfer. If it fails again, its firmware is at fault, or a second master "
-        "accesses it",
-    )
-
-
-def _send_error(transfer: _Transfer, code: ErrorCode) -> Procedure[None]:
-    yield from send_only(transfer.channel, Type.FOE, Error(code).encode())
-
-
-def _refused(transfer: _Transfer, answer: Error) -> FoeError:
-    meaning = error_meaning(answer.code)
-    words = f" ({answer.text})" if answer.text else ""
-    place = f" after {transfer.progress.done} bytes" if transfer.progress.done else ""
-    return FoeError(
-        f"{transfer} refused{place} with 0x{answer.code:04X}: {meaning.text}{words}",
-        position=transfer.channel.station.position,
-        name=transfer.name,
-        code=answer.code,
-        text=answer.text,
-        hint=meaning.hint,
-    )
-
-
-def _too_busy(transfer: _Transfer, answer: Busy, seconds: float) -> ResponseTimeout:
-    state = f", last progress {answer.done} of {answer.entire}" if answer.entire else ""
-    words = f" ({answer.text})" if answer.text else ""
-    return ResponseTimeout(
-        f"{transfer}: the device has been busy for {seconds:g} s after {transfer.progress.done} "
-        f"bytes{state}{words}",
-        hint="allow more time if the device needs it, else power-cycle it and repeat the transfer",
-    )

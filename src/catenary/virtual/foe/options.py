@@ -47,8 +47,13 @@ class DeviceFiles(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_on
     # False: errors have no text (SOES, esc_foe.c, FOE_abort).
     error_texts: bool = True
 
+    # Message that continues a read after BUSY in answer to the request. "acknowledgement": that of
+    # packet 0 (SSC from 5.11, ecatfoe.c); a second request is then illegal. "request": the same
+    # request.
+    after_busy: Literal["acknowledgement", "request"] = "acknowledgement"
+
     # Request during a transfer. "restarts": it begins a new transfer. "refused": it ends the
-    # transfer with error 0x8004 (SOES, esc_foe.c, FOE_read and FOE_write).
+    # transfer with error 0x8004 (SSC, ecatfoe.c; SOES, esc_foe.c, FOE_read and FOE_write).
     second_request: Literal["restarts", "refused"] = "restarts"
 
     def __post_init__(self) -> None:

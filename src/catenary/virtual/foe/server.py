@@ -69,14 +69,23 @@ class FileServer:
         """Return the answers to a message of at least 6 bytes."""
         code, number = HEADER.unpack_from(payload)
         rest = payload[HEADER.size :]
-        if self._busy and code in (RRQ, WRQ, DATA, ACK) and self._state is not State.LAST_SENT:
-            return [self._busy_answer()]
-        self._busy = self._store.options.busy
         try:
+            if self._busy and code in (RRQ, WRQ, DATA, ACK) and self._state is not State.LAST_SENT:
+                if code == RRQ and self._store.options.after_busy == "acknowledgement":
+                    self._begin_busy_read(rest, number)
+                return [self._busy_answer()]
+            self._busy = self._store.options.busy
             return self._answer(code, number, rest)
         except Refusal as refusal:
             self.reset()
             return [self._error(refusal.code)]
+
+    def _begin_busy_read(self, rest: bytes, password: int) -> None:
+        """Open a file. Acknowledgement 0 then requests its first packet."""
+        if self._state is not State.IDLE:
+            raise Refusal(ILLEGAL)
+        self._data = bytearray(self._store.read(_name(rest), password, boot=self._boot()))
+        self._state = State.READING
 
     def _busy_answer(self) -> bytes:
         entire = min(self._store.options.busy, 0xFFFF)
@@ -86,12 +95,12 @@ class FileServer:
 
     def _answer(self, code: int, number: int, rest: bytes) -> list[bytes]:
         if code in (RRQ, WRQ):
-            return self._open(code, rest.split(b"\0", 1)[0].decode("latin-1"), number)
+            return self._open(code, _name(rest), number)
         if code == DATA and self._state is State.WRITING:
             return self._take(number, rest)
         if code == ACK and self._state in (State.READING, State.LAST_SENT):
             return self._acknowledged(number)
-        if code == BUSY and self._state in (State.READING, State.LAST_SENT):
+        if code == BUSY and self._packet and self._state in (State.READING, State.LAST_SENT):
             return [self._packet_answer()]
         if code == ERR:
             self.reset()
@@ -143,3 +152,7 @@ class FileServer:
     def _error(self, code: int) -> bytes:
         text = TEXTS.get(code, "") if self._store.options.error_texts else ""
         return HEADER.pack(ERR, code) + text.encode()
+
+
+def _name(rest: bytes) -> str:
+    return rest.split(b"\0", 1)[0].decode("latin-1")
