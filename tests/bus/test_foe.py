@@ -178,6 +178,51 @@ def test_boot_twice(sub: SubDevice) -> None:
     assert sub.read_state().state is AlState.PRE_OP
 
 
+def test_boot_requested_in_boot_keeps_the_counter_of_the_mailbox(sub: SubDevice) -> None:
+    for _ in range(2):
+        sub.request_state("BOOT")
+        with pytest.raises(FoeError, match="not accessible in the state BOOT"):
+            sub.foe.read("log.txt")  # one message
+    assert sub.file_channel is not None
+    assert sub.file_channel.counter == 2  # a device drops a message with the last counter
+
+
+def test_a_device_that_was_left_in_boot(sub: SubDevice) -> None:
+    sub.request_state("BOOT")
+    [_, found] = sub.main.passive_scan()  # type: ignore[attr-defined]
+    assert found.read_state().state is AlState.BOOT
+    found.request_state("BOOT")
+    with pytest.raises(FoeError, match="not accessible in the state BOOT"):
+        found.foe.read("log.txt")
+
+
+def test_an_interruption_of_the_transition_leaves_the_device_in_init(
+    sub: SubDevice, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    request_state = SubDevice.request_state
+
+    def interrupt(device: SubDevice, state: AlState) -> object:
+        outcome = request_state(device, state)
+        if state is AlState.BOOT:
+            raise KeyboardInterrupt
+        return outcome
+
+    monkeypatch.setattr(SubDevice, "request_state", interrupt)
+    with pytest.raises(KeyboardInterrupt), sub.boot():
+        pass
+    assert sub.read_state().state is AlState.INIT
+
+
+def test_a_refused_boot_leaves_the_device_in_init_without_an_error(
+    sub: SubDevice, terminal: AnalogInputs
+) -> None:
+    terminal.refuse_state(3, 0x0029, times=1)
+    with pytest.raises(StateError, match="0x0029"), sub.boot():
+        pass
+    found = sub.read_state()
+    assert (found.state, found.error) == (AlState.INIT, False)
+
+
 def test_an_error_in_boot_leaves_the_device_in_init(sub: SubDevice) -> None:
     with pytest.raises(FoeError, match="not accessible in the state BOOT"), sub.boot() as foe:
         foe.read("log.txt")

@@ -163,7 +163,7 @@ class SubDevice:
             ValueError: The text or the number is not a state.
         """
         target = AlState.from_name(state) if isinstance(state, str) else AlState(state)
-        if target is AlState.BOOT:
+        if target is AlState.BOOT and (self._boot_channel is None or not self.in_boot):
             self._prepare_boot()
         outcome = self.main.request_states(self.main.subs, [self.position], target)[self.position]
         if isinstance(outcome, CatenaryError):
@@ -189,8 +189,8 @@ class SubDevice:
         """
         self.main.require_no_loop()
         self.request_state(AlState.INIT)  # also restarts the mailbox of a device in BOOT
-        self.request_state(AlState.BOOT)
         try:
+            self.request_state(AlState.BOOT)
             yield self.foe
         except BaseException:
             with suppress(CatenaryError):
