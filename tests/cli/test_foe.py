@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import json
 import shlex
 from pathlib import Path
@@ -76,6 +77,14 @@ def test_write(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     )
 
 
+def test_write_from_stdin(
+    folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr("sys.stdin", io.TextIOWrapper(io.BytesIO(b"abc")))
+    status, out, _ = call(f"foe write virtual:cell.toml 1 - --name PARAM {PASSWORD}", capsys)
+    assert (status, out.endswith("3 bytes written: PARAM\n")) == (0, True)
+
+
 @pytest.mark.parametrize(
     ("line", "status", "message"),
     [
@@ -83,6 +92,12 @@ def test_write(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
         (f"foe read virtual:cell.toml 1 x {PASSWORD}", 1, "file not found"),
         (f"foe read virtual:cell.toml 1 log.txt {PASSWORD} --max-size 3", 1, "larger than 3 bytes"),
         ("foe read virtual:cell.toml 0 log.txt", 1, "has no mailbox"),
+        (f"foe read virtual:cell.toml 1 missing/log.txt {PASSWORD}", 2, "no folder missing"),
+        ("foe read virtual:cell.toml 1 missing/log.txt", 2, "no folder missing"),  # before a frame
+        ("foe read virtual:cell.toml 1 . --name log.txt", 2, "a file is needed"),
+        ("foe write virtual:cell.toml 1 -", 2, "add --name NAME"),
+        ("firmware virtual:cell.toml 1 empty.efw --name app.efw", 2, "empty.efw is empty"),
+        ("foe write virtual:cell.toml 1 app.efw --password 0x1234", 1, "--boot"),
         ("foe write virtual:cell.toml 1 missing", 1, "No such file"),
         ("foe read virtual:cell.toml 5 log.txt", 2, "there is no device 5"),
         ("foe read virtual:cell.toml 1 -", 2, "add --name NAME"),
@@ -95,6 +110,7 @@ def test_write(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
 def test_errors(
     folder: Path, line: str, status: int, message: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
+    (folder / "empty.efw").write_bytes(b"")
     found, _, err = call(line, capsys)
     assert (found, message in err) == (status, True), err
     assert not (folder / "log.txt").exists()

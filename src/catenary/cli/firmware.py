@@ -5,12 +5,11 @@ from __future__ import annotations
 import argparse
 import json
 import sys
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from catenary.cli.arguments import number, positive_seconds
-from catenary.cli.failure import one_line, with_hint
-from catenary.cli.foe import add_transfer_options, name_in_device, require_interface
+from catenary.cli.failure import UsageError, one_line, with_hint
+from catenary.cli.foe import add_transfer_options, contents, name_in_device, require_interface
 from catenary.cli.parsers import Commands, add_command, add_json, add_position, add_target
 from catenary.cli.progress import TransferProgress, transfer_text
 from catenary.cli.text import escaped
@@ -70,12 +69,13 @@ def _add_checks(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     from catenary.bus.firmware import FirmwareUpdate, require_idle
-    from catenary.bus.foe import contents_of
     from catenary.cli.devices import device_at
     from catenary.target import MainDevice
 
     require_interface(arguments)
-    options, data = _options(arguments), contents_of(Path(arguments.file))
+    options, data = _options(arguments), contents(arguments)
+    if not data:  # a device erases its memory before it receives the first byte
+        raise UsageError(f"{arguments.file} is empty", hint="give the firmware file of the vendor")
     with (
         MainDevice(arguments.target, force=arguments.force) as main,
         TransferProgress("writing") as progress,

@@ -20,6 +20,7 @@ from catenary.cli.parsers import (
     add_target,
 )
 from catenary.cli.progress import TransferProgress
+from catenary.cli.sdo_value import write_bytes
 from catenary.cli.share_target import names_share
 
 if TYPE_CHECKING:
@@ -27,7 +28,7 @@ if TYPE_CHECKING:
 
     from catenary.bus import MainDevice, SubDevice
 
-STDOUT = "-"
+STDIO = "-"
 
 
 def add_parser(commands: Commands) -> None:
@@ -68,7 +69,7 @@ def _add_write(group: Commands) -> None:
         description="Writes FILE to the device.",
         example="catenary foe write eth0 2 parameters.bin --name PARAM",
     )
-    _add_common(writing, "file to read on this machine")
+    _add_common(writing, "file to read on this machine; - is stdin")
     writing.set_defaults(run=run_write)
 
 
@@ -123,10 +124,27 @@ def require_interface(arguments: argparse.Namespace) -> None:
 
 def name_in_device(arguments: argparse.Namespace) -> str:
     """Return the name of the file in the device."""
-    if arguments.name is None and arguments.file == STDOUT:
+    if arguments.name is None and arguments.file == STDIO:
         raise UsageError("foe needs a file name", hint="add --name NAME")
     name: str = Path(arguments.file).name if arguments.name is None else arguments.name
     return name
+
+
+def contents(arguments: argparse.Namespace) -> bytes:
+    """Return the contents of FILE, or of stdin for "-"."""
+    from catenary.bus.foe import contents_of
+
+    if arguments.file == STDIO:
+        return sys.stdin.buffer.read()
+    return contents_of(Path(arguments.file))
+
+
+def _require_folder(path: Path) -> None:
+    """Raise UsageError if a file cannot be written because of its folder."""
+    if path.is_dir():
+        raise UsageError(f"{path} is a folder: a file is needed", hint=f"{path}/NAME")
+    if not path.parent.is_dir():
+        raise UsageError(f"there is no folder {path.parent}", hint=f"mkdir {path.parent}")
 
 
 def run_read(arguments: argparse.Namespace) -> int:
@@ -135,6 +153,7 @@ def run_read(arguments: argparse.Namespace) -> int:
 
     require_interface(arguments)
     name = name_in_device(arguments)
+    _require_folder(Path(arguments.file))
     with (
         MainDevice(arguments.target, force=arguments.force) as main,
         TransferProgress("reading") as progress,
@@ -149,20 +168,17 @@ def run_read(arguments: argparse.Namespace) -> int:
                 timeout=arguments.timeout,
                 busy_timeout=arguments.busy_timeout,
             )
-    if arguments.file == STDOUT:
-        sys.stdout.buffer.write(data)
-        return 0
-    Path(arguments.file).write_bytes(data)
-    _report(arguments, device, name, len(data), "read")
+    write_bytes(arguments.file, data)
+    if arguments.file != STDIO:
+        _report(arguments, device, name, len(data), "read")
     return 0
 
 
 def run_write(arguments: argparse.Namespace) -> int:
-    from catenary.bus.foe import contents_of
     from catenary.target import MainDevice
 
     require_interface(arguments)
-    name, data = name_in_device(arguments), contents_of(Path(arguments.file))
+    name, data = name_in_device(arguments), contents(arguments)
     with (
         MainDevice(arguments.target, force=arguments.force) as main,
         TransferProgress("writing") as progress,

@@ -184,7 +184,7 @@ def send_error(transfer: Transfer, code: ErrorCode) -> Procedure[None]:
 
 def _refused(transfer: Transfer, answer: Error) -> FoeError:
     meaning = error_meaning(answer.code)
-    words = f" ({answer.text})" if answer.text else ""
+    words = f" ({answer.text})" if answer.text not in ("", meaning.text) else ""
     place = f" after {transfer.progress.done} bytes" if transfer.progress.done else ""
     return FoeError(
         f"{transfer} refused{place} with 0x{answer.code:04X}: {meaning.text}{words}",

@@ -87,14 +87,14 @@ ERRORS = {
     ErrorCode.ALREADY_EXISTS: ErrorMeaning("file already exists", "use another name"),
     ErrorCode.NO_USER: ErrorMeaning("no user"),
     ErrorCode.BOOTSTRAP_ONLY: ErrorMeaning(
-        "access only in the state BOOT", "bring the device to BOOT first"
+        "access only in the state BOOT", "bring the device to BOOT first: --boot, or sub.boot()"
     ),
     ErrorCode.NOT_IN_BOOTSTRAP: ErrorMeaning(
         "file not accessible in the state BOOT",
-        "check the name of the file, or bring the device to PRE-OP",
+        "check the name of the file (--name), or transfer it in PRE-OP",
     ),
     ErrorCode.NO_RIGHTS: ErrorMeaning(
-        "no access rights, or wrong password", "the vendor of the device provides the password"
+        "no access rights, or wrong password", "the vendor provides the password (--password)"
     ),
     ErrorCode.PROGRAM_ERROR: ErrorMeaning("error of the program in the device"),
     ErrorCode.CHECKSUM: ErrorMeaning(
