@@ -317,6 +317,50 @@ def test_a_device_that_does_not_return() -> None:
     assert result.end.state is None
 
 
+def test_a_device_that_restarts_late() -> None:
+    cell = Cell(restart="power")
+
+    def delay(step: Step) -> None:
+        if step is Step.RESTART:
+            scheduler = cell.terminal._scheduler
+            assert scheduler is not None
+            cell.terminal.application.on_restart = lambda: scheduler.after(
+                3_000_000_000, cell.terminal.reset
+            )
+
+    cell.steps = _Calls(delay)
+    result = cell.update(version="2.0")
+    assert (result.error, cell.version) == (None, "2.0")
+
+
+def test_another_identity_after_the_restart(monkeypatch: pytest.MonkeyPatch) -> None:
+    cell = Cell()
+
+    def replace_device(step: Step) -> None:
+        if step is Step.RESTART:  # the EEPROM of a virtual device does not change
+            monkeypatch.setattr("catenary.bus.firmware.same_device", lambda *_: False)
+
+    cell.steps = _Calls(replace_device)
+    result = cell.update(restart_timeout=5.0)
+    assert isinstance(result.error, IdentityError)
+    assert "device 1 is now vendor" in result.error.message
+    assert result.end.state is AlState.PRE_OP
+    assert "is now vendor" in result.end.next_step
+
+
+def test_a_device_that_keeps_its_firmware() -> None:
+    cell = Cell(restart="power")
+
+    def keep(step: Step) -> None:
+        if step is Step.RESTART:
+            cell.terminal.application.on_restart = lambda: None
+
+    cell.steps = _Calls(keep)
+    result = cell.update(version="2.0", restart_timeout=5.0)
+    assert isinstance(result.error, FirmwareError)
+    assert "reports version 1.0" in result.error.message
+
+
 class _Calls(list[Step]):
     """List that also passes each new element to a function."""
 

@@ -13,12 +13,11 @@ from catenary.bus.firmware_result import (
     End,
     FirmwareOptions,
     FirmwareResult,
-    Reported,
     Step,
 )
+from catenary.bus.firmware_version import Reported, read_reported, same_device
 from catenary.bus.foe import ProgressReport
 from catenary.bus.main_device import MainDevice
-from catenary.bus.sub_device import SubDevice
 from catenary.errors import (
     CatenaryError,
     ConfigurationError,
@@ -28,8 +27,6 @@ from catenary.errors import (
     ResponseTimeout,
     StateError,
 )
-from catenary.model.device import Identity
-from catenary.model.text import printable
 from catenary.procedure.al_state import read_state, request_state
 from catenary.procedure.exchange import Procedure, after
 from catenary.wire.al import AlState
@@ -37,7 +34,6 @@ from catenary.wire.al import AlState
 NO_VALID_FIRMWARE = 0x0014  # AL status code
 RECOVERY_TIMEOUT = 10.0  # [s] until it returns after a failure
 RETRY_PAUSE = 0.5  # [s] between two scans while the device restarts
-IDENTITY, VERSION = 0x1018, 0x100A  # objects
 
 
 def require_idle(main: MainDevice) -> None:
@@ -94,12 +90,16 @@ class FirmwareUpdate:
 
     def run(self) -> FirmwareResult:
         """Update the firmware. An error is part of the result."""
+        failure: CatenaryError
         try:
-            end = self._update()
-        except (CatenaryError, KeyboardInterrupt) as error:
-            failure = error if isinstance(error, CatenaryError) else self._interrupted()
-            return self._result(self._end_after_failure(), failure)
-        return self._result(end, None)
+            return self._result(self._update(), None)
+        except CatenaryError as error:
+            failure = error
+        except KeyboardInterrupt:
+            failure = FirmwareError(
+                f"{self._sub.station}: the update was interrupted (Ctrl+C) during the {self._step}"
+            )
+        return self._result(self._end_after_failure(), failure)
 
     def _update(self) -> End:
         steps = {
@@ -190,9 +190,9 @@ class FirmwareUpdate:
         self._await_return(self._options.restart_timeout)
 
     def _verified(self) -> Reported:
+        now = self._read_after_restart()
         sub, before, expected = self._sub, self._before, self._options.version
-        now = read_reported(sub)
-        if before is not None and not _same_device(before.identity, now.identity):
+        if before is not None and not same_device(before.identity, now.identity):
             raise IdentityError(
                 f"{sub.station} reports another identity after the update: {now.identity}; before: "
                 f"{before.identity}",
@@ -210,6 +210,18 @@ class FirmwareUpdate:
             self._notes.append("identity and version are the same as before the update")
         return now
 
+    def _read_after_restart(self) -> Reported:
+        """Read identity and version. If another version is expected, wait for a late restart."""
+        end_ns = self._main.link.now() + round(self._options.restart_timeout * 1e9)
+        while True:
+            now = read_reported(self._sub)
+            pending = now.version is None or (self._before is not None and now == self._before)
+            expected = self._options.version not in (None, now.version)
+            if not (expected and pending) or self._main.link.now() >= end_ns:
+                return now
+            self._main.converse(_pause())
+            self._await_return(self._options.restart_timeout)
+
     # -- restart and failure -------------------------------------------------------------------
 
     def _await_return(self, timeout: float) -> None:
@@ -226,7 +238,7 @@ class FirmwareUpdate:
             invalid = isinstance(error, StateError) and error.code == NO_VALID_FIRMWARE
             if invalid or self._main.link.now() >= end_ns:
                 raise error
-            self._main.converse(_pause(RETRY_PAUSE))
+            self._main.converse(_pause())
 
     def _scan_error(self) -> CatenaryError | None:
         """Scan the segment. Return the reason why the device is not in PRE-OP, if there is one."""
@@ -234,13 +246,22 @@ class FirmwareUpdate:
             subs = self._main.scan(strict=False)
         except CatenaryError as error:
             return error
-        if len(subs) == self._count and _same_device(self._first, subs[self._position].identity):
-            self._sub = subs[self._position]
-            return self._sub.error
-        return ResponseTimeout(
-            f"device {self._position} has not returned: the segment has {len(subs)} devices "
-            f"instead of {self._count}, or another device is at its position",
-            hint="check its power and its cables",
+        if len(subs) != self._count:
+            return ResponseTimeout(
+                f"device {self._position} has not returned: the segment has {len(subs)} devices "
+                f"instead of {self._count}",
+                hint="check its power and its cables",
+            )
+        found = subs[self._position]
+        if same_device(self._first, found.identity):
+            self._sub = found
+            return found.error
+        return IdentityError(
+            f"device {self._position} is now {found.identity}; before: {self._first}",
+            position=self._position,
+            expected=self._first,
+            found=found.identity,
+            hint="the file may belong to another product, or the cables were changed",
         )
 
     def _end_after_failure(self) -> End:
@@ -256,6 +277,9 @@ class FirmwareUpdate:
             next_step = f"it refuses PRE-OP ({error.message}): power-cycle it and repeat the update"
             if error.code == NO_VALID_FIRMWARE:
                 next_step = "only its boot loader runs: repeat the update with a valid file"
+            return End(self._present_state(), None, next_step)
+        except IdentityError as error:
+            next_step = f"{error.message}: check that the file is for this product"
             return End(self._present_state(), None, next_step)
         except CatenaryError:
             return End(
@@ -273,35 +297,6 @@ class FirmwareUpdate:
         except CatenaryError:
             return None
 
-    def _interrupted(self) -> FirmwareError:
-        return FirmwareError(
-            f"{self._sub.station}: the update was interrupted (Ctrl+C) during the {self._step}"
-        )
 
-
-def read_reported(sub: SubDevice) -> Reported:
-    """Read identity and version of a device: objects 0x1018 and 0x100A.
-
-    An identity that cannot be read is that of the SII.
-
-    Args:
-        sub: The device.
-    """
-    identity, version = sub.identity, None
-    with suppress(CatenaryError):
-        numbers = [int.from_bytes(sub.sdo.read(IDENTITY, k)[:4], "little") for k in range(1, 5)]
-        identity = Identity(*numbers)
-    with suppress(CatenaryError):
-        text = sub.sdo.read(VERSION).split(b"\0", 1)[0].decode("latin-1")
-        version = printable(text).strip()
-    return Reported(identity, version)
-
-
-def _same_device(before: Identity, now: Identity) -> bool:
-    """Compare two identities, of which one may be that of the SII without a serial number."""
-    serials = {before.serial, now.serial} - {0}
-    return (before.vendor, before.product) == (now.vendor, now.product) and len(serials) < 2
-
-
-def _pause(seconds: float) -> Procedure[None]:
-    yield after(seconds)
+def _pause() -> Procedure[None]:
+    yield after(RETRY_PAUSE)

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import NamedTuple
 
+from catenary.bus.firmware_version import Reported
 from catenary.errors import CatenaryError
-from catenary.model.device import Identity
 from catenary.procedure.foe_exchange import ANSWER_TIMEOUT, BUSY_TIMEOUT
 from catenary.wire.al import AlState
 
@@ -38,17 +38,6 @@ class FirmwareOptions:
     timeout: float = ANSWER_TIMEOUT  # [s] for each packet
     busy_timeout: float = BUSY_TIMEOUT  # [s]
     restart_timeout: float = RESTART_TIMEOUT  # [s]
-
-
-class Reported(NamedTuple):
-    """Identity and firmware version that a device reports."""
-
-    identity: Identity  # 0x1018; that of the SII if the object cannot be read
-    version: str | None  # 0x100A; None if it cannot be read
-
-    def __str__(self) -> str:
-        version = "unknown" if self.version is None else self.version
-        return f"version {version}, revision 0x{self.identity.revision:08X}"
 
 
 class End(NamedTuple):

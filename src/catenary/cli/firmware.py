@@ -16,7 +16,8 @@ from catenary.cli.text import escaped
 
 if TYPE_CHECKING:
     from catenary.bus import SubDevice
-    from catenary.bus.firmware_result import FirmwareOptions, FirmwareResult, Reported
+    from catenary.bus.firmware_result import FirmwareOptions, FirmwareResult
+    from catenary.bus.firmware_version import Reported
 
 
 def add_parser(commands: Commands) -> None:
