@@ -9,12 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from contextlib import suppress
 
-from catenary.bus.firmware_result import (
-    End,
-    FirmwareOptions,
-    FirmwareResult,
-    Step,
-)
+from catenary.bus.firmware_result import End, FirmwareOptions, FirmwareResult, Step
 from catenary.bus.firmware_version import Reported, read_reported, same_device
 from catenary.bus.foe import ProgressReport
 from catenary.bus.main_device import MainDevice
