@@ -201,7 +201,7 @@ def test_a_second_read_request_after_busy_is_illegal() -> None:
     assert made.ask(RRQ, 0, b"log")[0] == BUSY
     assert made.ask(RRQ, 0, b"log")[:2] == (ERR, 0x8004)
     assert made.ask(RRQ, 0, b"log")[0] == BUSY
-    assert made.ask(BUSY, 0)[:2] == (ERR, 0x8004)  # there is no packet to send again
+    assert made.ask(BUSY, 0)[:2] == (ERR, 0x8004)  # no packet was sent yet
 
 
 def test_a_busy_read_is_continued_with_the_request() -> None:

@@ -144,7 +144,7 @@ def _require_folder(path: Path) -> None:
     if path.is_dir():
         raise UsageError(f"{path} is a folder: a file is needed", hint=f"{path}/NAME")
     if not path.parent.is_dir():
-        raise UsageError(f"there is no folder {path.parent}", hint=f"mkdir {path.parent}")
+        raise UsageError(f"the folder {path.parent} does not exist", hint=f"mkdir {path.parent}")
 
 
 def run_read(arguments: argparse.Namespace) -> int:
