@@ -93,7 +93,7 @@ def test_write_from_stdin(
         (f"foe read virtual:cell.toml 1 log.txt {PASSWORD} --max-size 3", 1, "larger than 3 bytes"),
         ("foe read virtual:cell.toml 0 log.txt", 1, "has no mailbox"),
         (f"foe read virtual:cell.toml 1 missing/log.txt {PASSWORD}", 2, "missing does not exist"),
-        ("foe read virtual:cell.toml 1 missing/log.txt", 2, "missing does not exist"),  # before a frame
+        ("foe read virtual:cell.toml 1 missing/log.txt", 2, "missing does not exist"),
         ("foe read virtual:cell.toml 1 . --name log.txt", 2, "a file is needed"),
         ("foe write virtual:cell.toml 1 -", 2, "add --name NAME"),
         ("firmware virtual:cell.toml 1 empty.efw --name app.efw", 2, "empty.efw is empty"),

@@ -112,6 +112,10 @@ def test_every_error_code_has_a_text():
     assert error_meaning(0x38020001) is UNKNOWN_ERROR
 
 
+def test_bit_15_of_an_error_code_may_be_missing():
+    assert error_meaning(0x0001) is error_meaning(0x8001)
+
+
 def test_tshark_reads_the_same_fields(tshark: str, tmp_path: Path):
     """Let Wireshark's dissector judge the encoder.
 

@@ -11,6 +11,7 @@ Names and texts have one byte per character and no terminator.
 from __future__ import annotations
 
 import struct
+from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import IntEnum
 from typing import NamedTuple, TypeAlias
@@ -65,7 +66,7 @@ class ErrorMeaning(NamedTuple):
 
 # 0x8000 to 0x800B also in SOES (esc.h) and the SSC (ecatfoe.h); 0x800C to 0x8011 as TI's stack
 # (ESL_foeDemo.h) lists them.
-ERRORS = {
+ERRORS: Mapping[int, ErrorMeaning] = {
     ErrorCode.NOT_DEFINED: ErrorMeaning("error without a defined cause"),
     ErrorCode.NOT_FOUND: ErrorMeaning(
         "file not found",
@@ -115,8 +116,11 @@ UNKNOWN_ERROR = ErrorMeaning("code of the vendor", "the manual of the device exp
 
 
 def error_meaning(code: int) -> ErrorMeaning:
-    """Return the meaning of an error code; `UNKNOWN_ERROR` if the standard does not define it."""
-    return {int(known): meaning for known, meaning in ERRORS.items()}.get(code, UNKNOWN_ERROR)
+    """Return the meaning of an error code; `UNKNOWN_ERROR` if the standard does not define it.
+
+    Bit 15 may be missing, as in the definitions of Beckhoff's master sample and of Wireshark.
+    """
+    return ERRORS.get(code | 0x8000, UNKNOWN_ERROR)
 
 
 def _pack(code: OpCode, number: int, rest: bytes) -> bytes:
