@@ -299,6 +299,38 @@ def test_another_thread_transfers_with_progress_while_a_loop_runs() -> None:
     assert seen[-1] == len(CONTENT)
 
 
+def test_an_error_in_the_report_ends_a_transfer_next_to_a_loop() -> None:
+    servo = Servo(files=DeviceFiles(contents={"log.txt": CONTENT}))
+    errors: list[BaseException] = []
+    with cat.MainDevice(line(servo)) as main:
+        sub = main.scan()[1]
+        arm = cat.Drives([sub], counts_per_turn=2**20, velocity_limit=100.0)
+
+        def report(done: int, total: int | None) -> None:
+            raise LookupError("enough")
+
+        def write() -> None:
+            try:
+                sub.foe.write("new", CONTENT * 100, progress=report)
+            except LookupError as error:
+                errors.append(error)
+
+        with cat.Loop(arm) as loop:
+            thread = threading.Thread(target=write)
+            thread.start()
+            for _ in loop:
+                if not thread.is_alive():
+                    break
+            thread.join()
+            read = sub.foe.request("log.txt")
+            for _ in loop:
+                if read.done:
+                    break
+        assert read.result() == CONTENT
+    assert [str(error) for error in errors] == ["enough"]
+    assert "new" not in servo.store.files
+
+
 def test_a_busy_device_is_given_up_in_time() -> None:
     with MainDevice(line(device(busy=60_000))) as main:
         sub = main.scan()[1]

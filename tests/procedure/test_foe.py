@@ -338,6 +338,20 @@ def test_reordered_packets_end_a_read_with_an_error_message() -> None:
     assert server.received[-1] == Error(ErrorCode.PACKET_NUMBER)
 
 
+def test_a_stopped_transfer_ends_with_an_error_message() -> None:
+    progress = Progress()
+
+    class Stopping(Server):
+        def answer(self, request: Message) -> list[Message]:
+            progress.stopped = request == Data(2, content(5 * ROOM)[ROOM : 2 * ROOM])
+            return super().answer(request)
+
+    server = Stopping()
+    with pytest.raises(MailboxError, match=f"stopped after {2 * ROOM} bytes"):
+        play(write(channel(), "a", content(5 * ROOM), progress=progress), MailboxDevice(server))
+    assert server.received[-1] == Error(ErrorCode.NOT_DEFINED)
+
+
 def test_an_endless_file_ends_at_the_limit() -> None:
     class Endless(Server):
         def answer(self, request: Message) -> list[Message]:

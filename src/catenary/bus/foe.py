@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from os import PathLike
 from pathlib import Path
-from typing import Protocol, TypeAlias
+from typing import Protocol, TypeAlias, TypeVar
 
 from catenary.bus.pending import Pending
 from catenary.bus.runner import Watch
@@ -18,6 +18,7 @@ from catenary.procedure.mailbox import MailboxChannel
 from catenary.procedure.station import Station
 from catenary.wire.foe import Busy
 
+T = TypeVar("T")
 ProgressReport: TypeAlias = Callable[[int, int | None], object]
 Contents: TypeAlias = bytes | bytearray | memoryview | PathLike[str]
 
@@ -96,7 +97,7 @@ class Foe:
         """
         state = self._state = Progress()
         asked = self._read(name, password, max_size, state, _patience(timeout, busy_timeout))
-        return self._sub.main.converse(asked, _watch(state, progress))
+        return self._run(asked, state, progress)
 
     def write(
         self,
@@ -131,7 +132,7 @@ class Foe:
         """
         state = self._state = Progress()
         asked = self._write(name, data, password, state, _patience(timeout, busy_timeout))
-        self._sub.main.converse(asked, _watch(state, progress))
+        self._run(asked, state, progress)
 
     def request(self, name: str, *, password: int = 0, max_size: int = MAX_SIZE) -> Pending[bytes]:
         """Read a file while a loop runs, without waiting: poll `done`, then call `result()`.
@@ -150,6 +151,14 @@ class Foe:
         """
         asked = self._write(name, data, password, Progress(), Patience())
         return self._sub.main.request(asked)
+
+    def _run(self, asked: Procedure[T], state: Progress, progress: ProgressReport | None) -> T:
+        """Run a transfer. If the wait is interrupted, a loop ends the transfer."""
+        try:
+            return self._sub.main.converse(asked, _watch(state, progress))
+        except BaseException:
+            state.stopped = True
+            raise
 
     def _read(
         self, name: str, password: int, max_size: int, state: Progress, patience: Patience

@@ -56,11 +56,12 @@ PATIENCE = Patience()
 
 @dataclass(slots=True)
 class Progress:
-    """Progress of one transfer. The procedure updates it, and other code may read it."""
+    """Progress of one transfer. The procedure updates it, and other code may read or stop it."""
 
     total: int | None = None  # bytes of the file; None while a file is read
     done: int = 0  # bytes that the receiver has acknowledged
     busy: Busy | None = None  # last message of a busy device; None after any other answer
+    stopped: bool = False  # True ends the transfer before the next message
 
 
 class Transfer(NamedTuple):
@@ -120,6 +121,9 @@ def ask(
     deadline, pace = Deadline(patience.busy), Pace(BUSY_PAUSE, BUSY_PAUSE_MAX)
     accept = _acceptor(channel, expected, packet - 1)
     while True:
+        if transfer.progress.stopped:
+            yield from send_error(transfer, ErrorCode.NOT_DEFINED)
+            raise MailboxError(f"{transfer}: stopped after {transfer.progress.done} bytes")
         talk: Procedure[Message] = converse(
             channel, Type.FOE, message.encode(), accept, timeout=patience.answer
         )
