@@ -11,7 +11,15 @@ from collections import deque
 from dataclasses import dataclass
 from typing import Any, Protocol, TypeVar
 
-from catenary.bus.packing import Parcel, batches, indices, make_parcel, replies_of
+from catenary.bus.packing import (
+    Parcel,
+    batches,
+    expected_replies,
+    index_of,
+    indices,
+    make_parcel,
+    replies_of,
+)
 from catenary.bus.pending import Pending
 from catenary.bus.procedure_run import Task
 from catenary.bus.runner import ATTEMPTS, FRAME_TIMEOUT, FrameCounts, Watch
@@ -181,13 +189,15 @@ class AcyclicRunner:
 
     def _receive(self, now: int) -> None:
         while (raw := self._queue.acyclic_pop()) is not None:
-            try:
-                frame = decode_frame(raw)
-            except DecodeError:
-                self.counts.malformed += 1
-                continue
-            found = self._under_way.get(frame.datagrams[0].index)
-            replies = replies_of(found.parcel, frame, now) if found else None
+            found = self._under_way.get(index_of(raw))
+            replies = expected_replies(found.parcel, raw, now) if found else None
+            if replies is None:
+                try:
+                    frame = decode_frame(raw)
+                except DecodeError:
+                    self.counts.malformed += 1
+                    continue
+                replies = replies_of(found.parcel, frame, now) if found else None
             if found is None or replies is None:
                 self.counts.stale += 1
                 continue

@@ -10,8 +10,16 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from catenary.procedure.exchange import Reply, Request
+from catenary.wire import datagram as wire
 from catenary.wire.datagram import OVERHEAD, Datagram, EcatCommand
-from catenary.wire.frame import MAXIMUM_DATA, MAXIMUM_PAYLOAD, Frame, encode_frame
+from catenary.wire.frame import (
+    ETHERNET_HEADER_SIZE,
+    HEADER_SIZE,
+    MAXIMUM_DATA,
+    MAXIMUM_PAYLOAD,
+    Frame,
+    encode_frame,
+)
 
 INDEX_FIRST, INDEX_LAST = 0x80, 0xFF  # 0x00 to 0x7F belong to the cycle
 _COUNTED_ADDRESS = frozenset(  # every device increments their ADP
@@ -67,6 +75,40 @@ def batches(requests: Sequence[Request]) -> list[list[int]]:
 def make_parcel(requests: Sequence[Request], index: int) -> Parcel:
     datagrams = [Datagram(r.command, r.address, r.data, index) for r in requests]
     return Parcel(index, encode_frame(datagrams), tuple(requests))
+
+
+def expected_replies(parcel: Parcel, received: bytes, time_ns: int) -> list[Reply] | None:
+    """Return the replies of a frame that differs from the sent one only where devices change it.
+
+    This is the usual case for station addresses, and faster than `decode_frame` and `replies_of`.
+
+    Args:
+        parcel: Frame that was sent.
+        received: Frame that was received.
+        time_ns: Time of reception [ns].
+
+    Returns:
+        The replies; None if the frame must be decoded.
+    """
+    sent, place = parcel.frame, ETHERNET_HEADER_SIZE - 2  # the EtherType
+    if len(received) < len(sent) or received[place:HEADER_SIZE] != sent[place:HEADER_SIZE]:
+        return None
+    replies: list[Reply] = []
+    place = HEADER_SIZE
+    for request in parcel.requests:
+        start = place + wire.HEADER_SIZE
+        end = start + len(request.data)
+        if received[place : start - 2] != sent[place : start - 2]:  # all but the interrupt
+            return None
+        counter = received[end] | received[end + 1] << 8
+        replies.append(Reply(received[start:end], counter, False, time_ns))
+        place = end + wire.WORKING_COUNTER_SIZE
+    return replies
+
+
+def index_of(received: bytes) -> int:
+    """Return the index of the first datagram; -1 if the frame is too short."""
+    return received[HEADER_SIZE + 1] if len(received) > HEADER_SIZE + 1 else -1
 
 
 def replies_of(parcel: Parcel, frame: Frame, time_ns: int) -> list[Reply] | None:

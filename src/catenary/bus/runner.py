@@ -13,7 +13,15 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol, TypeAlias, TypeVar
 
-from catenary.bus.packing import Parcel, batches, indices, make_parcel, replies_of
+from catenary.bus.packing import (
+    Parcel,
+    batches,
+    expected_replies,
+    index_of,
+    indices,
+    make_parcel,
+    replies_of,
+)
 from catenary.bus.pending import Pending
 from catenary.bus.procedure_run import Task
 from catenary.errors import DecodeError
@@ -236,13 +244,16 @@ class BlockingRunner:
         under_way: dict[int, tuple[Parcel, list[int]]],
         replies: dict[int, Reply],
     ) -> None:
-        try:
-            frame = decode_frame(raw)
-        except DecodeError:
-            self._count_stray(raw)
-            return
-        parcel, group = under_way.get(frame.datagrams[0].index, (None, []))
-        found = replies_of(parcel, frame, self._link.now()) if parcel else None
+        now = self._link.now()
+        parcel, group = under_way.get(index_of(raw), (None, []))
+        found = expected_replies(parcel, raw, now) if parcel else None
+        if found is None:
+            try:
+                frame = decode_frame(raw)
+            except DecodeError:
+                self._count_stray(raw)
+                return
+            found = replies_of(parcel, frame, now) if parcel else None
         if parcel is None or found is None:
             self.counts.stale += 1
             return

@@ -169,6 +169,8 @@ class SubDevice:
         if isinstance(outcome, CatenaryError):
             raise outcome
         self.state = outcome.state
+        if target in (AlState.INIT, AlState.BOOT) and self.channel is not None:
+            self.channel.reset()  # its SyncManagers are configured again on the way to PRE-OP
         return outcome
 
     @contextmanager
@@ -198,8 +200,6 @@ class SubDevice:
             raise
         self.request_state(AlState.INIT)
         self.request_state(AlState.PRE_OP)
-        if self.channel is not None:
-            self.channel.reset()
 
     def _prepare_boot(self) -> None:
         """Make the mailbox for BOOT. Its counter restarts with that of the device."""

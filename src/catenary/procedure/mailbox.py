@@ -54,6 +54,7 @@ READ_TIMEOUT = 2.0  # [s] until it answers; AKD drives take long for 0x1010
 REPEAT_TIMEOUT = 0.2  # [s] until it acknowledges a repeat request
 EAGER_MAX = 256  # [bytes]; a larger mailbox is read after a status check, or if it should be full
 POLL = 100e-6  # [s] between the first two polls for an answer
+POLL_SOON = 20e-6  # [s] the same, if the last answer was there at the first poll
 TURN = 0.5e-3  # [s] between two checks for a free mailbox
 GRACE = 0.1  # [s] for an answer to a message whose frame was lost
 RECOVERIES = 5  # attempts per message; then the cable is assumed to be faulty
@@ -301,7 +302,9 @@ def _stuck(channel: MailboxChannel, full: bool, patience: float) -> MailboxError
 
 def _fetch(channel: MailboxChannel, deadline: Deadline) -> Procedure[Mailbox | None]:
     """Wait for the next message of the device. Return None if the deadline has passed."""
-    pace = Pace(max(POLL, channel.answer_delay_ns * 1e-10))  # a tenth of the expected time
+    # A tenth of the expected time; less if the answer cannot be much later than the last one.
+    first = POLL_SOON if channel.punctual else max(POLL, channel.answer_delay_ns * 1e-10)
+    pace = Pace(first)
     empty_ns: int | None = None
     while True:
         arrived, received, time_ns = yield from _poll(channel)

@@ -37,7 +37,8 @@ class Mailbox:
         self,
         ports: MailboxPorts,
         scheduler: Scheduler,
-        serve: Callable[[int, bytes], Iterable[bytes] | int],
+        serve: Callable[[bytes], Iterable[bytes]],
+        serve_other: Callable[[int, bytes], Iterable[bytes] | int | None],
         *,
         delay_ns: int,
         quirks: MailboxQuirks = NO_MAILBOX_QUIRKS,
@@ -47,14 +48,16 @@ class Mailbox:
         Args:
             ports: PDI side of the SyncManagers.
             scheduler: Delayed actions of the device.
-            serve: Function that returns the answers to a message, from its protocol and data, or
-                the code of a mailbox error.
+            serve: Function that returns the answers to a CoE message.
+            serve_other: Function that first receives every message: its protocol and data. It
+                returns the answers, the code of a mailbox error, or None for a CoE message.
             delay_ns: Time until a request is fetched [ns].
             quirks: Differences from the standard.
         """
         self._ports = ports
         self._scheduler = scheduler
         self._serve = serve
+        self._serve_other = serve_other
         self._delay_ns = delay_ns
         self._quirks = quirks
         self.silent = False
@@ -105,7 +108,9 @@ class Mailbox:
         if self._quirks.error_reply != "none" and protocol == COE_PROTOCOL:
             reply = struct.pack("<HH", 1, ERROR_UNSUPPORTED_PROTOCOL)
             return [(ERROR_PROTOCOL, reply[: 2 if self._quirks.error_reply == "short" else 4])]
-        served = self._serve(protocol, payload)
+        served = self._serve_other(protocol, payload)
+        if served is None:
+            return [(COE_PROTOCOL, answer) for answer in self._serve(payload)]
         if isinstance(served, int):
             return [(ERROR_PROTOCOL, struct.pack("<HH", 1, served))]
         return [(protocol, answer) for answer in served]

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import struct
 from dataclasses import dataclass
+from functools import cache
 from typing import Generic, TypeVar, cast
 
 from catenary.errors import DecodeError
@@ -235,6 +236,7 @@ def sync_manager_control(k: int) -> Register[int]:
     return Register(address, "<B", f"SyncManager {k} control")
 
 
+@cache  # read with every mailbox message
 def sync_manager_status(k: int) -> Register[int]:
     """Return the status register of SyncManager `k`: mailbox full, buffers."""
     address = 0x0805 + 8 * _checked(k, SYNC_MANAGER_COUNT)

@@ -156,6 +156,8 @@ def channels_of(mailbox_size: int) -> tuple[Channel, ...]:
 class Application:
     """Application of one device."""
 
+    on_restart: Callable[[], None] | None = None  # called if a new firmware is to start
+
     def __init__(
         self,
         core: Core,
@@ -179,7 +181,6 @@ class Application:
         boots, identification = self._bootstrap is not None, description.identification
         self.states = StateMachine(self, scheduler, identification, supports_boot=boots)
         self._files = FileAccess(store, self._box, self._bootstrap, self._state)
-        self.on_restart: Callable[[], None] | None = None  # called if a new firmware is to start
         self.history: DiagnosisHistory | None = None  # only of devices with 0x10F3
         self.dictionary = Dictionary(self._state)
         self._add_communication_objects(description, quirks.text_prefix)
@@ -195,7 +196,8 @@ class Application:
             description.mapping_quirks,
         )
         self._add_servers(description, quirks)
-        self.mailbox = Mailbox(self, scheduler, self._serve, delay_ns=delay_ns, quirks=quirks)
+        serve = self._serve_coe, self._serve_other
+        self.mailbox = Mailbox(self, scheduler, *serve, delay_ns=delay_ns, quirks=quirks)
         self._gate(mailbox=self._emulation, process_data=self._emulation)
 
     def _add_servers(self, description: Description, quirks: MailboxQuirks) -> None:
@@ -324,13 +326,13 @@ class Application:
         head = struct.pack("<HHB", EMERGENCY << 12, code, register)
         self.mailbox.send(head + data[:5].ljust(5, b"\0"))
 
-    def _serve(self, protocol: int, payload: bytes) -> Iterable[bytes] | int:
-        """Return the answers to a mailbox message, or the code of a mailbox error."""
+    def _serve_other(self, protocol: int, payload: bytes) -> Iterable[bytes] | int | None:
+        """Return the answers to a message, or the code of a mailbox error; None if it is CoE."""
         if protocol == FOE_PROTOCOL:
             return self._files.serve(payload)
         if protocol != COE_PROTOCOL or self._state() == BOOT:  # BOOT has no CoE, §6.4.1
             return ERROR_UNSUPPORTED_PROTOCOL
-        return ERROR_TOO_SHORT if len(payload) < 3 else self._serve_coe(payload)
+        return ERROR_TOO_SHORT if len(payload) < 3 else None
 
     def _serve_coe(self, payload: bytes) -> Iterable[bytes]:
         [header] = struct.unpack_from("<H", payload)
