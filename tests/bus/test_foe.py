@@ -21,6 +21,7 @@ from catenary.virtual import (
     Servo,
     make_firmware,
 )
+from catenary.virtual.foe.server import FileServer
 from catenary.wire.al import AlState
 
 IMAGE = make_firmware(0x0004_0002, "2.0", size=3000)
@@ -86,6 +87,17 @@ def test_a_busy_device_reports_its_own_progress() -> None:
         assert sub.foe.busy == ""
     request = [(0, ""), (0, "0/2 busy"), (0, "1/2 busy")]
     assert seen == [*request, *request, (3, "")]
+
+
+def test_a_busy_device_that_does_not_state_the_total(
+    sub: SubDevice, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    answers = iter([bytes.fromhex("06001e000000"), bytes.fromhex("050001800000")])
+    monkeypatch.setattr(FileServer, "serve", lambda *_: [next(answers)])
+    seen: list[str] = []
+    with pytest.raises(FoeError):
+        sub.foe.write("new", b"", progress=lambda *_: seen.append(sub.foe.busy))
+    assert "30" in seen
 
 
 @pytest.mark.parametrize("after_busy", ["acknowledgement", "request"])

@@ -62,9 +62,15 @@ class Foe:
 
     @property
     def busy(self) -> str:
-        """Progress that a busy device reports, such as "30/100 erase"; empty if it is not busy."""
+        """Progress that a busy device reports, such as "30/100 erase"; empty if it is not busy.
+
+        Without the second number, the device does not state the total (SSC, ecatfoe.c).
+        """
         busy = self._state.busy
-        return f"{busy.done}/{busy.entire} {busy.text}".strip() if busy is not None else ""
+        if busy is None:
+            return ""
+        total = f"/{busy.entire}" if busy.entire else ""
+        return f"{busy.done}{total} {busy.text}".strip()
 
     def read(
         self,
