@@ -67,6 +67,15 @@ def test_read_in_boot(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert (folder / "boot.log").read_bytes() == b"boot"
 
 
+def test_write_to_a_device_that_restarts_after_boot(
+    folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    cell = CELL.replace('version = "1.2"', 'version = "1.2", restart = "power"')
+    (folder / "cell.toml").write_text(cell)
+    status, out, err = call(f"foe write virtual:cell.toml 1 app.efw {PASSWORD} --boot", capsys)
+    assert (status, "10000 bytes written" in out, "catenary:" in err) == (0, True, False)
+
+
 def test_write(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     status, out, _ = call(
         f"foe write virtual:cell.toml 1 cell.toml --name PARAM {PASSWORD}", capsys

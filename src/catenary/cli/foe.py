@@ -5,7 +5,6 @@ from __future__ import annotations
 import argparse
 import json
 import sys
-from contextlib import nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -24,8 +23,6 @@ from catenary.cli.sdo_value import write_bytes
 from catenary.cli.share_target import names_share
 
 if TYPE_CHECKING:
-    from contextlib import AbstractContextManager
-
     from catenary.bus import MainDevice, SubDevice
 
 STDIO = "-"
@@ -158,16 +155,15 @@ def run_read(arguments: argparse.Namespace) -> int:
         MainDevice(arguments.target, force=arguments.force) as main,
         TransferProgress("reading") as progress,
     ):
-        device, session = _begin(main, arguments)
-        with session:
-            data = device.foe.read(
-                name,
-                password=arguments.password,
-                max_size=arguments.max_size or MAX_SIZE,
-                progress=lambda done, total: progress.report(done, total, device.foe.busy),
-                timeout=arguments.timeout,
-                busy_timeout=arguments.busy_timeout,
-            )
+        device = _prepared(main, arguments)
+        data = device.foe.read(
+            name,
+            password=arguments.password,
+            max_size=arguments.max_size or MAX_SIZE,
+            progress=lambda done, total: progress.report(done, total, device.foe.busy),
+            timeout=arguments.timeout,
+            busy_timeout=arguments.busy_timeout,
+        )
     write_bytes(arguments.file, data)
     if arguments.file != STDIO:
         _report(arguments, device, name, len(data), "read")
@@ -183,28 +179,31 @@ def run_write(arguments: argparse.Namespace) -> int:
         MainDevice(arguments.target, force=arguments.force) as main,
         TransferProgress("writing") as progress,
     ):
-        device, session = _begin(main, arguments)
-        with session:
-            device.foe.write(
-                name,
-                data,
-                password=arguments.password,
-                progress=lambda done, total: progress.report(done, total, device.foe.busy),
-                timeout=arguments.timeout,
-                busy_timeout=arguments.busy_timeout,
-            )
+        device = _prepared(main, arguments)
+        device.foe.write(
+            name,
+            data,
+            password=arguments.password,
+            progress=lambda done, total: progress.report(done, total, device.foe.busy),
+            timeout=arguments.timeout,
+            busy_timeout=arguments.busy_timeout,
+        )
     _report(arguments, device, name, len(data), "written")
     return 0
 
 
-def _begin(
-    main: MainDevice, arguments: argparse.Namespace
-) -> tuple[SubDevice, AbstractContextManager[object]]:
-    """Scan the segment. Return the device, and the block in which its files are accessible."""
+def _prepared(main: MainDevice, arguments: argparse.Namespace) -> SubDevice:
+    """Scan the segment, and return the device. Bring it to BOOT if `--boot` is given.
+
+    The end of the MainDevice brings it to INIT, like all devices.
+    """
     from catenary.cli.devices import device_at
 
     device = device_at(main.scan(strict=False), arguments.position)
-    return device, device.boot() if arguments.boot else nullcontext()
+    if arguments.boot:
+        device.request_state("INIT")
+        device.request_state("BOOT")
+    return device
 
 
 def _report(
