@@ -92,6 +92,10 @@ def test_write_from_stdin(
     monkeypatch.setattr("sys.stdin", io.TextIOWrapper(io.BytesIO(b"abc")))
     status, out, _ = call(f"foe write virtual:cell.toml 1 - --name PARAM {PASSWORD}", capsys)
     assert (status, out.endswith("3 bytes written: PARAM\n")) == (0, True)
+    monkeypatch.setattr("sys.stdin", io.TextIOWrapper(io.BytesIO(b"abc")))
+    monkeypatch.setattr("catenary.procedure.foe.MAX_SIZE", 2)
+    status, _, err = call(f"foe write virtual:cell.toml 1 - --name PARAM {PASSWORD}", capsys)
+    assert (status, "stdin exceeds 2 bytes" in err) == (2, True)
 
 
 @pytest.mark.parametrize(

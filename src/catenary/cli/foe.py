@@ -130,10 +130,14 @@ def name_in_device(arguments: argparse.Namespace) -> str:
 def contents(arguments: argparse.Namespace) -> bytes:
     """Return the contents of FILE, or of stdin for "-"."""
     from catenary.bus.foe import contents_of
+    from catenary.procedure.foe import MAX_SIZE
 
-    if arguments.file == STDIO:
-        return sys.stdin.buffer.read()
-    return contents_of(Path(arguments.file))
+    if arguments.file != STDIO:
+        return contents_of(Path(arguments.file))
+    data = sys.stdin.buffer.read(MAX_SIZE + 1)
+    if len(data) > MAX_SIZE:
+        raise UsageError(f"stdin exceeds {MAX_SIZE} bytes")
+    return data
 
 
 def _require_folder(path: Path) -> None:
