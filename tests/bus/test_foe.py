@@ -199,6 +199,15 @@ def test_boot_requested_in_boot_keeps_the_counter_of_the_mailbox(sub: SubDevice)
     assert sub.file_channel.counter == 2  # a device drops a message with the last counter
 
 
+def test_in_boot_the_processor_of_the_device_owns_its_eeprom(terminal: AnalogInputs) -> None:
+    segment = line(terminal)
+    with MainDevice(segment) as main:
+        subs = main.passive_scan()
+        segment.core.poke(1, 0x0500, b"\0")
+        main.request_states(subs, [1], AlState.BOOT)
+        assert segment.core.peek(1, 0x0500, 1) == b"\1"
+
+
 def test_a_device_that_was_left_in_boot(sub: SubDevice) -> None:
     sub.request_state("BOOT")
     [_, found] = sub.main.passive_scan()  # type: ignore[attr-defined]

@@ -68,7 +68,7 @@ def climb(
     """Bring a device to INIT, PRE-OP or BOOT.
 
     On the way up to PRE-OP, its mailbox is configured, and its EEPROM is assigned to its processor.
-    For BOOT, its bootstrap mailbox is configured.
+    For BOOT, its bootstrap mailbox is configured instead of the standard one.
 
     Args:
         station: The device.
@@ -91,6 +91,7 @@ def climb(
             yield from run_commands(station, device.register_commands, "IP")
         elif state is AlState.BOOT and before is not AlState.BOOT:
             yield from _open_bootstrap(station, device)
+            yield from hand_over(station)  # a boot loader may write it; TwinCAT's ENI files agree
         yield from request_state(station, state)
         before = state
     return channel
