@@ -155,6 +155,7 @@ def test_a_device_without_files_or_mailbox() -> None:
             coupler.foe.read("a")
         with pytest.raises(EepromError, match="no bootstrap mailbox"), terminal.boot():
             pass
+        assert terminal.read_state().state is AlState.PRE_OP
 
 
 def test_boot_uses_the_bootstrap_mailbox(sub: SubDevice, terminal: AnalogInputs) -> None:

@@ -190,6 +190,7 @@ class SubDevice:
             RuntimeError: A loop runs.
         """
         self.main.require_no_loop()
+        self._prepare_boot()  # before the device leaves its state, because this may fail
         self.request_state(AlState.INIT)  # also restarts the mailbox of a device in BOOT
         try:
             self.request_state(AlState.BOOT)
