@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from catenary.errors import SdoAbort
+from catenary.errors import DecodeError, SdoAbort
 from catenary.model.diagnosis_history import RawMessage, SyncCounter, described
 from catenary.procedure.diagnosis_history import (
     Upload,
@@ -111,20 +111,49 @@ def test_the_flags_and_the_time_of_the_device() -> None:
     assert described(found.messages[0], {1: "hot"}, found.now_ns).age == 2.0
 
 
+@pytest.mark.parametrize("number", [b"\x01", b"\x05", b"\x2c\x01"])
+def test_an_impossible_number_of_the_newest_message_is_an_error(number: bytes) -> None:
+    objects = history(6, {6: message(1)}) | {(0x10F3, 2): number}
+    with pytest.raises(DecodeError, match="0x10F3:02.*must be 0 or 6 to 255"):
+        run(read_history(from_objects(objects)))
+    with pytest.raises(DecodeError, match=f"received {int.from_bytes(number, 'little')}"):
+        run(read_newest(from_objects(objects)))
+
+
+@pytest.mark.parametrize("newest", range(6, 10))
+def test_messages_that_arrive_during_the_reading_are_left_for_the_next_one(newest: int) -> None:
+    """They replace the oldest messages of a full ring, which are read last."""
+    stored = {6 + (newest - 6 - back) % 4: message(10 - back) for back in range(4)}
+    objects = history(newest, stored)
+    upload = from_objects(objects)
+
+    def arriving(index: int, subindex: int) -> Procedure[bytes]:
+        data = yield from upload(index, subindex)
+        if subindex == newest:  # two messages arrive
+            for number in (1, 2):
+                objects[0x10F3, 6 + (newest - 6 + number) % 4] = message(10 + number)
+            objects[0x10F3, 2] = bytes((6 + (newest - 6 + 2) % 4,))
+        return data
+
+    found = run(read_history(arriving))
+    assert [each.message.text_id for each in found.messages] == [9, 10]
+    assert ids(objects, found.messages[-1]) == [11, 12]
+
+
 def test_a_malformed_message_is_shown() -> None:
     found = run(read_history(from_objects(history(6, {6: b"\x01\x02"}))))
     shown = described(found.messages[0], {}, None)
     assert (shown.severity, shown.text) == ("error", "malformed message of 2 bytes: 01 02")
 
 
-@given(st.integers(0, 255), st.integers(0, 255), st.binary(min_size=1, max_size=40))
+@given(st.integers(6, 255), st.integers(0, 255), st.binary(min_size=1, max_size=40))
 def test_any_numbers_end_after_a_bounded_number_of_requests(
     newest: int, maximum: int, data: bytes
 ) -> None:
     asked: list[tuple[int, int]] = []
     stored = dict.fromkeys(range(6, 256), data)
     run(read_history(from_objects(history(newest, stored, maximum), asked)))
-    assert len(asked) <= 5 + MESSAGES_MAX + 1
+    assert len(asked) <= 5 + MESSAGES_MAX + 2
 
 
 def test_acknowledged_messages() -> None:
