@@ -114,7 +114,7 @@ def test_the_flags_and_the_time_of_the_device() -> None:
 @pytest.mark.parametrize("number", [b"\x01", b"\x05", b"\x2c\x01"])
 def test_an_impossible_number_of_the_newest_message_is_an_error(number: bytes) -> None:
     objects = history(6, {6: message(1)}) | {(0x10F3, 2): number}
-    with pytest.raises(DecodeError, match="0x10F3:02.*must be 0 or 6 to 255"):
+    with pytest.raises(DecodeError, match=r"0x10F3:02.*must be 0 or 6 to 255"):
         run(read_history(from_objects(objects)))
     with pytest.raises(DecodeError, match=f"received {int.from_bytes(number, 'little')}"):
         run(read_newest(from_objects(objects)))

@@ -4,16 +4,26 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
 import catenary as cat
 from catenary.bus.event_types import DiagnosisReported, Event, SynchronisationFault
-from catenary.loop.watches.diagnosis import MESSAGES_PER_READING, _increase
+from catenary.errors import SdoAbort
+from catenary.loop.watches.diagnosis import (
+    FAILURES_MAX,
+    MESSAGES_PER_READING,
+    DiagnosisWatch,
+    _increase,
+)
+from catenary.procedure.exchange import Procedure
 from catenary.types import USINT
 from catenary.virtual import Coupler, HistoryOptions, MailboxQuirks, Segment, Servo
 from catenary.virtual.coe.diagnosis_history import FAULT, SYNC_LOST, TEXTS
 from catenary.virtual.faults import drive_fault, lose_frames, mailbox_silent
+from catenary.wire.al import AlState
+from catenary.wire.diagnosis_history import DiagnosisMessage
 from tests.bus.test_device_diagnosis import with_texts
 from tests.esi import servo_file
 
@@ -195,6 +205,90 @@ def test_devices_without_these_objects_are_left_alone() -> None:
         main.scan()
         with open_loop(main) as loop:
             assert events_after(loop, main, 0.3) == []
+
+
+class Device:
+    """A device whose objects are in a dictionary. An abort code stands for a refusal."""
+
+    def __init__(self) -> None:
+        self.objects: dict[tuple[int, int], bytes | int] = {}
+        self.sdo = SimpleNamespace(upload_small=self.upload)
+        self.description = SimpleNamespace(coe=True)
+        self.diagnosis = SimpleNamespace(texts={})
+        self.channel, self.state, self.station = None, AlState.OP, "device 1"
+        self.asked: list[tuple[int, int]] = []
+        self.events: list[Event] = []
+        self.steps = DiagnosisWatch(
+            [self],  # type: ignore[list-item]
+            1.0,
+            put=self.events.append,
+            now=lambda: 0.0,
+        ).run()
+
+    def upload(self, index: int, subindex: int) -> Procedure[bytes]:
+        self.asked.append((index, subindex))
+        found = self.objects.get((index, subindex), 0x0602_0000)
+        if isinstance(found, int):
+            raise SdoAbort("refused", position=1, index=index, subindex=subindex, code=found)
+        return found
+        yield []
+
+    def store(self, *text_ids: int) -> None:
+        messages = [DiagnosisMessage(0xE000, 0, each, 0).encode() for each in text_ids]
+        self.objects |= {(0x10F3, n): data for n, data in enumerate(messages, 6)}
+        self.objects |= {(0x10F3, 1): b"\x10", (0x10F3, 2): bytes((5 + len(messages),))}
+        self.objects |= {(0x10F3, 3): b"\0", (0x10F3, 4): b"\1", (0x10F3, 5): b"\0\0"}
+
+    def read(self) -> list[Event]:
+        """Make one reading, and return its events."""
+        self.events.clear()
+        self.asked.clear()
+        next(self.steps)
+        return list(self.events)
+
+
+def test_a_refusal_for_now_does_not_end_the_watch() -> None:
+    device = Device()
+    device.store(1)
+    assert device.read() == []
+    for place in ((0x10F3, 2), (0x10F3, 4)):
+        device.objects[place] = 0x0800_0022  # not in the present state
+    assert device.read() == []
+    device.store(1, 2)
+    assert text_ids(device.read()) == [2]
+
+
+def test_a_counter_that_is_refused_for_now_keeps_its_count() -> None:
+    device = Device()
+    counter = 0x1C32, 0x0B
+    device.objects = {counter: b"\x07\0", (0x1C32, 0x0C): b"\0\0"}
+    assert device.read() == []
+    device.objects[counter] = 0x0800_0022
+    assert device.read() == []
+    device.objects[counter] = b"\x09\0"
+    [event] = device.read()
+    assert isinstance(event, SynchronisationFault)
+    assert (event.count, event.total) == (2, 9)
+
+
+def test_a_reading_asks_for_no_object_twice() -> None:
+    device = Device()
+    device.store(1)
+    device.read()
+    device.store(1, 2)
+    assert text_ids(device.read()) == [2]
+    assert len(device.asked) == len(set(device.asked))
+
+
+def test_a_device_with_impossible_numbers_is_left_out() -> None:
+    device = Device()
+    device.store(1)
+    device.objects[0x10F3, 2] = b"\x2c\x01"  # 300
+    for _ in range(FAILURES_MAX):
+        assert device.read() == []
+        assert device.asked
+    assert device.read() == []
+    assert device.asked == []
 
 
 @pytest.mark.parametrize("interval", [0.0, -1.0, float("nan"), 1e6])

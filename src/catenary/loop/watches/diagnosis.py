@@ -21,6 +21,7 @@ from catenary.procedure.diagnosis_history import (
     read_sync_counters,
 )
 from catenary.procedure.exchange import Procedure, after
+from catenary.procedure.sdo import OBJECT_MISSING
 from catenary.wire.al import AlState
 
 MESSAGES_PER_READING = 20  # of one device; older ones stay on the device
@@ -106,7 +107,9 @@ class DiagnosisWatch:
         upload: Upload = subject.sub.sdo.upload_small
         try:
             state = yield from read_state(upload)
-        except SdoAbort:
+        except SdoAbort as error:
+            if error.code not in OBJECT_MISSING:
+                raise  # it refuses for now
             subject.has_history = False
             return
         if not state.newest:
@@ -116,7 +119,7 @@ class DiagnosisWatch:
         if known and not state.available:
             return
         limit = MESSAGES_PER_READING if subject.begun else 1
-        found = yield from read_history(upload, subject.last, limit=limit)
+        found = yield from read_history(upload, subject.last, limit=limit, state=state)
         if subject.begun:
             self._report(subject, found)
         if found.messages:
@@ -149,12 +152,11 @@ class DiagnosisWatch:
             for each in found
             for counter, number in each.by_counter.items()
         }
-        before, subject.counts = subject.counts, counts
-        subject.has_counters = bool(counts)
-        if not subject.begun:
-            return
+        before = subject.counts
+        subject.counts = before | counts  # a counter may be refused for now
+        subject.has_counters = bool(subject.counts)
         for (index, counter), total in counts.items():
-            count = _increase(before.get((index, counter), 0), total)
+            count = _increase(before.get((index, counter), total), total)
             # Most devices have the same counter for outputs and inputs.
             if count and subject.reported.get(counter) != total:
                 subject.reported[counter] = total
