@@ -94,6 +94,19 @@ def test_data_prints_the_newest_cycle(capsys: Capture) -> None:
     assert found["units"]["position"] == "rad"
 
 
+def test_data_accepts_the_form_of_a_target(capsys: Capture) -> None:
+    with program() as running:
+        assert main(["data", f"share:{running.name}"]) == 0
+    assert capsys.readouterr().out.startswith(f"{running.name}: running")
+
+
+def test_a_command_for_a_segment_names_those_for_a_share(capsys: Capture) -> None:
+    assert main(["pdos", "share:arm"]) == 1
+    hint = capsys.readouterr().err
+    for command in ("scan", "state", "diag", "messages", "sdo", "reg read", "shell"):
+        assert command in hint
+
+
 def test_data_of_a_missing_share(capsys: Capture) -> None:
     assert main(["data", "no-such-share"]) == 1
     assert "there is no share 'no-such-share'" in capsys.readouterr().err

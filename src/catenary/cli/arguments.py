@@ -56,6 +56,11 @@ def position(text: str) -> int:
     return value
 
 
+def share_name(text: str) -> str:
+    """Return the name of a share. The form of a target, such as `share:arm`, is accepted."""
+    return text.strip().removeprefix("share:")
+
+
 def password(text: str) -> int:
     value = number(text)
     if not 0 <= value <= 0xFFFF_FFFF:
