@@ -66,8 +66,10 @@ def add_parser(commands: Commands) -> None:
         "of shares and files. Needs catenary[completion] when it is printed, not when it is used. "
         "Print it again after an update.\n"
         "  bash: write it to ~/.local/share/bash-completion/completions/catenary\n"
-        "  zsh: write it to a file _catenary in a folder of $fpath",
-        example="catenary completion bash > ~/.local/share/bash-completion/completions/catenary\n"
+        "  zsh: write it to a file _catenary in a folder of $fpath\n"
+        "Create the folder first if it does not exist.",
+        example="mkdir -p ~/.local/share/bash-completion/completions\n"
+        "catenary completion bash > ~/.local/share/bash-completion/completions/catenary\n"
         "catenary completion zsh > ~/.zfunc/_catenary",
     )
     parser.add_argument("shell", metavar="SHELL", choices=SHELLS, help="bash or zsh")
