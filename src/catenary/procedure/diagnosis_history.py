@@ -74,9 +74,11 @@ def read_newest(upload: Upload) -> Procedure[int]:
         DecodeError: The number is not the subindex of a message.
     """
     newest = yield from _number(upload, NEWEST)
-    if newest and not FIRST_MESSAGE <= newest < FIRST_MESSAGE + MESSAGES_MAX:
+    if newest < FIRST_MESSAGE:
+        return 0  # slave stack code: 5 if all acknowledged messages have been deleted
+    if newest >= FIRST_MESSAGE + MESSAGES_MAX:
         raise DecodeError(
-            f"newest diagnosis message (0x10F3:02): received {newest}, must be 0 or "
+            f"newest diagnosis message (0x10F3:02): received {newest}, must be 0, or "
             f"{FIRST_MESSAGE} to {FIRST_MESSAGE + MESSAGES_MAX - 1}"
         )
     return newest
