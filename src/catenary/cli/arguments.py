@@ -134,6 +134,11 @@ def result_file(text: str) -> Path:
     return path
 
 
+def output_file(text: str) -> str:
+    """Return the path of a file that can be written, or "-" for stdout."""
+    return text if text == "-" else str(result_file(text))
+
+
 def seconds(text: str) -> float:
     try:
         value = float(text)

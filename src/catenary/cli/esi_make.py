@@ -7,7 +7,7 @@ import json
 import sys
 from pathlib import Path
 
-from catenary.cli.arguments import result_file
+from catenary.cli.arguments import output_file
 from catenary.cli.failure import UsageError
 from catenary.cli.parsers import (
     Commands,
@@ -42,11 +42,6 @@ def add_make(group: Commands) -> None:
     add_force(making)
     add_json(making)
     making.set_defaults(run=run_make)
-
-
-def output_file(text: str) -> str:
-    """Return the path of a file that can be written, or "-"."""
-    return text if text == "-" else str(result_file(text))
 
 
 def run_make(arguments: argparse.Namespace) -> int:
