@@ -208,7 +208,7 @@ def test_devices_without_these_objects_are_left_alone() -> None:
 
 
 class Device:
-    """A device whose objects are in a dictionary. An abort code stands for a refusal."""
+    """Device with objects in a dictionary. An integer is the abort code of a refusal."""
 
     def __init__(self) -> None:
         self.objects: dict[tuple[int, int], bytes | int] = {}
