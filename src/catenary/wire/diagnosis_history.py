@@ -137,11 +137,6 @@ class DiagnosisMessage:
         """Emergency error code in the diagnosis code; None if it has none."""
         return self.code >> 16 if self.code & 0xFFFF == EMERGENCY_CODE else None
 
-    @property
-    def is_complete(self) -> bool:
-        """True if all announced parameters were decoded."""
-        return not self.count or self.count == len(self.parameters)
-
     def encode(self) -> bytes:
         """Return the encoded bytes. Raises ValueError if a field does not fit."""
         count = self.count or len(self.parameters)
