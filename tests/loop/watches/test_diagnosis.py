@@ -17,9 +17,10 @@ from catenary.loop.watches.diagnosis import (
     DiagnosisWatch,
     _increase,
 )
+from catenary.model.diagnosis_history import SyncCounter
 from catenary.procedure.exchange import Procedure
 from catenary.types import USINT
-from catenary.virtual import Coupler, HistoryOptions, MailboxQuirks, Segment, Servo
+from catenary.virtual import Coupler, HistoryOptions, Segment, Servo
 from catenary.virtual.coe.diagnosis_history import FAULT, SYNC_LOST, TEXTS
 from catenary.virtual.faults import drive_fault, lose_frames, mailbox_silent
 from catenary.wire.al import AlState
@@ -199,14 +200,6 @@ def test_a_silent_mailbox_does_not_harm_the_loop(servo: Servo) -> None:
             assert loop.timing.counters["lost"] == 0
 
 
-def test_devices_without_these_objects_are_left_alone() -> None:
-    quirks = MailboxQuirks(missing_descriptions=(0x1018,))
-    with cat.MainDevice(Segment([Coupler(), Servo(mailbox_quirks=quirks)])) as main:
-        main.scan()
-        with open_loop(main) as loop:
-            assert events_after(loop, main, 0.3) == []
-
-
 class Device:
     """Device with objects in a dictionary. An integer is the abort code of a refusal."""
 
@@ -278,6 +271,17 @@ def test_a_reading_asks_for_no_object_twice() -> None:
     device.store(1, 2)
     assert text_ids(device.read()) == [2]
     assert len(device.asked) == len(set(device.asked))
+
+
+def test_a_device_without_these_objects_is_read_once() -> None:
+    device = Device()
+    assert device.read() == []
+    assert device.asked == [
+        (0x10F3, 2),
+        *((index, n) for index in (0x1C32, 0x1C33) for n in SyncCounter),
+    ]
+    with pytest.raises(StopIteration):
+        device.read()
 
 
 def test_a_device_with_impossible_numbers_is_left_out() -> None:
