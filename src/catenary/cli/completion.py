@@ -22,14 +22,16 @@ FUNCTIONS: Mapping[str, str] = {
     "STATE": "_catenary_states",
     "T": "_catenary_types",
 }
+# Bash expands words, also `$(...)`. So names from folders of other users must be plain.
 LISTS = r"""
+_catenary_plain() { case "$1" in *[!A-Za-z0-9._-]*) ;; *) echo "$1" ;; esac; }
 _catenary_list_interfaces() {
     local each
-    for each in /sys/class/net/*; do echo "${each##*/}"; done
+    for each in /sys/class/net/*; do _catenary_plain "${each##*/}"; done
 }
 _catenary_list_shares() {
     local each
-    while read -r each; do echo "${each##*/share-}"; done < <(
+    while read -r each; do _catenary_plain "${each##*/share-}"; done < <(
         find /run/catenary "/dev/shm/catenary-$UID" -maxdepth 1 -name 'share-*' 2>/dev/null)
 }
 _catenary_list_targets() {
