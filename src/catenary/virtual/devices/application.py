@@ -82,6 +82,7 @@ ENABLE_AND_MODE = 0x0F  # mask of direction and mode in the control byte of a Sy
 WATCHDOG_TRIGGER = 0x40  # bit in the same byte
 AL_STATUS, WATCHDOG_DIVIDER, WATCHDOG_TIME = 0x0130, 0x0400, 0x0420  # registers
 RAM_START, RAM_END = 0x1000, 0x3000
+SLOT_BYTES = 8  # of a slot, which has a sign
 BLOB_BYTES = 2048  # an object larger than any usual mailbox
 
 
@@ -483,7 +484,7 @@ class Application:
         def write(data: bytes) -> None:
             if len(data) != size:
                 raise Abort(TOO_LONG if len(data) > size else TOO_SHORT)
-            value = int.from_bytes(data, "little", signed=signed or bits == 64)
+            value = int.from_bytes(data, "little", signed=signed or size == SLOT_BYTES)
             self._core.put_slot(self._position, slot, value)
 
         writable = access & WRITE_ANY

@@ -166,8 +166,8 @@ class TwinObjects:
         )
         if is_axis and (entry.value is None or slot % _segment.SLOTS_PER_AXIS in WRITTEN):
             return made
-        signed = made.signed or entry.bits == SLOT_BITS_MAX
         data = self._fitted(entry)[: (entry.bits + 7) // 8]  # a device may send more
+        signed = made.signed or len(data) == SLOT_BITS_MAX // 8  # a slot has 64 bits with a sign
         value = int.from_bytes(data, "little", signed=signed)
         if not value and self._presets.get(slot):
             return _unset(made, self._presets[slot])
