@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Iterator
 from pathlib import Path
 from types import SimpleNamespace
@@ -14,12 +15,14 @@ from catenary.errors import SdoAbort
 from catenary.loop.watches.diagnosis import (
     FAILURES_MAX,
     MESSAGES_PER_READING,
+    TURN_MAX,
     DiagnosisWatch,
     _increase,
 )
 from catenary.model.diagnosis_history import SyncCounter
-from catenary.procedure.exchange import Procedure
-from catenary.types import USINT
+from catenary.procedure.exchange import Procedure, after
+from catenary.procedure.mailbox import TURN
+from catenary.types import UDINT, USINT
 from catenary.virtual import Coupler, HistoryOptions, Segment, Servo
 from catenary.virtual.coe.diagnosis_history import FAULT, SYNC_LOST, TEXTS
 from catenary.virtual.faults import drive_fault, lose_frames, mailbox_silent
@@ -105,6 +108,22 @@ def test_a_flood_is_bounded(servo: Servo, main: cat.MainDevice) -> None:
             servo.store_diagnosis(text_id)
         newest = list(range(200 - MESSAGES_PER_READING, 200))
         assert text_ids(events_after(loop, main, 0.3)) == newest
+
+
+def test_a_mailbox_in_constant_use_is_read_too(servo: Servo, main: cat.MainDevice) -> None:
+    sdo = main.subs[1].sdo
+    found: list[int] = []
+    with open_loop(main) as loop:
+        answers = [sdo.request(0x1018, 1, type=UDINT) for _ in range(3)]
+        for cycle in loop:
+            answers = [each for each in answers if not each.done]
+            answers += [sdo.request(0x1018, 1, type=UDINT) for _ in range(3 - len(answers))]
+            if cycle.number == 200:
+                servo.store_diagnosis(7)
+            found += text_ids(list(main.events))
+            if found or cycle.number == 2000:
+                break
+    assert found == [7]
 
 
 def test_a_cleared_history_begins_again(servo: Servo, main: cat.MainDevice) -> None:
@@ -208,7 +227,8 @@ class Device:
         self.sdo = SimpleNamespace(upload_small=self.upload)
         self.description = SimpleNamespace(coe=True)
         self.diagnosis = SimpleNamespace(texts={})
-        self.channel, self.state, self.station = None, AlState.OP, "device 1"
+        self.channel: SimpleNamespace | None = None
+        self.state, self.station = AlState.OP, "device 1"
         self.asked: list[tuple[int, int]] = []
         self.events: list[Event] = []
         self.steps = DiagnosisWatch(
@@ -271,6 +291,17 @@ def test_a_reading_asks_for_no_object_twice() -> None:
     device.store(1, 2)
     assert text_ids(device.read()) == [2]
     assert len(device.asked) == len(set(device.asked))
+
+
+def test_a_long_transfer_delays_the_other_devices_only_briefly() -> None:
+    device = Device()
+    transfer = object()
+    device.channel = SimpleNamespace(turns=deque([transfer]))
+    for _ in range(round(TURN_MAX / TURN)):
+        assert next(device.steps) == after(TURN)
+    assert next(device.steps) != after(TURN)  # the pause before the next device
+    assert device.asked == []
+    assert list(device.channel.turns) == [transfer]
 
 
 def test_a_device_without_these_objects_is_read_once() -> None:

@@ -21,12 +21,14 @@ from catenary.procedure.diagnosis_history import (
     read_sync_counters,
 )
 from catenary.procedure.exchange import Procedure, after
+from catenary.procedure.mailbox import turn_comes
 from catenary.procedure.sdo import OBJECT_MISSING
 from catenary.wire.al import AlState
 
 MESSAGES_PER_READING = 20  # of one device; older ones stay on the device
 FAILURES_MAX = 3  # in a row, before a device is left out for a while
 PAUSE = 10  # readings of a device that are left out
+TURN_MAX = 0.1  # [s] for a turn in the queue of a mailbox
 PERIOD_MIN = 0.001  # [s] between two devices
 COUNTS = 1 << 16  # counters have 16 bits
 
@@ -85,10 +87,11 @@ class DiagnosisWatch:
         if subject.left_out:
             subject.left_out -= 1
             return
+        if subject.sub.state is not AlState.OP:
+            return  # it is lost or returning
         channel = subject.sub.channel  # None with an external master
-        is_busy = channel is not None and bool(channel.turns)
-        if subject.sub.state is not AlState.OP or is_busy:
-            return  # it is lost or returning, or another request uses its mailbox
+        if channel is not None and not (yield from turn_comes(channel, TURN_MAX)):
+            return  # a long request uses its mailbox, such as the transfer of a file
         try:
             if subject.has_history:
                 yield from self._read_messages(subject)
