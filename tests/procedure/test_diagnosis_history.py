@@ -102,6 +102,13 @@ def test_a_maximum_of_0_does_not_hide_messages() -> None:
     assert ids(history(8, {n: message(n) for n in range(6, 9)}, maximum=0)) == [6, 7, 8]
 
 
+def test_a_maximum_of_0_is_taken_from_subindex_0() -> None:
+    """Beckhoff's EP3632: subindex 0 is 21, and it stores 16 messages."""
+    objects = history(7, {n: message(n) for n in range(6, 22)}, maximum=0)
+    objects[0x10F3, 0] = bytes((21,))
+    assert ids(objects) == [*range(8, 22), 6, 7]
+
+
 def test_the_flags_and_the_time_of_the_device() -> None:
     objects = history(6, {6: message(1, 10**9)}) | {(0x10F8, 0): (3 * 10**9).to_bytes(8, "little")}
     objects[0x10F3, 5] = b"\x31\0"
@@ -157,7 +164,7 @@ def test_any_numbers_end_after_a_bounded_number_of_requests(
     asked: list[tuple[int, int]] = []
     stored = dict.fromkeys(range(6, 256), data)
     run(read_history(from_objects(history(newest, stored, maximum), asked)))
-    assert len(asked) <= 5 + MESSAGES_MAX + 2
+    assert len(asked) <= 6 + MESSAGES_MAX + 2
 
 
 def test_acknowledged_messages() -> None:

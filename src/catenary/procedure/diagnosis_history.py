@@ -25,6 +25,7 @@ from catenary.wire.diagnosis_history import (
     AVAILABLE,
     FIRST_MESSAGE,
     FLAGS,
+    HIGHEST_SUBINDEX,
     HISTORY,
     MAXIMUM,
     MESSAGES_MAX,
@@ -40,7 +41,7 @@ Upload: TypeAlias = Callable[[int, int], Procedure[bytes]]  # reads an entry: in
 
 
 def read_state(upload: Upload) -> Procedure[RawHistory]:
-    """Read subindices 1 to 5 of the history, without messages.
+    """Read subindices 1 to 5 of the history. A maximum of 0 is taken from subindex 0.
 
     Args:
         upload: Function that reads an entry.
@@ -51,6 +52,9 @@ def read_state(upload: Upload) -> Procedure[RawHistory]:
     """
     newest = yield from read_newest(upload)
     maximum = yield from _optional(upload, MAXIMUM)
+    if not maximum:
+        highest = yield from _optional(upload, HIGHEST_SUBINDEX)
+        maximum = max(highest - FIRST_MESSAGE + 1, 0)
     acknowledged = yield from _optional(upload, ACKNOWLEDGED)
     available = yield from _optional(upload, AVAILABLE)
     flags = yield from _optional(upload, FLAGS)

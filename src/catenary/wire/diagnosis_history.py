@@ -15,7 +15,7 @@ from enum import IntEnum, IntFlag
 from catenary.errors import DecodeError
 
 HISTORY = 0x10F3
-MAXIMUM, NEWEST, ACKNOWLEDGED, AVAILABLE, FLAGS = range(1, 6)  # subindices
+HIGHEST_SUBINDEX, MAXIMUM, NEWEST, ACKNOWLEDGED, AVAILABLE, FLAGS = range(6)  # subindices
 FIRST_MESSAGE = 6  # subindex
 MESSAGES_MAX = 250  # subindices 6 to 255
 TIMESTAMP = 0x10F8  # present time of the device [ns]
