@@ -11,7 +11,7 @@ import pytest
 
 import catenary as cat
 from catenary.bus.event_types import DiagnosisReported, Event, SynchronisationFault
-from catenary.errors import SdoAbort
+from catenary.errors import MailboxError, SdoAbort
 from catenary.loop.watches.diagnosis import (
     FAILURES_MAX,
     MESSAGES_PER_READING,
@@ -224,6 +224,7 @@ class Device:
 
     def __init__(self) -> None:
         self.objects: dict[tuple[int, int], bytes | int] = {}
+        self.failing: set[int] = set()  # indices
         self.sdo = SimpleNamespace(upload_small=self.upload)
         self.description = SimpleNamespace(coe=True)
         self.diagnosis = SimpleNamespace(texts={})
@@ -240,6 +241,8 @@ class Device:
 
     def upload(self, index: int, subindex: int) -> Procedure[bytes]:
         self.asked.append((index, subindex))
+        if index in self.failing:
+            raise MailboxError("malformed answer")
         found = self.objects.get((index, subindex), 0x0602_0000)
         if isinstance(found, int):
             raise SdoAbort("refused", position=1, index=index, subindex=subindex, code=found)
@@ -282,6 +285,15 @@ def test_a_counter_that_is_refused_for_now_keeps_its_count() -> None:
     [event] = device.read()
     assert isinstance(event, SynchronisationFault)
     assert (event.count, event.total) == (2, 9)
+
+
+def test_counters_that_fail_do_not_hide_the_messages() -> None:
+    device = Device()
+    device.store(1)
+    device.failing = {0x1C32}
+    assert device.read() == []
+    device.store(1, 2)
+    assert text_ids(device.read()) == [2]
 
 
 def test_a_reading_asks_for_no_object_twice() -> None:

@@ -40,7 +40,7 @@ class _Subject:
     """State of one device in the watch."""
 
     sub: SubDevice
-    begun: bool = False
+    begun: bool = False  # True after the first reading of messages
     has_history: bool = True
     has_counters: bool = True
     last: RawMessage | None = None
@@ -95,6 +95,7 @@ class DiagnosisWatch:
         try:
             if subject.has_history:
                 yield from self._read_messages(subject)
+                subject.begun = True
             if subject.has_counters:
                 yield from self._read_counters(subject)
         except CatenaryError:  # frames are being lost, or its mailbox has failed
@@ -102,7 +103,7 @@ class DiagnosisWatch:
             if subject.failures >= FAILURES_MAX:
                 subject.failures, subject.left_out = 0, PAUSE
             return
-        subject.begun, subject.failures = True, 0
+        subject.failures = 0
 
     # Messages
 
