@@ -8,7 +8,8 @@ from pathlib import Path
 import pytest
 
 import catenary as cat
-from catenary.errors import MailboxError, SdoAbort
+from catenary.errors import DecodeError, MailboxError, SdoAbort
+from catenary.procedure.exchange import Procedure
 from catenary.types import BOOL, UINT, ULINT, USINT
 from catenary.virtual import Coupler, HistoryOptions, Segment, Servo
 from catenary.virtual.coe.diagnosis_history import FAULT, REFUSED, TEXTS
@@ -84,6 +85,29 @@ def test_acknowledged_messages(servo: Servo, sub: cat.SubDevice) -> None:
     store(servo, 3)
     assert [each.acknowledged for each in sub.diagnosis.messages()] == [True, True, False]
     assert number(sub, 3) == 7
+
+
+def test_a_message_that_arrives_after_the_reading_is_not_acknowledged(
+    servo: Servo, sub: cat.SubDevice
+) -> None:
+    store(servo, 1, 2)
+    known = sub.diagnosis.messages()
+    store(servo, 3)
+    sub.diagnosis.acknowledge(known[-1])
+    assert [each.acknowledged for each in sub.diagnosis.messages()] == [True, True, False]
+
+
+@pytest.mark.parametrize("call", ["messages", "acknowledge"])
+def test_an_impossible_number_names_the_device(
+    sub: cat.SubDevice, monkeypatch: pytest.MonkeyPatch, call: str
+) -> None:
+    def upload(index: int, subindex: int) -> Procedure[bytes]:
+        return b"\x2c\x01"  # 300
+        yield []
+
+    monkeypatch.setattr(sub.sdo, "upload_small", upload)
+    with pytest.raises(DecodeError, match=r"device 1 \(.*\): .*0x10F3:02.*received 300"):
+        getattr(sub.diagnosis, call)()
 
 
 def test_clear_deletes_all_messages(servo: Servo, sub: cat.SubDevice) -> None:

@@ -7,6 +7,7 @@ import pytest
 import catenary as cat
 from catenary.bus.sub_devices import SubDevices
 from catenary.errors import SegmentError, StateError
+from catenary.procedure.registers import write_register
 from catenary.virtual import Coupler, DigitalOutputs, Segment, Servo
 from catenary.wire.al import AlState
 
@@ -86,6 +87,17 @@ def test_a_refused_state_is_an_error_of_the_device() -> None:
         servo = main.scan()[1]
         with pytest.raises(StateError, match="servo"):
             servo.request_state("OP")  # without process data
+
+
+def test_a_device_with_emulation_recovers_from_a_copied_error_bit() -> None:
+    """A device without a microcontroller copies AL control to AL status, also its error bit."""
+    with cat.MainDevice(Segment([DigitalOutputs()])) as main:
+        outputs = main.scan()[0]
+        main.converse(write_register(outputs.station, 0x0120, bytes((0x12, 0))))
+        assert outputs.read_state().error
+        outputs.request_state("SAFEOP")
+        now = outputs.read_state()
+        assert (now.state, now.error) == (AlState.SAFE_OP, False)
 
 
 def test_a_notebook_shows_a_table() -> None:

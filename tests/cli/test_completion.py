@@ -76,6 +76,15 @@ def test_bash_offers_the_shares_of_the_user(bash_script: Path, tmp_path: Path) -
         assert running.name in complete(bash_script, "catenary data ", tmp_path)
 
 
+def test_a_name_that_is_shell_code_is_not_run(bash_script: Path, tmp_path: Path) -> None:
+    """Other users may create files in a shared folder, and bash expands words."""
+    bad = tmp_path / "bash"
+    listed = "find() { printf '%s\\n' '/x/share-$(id>found)' '/x/share-`id>found`' /x/share-arm; }"
+    bad.write_text(f"{bash_script.read_text()}\n{listed}\n")
+    assert complete(bad, "catenary data ", tmp_path) == ["arm"]
+    assert not (tmp_path / "found").exists()
+
+
 @pytest.mark.skipif(shutil.which("zsh") is None, reason="needs zsh")
 def test_zsh_accepts_the_script(tmp_path: Path) -> None:
     path = tmp_path / "_catenary"

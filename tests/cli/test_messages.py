@@ -7,10 +7,14 @@ import json
 import pytest
 
 import catenary as cat
+from catenary.bus.device_diagnosis import DeviceDiagnosis
 from catenary.cli.main import main
+from catenary.errors import MailboxError
+from catenary.model.diagnosis_history import SyncCounters
 from catenary.virtual import Coupler, HistoryOptions, Segment, Servo
 from tests.remote.programs import program
 
+NOTE = "note: times are virtual: they come from the segment's clock, not from this machine's\n"
 Capture = pytest.CaptureFixture[str]
 
 
@@ -70,6 +74,37 @@ def test_a_missing_device(machine: Machine, capsys: Capture) -> None:
     assert "there is no device 7" in capsys.readouterr().err
 
 
+def test_a_device_that_fails_does_not_hide_the_messages_of_others(
+    machine: Machine, capsys: Capture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    machine.servo.store_diagnosis(4, severity="info")
+    synchronisation = DeviceDiagnosis.synchronisation
+
+    def fail(self: DeviceDiagnosis) -> tuple[SyncCounters, ...]:
+        found = synchronisation(self)
+        if self._sub.station.position == 2:
+            raise MailboxError("device 2 (right): no answer", hint="power-cycle it")
+        return found
+
+    monkeypatch.setattr(DeviceDiagnosis, "synchronisation", fail)
+    assert main(["messages", "virtual"]) == 1
+    out, err = capsys.readouterr()
+    assert out.startswith("1 left: 1 message\n  info: ")
+    assert out.endswith("2 right: failed\n")
+    assert err == "error: device 2 (right): no answer\n  hint: power-cycle it\n" + NOTE
+    assert main(["messages", "virtual", "--json"]) == 1
+    left, right = json.loads(capsys.readouterr().out)
+    assert left["error"] is None
+    assert right["error"].startswith("device 2 (right): no answer")
+
+
+def test_a_device_without_objects_is_shown_if_it_is_chosen(
+    machine: Machine, capsys: Capture
+) -> None:
+    assert main(["messages", "virtual", "0"]) == 0
+    assert capsys.readouterr().out.endswith("coupler: no diagnosis history\n")
+
+
 def test_acknowledge_and_clear_exclude_each_other(capsys: Capture) -> None:
     with pytest.raises(SystemExit) as caught:
         main(["messages", "virtual", "--acknowledge", "--clear"])
@@ -83,8 +118,11 @@ def test_messages_of_a_running_loop(capsys: Capture) -> None:
         target = f"share:{running.name}"
         assert main(["messages", target]) == 0
         title, message, other = capsys.readouterr().out.splitlines()
-        assert (title, other) == ("1 left: 1 messages", "2 right: no diagnosis history")
+        assert (title, other) == ("1 left: 1 message", "2 right: no diagnosis history")
         assert message.startswith("  info: code 0x0000E000, text 0x0003, parameters 7")
+        assert main(["messages", target, "0", "--json"]) == 0
+        [coupler] = json.loads(capsys.readouterr().out)
+        assert (coupler["position"], coupler["messages"]) == (0, None)
         assert main(["messages", target, "9"]) == 2
         assert main(["messages", target, "1", "--clear"]) == 2
     assert "only read" in capsys.readouterr().err

@@ -73,6 +73,33 @@ def test_sdo_read_saves_the_bytes(tmp_path: Path, capsys: Capture) -> None:
     assert capsys.readouterr().out == ""
 
 
+def test_sdo_read_saves_the_bytes_and_prints_json(tmp_path: Path, capsys: Capture) -> None:
+    call = ["sdo", "read", "virtual", "2", "0x1018:1", "--json", "-o"]
+    assert main([*call, str(tmp_path / "vendor")]) == 0
+    assert json.loads(capsys.readouterr().out)["data"] == "594e5443"
+    assert (tmp_path / "vendor").read_bytes().hex() == "594e5443"
+    assert main([*call, "-"]) == 2
+
+
+def test_sdo_read_refuses_an_impossible_file_before_the_scan(tmp_path: Path) -> None:
+    with pytest.raises(SystemExit) as caught:
+        main(["sdo", "read", "no-such-interface", "2", "0x1008", "-o", str(tmp_path / "no" / "x")])
+    assert caught.value.code == 2
+
+
+@pytest.mark.parametrize("kind", ["BYTES", "STRING"])
+def test_sdo_write_refuses_a_value_that_is_too_large(
+    monkeypatch: pytest.MonkeyPatch, capsys: Capture, kind: str
+) -> None:
+    import io
+    import sys
+
+    monkeypatch.setattr("catenary.cli.sdo_value.STDIN_MAX", 8)
+    monkeypatch.setattr(sys, "stdin", io.TextIOWrapper(io.BytesIO(b"123456789")))
+    assert main(["sdo", "write", "virtual", "2", "0x6065", "-", "--type", kind]) == 2
+    assert "more than 8 bytes" in capsys.readouterr().err
+
+
 def test_sdo_write_reads_text_from_stdin(monkeypatch: pytest.MonkeyPatch, capsys: Capture) -> None:
     import io
     import sys
@@ -92,6 +119,19 @@ def test_data_prints_the_newest_cycle(capsys: Capture) -> None:
     assert found["fields"]["number"] > 0
     assert len(found["fields"]["position"]) == len(found["axes"])
     assert found["units"]["position"] == "rad"
+
+
+def test_data_accepts_the_form_of_a_target(capsys: Capture) -> None:
+    with program() as running:
+        assert main(["data", f"share:{running.name}"]) == 0
+    assert capsys.readouterr().out.startswith(f"{running.name}: running")
+
+
+def test_a_command_for_a_segment_names_those_for_a_share(capsys: Capture) -> None:
+    assert main(["pdos", "share:arm"]) == 1
+    hint = capsys.readouterr().err
+    for command in ("scan", "state", "diag", "messages", "sdo", "reg read", "shell"):
+        assert command in hint
 
 
 def test_data_of_a_missing_share(capsys: Capture) -> None:

@@ -27,6 +27,27 @@ def target(running: Running) -> str:
 Capture = pytest.CaptureFixture[str]
 
 
+@pytest.mark.parametrize(
+    "line",
+    [
+        "scan TARGET",
+        "state TARGET",
+        "messages TARGET",
+        "sdo read TARGET POSITION 0x1018:1",
+        "sdo list TARGET POSITION --values",
+        "reg read TARGET POSITION AL_STATUS",
+    ],
+)
+def test_json_has_the_same_keys_as_for_a_segment(line: str, target: str, capsys: Capture) -> None:
+    found = []
+    for name, position in ((target, "1"), ("virtual", "2")):
+        call = line.replace("TARGET", name).replace("POSITION", position)
+        assert main([*call.split(), "--json"]) == 0
+        value = json.loads(capsys.readouterr().out)
+        found.append(list(value[-1] if isinstance(value, list) else value))
+    assert found[0] == found[1]
+
+
 def test_scan_lists_the_devices(target: str, capsys: Capture) -> None:
     assert main(["scan", target]) == 0
     lines = capsys.readouterr().out.splitlines()

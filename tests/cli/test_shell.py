@@ -45,6 +45,19 @@ def test_an_error_of_a_device_has_its_hint(capsys: Capture) -> None:
     assert "has no mailbox" in capsys.readouterr().err
 
 
+def test_a_mistake_in_the_code_is_not_an_error_of_catenary(capsys: Capture) -> None:
+    assert main(["shell", "virtual", "-c", "def f():\n    return subs[9]\nf() + 1 / 0"]) == 1
+    error = capsys.readouterr().err
+    assert error.startswith('Traceback (most recent call last):\n  File "<catenary shell -c>"')
+    assert "internal error" not in error
+
+
+def test_the_code_may_choose_the_exit_status() -> None:
+    with pytest.raises(SystemExit) as caught:
+        main(["shell", "virtual", "-c", "exit(3)"])
+    assert caught.value.code == 3
+
+
 def test_leaving_stops_an_open_loop(monkeypatch: pytest.MonkeyPatch) -> None:
     segment: Segment = demo_segment()
     monkeypatch.setattr("catenary.target.main_device.parse", lambda _: segment)
@@ -143,5 +156,6 @@ def test_the_shell_of_ipython(tmp_path: Path) -> None:
     assert talk(Terminal(folder=tmp_path), "]: ", "exit\n") == 0
 
 
-def test_exit_ends_the_shell_of_python(tmp_path: Path) -> None:
-    assert talk(Terminal("--plain", folder=tmp_path), ">>> ", "exit()\n") == 0
+@pytest.mark.parametrize(("end", "status"), [("exit()\n", 0), ("exit(3)\n", 3)])
+def test_exit_ends_the_shell_of_python(tmp_path: Path, end: str, status: int) -> None:
+    assert talk(Terminal("--plain", folder=tmp_path), ">>> ", end) == status

@@ -133,3 +133,12 @@ def test_the_command_prints_the_file(capsys: pytest.CaptureFixture[str]) -> None
     assert out.startswith("<?xml")
     assert "<Index>#x607A</Index>" in out
     assert main(["esi", "make", "virtual", "2", "--json"]) == 2
+
+
+def test_an_impossible_file_is_refused_before_the_scan(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with pytest.raises(SystemExit) as caught:
+        main(["esi", "make", "no-such-interface", "2", "-o", str(tmp_path / "no" / "x.xml")])
+    assert caught.value.code == 2
+    assert "does not exist" in capsys.readouterr().err

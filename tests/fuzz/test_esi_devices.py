@@ -133,3 +133,27 @@ def test_an_absurd_device_is_refused_or_scanned(
         except CatenaryError:
             return
         assert sub.identity.product == 2
+
+
+def test_an_object_of_57_bits_may_have_its_highest_byte_set() -> None:
+    """Found by `test_an_absurd_device_is_refused_or_scanned`."""
+    default = bytes(7) + b"\x80"
+    entry = EsiObjectEntry(0x7000, 1, "x", "", 57, "rw", "R", default)
+    device = EsiDevice(
+        DeviceKey(1, 2, 3),
+        "Vendor",
+        "type",
+        "name",
+        sync_managers=(
+            EsiSyncManager(0, SyncManagerUse.MAILBOX_OUT, 0x1000, 128, control=0x26),
+            EsiSyncManager(1, SyncManagerUse.MAILBOX_IN, 0x1080, 128, control=0x22),
+            EsiSyncManager(2, SyncManagerUse.OUTPUTS, 0x1100, 8, control=0x64),
+        ),
+        pdos=(EsiPdo(Direction.OUTPUT, 0x1600, "Outputs", (EsiEntry(0x7000, 1, 57, "x"),), 2),),
+        mailbox=EsiMailbox(MailboxProtocol.COE),
+        dictionary=EsiDictionary(objects={0x7000: EsiObject(0x7000, "x", "", 57, (entry,))}),
+    )
+    with cat.MainDevice(Segment([from_esi(device)])) as main:
+        sub = main.scan()[0]
+        assert sub.sdo.read(0x7000, 1)[:7] == default[:7]
+        sub.sdo.write(0x7000, 1, b"\xff" * 8)

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from catenary.errors import SdoAbort
+from catenary.errors import DecodeError, SdoAbort
 from catenary.model.diagnosis_history import RawMessage, SyncCounter, described
 from catenary.procedure.diagnosis_history import (
     Upload,
@@ -102,6 +102,13 @@ def test_a_maximum_of_0_does_not_hide_messages() -> None:
     assert ids(history(8, {n: message(n) for n in range(6, 9)}, maximum=0)) == [6, 7, 8]
 
 
+def test_a_maximum_of_0_is_taken_from_subindex_0() -> None:
+    """Beckhoff's EP3632: subindex 0 is 21, and it stores 16 messages."""
+    objects = history(7, {n: message(n) for n in range(6, 22)}, maximum=0)
+    objects[0x10F3, 0] = bytes((21,))
+    assert ids(objects) == [*range(8, 22), 6, 7]
+
+
 def test_the_flags_and_the_time_of_the_device() -> None:
     objects = history(6, {6: message(1, 10**9)}) | {(0x10F8, 0): (3 * 10**9).to_bytes(8, "little")}
     objects[0x10F3, 5] = b"\x31\0"
@@ -109,6 +116,39 @@ def test_the_flags_and_the_time_of_the_device() -> None:
     assert found.available
     assert found.flags == HistoryFlags.EMERGENCY | HistoryFlags.ACKNOWLEDGE_MODE | 0x20
     assert described(found.messages[0], {1: "hot"}, found.now_ns).age == 2.0
+
+
+def test_an_impossible_number_of_the_newest_message_is_an_error() -> None:
+    objects = history(6, {6: message(1)}) | {(0x10F3, 2): b"\x2c\x01"}
+    for procedure in (read_history, read_newest):
+        with pytest.raises(DecodeError, match=r"0x10F3:02.*received 300, must be 0, or 6 to 255"):
+            run(procedure(from_objects(objects)))
+
+
+def test_a_newest_message_of_5_is_an_empty_history() -> None:
+    """Slave stack code (diag.c, ClearMessageHistory): all acknowledged messages were deleted."""
+    assert ids(history(5, {6: message(1)})) == []
+    assert run(read_newest(from_objects(history(5, {})))) == 0
+
+
+@pytest.mark.parametrize("newest", range(6, 10))
+def test_messages_that_arrive_during_the_reading_are_left_for_the_next_one(newest: int) -> None:
+    """They replace the oldest messages of a full ring, which are read last."""
+    stored = {6 + (newest - 6 - back) % 4: message(10 - back) for back in range(4)}
+    objects = history(newest, stored)
+    upload = from_objects(objects)
+
+    def arriving(index: int, subindex: int) -> Procedure[bytes]:
+        data = yield from upload(index, subindex)
+        if subindex == newest:  # two messages arrive
+            for number in (1, 2):
+                objects[0x10F3, 6 + (newest - 6 + number) % 4] = message(10 + number)
+            objects[0x10F3, 2] = bytes((6 + (newest - 6 + 2) % 4,))
+        return data
+
+    found = run(read_history(arriving))
+    assert [each.message.text_id for each in found.messages] == [9, 10]
+    assert ids(objects, found.messages[-1]) == [11, 12]
 
 
 def test_a_malformed_message_is_shown() -> None:
@@ -124,7 +164,7 @@ def test_any_numbers_end_after_a_bounded_number_of_requests(
     asked: list[tuple[int, int]] = []
     stored = dict.fromkeys(range(6, 256), data)
     run(read_history(from_objects(history(newest, stored, maximum), asked)))
-    assert len(asked) <= 5 + MESSAGES_MAX + 1
+    assert len(asked) <= 6 + MESSAGES_MAX + 2
 
 
 def test_acknowledged_messages() -> None:

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Protocol, TypeVar
 
 from catenary.bus.sdo import ObjectOwner, Sdo
-from catenary.errors import MailboxError, SdoAbort
+from catenary.errors import DecodeError, MailboxError, SdoAbort
 from catenary.procedure.exchange import Procedure
 from catenary.procedure.sdo import OBJECT_MISSING
 from catenary.wire.diagnosis_history import ACKNOWLEDGED, CLEAR, HISTORY
@@ -45,6 +45,7 @@ class DeviceDiagnosis:
 
         Raises:
             SdoAbort: The device refuses an object.
+            DecodeError: The device reports an impossible number.
             MailboxError: The device has no diagnosis history, or no object dictionary.
         """
         from catenary.model.diagnosis_history import described
@@ -53,8 +54,12 @@ class DeviceDiagnosis:
         texts = self.texts
         return tuple(described(each, texts, found.now_ns) for each in found.messages)
 
-    def acknowledge(self) -> None:
-        """Acknowledge all present messages, so that the device may overwrite them.
+    def acknowledge(self, newest: HistoryMessage | None = None) -> None:
+        """Acknowledge a message and all older ones, so that the device may overwrite them.
+
+        Args:
+            newest: Newest message to acknowledge; None: all present messages, also those that have
+                arrived after `messages`.
 
         Raises:
             SdoAbort: The device refuses the value.
@@ -62,9 +67,12 @@ class DeviceDiagnosis:
         """
         from catenary.procedure.diagnosis_history import read_newest
 
-        newest = self._converse(read_newest(self._sub.sdo.upload_small))
-        if newest:
-            self._write(newest)
+        if newest is not None:
+            self._write(newest.subindex)
+            return
+        subindex = self._converse(read_newest(self._sub.sdo.upload_small))
+        if subindex:
+            self._write(subindex)
 
     def clear(self) -> None:
         """Delete the messages: all of them, or the acknowledged ones in the acknowledge mode.
@@ -103,6 +111,8 @@ class DeviceDiagnosis:
         """Run a procedure. Raises MailboxError if the device does not have the object."""
         try:
             return self._sub.main.converse(procedure)
+        except DecodeError as error:
+            raise DecodeError(f"{self._sub.station}: {error.message}", hint=error.hint) from error
         except SdoAbort as error:
             if error.code in OBJECT_MISSING and error.index == HISTORY:
                 raise MailboxError(

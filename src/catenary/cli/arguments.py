@@ -56,6 +56,11 @@ def position(text: str) -> int:
     return value
 
 
+def share_name(text: str) -> str:
+    """Return the name of a share. The form of a target, such as `share:arm`, is accepted."""
+    return text.strip().removeprefix("share:")
+
+
 def password(text: str) -> int:
     value = number(text)
     if not 0 <= value <= 0xFFFF_FFFF:
@@ -127,6 +132,11 @@ def result_file(text: str) -> Path:
     if not os.access(path if os.path.exists(path) else path.parent, os.W_OK):
         raise argparse.ArgumentTypeError(f"{text} cannot be written: no permission")
     return path
+
+
+def output_file(text: str) -> str:
+    """Return the path of a file that can be written, or "-" for stdout."""
+    return text if text == "-" else str(result_file(text))
 
 
 def seconds(text: str) -> float:

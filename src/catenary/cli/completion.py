@@ -22,14 +22,16 @@ FUNCTIONS: Mapping[str, str] = {
     "STATE": "_catenary_states",
     "T": "_catenary_types",
 }
+# Bash expands words, also `$(...)`. So names from folders of other users must be plain.
 LISTS = r"""
+_catenary_plain() { case "$1" in *[!A-Za-z0-9._-]*) ;; *) echo "$1" ;; esac; }
 _catenary_list_interfaces() {
     local each
-    for each in /sys/class/net/*; do echo "${each##*/}"; done
+    for each in /sys/class/net/*; do _catenary_plain "${each##*/}"; done
 }
 _catenary_list_shares() {
     local each
-    while read -r each; do echo "${each##*/share-}"; done < <(
+    while read -r each; do _catenary_plain "${each##*/share-}"; done < <(
         find /run/catenary "/dev/shm/catenary-$UID" -maxdepth 1 -name 'share-*' 2>/dev/null)
 }
 _catenary_list_targets() {
@@ -66,8 +68,10 @@ def add_parser(commands: Commands) -> None:
         "of shares and files. Needs catenary[completion] when it is printed, not when it is used. "
         "Print it again after an update.\n"
         "  bash: write it to ~/.local/share/bash-completion/completions/catenary\n"
-        "  zsh: write it to a file _catenary in a folder of $fpath",
-        example="catenary completion bash > ~/.local/share/bash-completion/completions/catenary\n"
+        "  zsh: write it to a file _catenary in a folder of $fpath\n"
+        "Create the folder first if it does not exist.",
+        example="mkdir -p ~/.local/share/bash-completion/completions\n"
+        "catenary completion bash > ~/.local/share/bash-completion/completions/catenary\n"
         "catenary completion zsh > ~/.zfunc/_catenary",
     )
     parser.add_argument("shell", metavar="SHELL", choices=SHELLS, help="bash or zsh")

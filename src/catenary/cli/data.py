@@ -6,6 +6,7 @@ import argparse
 import json
 from typing import TYPE_CHECKING
 
+from catenary.cli.arguments import share_name
 from catenary.cli.parsers import Commands, add_command, add_json, add_uid
 from catenary.cli.plain import plain
 
@@ -25,7 +26,7 @@ def add_parser(commands: Commands) -> None:
         "of devices without names. Reading does not delay the loop.",
         example="catenary data arm\ncatenary data arm --json",
     )
-    parser.add_argument("share", metavar="SHARE", help="name of the loop's share")
+    parser.add_argument("share", metavar="SHARE", type=share_name, help="name of the loop's share")
     add_uid(parser)
     add_json(parser)
     parser.set_defaults(run=run)

@@ -7,6 +7,7 @@ import json
 import sys
 from pathlib import Path
 
+from catenary.cli.arguments import output_file
 from catenary.cli.failure import UsageError
 from catenary.cli.parsers import (
     Commands,
@@ -31,7 +32,12 @@ def add_make(group: Commands) -> None:
     add_target(making)
     add_position(making)
     making.add_argument(
-        "-o", "--output", metavar="FILE", default="-", help="file to write; - is stdout (default)"
+        "-o",
+        "--output",
+        metavar="FILE",
+        type=output_file,
+        default="-",
+        help="file to write; - is stdout (default)",
     )
     add_force(making)
     add_json(making)

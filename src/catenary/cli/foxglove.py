@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 
-from catenary.cli.arguments import number
+from catenary.cli.arguments import number, share_name
 from catenary.cli.parsers import Commands, add_command, add_uid
 from catenary.cli.record import stopped_by_signals
 
@@ -20,7 +20,7 @@ def add_parser(commands: Commands) -> None:
         "anyone who reaches the address can read. Ends on Ctrl-C. Needs catenary[foxglove].",
         example="catenary foxglove arm\ncatenary foxglove arm --port 9000",
     )
-    parser.add_argument("share", metavar="SHARE", help="name of the loop's share")
+    parser.add_argument("share", metavar="SHARE", type=share_name, help="name of the loop's share")
     parser.add_argument("--host", default="127.0.0.1", help="address (default: this machine only)")
     parser.add_argument("--port", type=number, default=8765, help="TCP port (default: 8765)")
     add_uid(parser)

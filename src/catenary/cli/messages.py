@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import argparse
 import json
+import sys
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from catenary.cli import share_target
@@ -21,7 +23,13 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
     from catenary.bus import SubDevice
+    from catenary.errors import CatenaryError
     from catenary.model.diagnosis_history import HistoryMessage, SyncCounters
+    from catenary.remote import Client
+    from catenary.remote.messages import Device
+
+
+NAMES = ("index", "missed", "exceeded", "shift_too_short", "error")  # of SyncCounters
 
 
 def add_parser(commands: Commands) -> None:
@@ -32,8 +40,8 @@ def add_parser(commands: Commands) -> None:
         description="Brings all devices to PRE-OP and shows the messages of their diagnosis "
         "history (object 0x10F3), oldest first, and their counters of synchronisation errors "
         "(0x1C32, 0x1C33) that are not zero. Texts come from the ESI files of the devices. The "
-        "messages of a running loop are read through its share. Exit status 1 if there is an "
-        "error that is not acknowledged.",
+        "messages of a running loop are read through its share, without texts. Exit status 1 if "
+        "there is an error that is not acknowledged, or a device fails.",
         example="catenary messages eth0\ncatenary messages eth0 2 --json\n"
         "catenary messages eth0 2 --acknowledge\ncatenary messages share:arm",
     )
@@ -41,7 +49,7 @@ def add_parser(commands: Commands) -> None:
     add_optional_position(parser)
     action = parser.add_mutually_exclusive_group()
     action.add_argument(
-        "--acknowledge", action="store_true", help="acknowledge the messages after reading"
+        "--acknowledge", action="store_true", help="acknowledge the messages that were read"
     )
     action.add_argument(
         "--clear",
@@ -53,98 +61,114 @@ def add_parser(commands: Commands) -> None:
     parser.set_defaults(run=run)
 
 
+@dataclass(frozen=True, slots=True)
 class Report:
-    """Messages and counters of one device. `history`: None without object 0x10F3."""
+    """Messages and counters of one device. `history`: None if they were not read."""
 
-    def __init__(
-        self,
-        position: int,
-        name: str,
-        history: Sequence[HistoryMessage] | None,
-        counters: Sequence[SyncCounters],
-    ) -> None:
-        self.position = position
-        self.name = name
-        self.history = history
-        self.counters = counters
+    position: int
+    name: str
+    history: Sequence[HistoryMessage] | None = None
+    counters: Sequence[SyncCounters] = ()
+    error: CatenaryError | None = None
 
     @property
-    def faults(self) -> int:
-        """Number of errors that are not acknowledged."""
-        return sum(not m.acknowledged and m.severity == "error" for m in self.history or ())
+    def is_bad(self) -> bool:
+        """True if the device has failed, or has an error that is not acknowledged."""
+        faults = (not m.acknowledged and m.severity == "error" for m in self.history or ())
+        return self.error is not None or any(faults)
 
 
 def run(arguments: argparse.Namespace) -> int:
-    if share_target.names_share(arguments.target):
-        reports = of_share(arguments)
-        failed = 0
-    else:
-        reports, failed = of_devices(arguments)
+    from catenary.cli.failure import with_hint
+
+    of_share = share_target.names_share(arguments.target)
+    reports = share_reports(arguments) if of_share else reports_of(arguments)
     if arguments.json:
         print(json.dumps([as_values(each) for each in reports], indent=2))
     else:
         print(as_text(reports))
-    return int(failed or any(each.faults for each in reports))
+    for each in reports:
+        if each.error is not None:
+            print(f"error: {with_hint(each.error)}", file=sys.stderr)
+    return int(any(each.is_bad for each in reports))
 
 
-def of_devices(arguments: argparse.Namespace) -> tuple[list[Report], int]:
-    """Read the devices of a target. Return the reports, and 1 if a device has failed."""
-    from catenary.cli.devices import device_at, report_failures
+def reports_of(arguments: argparse.Namespace) -> list[Report]:
+    """Read the devices of a target: one device, or all that have an object dictionary."""
+    from catenary.cli.devices import device_at
     from catenary.target import MainDevice
 
     with MainDevice(arguments.target, force=arguments.force) as main:
         devices: Sequence[SubDevice] = main.scan(strict=False)
         if arguments.position is not None:
-            devices = [device_at(devices, arguments.position)]
-        working = [each for each in devices if each.error is None]
-        reports = [read_device(each) for each in working if has_objects(each)]
-        for device, report in zip(filter(has_objects, working), reports, strict=True):
-            if report.history and (arguments.acknowledge or arguments.clear):
-                act = device.diagnosis.clear if arguments.clear else device.diagnosis.acknowledge
-                act()
-    return reports, report_failures(devices)
+            chosen: Sequence[SubDevice] = [device_at(devices, arguments.position)]
+        else:
+            chosen = [each for each in devices if each.description.coe or each.error is not None]
+        return [read_device(each, arguments) for each in chosen]
 
 
-def has_objects(device: SubDevice) -> bool:
-    return device.description.coe
+def read_device(device: SubDevice, arguments: argparse.Namespace) -> Report:
+    """Read a device, and acknowledge or delete its messages on request."""
+    from catenary.errors import CatenaryError
+
+    report = Report(device.position, device.name, error=device.error)
+    if device.error is not None or not device.description.coe:
+        return report
+    try:
+        report = replace(report, history=messages_of(device))
+        if report.history and arguments.acknowledge:
+            device.diagnosis.acknowledge(report.history[-1])
+        elif report.history and arguments.clear:
+            device.diagnosis.clear()
+        return replace(report, counters=device.diagnosis.synchronisation())
+    except CatenaryError as error:  # other devices may have messages
+        return replace(report, error=error)
 
 
-def read_device(device: SubDevice) -> Report:
+def messages_of(device: SubDevice) -> Sequence[HistoryMessage] | None:
+    """Read the messages of a device; None if it refuses object 0x10F3."""
     from catenary.errors import MailboxError, SdoAbort
 
-    history: Sequence[HistoryMessage] | None
     try:
-        history = device.diagnosis.messages()
+        return device.diagnosis.messages()
     except MailboxError as error:
-        if not isinstance(error.__cause__, SdoAbort):
-            raise
-        history = None  # the device refuses object 0x10F3
-    return Report(device.position, device.name, history, device.diagnosis.synchronisation())
+        if isinstance(error.__cause__, SdoAbort):
+            return None
+        raise
 
 
-def of_share(arguments: argparse.Namespace) -> list[Report]:
+def share_reports(arguments: argparse.Namespace) -> list[Report]:
     """Read the devices of the program that owns a share."""
     if arguments.acknowledge or arguments.clear:
         raise UsageError(
             "messages of a running program are only read",
             hint="acknowledge them in the program: sub.diagnosis.acknowledge()",
         )
-    from catenary.cli.share_messages import read_device as read
-
     with share_target.connect_to(arguments.target) as program:
         devices = program.devices()
         position = share_target.position_in(program, arguments.position)
-        chosen = [each for each in devices if position in (None, each.position)]
-        if not chosen:
-            raise UsageError(
-                f"there is no device {position}; the program has {len(devices)} devices"
-            )
-        found = ((each, read(program, each.position)) for each in chosen)
-        return [
-            Report(each.position, each.name, *contents)
-            for each, contents in found
-            if contents is not None
-        ]
+        if position is None:
+            chosen = [each for each in devices if each.coe]
+        else:
+            chosen = [each for each in devices if each.position == position]
+            if not chosen:
+                raise UsageError(
+                    f"there is no device {position}; the program has {len(devices)} devices"
+                )
+        return [read_share_device(program, each) for each in chosen]
+
+
+def read_share_device(program: Client, device: Device) -> Report:
+    """Read a device of the program that owns a share."""
+    from catenary.cli.share_messages import read_device as read
+    from catenary.errors import CatenaryError
+
+    report = Report(device.position, device.name)
+    try:
+        history, counters = read(program, device.position) if device.coe else (None, ())
+    except CatenaryError as error:
+        return replace(report, error=error)
+    return replace(report, history=history, counters=counters)
 
 
 def as_text(reports: Iterable[Report]) -> str:
@@ -153,13 +177,20 @@ def as_text(reports: Iterable[Report]) -> str:
     lines: list[str] = []
     for report in reports:
         messages = report.history
-        number = "no diagnosis history" if messages is None else f"{len(messages)} messages"
-        lines.append(escaped(f"{report.position} {report.name}: {number}"))
+        lines.append(escaped(f"{report.position} {report.name}: {_number(report)}"))
         for each in messages or ():
             mark = "  (acknowledged)" if each.acknowledged else ""
             lines.append(escaped(f"  {each}{mark}"))
         lines += [f"  {text}" for each in report.counters for text in counter_lines(each)]
     return "\n".join(lines) or "no device has an object dictionary"
+
+
+def _number(report: Report) -> str:
+    """Return the number of messages as text."""
+    if report.history is None:
+        return "no diagnosis history" if report.error is None else "failed"
+    count = len(report.history)
+    return "1 message" if count == 1 else f"{count} messages"
 
 
 def counter_lines(counters: SyncCounters) -> Iterable[str]:
@@ -179,11 +210,8 @@ def as_values(report: Report) -> dict[str, object]:
         "name": report.name,
         "messages": None if report.history is None else plain(tuple(report.history)),
         "synchronisation": [
-            {"direction": each.direction, **_fields(plain(each))} for each in report.counters
+            {"direction": each.direction, **{name: getattr(each, name) for name in NAMES}}
+            for each in report.counters
         ],
+        "error": None if report.error is None else str(report.error),
     }
-
-
-def _fields(value: object) -> dict[str, object]:
-    assert isinstance(value, dict)
-    return value

@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
-from catenary.cli.arguments import positive_seconds
+from catenary.cli.arguments import positive_seconds, share_name
 from catenary.cli.failure import UsageError
 from catenary.cli.parsers import Commands, add_command, add_json, add_uid
 
@@ -33,7 +33,9 @@ def add_parser(commands: Commands) -> None:
         "catenary record --repair arm.mcap\n"
         "catenary plot arm.mcap",
     )
-    parser.add_argument("share", metavar="SHARE", nargs="?", help="name of the loop's share")
+    parser.add_argument(
+        "share", metavar="SHARE", type=share_name, nargs="?", help="name of the loop's share"
+    )
     parser.add_argument("file", metavar="FILE.mcap", help="file to write")
     parser.add_argument("--seconds", metavar="N", type=positive_seconds, help="end after N seconds")
     parser.add_argument("--force", action="store_true", help="replace an existing file")

@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from catenary.cli.arguments import number
+from catenary.cli.arguments import number, share_name
 from catenary.cli.parsers import Commands, add_command, add_uid
 from catenary.cli.record import stopped_by_signals
 
@@ -25,7 +25,7 @@ def add_parser(commands: Commands) -> None:
         "torques become 0.",
         example="catenary ros2 arm\ncatenary ros2 arm --config ros2.toml --domain 7",
     )
-    parser.add_argument("share", metavar="SHARE", help="name of the loop's share")
+    parser.add_argument("share", metavar="SHARE", type=share_name, help="name of the loop's share")
     parser.add_argument("--config", type=Path, help="configuration file (docs/how_to/ros2.md)")
     parser.add_argument("--domain", type=number, help="ROS domain (default: $ROS_DOMAIN_ID, or 0)")
     parser.add_argument("--namespace", help="namespace of the node, such as /left")

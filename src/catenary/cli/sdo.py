@@ -8,7 +8,7 @@ import sys
 from typing import TYPE_CHECKING
 
 from catenary.cli import share_target
-from catenary.cli.arguments import Entry, entry
+from catenary.cli.arguments import Entry, entry, output_file
 from catenary.cli.failure import UsageError, one_line
 from catenary.cli.parsers import (
     Commands,
@@ -67,7 +67,11 @@ def _add_read(group: Commands) -> None:
     _add_type(reading)
     _add_complete(reading, "read")
     reading.add_argument(
-        "-o", "--output", metavar="FILE", help="write the bytes to FILE; - is stdout"
+        "-o",
+        "--output",
+        metavar="FILE",
+        type=output_file,
+        help="write the bytes to FILE; - is stdout",
     )
     add_json(reading)
     reading.set_defaults(run=run_read)
@@ -148,6 +152,8 @@ def run_read(arguments: argparse.Namespace) -> int:
     kind = data_type(arguments.type)
     at: Entry = arguments.entry
     _check_complete(arguments)
+    if arguments.json and arguments.output == "-":
+        raise UsageError("--json needs -o FILE", hint="stdout has only one of JSON and bytes")
     if names_share(arguments.target):
         return _show(arguments, share_target.sdo_read(arguments))
     with MainDevice(arguments.target, force=arguments.force) as main:
@@ -157,7 +163,8 @@ def run_read(arguments: argparse.Namespace) -> int:
         known = device.description.documented_object(at.index, at.subindex)
     if arguments.output is not None:
         write_bytes(arguments.output, data)
-        return 0
+        if not arguments.json:
+            return 0
     value = kind.decode(data) if kind else None
     if kind is None and known is not None and not arguments.complete:
         value = documented_value(known, data)

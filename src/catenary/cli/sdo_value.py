@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
 from catenary.cli.failure import UsageError
 from catenary.cli.text import escaped
@@ -15,6 +15,7 @@ if TYPE_CHECKING:
 
 NUMBER_SIZES = (1, 2, 4, 8)  # sizes of numbers [bytes]
 STDIN_MAX = 1 << 24  # largest value from stdin [bytes]
+Given = TypeVar("Given", str, bytes)
 
 
 def data_type(name: str | None) -> DataType[Value] | None:
@@ -39,11 +40,20 @@ def parse_value(kind: DataType[Value], text: str) -> Value:
     from catenary.types import Octets
 
     if text == "-" and isinstance(kind, Octets):
-        return sys.stdin.buffer.read(STDIN_MAX)
+        return bounded(sys.stdin.buffer.read(STDIN_MAX + 1))
     try:
-        return kind.parse(sys.stdin.read(STDIN_MAX).rstrip("\n") if text == "-" else text)
+        return kind.parse(
+            bounded(sys.stdin.read(STDIN_MAX + 1)).rstrip("\n") if text == "-" else text
+        )
     except ValueError as error:
         raise UsageError(str(error), hint="write numbers as decimal or 0x...") from error
+
+
+def bounded(given: Given) -> Given:
+    """Return the value from stdin. Raises UsageError if it is too large."""
+    if len(given) > STDIN_MAX:
+        raise UsageError(f"stdin has more than {STDIN_MAX} bytes", hint="check the file")
+    return given
 
 
 def write_bytes(path: str, data: bytes) -> None:

@@ -20,8 +20,8 @@ T = TypeVar("T")
 
 def read_device(
     program: Client, position: int
-) -> tuple[Sequence[HistoryMessage] | None, Sequence[SyncCounters]] | None:
-    """Return messages and counters of a device; None if it has no object dictionary.
+) -> tuple[Sequence[HistoryMessage] | None, Sequence[SyncCounters]]:
+    """Return messages and counters of a device.
 
     The messages are None if the device has no diagnosis history. Texts of ESI files are missing.
 
@@ -30,10 +30,7 @@ def read_device(
         position: Position of the device.
     """
     upload = partial(_upload, program, position)
-    try:
-        counters = result_of(read_sync_counters(upload))
-    except ValueError:  # the program refuses the request: the device has no object dictionary
-        return None
+    counters = result_of(read_sync_counters(upload))
     try:
         found = result_of(read_history(upload))
     except SdoAbort as error:

@@ -63,7 +63,8 @@ def _numbers(device: Device) -> tuple[str, ...]:
 
 def _scan_fields(device: Device) -> dict[str, object]:
     names = ("position", "name", "order", "vendor", "product", "revision", "serial", "state")
-    return {name: getattr(device, name) for name in names}
+    error = None if device.state else "no answer"
+    return {name: getattr(device, name) for name in names} | {"esi": None, "error": error}
 
 
 def state(arguments: argparse.Namespace) -> int:

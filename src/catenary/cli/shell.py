@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import argparse
 import sys
+import traceback
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from importlib import import_module
 from importlib.util import find_spec
+from types import CodeType
 from typing import Any
 
 from catenary.cli import share_target
@@ -48,11 +50,26 @@ def run(arguments: argparse.Namespace) -> int:
             raise UsageError(f"CODE is not Python: {error.msg} (line {error.lineno})") from error
     with names_of(arguments) as (names, banner):
         if code is not None:
-            exec(code, names)
-        elif not arguments.plain and find_spec("IPython") is not None:
+            return run_code(code, names)
+        if not arguments.plain and find_spec("IPython") is not None:
             run_ipython(names, banner)
         else:
             run_plain(names, banner)
+    return 0
+
+
+def run_code(code: CodeType, names: dict[str, Any]) -> int:
+    """Run code. Return 1 after an error, and print the traceback of the code."""
+    from catenary.errors import CatenaryError
+
+    try:
+        exec(code, names)
+    except (CatenaryError, BrokenPipeError):
+        raise  # has its own message and exit status
+    except Exception as error:
+        inner = error.__traceback__
+        traceback.print_exception(error.with_traceback(inner.tb_next if inner else None))
+        return 1
     return 0
 
 
@@ -118,7 +135,4 @@ def run_plain(names: dict[str, Any], banner: str) -> None:
         readline = import_module("readline")
         readline.set_completer(completer.complete)
         readline.parse_and_bind("tab: complete")
-    try:
-        code.interact(banner=banner, local=names, exitmsg="")
-    except SystemExit:
-        return  # `exit()` in the shell
+    code.interact(banner=banner, local=names, exitmsg="")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 
+from catenary.cli.arguments import share_name
 from catenary.cli.parsers import Commands, add_command, add_uid
 
 
@@ -18,7 +19,7 @@ def add_parser(commands: Commands) -> None:
         "ends, the page waits until it returns. Needs catenary[top].",
         example="catenary top arm\nssh -t robot catenary top arm",
     )
-    parser.add_argument("share", metavar="SHARE", help="name of the loop's share")
+    parser.add_argument("share", metavar="SHARE", type=share_name, help="name of the loop's share")
     add_uid(parser)
     parser.set_defaults(run=run)
 

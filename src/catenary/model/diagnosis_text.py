@@ -1,7 +1,8 @@
 """Texts of diagnosis messages (ETG.2000, DiagMessage): templates with placeholders as in printf.
 
 `%d`, `%u`, `%x`, `%X`, `%c`, `%s` and the formats of floats take the parameters in order. `%2$d`
-and `%2` take the second parameter. The templates come from files, so widths are bounded.
+and `%2` take the second parameter. The space is not a flag: "90 % during the start" has no
+placeholder. The templates come from files, so widths are bounded.
 """
 
 from __future__ import annotations
@@ -13,13 +14,13 @@ from catenary.wire.diagnosis_history import DiagnosisMessage, Parameter, Paramet
 from catenary.wire.drive_error import error_text
 
 PLACEHOLDER = re.compile(
-    r"%(?:(?P<place>\d{1,3})\$)?(?P<flags>[-+ #0]*)(?P<width>\d*)(?:\.(?P<precision>\d*))?"
+    r"%(?:(?P<place>\d{1,3})\$)?(?P<flags>[-+#0]*)(?P<width>\d*)(?:\.(?P<precision>\d*))?"
     r"(?:hh|h|ll|l|I64|q)?(?P<form>[diouxXcsSeEfFgGp])|%(?P<number>\d{1,3})|%(?P<percent>%)"
 )
 WIDTH_MAX = 64
 TEXT_MAX = 1000  # characters of a message
 FIRST_SURROGATE = 0xD800
-INTEGERS, FLOATS, TEXTS = "diouxXp", "eEfFgG", "sSc"
+FLOATS, TEXTS, UNSIGNED = "eEfFgG", "sSc", "oxX"
 Value = int | float | str | bytes
 
 
@@ -104,6 +105,8 @@ def _printed(match: re.Match[str], value: Value) -> str:
     if isinstance(value, float):
         return _plain(value)
     form = {"u": "d", "i": "d", "p": "x"}.get(form, form)
+    if value < 0 and form in UNSIGNED:
+        value += 1 << (32 if value >= -(1 << 31) else 64)  # as in C
     return f"%{flags}{width or ''}{dot}{form}" % value
 
 

@@ -25,6 +25,7 @@ from catenary.wire.diagnosis_history import (
     AVAILABLE,
     FIRST_MESSAGE,
     FLAGS,
+    HIGHEST_SUBINDEX,
     HISTORY,
     MAXIMUM,
     MESSAGES_MAX,
@@ -40,16 +41,20 @@ Upload: TypeAlias = Callable[[int, int], Procedure[bytes]]  # reads an entry: in
 
 
 def read_state(upload: Upload) -> Procedure[RawHistory]:
-    """Read subindices 1 to 5 of the history, without messages.
+    """Read subindices 1 to 5 of the history. A maximum of 0 is taken from subindex 0.
 
     Args:
         upload: Function that reads an entry.
 
     Raises:
         SdoAbort: The device has no diagnosis history.
+        DecodeError: The number of the newest message is impossible.
     """
-    newest = yield from _number(upload, NEWEST)
+    newest = yield from read_newest(upload)
     maximum = yield from _optional(upload, MAXIMUM)
+    if not maximum:
+        highest = yield from _optional(upload, HIGHEST_SUBINDEX)
+        maximum = max(highest - FIRST_MESSAGE + 1, 0)
     acknowledged = yield from _optional(upload, ACKNOWLEDGED)
     available = yield from _optional(upload, AVAILABLE)
     flags = yield from _optional(upload, FLAGS)
@@ -70,12 +75,25 @@ def read_newest(upload: Upload) -> Procedure[int]:
 
     Raises:
         SdoAbort: The device has no diagnosis history.
+        DecodeError: The number is not the subindex of a message.
     """
-    return (yield from _number(upload, NEWEST))
+    newest = yield from _number(upload, NEWEST)
+    if newest < FIRST_MESSAGE:
+        return 0  # slave stack code: 5 if all acknowledged messages have been deleted
+    if newest >= FIRST_MESSAGE + MESSAGES_MAX:
+        raise DecodeError(
+            f"newest diagnosis message (0x10F3:02): received {newest}, must be 0, or "
+            f"{FIRST_MESSAGE} to {FIRST_MESSAGE + MESSAGES_MAX - 1}"
+        )
+    return newest
 
 
 def read_history(
-    upload: Upload, last: RawMessage | None = None, *, limit: int = MESSAGES_MAX
+    upload: Upload,
+    last: RawMessage | None = None,
+    *,
+    limit: int = MESSAGES_MAX,
+    state: RawHistory | None = None,
 ) -> Procedure[RawHistory]:
     """Read the history with its messages, oldest first.
 
@@ -83,11 +101,14 @@ def read_history(
         upload: Function that reads an entry.
         last: Last known message. Only newer messages are read; None: all messages.
         limit: Largest number of messages; the newest ones are read.
+        state: Result of `read_state`; None: it is read first.
 
     Raises:
         SdoAbort: The device has no diagnosis history.
+        DecodeError: The number of the newest message is impossible.
     """
-    state = yield from read_state(upload)
+    if state is None:
+        state = yield from read_state(upload)
     messages = yield from _messages(upload, state, last, limit)
     now_ns = (yield from _time(upload)) if messages else None
     return replace(state, messages=acknowledged_up_to(messages, state.acknowledged), now_ns=now_ns)
@@ -128,7 +149,7 @@ def _messages(
 ) -> Procedure[tuple[RawMessage, ...]]:
     """Read the messages backwards from the newest one, and return them oldest first."""
     newest = state.newest
-    if newest < FIRST_MESSAGE:
+    if not newest:
         return ()
     room = min(max(state.maximum, newest - FIRST_MESSAGE + 1), MESSAGES_MAX)
     found: list[RawMessage] = []
@@ -141,7 +162,24 @@ def _messages(
         if is_empty(data) or _is_known(last, subindex, data):
             break
         found.append(RawMessage(subindex, data, _decoded(data)))
+    if len(found) == room:
+        found = yield from _without_replaced(upload, found, newest)
     return tuple(reversed(found))
+
+
+def _without_replaced(
+    upload: Upload, found: list[RawMessage], newest: int
+) -> Procedure[list[RawMessage]]:
+    """Drop the last messages of a full ring if newer ones have replaced them during the reading.
+
+    Args:
+        upload: Function that reads an entry.
+        found: Messages of all subindices, newest first.
+        newest: Subindex of the newest message before the reading.
+    """
+    now = yield from read_newest(upload)
+    replaced = (now - newest) % len(found) if now else 0
+    return found[: len(found) - replaced]
 
 
 def _is_known(last: RawMessage | None, subindex: int, data: bytes) -> bool:

@@ -80,6 +80,25 @@ def exclusively(channel: MailboxChannel, procedure: Procedure[T]) -> Procedure[T
         channel.turns.remove(ticket)
 
 
+def turn_comes(channel: MailboxChannel, seconds: float) -> Procedure[bool]:
+    """Wait for a turn in the queue of a mailbox. Return False if it does not come in time.
+
+    Args:
+        channel: The mailbox of the device.
+        seconds: Longest time to wait [s].
+    """
+    ticket = object()
+    channel.turns.append(ticket)
+    try:
+        for _ in range(round(seconds / TURN)):
+            if channel.turns[0] is ticket:
+                return True
+            yield after(TURN)
+        return channel.turns[0] is ticket
+    finally:
+        channel.turns.remove(ticket)
+
+
 def converse(
     channel: MailboxChannel,
     kind: Type,

@@ -44,8 +44,8 @@ def parse(target: str) -> LinkSource:
     if kind == SHARE:
         raise ConfigurationError(
             f"{target!r} is a running program, not a segment",
-            hint="these commands accept a share: scan, state, diag, sdo, reg read; in Python, use "
-            "cat.connect",
+            hint="these commands accept a share: scan, state, diag, messages, sdo, reg read and "
+            "shell; in Python, use cat.connect",
         )
     if kind == IGH:
         return _kernel_master(target, rest)

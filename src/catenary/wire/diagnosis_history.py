@@ -15,7 +15,7 @@ from enum import IntEnum, IntFlag
 from catenary.errors import DecodeError
 
 HISTORY = 0x10F3
-MAXIMUM, NEWEST, ACKNOWLEDGED, AVAILABLE, FLAGS = range(1, 6)  # subindices
+HIGHEST_SUBINDEX, MAXIMUM, NEWEST, ACKNOWLEDGED, AVAILABLE, FLAGS = range(6)  # subindices
 FIRST_MESSAGE = 6  # subindex
 MESSAGES_MAX = 250  # subindices 6 to 255
 TIMESTAMP = 0x10F8  # present time of the device [ns]
@@ -136,11 +136,6 @@ class DiagnosisMessage:
     def error_code(self) -> int | None:
         """Emergency error code in the diagnosis code; None if it has none."""
         return self.code >> 16 if self.code & 0xFFFF == EMERGENCY_CODE else None
-
-    @property
-    def is_complete(self) -> bool:
-        """True if all announced parameters were decoded."""
-        return not self.count or self.count == len(self.parameters)
 
     def encode(self) -> bytes:
         """Return the encoded bytes. Raises ValueError if a field does not fit."""

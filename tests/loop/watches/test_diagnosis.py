@@ -2,18 +2,32 @@
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Iterator
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
 import catenary as cat
 from catenary.bus.event_types import DiagnosisReported, Event, SynchronisationFault
-from catenary.loop.watches.diagnosis import MESSAGES_PER_READING, _increase
-from catenary.types import USINT
-from catenary.virtual import Coupler, HistoryOptions, MailboxQuirks, Segment, Servo
+from catenary.errors import MailboxError, SdoAbort
+from catenary.loop.watches.diagnosis import (
+    FAILURES_MAX,
+    MESSAGES_PER_READING,
+    TURN_MAX,
+    DiagnosisWatch,
+    _increase,
+)
+from catenary.model.diagnosis_history import SyncCounter
+from catenary.procedure.exchange import Procedure, after
+from catenary.procedure.mailbox import TURN
+from catenary.types import UDINT, USINT
+from catenary.virtual import Coupler, HistoryOptions, Segment, Servo
 from catenary.virtual.coe.diagnosis_history import FAULT, SYNC_LOST, TEXTS
 from catenary.virtual.faults import drive_fault, lose_frames, mailbox_silent
+from catenary.wire.al import AlState
+from catenary.wire.diagnosis_history import DiagnosisMessage
 from tests.bus.test_device_diagnosis import with_texts
 from tests.esi import servo_file
 
@@ -94,6 +108,22 @@ def test_a_flood_is_bounded(servo: Servo, main: cat.MainDevice) -> None:
             servo.store_diagnosis(text_id)
         newest = list(range(200 - MESSAGES_PER_READING, 200))
         assert text_ids(events_after(loop, main, 0.3)) == newest
+
+
+def test_a_mailbox_in_constant_use_is_read_too(servo: Servo, main: cat.MainDevice) -> None:
+    sdo = main.subs[1].sdo
+    found: list[int] = []
+    with open_loop(main) as loop:
+        answers = [sdo.request(0x1018, 1, type=UDINT) for _ in range(3)]
+        for cycle in loop:
+            answers = [each for each in answers if not each.done]
+            answers += [sdo.request(0x1018, 1, type=UDINT) for _ in range(3 - len(answers))]
+            if cycle.number == 200:
+                servo.store_diagnosis(7)
+            found += text_ids(list(main.events))
+            if found or cycle.number == 2000:
+                break
+    assert found == [7]
 
 
 def test_a_cleared_history_begins_again(servo: Servo, main: cat.MainDevice) -> None:
@@ -189,12 +219,123 @@ def test_a_silent_mailbox_does_not_harm_the_loop(servo: Servo) -> None:
             assert loop.timing.counters["lost"] == 0
 
 
-def test_devices_without_these_objects_are_left_alone() -> None:
-    quirks = MailboxQuirks(missing_descriptions=(0x1018,))
-    with cat.MainDevice(Segment([Coupler(), Servo(mailbox_quirks=quirks)])) as main:
-        main.scan()
-        with open_loop(main) as loop:
-            assert events_after(loop, main, 0.3) == []
+class Device:
+    """Device with objects in a dictionary. An integer is the abort code of a refusal."""
+
+    def __init__(self) -> None:
+        self.objects: dict[tuple[int, int], bytes | int] = {}
+        self.failing: set[int] = set()  # indices
+        self.sdo = SimpleNamespace(upload_small=self.upload)
+        self.description = SimpleNamespace(coe=True)
+        self.diagnosis = SimpleNamespace(texts={})
+        self.channel: SimpleNamespace | None = None
+        self.state, self.station = AlState.OP, "device 1"
+        self.asked: list[tuple[int, int]] = []
+        self.events: list[Event] = []
+        self.steps = DiagnosisWatch(
+            [self],  # type: ignore[list-item]
+            1.0,
+            put=self.events.append,
+            now=lambda: 0.0,
+        ).run()
+
+    def upload(self, index: int, subindex: int) -> Procedure[bytes]:
+        self.asked.append((index, subindex))
+        if index in self.failing:
+            raise MailboxError("malformed answer")
+        found = self.objects.get((index, subindex), 0x0602_0000)
+        if isinstance(found, int):
+            raise SdoAbort("refused", position=1, index=index, subindex=subindex, code=found)
+        return found
+        yield []
+
+    def store(self, *text_ids: int) -> None:
+        messages = [DiagnosisMessage(0xE000, 0, each, 0).encode() for each in text_ids]
+        self.objects |= {(0x10F3, n): data for n, data in enumerate(messages, 6)}
+        self.objects |= {(0x10F3, 1): b"\x10", (0x10F3, 2): bytes((5 + len(messages),))}
+        self.objects |= {(0x10F3, 3): b"\0", (0x10F3, 4): b"\1", (0x10F3, 5): b"\0\0"}
+
+    def read(self) -> list[Event]:
+        """Make one reading, and return its events."""
+        self.events.clear()
+        self.asked.clear()
+        next(self.steps)
+        return list(self.events)
+
+
+def test_a_refusal_for_now_does_not_end_the_watch() -> None:
+    device = Device()
+    device.store(1)
+    assert device.read() == []
+    for place in ((0x10F3, 2), (0x10F3, 4)):
+        device.objects[place] = 0x0800_0022  # not in the present state
+    assert device.read() == []
+    device.store(1, 2)
+    assert text_ids(device.read()) == [2]
+
+
+def test_a_counter_that_is_refused_for_now_keeps_its_count() -> None:
+    device = Device()
+    counter = 0x1C32, 0x0B
+    device.objects = {counter: b"\x07\0", (0x1C32, 0x0C): b"\0\0"}
+    assert device.read() == []
+    device.objects[counter] = 0x0800_0022
+    assert device.read() == []
+    device.objects[counter] = b"\x09\0"
+    [event] = device.read()
+    assert isinstance(event, SynchronisationFault)
+    assert (event.count, event.total) == (2, 9)
+
+
+def test_counters_that_fail_do_not_hide_the_messages() -> None:
+    device = Device()
+    device.store(1)
+    device.failing = {0x1C32}
+    assert device.read() == []
+    device.store(1, 2)
+    assert text_ids(device.read()) == [2]
+
+
+def test_a_reading_asks_for_no_object_twice() -> None:
+    device = Device()
+    device.store(1)
+    device.read()
+    device.store(1, 2)
+    assert text_ids(device.read()) == [2]
+    assert len(device.asked) == len(set(device.asked))
+
+
+def test_a_long_transfer_delays_the_other_devices_only_briefly() -> None:
+    device = Device()
+    transfer = object()
+    device.channel = SimpleNamespace(turns=deque([transfer]))
+    for _ in range(round(TURN_MAX / TURN)):
+        assert next(device.steps) == after(TURN)
+    assert next(device.steps) != after(TURN)  # the pause before the next device
+    assert device.asked == []
+    assert list(device.channel.turns) == [transfer]
+
+
+def test_a_device_without_these_objects_is_read_once() -> None:
+    device = Device()
+    assert device.read() == []
+    assert device.asked == [
+        (0x10F3, 2),
+        *((index, n) for index in (0x1C32, 0x1C33) for n in SyncCounter),
+    ]
+    with pytest.raises(StopIteration):
+        device.read()
+
+
+def test_a_device_with_impossible_numbers_is_left_out() -> None:
+    device = Device()
+    device.store(1)
+    device.objects[0x10F3, 2] = b"\x2c\x01"  # 300
+    for _ in range(FAILURES_MAX):
+        assert device.read() == []
+        assert device.asked
+    assert device.read() == []
+    assert device.asked == []
 
 
 @pytest.mark.parametrize("interval", [0.0, -1.0, float("nan"), 1e6])

@@ -21,11 +21,14 @@ from catenary.procedure.diagnosis_history import (
     read_sync_counters,
 )
 from catenary.procedure.exchange import Procedure, after
+from catenary.procedure.mailbox import turn_comes
+from catenary.procedure.sdo import OBJECT_MISSING
 from catenary.wire.al import AlState
 
 MESSAGES_PER_READING = 20  # of one device; older ones stay on the device
 FAILURES_MAX = 3  # in a row, before a device is left out for a while
 PAUSE = 10  # readings of a device that are left out
+TURN_MAX = 0.1  # [s] for a turn in the queue of a mailbox
 PERIOD_MIN = 0.001  # [s] between two devices
 COUNTS = 1 << 16  # counters have 16 bits
 
@@ -37,7 +40,7 @@ class _Subject:
     """State of one device in the watch."""
 
     sub: SubDevice
-    begun: bool = False
+    begun: bool = False  # True after the first reading of messages
     has_history: bool = True
     has_counters: bool = True
     last: RawMessage | None = None
@@ -84,13 +87,15 @@ class DiagnosisWatch:
         if subject.left_out:
             subject.left_out -= 1
             return
+        if subject.sub.state is not AlState.OP:
+            return  # it is lost or returning
         channel = subject.sub.channel  # None with an external master
-        is_busy = channel is not None and bool(channel.turns)
-        if subject.sub.state is not AlState.OP or is_busy:
-            return  # it is lost or returning, or another request uses its mailbox
+        if channel is not None and not (yield from turn_comes(channel, TURN_MAX)):
+            return  # a long request uses its mailbox, such as the transfer of a file
         try:
             if subject.has_history:
                 yield from self._read_messages(subject)
+                subject.begun = True
             if subject.has_counters:
                 yield from self._read_counters(subject)
         except CatenaryError:  # frames are being lost, or its mailbox has failed
@@ -98,7 +103,7 @@ class DiagnosisWatch:
             if subject.failures >= FAILURES_MAX:
                 subject.failures, subject.left_out = 0, PAUSE
             return
-        subject.begun, subject.failures = True, 0
+        subject.failures = 0
 
     # Messages
 
@@ -106,7 +111,9 @@ class DiagnosisWatch:
         upload: Upload = subject.sub.sdo.upload_small
         try:
             state = yield from read_state(upload)
-        except SdoAbort:
+        except SdoAbort as error:
+            if error.code not in OBJECT_MISSING:
+                raise  # it refuses for now
             subject.has_history = False
             return
         if not state.newest:
@@ -116,7 +123,7 @@ class DiagnosisWatch:
         if known and not state.available:
             return
         limit = MESSAGES_PER_READING if subject.begun else 1
-        found = yield from read_history(upload, subject.last, limit=limit)
+        found = yield from read_history(upload, subject.last, limit=limit, state=state)
         if subject.begun:
             self._report(subject, found)
         if found.messages:
@@ -149,12 +156,11 @@ class DiagnosisWatch:
             for each in found
             for counter, number in each.by_counter.items()
         }
-        before, subject.counts = subject.counts, counts
-        subject.has_counters = bool(counts)
-        if not subject.begun:
-            return
+        before = subject.counts
+        subject.counts = before | counts  # a counter may be refused for now
+        subject.has_counters = bool(subject.counts)
         for (index, counter), total in counts.items():
-            count = _increase(before.get((index, counter), 0), total)
+            count = _increase(before.get((index, counter), total), total)
             # Most devices have the same counter for outputs and inputs.
             if count and subject.reported.get(counter) != total:
                 subject.reported[counter] = total

@@ -169,10 +169,9 @@ class Application:
         quirks: MailboxQuirks = NO_MAILBOX_QUIRKS,
         store: FileStore | None = None,
     ) -> None:
-        self._core = core
+        self._core, self._position = core, position
         self._description = description
         self._buffers = Buffers(core)
-        self._position = position
         self._box, self._bootstrap = description.mailbox, description.bootstrap
         self._emulation = description.emulation
         self.synchronisation: Synchronisation | None = None  # only for devices that support SYNC0
