@@ -147,15 +147,26 @@ static object *unused_object(pointer_work *w) {
     }
 }
 
-/* Offers objects until `count` were served; a place is overwritten as soon as it counts as unused.
- * wrong: an object that was overwritten meanwhile; backward: an older one, or a request twice. */
-void hammer_pointer(uint64_t count, int requests, uint64_t *wrong, uint64_t *backward) {
+static int64_t monotonic(void) {
+    struct timespec t;
+    clock_gettime(CLOCK_MONOTONIC, &t);
+    return t.tv_sec * 1000000000LL + t.tv_nsec;
+}
+
+/* Offer objects until `count` were served, or for at most 20 s: on a busy machine, each hand-over
+ * waits for a switch of threads. A place is overwritten as soon as it counts as unused.
+ * wrong: an object that was overwritten meanwhile; backward: an older one, or a request twice.
+ * Return the number of objects served. */
+#define POINTER_NS 20000000000LL
+
+uint64_t hammer_pointer(uint64_t count, int requests, uint64_t *wrong, uint64_t *backward) {
     static pointer_work w;
     pthread_t user;
     memset(&w, 0, sizeof w);
     w.requests = requests;
+    const int64_t end = monotonic() + POINTER_NS;
     pthread_create(&user, 0, use_pointers, &w);
-    for (uint64_t n = 1; cat_load_acquire64(&w.served) < count; n++) {
+    for (uint64_t n = 1; cat_load_acquire64(&w.served) < count && monotonic() < end; n++) {
         object *o = unused_object(&w);
         o->alive = 0;
         o->number = o->copy = n;
@@ -168,6 +179,7 @@ void hammer_pointer(uint64_t count, int requests, uint64_t *wrong, uint64_t *bac
     pthread_join(user, 0);
     *wrong = w.wrong;
     *backward = w.backward;
+    return w.served;
 }
 
 /* Triggers: the sender sends as soon as the receiver has processed the previous one, while the
@@ -179,12 +191,6 @@ typedef struct {
     uint64_t processed;
     uint64_t count;
 } trigger_work;
-
-static int64_t monotonic(void) {
-    struct timespec t;
-    clock_gettime(CLOCK_MONOTONIC, &t);
-    return t.tv_sec * 1000000000LL + t.tv_nsec;
-}
 
 static void *send_triggers(void *argument) {
     trigger_work *w = argument;

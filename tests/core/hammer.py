@@ -20,6 +20,7 @@ HEADERS = HERE.parent.parent / "src" / "catenary" / "native"
 def load_hammer() -> ctypes.CDLL:
     hammer = compiled(HERE / "hammer.c")
     hammer.hammer_ring.restype = ctypes.c_uint64
+    hammer.hammer_pointer.restype = ctypes.c_uint64
     hammer.hammer_trigger.restype = ctypes.c_uint64
     return hammer
 
