@@ -16,12 +16,14 @@ from collections.abc import Sequence
 from pathlib import Path
 
 TESTS = Path(__file__).resolve().parent.parent / "tests"
-VIRTUAL = "bus capture cli control core docs drive esi examples fuzz igh line machine model"
-VIRTUAL += " plan procedure programs pyigh quirk record virtual wire"
+VIRTUAL = (
+    *("bus", "capture", "cli", "control", "core", "docs", "drive", "esi", "examples", "fuzz"),
+    *("igh", "line", "machine", "model", "plan", "procedure", "programs", "pyigh", "quirk"),
+    *("record", "virtual", "wire"),
+)
 PYTEST = (sys.executable, "-m", "catenary.realtime.private_network", "-m", "pytest")
 LOW_PRIORITY = 5  # nice(1)
 SLOWEST = "--durations=25"
-NO_TESTS = 5  # exit status of pytest
 
 
 def main(arguments: Sequence[str]) -> int:
@@ -29,13 +31,18 @@ def main(arguments: Sequence[str]) -> int:
     if not only_requires(arguments):
         return subprocess.call([*PYTEST, *arguments])
     colour = ["--color=yes"] if sys.stdout.isatty() else []
-    folders = [f"tests/{name}" for name in VIRTUAL.split()]
+    folders = [f"tests/{name}" for name in VIRTUAL]
     options = [SLOWEST, *colour, *arguments]
     virtual = Run("virtual: ", [*options, "--part", *folders], LOW_PRIORITY)
     real = Run("", [*options, *(f"--ignore={folder}" for folder in folders)])
     statuses = [each.wait() for each in (real, virtual)]
     print(f"Exit status: {statuses[0]} in real time, {statuses[1]} in virtual time")
-    return max(statuses)
+    return first_failure(statuses)
+
+
+def first_failure(statuses: Sequence[int]) -> int:
+    """Return the first status that is not 0. It is negative if a signal ended the process."""
+    return next((status for status in statuses if status), 0)
 
 
 def only_requires(arguments: Sequence[str]) -> bool:
@@ -44,7 +51,7 @@ def only_requires(arguments: Sequence[str]) -> bool:
 
 
 class Run:
-    """Process of pytest whose lines are printed with a prefix when they are complete."""
+    """Process of pytest. Each complete line of its output is printed with a prefix."""
 
     def __init__(self, prefix: str, options: Sequence[str], niceness: int = 0) -> None:
         self._prefix = prefix

@@ -153,12 +153,12 @@ static int64_t monotonic(void) {
     return t.tv_sec * 1000000000LL + t.tv_nsec;
 }
 
+#define POINTER_NS 20000000000LL
+
 /* Offer objects until `count` were served, or for at most 20 s: on a busy machine, each hand-over
  * waits for a switch of threads. A place is overwritten as soon as it counts as unused.
  * wrong: an object that was overwritten meanwhile; backward: an older one, or a request twice.
  * Return the number of objects served. */
-#define POINTER_NS 20000000000LL
-
 uint64_t hammer_pointer(uint64_t count, int requests, uint64_t *wrong, uint64_t *backward) {
     static pointer_work w;
     pthread_t user;

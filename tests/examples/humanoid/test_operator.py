@@ -65,7 +65,7 @@ def test_an_operator_selects_modes_and_presets(name: str) -> None:
     ):
         assert len(upper.layout.axes) == 18
         assert len(lower.layout.axes) == 15
-        assert upper.mode == "balance"
+        assert until(lambda: upper.mode == "balance")
         pelvis = base.read()["position"]
         assert pelvis[2] == pytest.approx(0.93, abs=0.02)
         elbow = upper.layout.axes.index("right_elbow")
