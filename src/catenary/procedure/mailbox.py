@@ -180,7 +180,8 @@ def _await(
     channel: MailboxChannel, accept: Callable[[Mailbox], T | None], deadline: Deadline
 ) -> Procedure[T | None]:
     """Return the first message that `accept` converts; None if none arrives by the deadline."""
-    for _ in range(UNEXPECTED_MAX):
+    before = channel.dropped
+    while channel.dropped - before < UNEXPECTED_MAX:
         received = yield from _fetch(channel, deadline)
         if received is None:
             return None
@@ -189,6 +190,8 @@ def _await(
         if answer is not None:
             return answer
         channel.owed = True
+        if deadline.passed_at(channel.received_ns):
+            return None  # a device may send emergencies or Ethernet frames without end
     raise MailboxError(
         f"{channel.station} sent {UNEXPECTED_MAX} unexpected mailbox messages in a row",
         hint="its firmware is at fault, or a second master accesses it",
@@ -298,11 +301,11 @@ def _settle(channel: MailboxChannel) -> Procedure[None]:
 
 
 def _drop_late(channel: MailboxChannel, message: Mailbox) -> None:
-    """Drop a late message, but report an emergency."""
+    """Drop a late message, but report an emergency, and give others to their subscribers."""
     emergency = _emergency(message)
     if emergency is not None:
         channel.add_emergency(emergency)
-    else:
+    elif not channel.deliver(message):
         channel.dropped += 1
 
 
@@ -483,7 +486,7 @@ def _sorted(
         channel.add_emergency(emergency)
         return None
     answer = accept(message)
-    if answer is None:
+    if answer is None and not channel.deliver(message):
         channel.dropped += 1
     return answer
 

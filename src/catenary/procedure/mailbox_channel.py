@@ -10,7 +10,7 @@ from typing import NamedTuple, TypeAlias
 from catenary.model.device import MailboxLayout
 from catenary.procedure.station import Station
 from catenary.wire import coe
-from catenary.wire.mailbox import Mailbox
+from catenary.wire.mailbox import Mailbox, Type
 
 EMERGENCIES_KEPT = 64
 ANSWER_DELAY_FIRST_NS = 100_000
@@ -25,6 +25,8 @@ class ReceivedEmergency(NamedTuple):
 
 
 Listener: TypeAlias = Callable[[ReceivedEmergency], None]
+# Receives a message and the time at which it was read [ns]. It returns True if it used the message.
+Subscriber: TypeAlias = Callable[[Mailbox, int], bool]
 
 
 @dataclass(slots=True)
@@ -46,6 +48,8 @@ class MailboxChannel:
         default_factory=lambda: deque(maxlen=EMERGENCIES_KEPT)
     )
     listener: Listener | None = None
+    # Receivers of messages that no procedure expects, by protocol, for example Ethernet frames.
+    subscribers: dict[Type, Subscriber] = field(default_factory=dict)
     dropped: int = 0  # unexpected messages and duplicates
     # Active and waiting procedures; the first one uses the mailbox.
     turns: deque[object] = field(default_factory=deque)
@@ -102,6 +106,18 @@ class MailboxChannel:
             for received in tuple(self.emergencies):
                 listener(received)
         self.listener = listener
+
+    def deliver(self, message: Mailbox) -> bool:
+        """Give an unexpected message to the subscriber of its protocol.
+
+        Args:
+            message: The message.
+
+        Returns:
+            True if a subscriber used the message.
+        """
+        subscriber = self.subscribers.get(message.type)
+        return subscriber is not None and subscriber(message, self.received_ns)
 
     def add_emergency(self, emergency: coe.Emergency) -> None:
         """Store an emergency and report it to the listener."""

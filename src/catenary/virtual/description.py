@@ -128,6 +128,7 @@ class Description:
     facts: FileFacts | None = field(default=None, repr=False)  # None: one of our own kinds
     bootstrap: MailboxDefault | None = field(default=None, repr=False)  # mailbox in BOOT
     serves_files: bool = field(default=False, repr=False)  # FoE
+    protocols: tuple[int, ...] = field(default=(), repr=False)  # beside CoE and FoE
 
     @property
     def vendor(self) -> int:

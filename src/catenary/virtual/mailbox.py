@@ -16,6 +16,7 @@ from catenary.virtual.scheduler import Scheduler
 HEADER = struct.Struct("<HHBB")  # length, address, channel and priority, type and counter
 ERROR_PROTOCOL, COE_PROTOCOL, FOE_PROTOCOL = 0, 3, 4
 ERROR_SYNTAX, ERROR_UNSUPPORTED_PROTOCOL, ERROR_TOO_SHORT, ERROR_SIZE = 0x01, 0x02, 0x06, 0x08
+WAITING_MAX = 16  # unsolicited messages that wait for the MainDevice
 
 
 class MailboxPorts(Protocol):
@@ -37,8 +38,7 @@ class Mailbox:
         self,
         ports: MailboxPorts,
         scheduler: Scheduler,
-        serve: Callable[[bytes], Iterable[bytes]],
-        serve_other: Callable[[int, bytes], Iterable[bytes] | int | None],
+        serve: Callable[[int, bytes], Iterable[bytes] | int],
         *,
         delay_ns: int,
         quirks: MailboxQuirks = NO_MAILBOX_QUIRKS,
@@ -48,16 +48,14 @@ class Mailbox:
         Args:
             ports: PDI side of the SyncManagers.
             scheduler: Delayed actions of the device.
-            serve: Function that returns the answers to a CoE message.
-            serve_other: Function that first receives every message: its protocol and data. It
-                returns the answers, the code of a mailbox error, or None for a CoE message.
+            serve: Function that receives the protocol and the data of a message. It returns the
+                answers, or the code of a mailbox error.
             delay_ns: Time until a request is fetched [ns].
             quirks: Differences from the standard.
         """
         self._ports = ports
         self._scheduler = scheduler
         self._serve = serve
-        self._serve_other = serve_other
         self._delay_ns = delay_ns
         self._quirks = quirks
         self.silent = False
@@ -108,9 +106,7 @@ class Mailbox:
         if self._quirks.error_reply != "none" and protocol == COE_PROTOCOL:
             reply = struct.pack("<HH", 1, ERROR_UNSUPPORTED_PROTOCOL)
             return [(ERROR_PROTOCOL, reply[: 2 if self._quirks.error_reply == "short" else 4])]
-        served = self._serve_other(protocol, payload)
-        if served is None:
-            return [(COE_PROTOCOL, answer) for answer in self._serve(payload)]
+        served = self._serve(protocol, payload)
         if isinstance(served, int):
             return [(ERROR_PROTOCOL, struct.pack("<HH", 1, served))]
         return [(protocol, answer) for answer in served]
@@ -125,11 +121,21 @@ class Mailbox:
         given = {"echoed": self._request_counter, "stuck": 1, "zero": 0}
         return given.get(self._quirks.counter, self._counter)
 
-    def send(self, payload: bytes) -> None:
-        """Queue an unsolicited CoE message (an emergency). Drop it if 16 messages are waiting."""
-        if len(self._waiting) < 16:
-            self._queue((COE_PROTOCOL, payload))
-            self._deliver()
+    def send(self, protocol: int, payload: bytes) -> bool:
+        """Queue an unsolicited message, for example an emergency.
+
+        Args:
+            protocol: Protocol of the message.
+            payload: Data of the message.
+
+        Returns:
+            False if the message was dropped, because 16 messages are waiting.
+        """
+        if len(self._waiting) >= WAITING_MAX:
+            return False
+        self._queue((protocol, payload))
+        self._deliver()
+        return True
 
     def _deliver(self) -> None:
         if self._waiting and not self.silent and self._ports.put_answer(self._waiting[0]):

@@ -24,6 +24,8 @@ STRINGS, GENERAL, FMMU, SYNC_MANAGER, TX_PDO, RX_PDO, CLOCK, END = (
 )
 FIXED_CONTENT = 0x0010  # PDO flag
 COE_PROTOCOL, FOE_PROTOCOL = 0x0004, 0x0008
+AOE, EOE, SOE, VOE = 1, 2, 5, 15  # in the mailbox header
+PROTOCOL_BITS = {AOE: 0x0001, EOE: 0x0002, SOE: 0x0010, VOE: 0x0020}  # in word 0x001C
 # Flags in byte 0x0B of the general category
 NO_LRW, IDENTIFICATION_IN_MEMORY = 0x02, 0x10
 HEADER_BYTES = 128
@@ -77,10 +79,16 @@ def _header(device: Description, size: int, mailbox_size: int | None) -> bytes:
             box.receive_size if mailbox_size is None else mailbox_size,
             box.send_offset,
             box.send_size if mailbox_size is None else mailbox_size,
-            COE_PROTOCOL | (FOE_PROTOCOL if device.serves_files else 0),
+            _protocols(device),
         )
     words = words.ljust(124, b"\0")
     return words + struct.pack("<HH", max(size * 8 // 1024 - 1, 0), 1)
+
+
+def _protocols(device: Description) -> int:
+    """Return the mailbox protocols as the bits of word 0x001C."""
+    found = COE_PROTOCOL | (FOE_PROTOCOL if device.serves_files else 0)
+    return found | sum(PROTOCOL_BITS[number] for number in device.protocols)
 
 
 def _general(device: Description, strings: _Strings) -> bytes:
@@ -92,7 +100,8 @@ def _general(device: Description, strings: _Strings) -> bytes:
     ports = sum(1 << 4 * port for port in device.ports)  # 1: MII
     return struct.pack(
         "<BBBBxBBBBBBBhBxHH12x",
-        *(group, 0, order, name, details, device.serves_files, 0, 0, device.axes, 0, flags),
+        *(group, 0, order, name, details, device.serves_files, EOE in device.protocols),
+        *(SOE in device.protocols, device.axes, 0, flags),
         *(device.current_milliampere, group, ports, 0x0012 if device.identification else 0),
     )
 

@@ -5,6 +5,7 @@ Real terminals use the same layout.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Literal
 
 from catenary.virtual.coe.dictionary import (
@@ -25,6 +26,7 @@ from catenary.virtual.devices.application import Application, mailbox_of, sync_m
 from catenary.virtual.devices.applied import AppliedDevice, MailboxOptions
 from catenary.virtual.foe.options import DeviceFiles
 from catenary.virtual.mapping_quirks import NO_MAPPING_QUIRKS, MappingQuirks
+from catenary.virtual.protocols import MailboxProtocol
 from catenary.virtual.scheduler import Scheduler
 from catenary.virtual.sii_quirks import NO_SII_QUIRKS, SiiQuirks
 
@@ -58,6 +60,7 @@ class AnalogInputs(AppliedDevice):
         mailbox_quirks: MailboxQuirks = NO_MAILBOX_QUIRKS,
         sii_quirks: SiiQuirks = NO_SII_QUIRKS,
         files: DeviceFiles | None = None,
+        protocols: Sequence[MailboxProtocol] = (),
     ) -> None:
         """Initialise the terminal.
 
@@ -78,6 +81,7 @@ class AnalogInputs(AppliedDevice):
             mailbox_quirks: Quirks of the mailbox.
             sii_quirks: Quirks of the SII.
             files: Files that FoE reads and writes; None: the device does not support FoE.
+            protocols: Further mailbox protocols of the device.
 
         Raises:
             ValueError: A value is out of range.
@@ -92,7 +96,7 @@ class AnalogInputs(AppliedDevice):
             crystal=crystal,
             clock_bits=clock_bits,
             sii_quirks=sii_quirks,
-            mailbox=MailboxOptions(mailbox_bytes, mailbox_delay, mailbox_quirks, files),
+            mailbox=MailboxOptions(mailbox_bytes, mailbox_delay, mailbox_quirks, files, protocols),
         )
         self.channels = channels
         self.second_pdo = second_pdo

@@ -66,6 +66,7 @@ from catenary.virtual.mailbox import (
     HEADER,
     Mailbox,
 )
+from catenary.virtual.protocols import MailboxProtocol, ProtocolServer, Surroundings
 from catenary.virtual.scheduler import Scheduler
 from catenary.virtual.state_machine import (
     BOOT,
@@ -168,6 +169,7 @@ class Application:
         delay_ns: int,
         quirks: MailboxQuirks = NO_MAILBOX_QUIRKS,
         store: FileStore | None = None,
+        protocols: Sequence[MailboxProtocol] = (),
     ) -> None:
         self._core, self._position = core, position
         self._description = description
@@ -195,8 +197,8 @@ class Application:
             description.mapping_quirks,
         )
         self._add_servers(description, quirks)
-        serve = self._serve_coe, self._serve_other
-        self.mailbox = Mailbox(self, scheduler, *serve, delay_ns=delay_ns, quirks=quirks)
+        self.mailbox = Mailbox(self, scheduler, self._serve, delay_ns=delay_ns, quirks=quirks)
+        self._servers = self._start_protocols(protocols, scheduler)
         self._gate(mailbox=self._emulation, process_data=self._emulation)
 
     def _add_servers(self, description: Description, quirks: MailboxQuirks) -> None:
@@ -214,6 +216,21 @@ class Application:
             supported=facts is None or facts.sdo_information,
             quirks=quirks,
         )
+
+    def _start_protocols(
+        self, protocols: Sequence[MailboxProtocol], scheduler: Scheduler
+    ) -> dict[int, ProtocolServer]:
+        """Return the servers of the protocols beside CoE and FoE, by number."""
+        if self._box is None:
+            return {}
+        surroundings = Surroundings(
+            self.mailbox,
+            scheduler,
+            self._state,
+            self._box.receive_size - HEADER.size,
+            self._box.send_size - HEADER.size,
+        )
+        return {each.number: each.start(surroundings) for each in protocols}
 
     def _state(self) -> int:
         """Return the AL state. With emulation, only the controller knows it."""
@@ -323,15 +340,18 @@ class Application:
             return
         register = 1 if code else 0
         head = struct.pack("<HHB", EMERGENCY << 12, code, register)
-        self.mailbox.send(head + data[:5].ljust(5, b"\0"))
+        self.mailbox.send(COE_PROTOCOL, head + data[:5].ljust(5, b"\0"))
 
-    def _serve_other(self, protocol: int, payload: bytes) -> Iterable[bytes] | int | None:
-        """Return the answers to a message, or the code of a mailbox error; None if it is CoE."""
+    def _serve(self, protocol: int, payload: bytes) -> Iterable[bytes] | int:
+        """Return the answers to a message, or the code of a mailbox error."""
         if protocol == FOE_PROTOCOL:
             return self._files.serve(payload)
-        if protocol != COE_PROTOCOL or self._state() == BOOT:  # BOOT has no CoE, §6.4.1
+        if self._state() == BOOT:  # only FoE, §6.4.1
             return ERROR_UNSUPPORTED_PROTOCOL
-        return ERROR_TOO_SHORT if len(payload) < 3 else None
+        if protocol == COE_PROTOCOL:
+            return ERROR_TOO_SHORT if len(payload) < 3 else self._serve_coe(payload)
+        server = self._servers.get(protocol)
+        return ERROR_UNSUPPORTED_PROTOCOL if server is None else server.serve(payload)
 
     def _serve_coe(self, payload: bytes) -> Iterable[bytes]:
         [header] = struct.unpack_from("<H", payload)
@@ -447,6 +467,8 @@ class Application:
         if before == INIT and state in (PRE_OP, BOOT):
             self.mailbox.reset()
             self._files.reset()
+            for server in self._servers.values():
+                server.reset()
         if before == BOOT and state == INIT:
             self._leave_boot()
         if before < SAFE_OP <= state:

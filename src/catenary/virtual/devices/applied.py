@@ -14,6 +14,7 @@ from catenary.virtual.devices.application import Application, mailbox_of
 from catenary.virtual.devices.device import Device
 from catenary.virtual.foe.options import DeviceFiles
 from catenary.virtual.foe.store import FileStore
+from catenary.virtual.protocols import MailboxProtocol
 from catenary.virtual.scheduler import Scheduler
 from catenary.virtual.sii_quirks import SiiQuirks
 
@@ -28,6 +29,7 @@ class MailboxOptions:
     delay: float = 300e-6  # time until a request is answered [s]
     quirks: MailboxQuirks = NO_MAILBOX_QUIRKS
     files: DeviceFiles | None = None  # None: the device does not support FoE
+    protocols: Sequence[MailboxProtocol] = ()  # beside CoE and FoE
 
     def __post_init__(self) -> None:
         if not 32 <= self.size <= 1024 or self.size % 2:
@@ -64,6 +66,7 @@ class AppliedDevice(Device):
         self.mailbox_quirks = mailbox.quirks
         self._mailbox_delay_ns = round(mailbox.delay * 1e9)
         self.files = mailbox.files
+        self.protocols = tuple(mailbox.protocols)
         self._store: FileStore | None = None  # made when the device starts for the first time
         self._application: Application | None = None
 
@@ -81,8 +84,12 @@ class AppliedDevice(Device):
         return self._store
 
     def whole_description(self) -> Description:
-        """Return the description with the bootstrap mailbox of a device with files."""
+        """Return the description with all protocols, and the bootstrap mailbox for files."""
         found = super().whole_description()
+        if self.protocols:
+            numbers = tuple(each.number for each in self.protocols)
+            variant = f"{found.sii_variant} protocols {numbers}"
+            found = replace(found, protocols=numbers, sii_variant=variant)
         if self.files is None:
             return found
         chosen = self.files.bootstrap_bytes
@@ -113,6 +120,7 @@ class AppliedDevice(Device):
             delay_ns=self._mailbox_delay_ns,
             quirks=self.mailbox_quirks,
             store=self._store,
+            protocols=self.protocols,
         )
         if self.files and self.files.firmware and self.files.firmware.restart == "power":
             self._application.on_restart = self.reset

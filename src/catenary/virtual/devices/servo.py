@@ -8,6 +8,7 @@ mille of the rated torque.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 from catenary.virtual import _segment
@@ -50,6 +51,7 @@ from catenary.virtual.devices.servo_quirks import NO_QUIRKS, ServoQuirks
 from catenary.virtual.devices.synchronisation import DC_SYNC0, DC_SYNC1, Synchronisation
 from catenary.virtual.foe.options import DeviceFiles
 from catenary.virtual.mapping_quirks import NO_MAPPING_QUIRKS, MappingQuirks
+from catenary.virtual.protocols import MailboxProtocol
 from catenary.virtual.sii_quirks import NO_SII_QUIRKS, SiiQuirks
 
 MINIMUM_CYCLE_NS = 62_500  # shortest SYNC0 cycle
@@ -107,6 +109,7 @@ class Servo(MotorDevice):
         mailbox_quirks: MailboxQuirks = NO_MAILBOX_QUIRKS,
         sii_quirks: SiiQuirks = NO_SII_QUIRKS,
         files: DeviceFiles | None = None,
+        protocols: Sequence[MailboxProtocol] = (),
     ) -> None:
         """Initialise the drive.
 
@@ -139,6 +142,7 @@ class Servo(MotorDevice):
             mailbox_quirks: Quirks of the mailbox.
             sii_quirks: Quirks of the SII.
             files: Files that FoE reads and writes; None: the device does not support FoE.
+            protocols: Further mailbox protocols of the device.
 
         Raises:
             ValueError: A value is out of range.
@@ -167,7 +171,7 @@ class Servo(MotorDevice):
             crystal=crystal,
             clock_bits=clock_bits,
             sii_quirks=sii_quirks,
-            mailbox=MailboxOptions(mailbox_bytes, mailbox_delay, mailbox_quirks, files),
+            mailbox=MailboxOptions(mailbox_bytes, mailbox_delay, mailbox_quirks, files, protocols),
         )
         self.install_motors([motor] * axes, quirks)
         self.counts_per_turn = counts_per_turn

@@ -32,6 +32,7 @@ from catenary.virtual.devices.synchronisation import Synchronisation
 from catenary.virtual.devices.twin_objects import TwinObjects, layout_of
 from catenary.virtual.foe.options import DeviceFiles
 from catenary.virtual.mapping_quirks import MappingQuirks
+from catenary.virtual.protocols import MailboxProtocol
 from catenary.virtual.scheduler import Scheduler
 from catenary.virtual.sii_quirks import NO_SII_QUIRKS
 
@@ -61,6 +62,7 @@ class TwinOptions:
         mailbox_quirks: Quirks of the mailbox.
         files: Files that FoE reads and writes; None: the twin does not support FoE. It supports
             BOOT if its EEPROM has a bootstrap mailbox.
+        protocols: Further mailbox protocols, whether or not the EEPROM names them.
     """
 
     motor: Motor | None = STANDARD_MOTOR
@@ -72,6 +74,7 @@ class TwinOptions:
     mapping_quirks: MappingQuirks | None = None
     mailbox_quirks: MailboxQuirks = NO_MAILBOX_QUIRKS
     files: DeviceFiles | None = None
+    protocols: Sequence[MailboxProtocol] = ()
 
     def __post_init__(self) -> None:
         for name in OF_THE_FILE:
@@ -125,6 +128,7 @@ class Twin(MotorDevice):
                 delay=options.mailbox_delay,
                 quirks=options.mailbox_quirks if blueprint.serves_coe else REFUSES_COE,
                 files=options.files,
+                protocols=options.protocols,
             ),
         )
         self.install_motors(motors, options.quirks)
