@@ -72,7 +72,7 @@ def ignored() -> list[str]:
 
 
 def elsewhere(markers: Collection[str]) -> list[str]:
-    """Return the options for markers whose tests may all be in other processes."""
+    """Return the options for markers that need no test in a process."""
     return [f"--elsewhere={marker}" for marker in sorted(markers)]
 
 
