@@ -48,7 +48,8 @@ class Aoe:
         """
         self._sub = sub
         self._unavailable = unavailable
-        self._peer: AdsPeer | None = None
+        self._peer = AdsPeer(b"")
+        self._assigned: bytes | None = None  # NetId that the program has chosen
         self._queues = NotificationQueues()
 
     @property
@@ -68,10 +69,8 @@ class Aoe:
             AdsError: The device refuses the NetId.
             ValueError: `net_id` is not a NetId.
         """
-        peer = self._known_peer()
-        if net_id is not None:
-            peer.net_id = net_id_of(net_id)
-        self._sub.main.converse(assign_net_id(self._channel(), peer))
+        self._assigned = None if net_id is None else net_id_of(net_id)
+        self._sub.main.converse(assign_net_id(self._channel(), self._known_peer()))
 
     def read(
         self,
@@ -250,8 +249,7 @@ class Aoe:
         return write(self._channel(), self._known_peer(), place, bytes(data), timeout=timeout)
 
     def _known_peer(self) -> AdsPeer:
-        if self._peer is None:
-            self._peer = AdsPeer(own_net_id(self._sub.station.address))
+        self._peer.net_id = self._assigned or own_net_id(self._sub.station.address)
         return self._peer
 
     def _channel(self) -> MailboxChannel:
