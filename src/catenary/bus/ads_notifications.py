@@ -12,7 +12,8 @@ from catenary.procedure.aoe import AdsPeer, request
 from catenary.procedure.delivery import await_delivery
 from catenary.procedure.exchange import Procedure
 from catenary.procedure.mailbox import MailboxChannel
-from catenary.wire.ads import DeleteNotification, Sample, decode_notification
+from catenary.wire.ads import DeleteNotification
+from catenary.wire.ads_response import Sample, decode_notification
 from catenary.wire.aoe import Command, Message, decode_aoe
 from catenary.wire.mailbox import Mailbox, Type
 

@@ -23,7 +23,14 @@ from catenary.procedure.aoe import (
 from catenary.procedure.exchange import Procedure
 from catenary.procedure.mailbox import MailboxChannel
 from catenary.wire import ads
-from catenary.wire.ads import DeviceInfo, States, Transmission
+from catenary.wire.ads import Transmission
+from catenary.wire.ads_response import (
+    DeviceInfo,
+    States,
+    decode_device_info,
+    decode_handle,
+    decode_states,
+)
 from catenary.wire.aoe import net_id_of, net_id_text
 
 T = TypeVar("T")
@@ -168,11 +175,11 @@ class Aoe:
     def device_info(self, *, port: int = DEVICE_PORT) -> DeviceInfo:
         """Read the name and the version of the ADS device. The errors are those of `read`."""
         asked = self._ask(ads.ReadDeviceInfo(), port)
-        return self._decoded(asked, ads.decode_device_info)
+        return self._decoded(asked, decode_device_info)
 
     def state(self, *, port: int = DEVICE_PORT) -> States:
         """Read the ADS state and the device state. The errors are those of `read`."""
-        return self._decoded(self._ask(ads.ReadState(), port), ads.decode_states)
+        return self._decoded(self._ask(ads.ReadState(), port), decode_states)
 
     def write_control(
         self,
@@ -226,7 +233,7 @@ class Aoe:
         asked = self._ask(ads.AddNotification(group, offset, size, mode, 0, cycle), port)
         channel = self._channel()
         self._queues.listen(channel)
-        handle = self._decoded(asked, ads.decode_handle)
+        handle = self._decoded(asked, decode_handle)
         main, peer = self._sub.main, self._known_peer()
         return AdsNotifications(self._queues, channel, main, peer, handle, port=port, kept=kept)
 

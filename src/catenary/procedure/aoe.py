@@ -17,6 +17,7 @@ from catenary.procedure.exchange import Procedure
 from catenary.procedure.mailbox import MailboxChannel, exclusively
 from catenary.wire import ads
 from catenary.wire.ads_error import ads_meaning
+from catenary.wire.ads_response import decode_data, decode_result
 from catenary.wire.aoe import Address, AoeMessage, Command, Fragment, Message, decode_aoe
 from catenary.wire.mailbox import Mailbox, Type
 
@@ -139,7 +140,7 @@ def read(
 def _read(
     channel: MailboxChannel, exchange: Procedure[bytes], size: int, what: str
 ) -> Procedure[bytes]:
-    found = decoded(channel, ads.decode_data, (yield from exchange))
+    found = decoded(channel, decode_data, (yield from exchange))
     if len(found) > size:
         raise MailboxError(
             f"{channel.station}: {what}: the device sent {len(found)} bytes",
@@ -232,7 +233,7 @@ def _acceptor(
 
 def _successful(channel: MailboxChannel, answer: Message, what: str) -> bytes:
     """Return the data of a response. Raises AdsError if the device refuses the request."""
-    code = answer.error or decoded(channel, ads.decode_result, answer.data)
+    code = answer.error or decoded(channel, decode_result, answer.data)
     if code == 0:
         return answer.data
     meaning = ads_meaning(code)

@@ -52,7 +52,8 @@ def send_message(
     room = channel.layout.receive_size - HEADER_SIZE
     encoded = message.encode()
     if len(encoded) <= room:
-        return (yield from converse(channel, Type.AOE, encoded, accept, timeout=timeout))
+        whole: Procedure[AoeMessage] = converse(channel, Type.AOE, encoded, accept, timeout=timeout)
+        return (yield from whole)
     *parts, last = fragments(message, room, PACKET)
     for part in parts:
         sent = yield from send_only(channel, Type.AOE, part.encode(), attempts=RECOVERIES)
@@ -62,7 +63,8 @@ def send_message(
                 "request were lost",
                 hint="check the cables: the error counters at 0x0300 show which one is faulty",
             )
-    return (yield from converse(channel, Type.AOE, last.encode(), accept, timeout=timeout))
+    end: Procedure[AoeMessage] = converse(channel, Type.AOE, last.encode(), accept, timeout=timeout)
+    return (yield from end)
 
 
 def collect(
