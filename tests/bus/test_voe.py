@@ -74,7 +74,7 @@ def test_no_answer() -> None:
     echo = VendorEcho(answers="none")
     with MainDevice(Segment([Coupler(), AnalogInputs(protocols=[echo])])) as main:
         sub = main.scan()[1]
-        with pytest.raises(ResponseTimeout, match="no answer to a VOE message within 0.3 s"):
+        with pytest.raises(ResponseTimeout, match=r"no answer to a VOE message within 0\.3 s"):
             sub.voe.exchange(1, timeout=0.3)
         assert len(sub.sdo.read(0x1018, 1)) == 4
 
