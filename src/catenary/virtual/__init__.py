@@ -1,7 +1,7 @@
 """Virtual EtherCAT segments at register level: in virtual time, in real time, or on a NIC."""
 
 from catenary.virtual import faults
-from catenary.virtual.aoe.options import Ads
+from catenary.virtual.aoe.protocol import Ads
 from catenary.virtual.coe.diagnosis_history import HistoryOptions
 from catenary.virtual.coe.quirks import MailboxQuirks
 from catenary.virtual.configuration import read_segment

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import msgspec
 
-from catenary.virtual.aoe.options import Ads
+from catenary.virtual.aoe.protocol import Ads
 from catenary.virtual.coe.diagnosis_history import NO_HISTORY, HistoryOptions
 from catenary.virtual.coe.quirks import NO_MAILBOX_QUIRKS, MailboxQuirks
 from catenary.virtual.crystal import ClockBits, Crystal

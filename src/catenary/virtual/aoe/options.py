@@ -10,14 +10,11 @@ from typing import Any, Literal
 
 import msgspec
 
-from catenary.virtual.aoe.server import AdsServer
-from catenary.virtual.protocols import Surroundings
-
 AREA_MAX = 1 << 22  # [bytes]
 
 
-class Ads(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """ADS device in a virtual device, for AoE. Areas start with their contents after power-on."""
+class AdsOptions(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """Data and behaviour of an ADS device. Areas start with their contents after power-on."""
 
     # Memory by index group: the number of bytes (zeros), bytes, or text. In TOML, a key is text.
     areas: Mapping[Any, Any] = {}
@@ -50,16 +47,6 @@ class Ads(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True)
             raise ValueError(f"port must be 0 to 0xFFFF, not {self.port}")
         if len(self.name) > 16 or not self.name.isascii():
             raise ValueError(f"name must have at most 16 ASCII characters, not {self.name!r}")
-
-    @property
-    def number(self) -> int:
-        """Type of AoE in the mailbox header."""
-        return 1
-
-    def start(self, surroundings: Surroundings) -> AdsServer:
-        """Make the server. Called at each start of the device."""
-        areas = {group_of(group): content_of(each) for group, each in self.areas.items()}
-        return AdsServer(self, areas, surroundings)
 
 
 def group_of(key: object) -> int:

@@ -6,7 +6,6 @@ import struct
 from collections.abc import Mapping
 from dataclasses import replace
 from enum import IntEnum
-from typing import TYPE_CHECKING
 
 from catenary.virtual.aoe.messages import (
     ADS_COMMAND,
@@ -20,6 +19,7 @@ from catenary.virtual.aoe.messages import (
     fragments,
 )
 from catenary.virtual.aoe.notifications import Notifications
+from catenary.virtual.aoe.options import AdsOptions
 from catenary.virtual.coe.dictionary import (
     NO_OBJECT,
     NO_SUBINDEX,
@@ -31,9 +31,6 @@ from catenary.virtual.coe.dictionary import (
 )
 from catenary.virtual.mailbox import ERROR_SIZE, ERROR_TOO_SHORT
 from catenary.virtual.protocols import Surroundings
-
-if TYPE_CHECKING:
-    from catenary.virtual.aoe.options import Ads
 
 NO_PORT, NO_TARGET = 0x0006, 0x0007  # errors of the transport
 NO_SERVICE, NO_GROUP, NO_OFFSET, NO_ACCESS, BAD_SIZE = 0x701, 0x702, 0x703, 0x704, 0x705
@@ -77,7 +74,7 @@ class AdsServer:
     """Server of one device. It owns the areas, the ADS state and the NetId."""
 
     def __init__(
-        self, options: Ads, areas: Mapping[int, bytearray], surroundings: Surroundings
+        self, options: AdsOptions, areas: Mapping[int, bytearray], surroundings: Surroundings
     ) -> None:
         self._options = options
         self._areas = areas
