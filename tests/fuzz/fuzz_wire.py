@@ -107,7 +107,7 @@ def _timeline_of_frames(data: bytes) -> list[str]:
 
 
 def _ads_request(data: bytes) -> ads.Request:
-    """Decode a request whose command is the first byte."""
+    """Decode a request. The first byte is its command."""
     return ads.decode_request(data[0] if data else 0, data[1:])
 
 

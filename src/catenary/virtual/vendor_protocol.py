@@ -47,7 +47,7 @@ class VendorServer:
 
 
 class VendorMessages:
-    """VoE of a virtual device, whose answers a function computes.
+    """VoE of a virtual device. A function computes the answers.
 
     Example: `Servo(protocols=[VendorMessages(lambda vendor, type, data: (type, data[::-1]))])`.
     """

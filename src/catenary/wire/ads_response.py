@@ -82,7 +82,7 @@ def decode_device_info(data: bytes) -> DeviceInfo:
 
 
 class States(NamedTuple):
-    """State of an ADS device, and a state whose meaning the device defines."""
+    """State of an ADS device. The device defines the meaning of `device_state`."""
 
     ads_state: int
     device_state: int

@@ -213,7 +213,12 @@ def fragments(message: Message, size: int, packet: int) -> Iterator[Fragment]:
 
 
 def join(first: Fragment, parts: bytes) -> Message:
-    """Return the message whose fragments have the data `parts`. Raises DecodeError if invalid."""
+    """Return the message of joined fragments. Raises DecodeError if it is invalid.
+
+    Args:
+        first: The first fragment.
+        parts: Data of all fragments.
+    """
     found = decode_aoe(_head(first.target, first.source, parts))
     if isinstance(found, Fragment):
         raise DecodeError("AoE: fragments contain another fragment")

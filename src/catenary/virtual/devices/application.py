@@ -171,8 +171,7 @@ class Application:
         store: FileStore | None = None,
         protocols: Sequence[MailboxProtocol] = (),
     ) -> None:
-        self._core, self._position = core, position
-        self._description = description
+        self._core, self._position, self._description = core, position, description
         self._buffers = Buffers(core)
         self._box, self._bootstrap = description.mailbox, description.bootstrap
         self._emulation = description.emulation
