@@ -24,7 +24,10 @@ from catenary.capture import EventStream
 from catenary.capture.notes import notes
 from catenary.errors import DecodeError
 from catenary.wire import (
+    ads,
+    ads_response,
     al,
+    aoe,
     capture,
     clock,
     coe,
@@ -45,6 +48,7 @@ from catenary.wire import (
     sii_categories,
     sii_interface,
     sync_manager,
+    voe,
 )
 
 
@@ -100,6 +104,15 @@ def _timeline_of_frames(data: bytes) -> list[str]:
         blocks.append(pcapng.encode_packet(packet))
         rest = rest[2 + size :]
     return _timeline(b"".join(blocks))
+
+
+def _ads_request(data: bytes) -> ads.Request:
+    """Decode a request. The first byte is its command."""
+    return ads.decode_request(data[0] if data else 0, data[1:])
+
+
+def _encoded_ads_request(request: ads.Request) -> bytes:
+    return bytes((request.command,)) + request.encode()
 
 
 def _word(name: str, decode: Callable[[int], Any], size: int, *values: int) -> Target:
@@ -165,6 +178,20 @@ PCAP = (
     + struct.pack("<4I", 1, 2, len(FRAME), len(FRAME))
     + FRAME
 )
+ADS_REQUESTS: tuple[ads.Request, ...] = (
+    ads.Read(0xF302, 0x10180001, 4),
+    ads.Write(0x4020, 0, b"abc"),
+    ads.ReadWrite(0x4020, 0, 4, b"abc"),
+    ads.WriteControl(5, 0, b"x"),
+    ads.AddNotification(0x4020, 0, 4, 4, 0, 10_000),
+    ads.DeleteNotification(1),
+    ads.ReadDeviceInfo(),
+    ads.ReadState(),
+)
+ADDRESSES = (aoe.Address(bytes((1, 2, 3, 4, 5, 6)), 0xFFFF), aoe.Address(bytes(6), 0x8000))
+AOE = tuple(aoe.Message(*ADDRESSES, each.command, each.encode(), 7) for each in ADS_REQUESTS)
+AOE_FRAGMENTS = tuple(aoe.fragments(AOE[2], 48, 1))
+ADS_SAMPLES = (ads_response.Sample(1, 5, b"abcd"), ads_response.Sample(2, 6, b""))
 MAILBOX_DATA = mailbox.Mailbox(mailbox.Type.COE, SDO_DOWNLOAD, 1).encode(64)
 BRING_UP = tuple(
     frame.encode_frame([datagram.Datagram(command, address, data, i, counter)], source=source)
@@ -286,6 +313,50 @@ TARGETS = (
             foe.Busy(3, 100, "erase").encode(),
         ),
     ),
+    Target(
+        "aoe.decode_aoe",
+        aoe.decode_aoe,
+        _method,
+        tuple(each.encode() for each in (*AOE, *AOE_FRAGMENTS)),
+    ),
+    Target(
+        "ads.decode_request",
+        _ads_request,
+        _encoded_ads_request,
+        tuple(bytes((each.command,)) + each.encode() for each in ADS_REQUESTS),
+    ),
+    Target("ads_response.decode_result", ads_response.decode_result, None, (bytes(4),)),
+    Target(
+        "ads_response.decode_data",
+        ads_response.decode_data,
+        lambda data: ads_response.encode_result(0, data),
+        (ads_response.encode_result(0, b"abcd"),),
+    ),
+    Target(
+        "ads_response.decode_device_info",
+        ads_response.decode_device_info,
+        _method,
+        (ads_response.DeviceInfo("probe", 1, 2, 3).encode(),),
+    ),
+    Target(
+        "ads_response.decode_states",
+        ads_response.decode_states,
+        _method,
+        (ads_response.States(5, 1).encode(),),
+    ),
+    Target(
+        "ads_response.decode_handle",
+        ads_response.decode_handle,
+        ads_response.encode_handle,
+        (ads_response.encode_handle(3),),
+    ),
+    Target(
+        "ads_response.decode_notification",
+        ads_response.decode_notification,
+        ads_response.encode_notification,
+        (ads_response.encode_notification(ADS_SAMPLES),),
+    ),
+    Target("voe.decode_voe", voe.decode_voe, _method, (voe.VoeMessage(2, 1, b"hello").encode(),)),
     Target(
         "diagnosis_history.decode_diagnosis_message",
         diagnosis_history.decode_diagnosis_message,

@@ -1,6 +1,8 @@
 """MainDevice and SubDevice, and the runners of procedures."""
 
 from catenary.bus.acyclic_runner import AcyclicQueue, AcyclicRunner
+from catenary.bus.ads_notifications import AdsNotifications
+from catenary.bus.aoe import Aoe
 from catenary.bus.external_master import Carrier, CycleClock
 from catenary.bus.foe import Foe
 from catenary.bus.main_device import MainDevice
@@ -9,11 +11,14 @@ from catenary.bus.runner import BlockingRunner, FrameCounts, Runner
 from catenary.bus.sdo import Sdo
 from catenary.bus.sub_device import SubDevice
 from catenary.bus.sub_devices import SubDevices
+from catenary.bus.voe import Voe
 from catenary.wire.sdo_information import ListType
 
 __all__ = [
     "AcyclicQueue",
     "AcyclicRunner",
+    "AdsNotifications",
+    "Aoe",
     "BlockingRunner",
     "Carrier",
     "CycleClock",
@@ -26,4 +31,5 @@ __all__ = [
     "Sdo",
     "SubDevice",
     "SubDevices",
+    "Voe",
 ]

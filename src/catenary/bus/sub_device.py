@@ -7,10 +7,12 @@ from contextlib import contextmanager, suppress
 from dataclasses import replace
 from typing import TYPE_CHECKING, Protocol
 
+from catenary.bus.aoe import Aoe
 from catenary.bus.device_diagnosis import DeviceDiagnosis
 from catenary.bus.foe import Foe
 from catenary.bus.pdo_table import PdoTable
 from catenary.bus.sdo import Conversations, Objects, Sdo
+from catenary.bus.voe import Voe
 from catenary.errors import CatenaryError
 from catenary.model.device import DeviceDescription, Identity
 from catenary.procedure.al_state import DeviceState, read_state
@@ -45,7 +47,8 @@ class SubDevice:
     """Handle of one device, such as `main.scan()[2]`. It stays valid across scans.
 
     Attributes never cause traffic; calls with a verb do. `sub.sdo` reads and writes its objects,
-    `sub.foe` its files. `sub.diagnosis` reads the messages that it stores.
+    `sub.foe` its files, `sub.aoe` its ADS data. `sub.voe` exchanges vendor-specific messages.
+    `sub.diagnosis` reads the messages that it stores.
     """
 
     def __init__(
@@ -62,6 +65,8 @@ class SubDevice:
         self.esi: EsiDevice | None = None  # ESI that the last scan used for it
         self.sdo = Sdo(self)
         self.foe = Foe(self)
+        self.aoe = Aoe(self)
+        self.voe = Voe(self)
         self.diagnosis = DeviceDiagnosis(self)
 
     @property

@@ -1,6 +1,7 @@
 """Virtual EtherCAT segments at register level: in virtual time, in real time, or on a NIC."""
 
 from catenary.virtual import faults
+from catenary.virtual.aoe.protocol import Ads
 from catenary.virtual.coe.diagnosis_history import HistoryOptions
 from catenary.virtual.coe.quirks import MailboxQuirks
 from catenary.virtual.configuration import read_segment
@@ -29,8 +30,10 @@ from catenary.virtual.plant import Plant, PlantPart
 from catenary.virtual.segment import FrameCounters, Segment, demo_segment
 from catenary.virtual.server import Served, Server, serve, serve_all
 from catenary.virtual.sii_quirks import SiiQuirks
+from catenary.virtual.vendor_protocol import VendorEcho, VendorMessages
 
 __all__ = [
+    "Ads",
     "AnalogInputs",
     "Coupler",
     "Crystal",
@@ -61,6 +64,8 @@ __all__ = [
     "SiiQuirks",
     "Twin",
     "TwinOptions",
+    "VendorEcho",
+    "VendorMessages",
     "demo_segment",
     "faults",
     "from_esi",

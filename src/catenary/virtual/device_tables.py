@@ -6,6 +6,7 @@ from pathlib import Path
 
 import msgspec
 
+from catenary.virtual.aoe.protocol import Ads
 from catenary.virtual.coe.diagnosis_history import NO_HISTORY, HistoryOptions
 from catenary.virtual.coe.quirks import NO_MAILBOX_QUIRKS, MailboxQuirks
 from catenary.virtual.crystal import ClockBits, Crystal
@@ -23,7 +24,9 @@ from catenary.virtual.devices.servo_quirks import NO_QUIRKS, ServoQuirks
 from catenary.virtual.devices.twin import STANDARD_MOTOR, TwinOptions
 from catenary.virtual.foe.options import DeviceFiles
 from catenary.virtual.mapping_quirks import NO_MAPPING_QUIRKS, MappingQuirks
+from catenary.virtual.protocols import MailboxProtocol
 from catenary.virtual.sii_quirks import NO_SII_QUIRKS, SiiQuirks
+from catenary.virtual.vendor_protocol import VendorEcho
 
 
 class CrystalTable(msgspec.Struct, forbid_unknown_fields=True, frozen=True, kw_only=True):
@@ -64,6 +67,11 @@ class _AppliedTable(_ClockedTable, frozen=True, kw_only=True):
     lrw: bool = True
     mailbox_quirks: MailboxQuirks = NO_MAILBOX_QUIRKS
     sii_quirks: SiiQuirks = NO_SII_QUIRKS
+
+
+def _given(*protocols: MailboxProtocol | None) -> tuple[MailboxProtocol, ...]:
+    """Return the mailbox protocols that a table has."""
+    return tuple(each for each in protocols if each is not None)
 
 
 class CouplerTable(_ClockedTable, tag="coupler", frozen=True, kw_only=True):
@@ -119,6 +127,8 @@ class AnalogInputsTable(_AppliedTable, tag="analog_inputs", frozen=True, kw_only
     second_pdo: SecondPdo = "none"
     mapping_quirks: MappingQuirks = NO_MAPPING_QUIRKS
     files: DeviceFiles | None = None
+    ads: Ads | None = None
+    vendor_echo: VendorEcho | None = None
 
     def device(self) -> Device:
         return AnalogInputs(
@@ -136,6 +146,7 @@ class AnalogInputsTable(_AppliedTable, tag="analog_inputs", frozen=True, kw_only
             mailbox_quirks=self.mailbox_quirks,
             sii_quirks=self.sii_quirks,
             files=self.files,
+            protocols=_given(self.ads, self.vendor_echo),
         )
 
 
@@ -183,6 +194,8 @@ class ServoTable(_AppliedTable, tag="servo", frozen=True, kw_only=True):
     quirks: ServoQuirks = NO_QUIRKS
     mapping_quirks: MappingQuirks = NO_MAPPING_QUIRKS
     files: DeviceFiles | None = None
+    ads: Ads | None = None
+    vendor_echo: VendorEcho | None = None
 
     def device(self) -> Device:
         return Servo(
@@ -212,6 +225,7 @@ class ServoTable(_AppliedTable, tag="servo", frozen=True, kw_only=True):
             mailbox_quirks=self.mailbox_quirks,
             sii_quirks=self.sii_quirks,
             files=self.files,
+            protocols=_given(self.ads, self.vendor_echo),
         )
 
 
@@ -224,6 +238,8 @@ class EsiTable(_ClockedTable, tag="esi", frozen=True, kw_only=True):
     quirks: ServoQuirks = NO_QUIRKS
     motor: Motor = STANDARD_MOTOR
     files: DeviceFiles | None = None
+    ads: Ads | None = None
+    vendor_echo: VendorEcho | None = None
     modules: tuple[str | int, ...] | None = None  # "" for an empty slot
 
     def device(self) -> Device:
@@ -242,6 +258,7 @@ class EsiTable(_ClockedTable, tag="esi", frozen=True, kw_only=True):
                 mapping_quirks=self.mapping_quirks,
                 mailbox_quirks=self.mailbox_quirks,
                 files=self.files,
+                protocols=_given(self.ads, self.vendor_echo),
             ),
         )
 
@@ -259,6 +276,8 @@ class SiiTable(_PlacedTable, tag="sii", frozen=True, kw_only=True):
     quirks: ServoQuirks = NO_QUIRKS
     motor: Motor = STANDARD_MOTOR
     files: DeviceFiles | None = None
+    ads: Ads | None = None
+    vendor_echo: VendorEcho | None = None
 
     def device(self) -> Device:
         return Device.from_sii(
@@ -276,6 +295,7 @@ class SiiTable(_PlacedTable, tag="sii", frozen=True, kw_only=True):
                 mapping_quirks=self.mapping_quirks,
                 mailbox_quirks=self.mailbox_quirks,
                 files=self.files,
+                protocols=_given(self.ads, self.vendor_echo),
             ),
         )
 
