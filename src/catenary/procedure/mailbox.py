@@ -150,12 +150,17 @@ def converse(
 
 
 def further(
-    channel: MailboxChannel, accept: Callable[[Mailbox], T | None], *, timeout: float = READ_TIMEOUT
+    channel: MailboxChannel,
+    kind: Type,
+    accept: Callable[[Mailbox], T | None],
+    *,
+    timeout: float = READ_TIMEOUT,
 ) -> Procedure[T]:
     """Receive the next part of an answer that consists of several messages.
 
     Args:
         channel: The mailbox of the device.
+        kind: The protocol of the message.
         accept: Function that converts a message. It returns None for an unexpected message.
         timeout: Longest time until the part arrives [s].
 
@@ -167,7 +172,7 @@ def further(
     before, patience = channel.dropped, _patience(channel, timeout)
     answer = yield from _await(channel, accept, Deadline(patience))
     if answer is None:
-        raise _no_answer(channel, Type.COE, patience, channel.dropped - before)
+        raise _no_answer(channel, kind, patience, channel.dropped - before)
     return answer
 
 

@@ -59,6 +59,7 @@ class MailboxChannel:
     unsure_ns: int | None = None  # time of a lost frame that may have emptied the mailbox
     owed: bool = False  # an answer may still arrive: a request is pending or has timed out
     undescribed: int = 0  # number of missing or malformed SDO information answers in a row
+    resets: int = 0  # number of times that the SyncManagers were configured again
     emptied: bool = False  # configured again since the request, so no answer will arrive
 
     def reset(self) -> None:
@@ -67,6 +68,7 @@ class MailboxChannel:
         self.received = None
         self.counts = self.owed = False
         self.unsure_ns = None
+        self.resets += 1
         self.emptied = True
 
     def accept(self, message: Mailbox) -> bool:
