@@ -199,7 +199,7 @@ def test_notifications() -> None:
         decode_notification(data[:-1])
     with pytest.raises(DecodeError, match="at most 1024"):
         decode_notification(bytes(4) + b"\xff" * 4)
-    with pytest.raises(DecodeError, match="notification of .* bytes"):
+    with pytest.raises(DecodeError, match=r"notification of \d+ bytes"):
         decode_notification(b"\xff\xff\0\0" + data[4:])
 
 
