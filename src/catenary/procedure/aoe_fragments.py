@@ -75,8 +75,8 @@ def send_message(
                 "were lost",
                 hint="check the cables: the error counters at 0x0300 show which one is faulty",
             )
-        early: list[AoeMessage] = yield from drain(channel, accept)
-        if early:
+        arrived: Procedure[list[AoeMessage]] = drain(channel, accept)
+        if early := (yield from arrived):
             return early[0]
     end: Procedure[AoeMessage] = converse(channel, Type.AOE, last, accept, timeout=timeout)
     return (yield from end)
