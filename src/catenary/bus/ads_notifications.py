@@ -30,7 +30,7 @@ class NotificationQueues:
 
     def __init__(self) -> None:
         self._queues: dict[tuple[int, int], SampleQueue] = {}
-        self._opening = 0  # notifications whose handle is not yet known
+        self._opening = 0  # requests without an answer
         self._early: deque[tuple[int, Sample]] = deque(maxlen=EARLY_KEPT)
 
     def listen(self, channel: MailboxChannel) -> None:
