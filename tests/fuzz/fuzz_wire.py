@@ -35,6 +35,7 @@ from catenary.wire import (
     features,
     fmmu,
     foe,
+    gateway,
     frame,
     mailbox,
     pcap,
@@ -284,6 +285,15 @@ TARGETS = (
             foe.Acknowledge(1).encode(),
             foe.Error(0x8003, "full").encode(),
             foe.Busy(3, 100, "erase").encode(),
+        ),
+    ),
+    Target(
+        "gateway.decode_gateway",
+        gateway.decode_gateway,
+        gateway.encode_gateway,
+        (
+            bytes.fromhex("10500a00e903002300204180f90200000000"),
+            gateway.encode_gateway(mailbox.Mailbox(mailbox.Type.FOE, bytes(64), 7, 0x1002)),
         ),
     ),
     Target(
