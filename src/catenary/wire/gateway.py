@@ -33,7 +33,7 @@ def encode_gateway(message: Mailbox) -> bytes:
     return (len(encoded) | _TYPE << 12).to_bytes(ETHERCAT_HEADER_SIZE, "little") + encoded
 
 
-def frame_size(data: bytes) -> int | None:
+def frame_size(data: bytes | bytearray) -> int | None:
     """Return the size of the first frame of a stream; None if its header is not complete.
 
     Args:
