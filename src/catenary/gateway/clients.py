@@ -22,6 +22,7 @@ from catenary.wire.gateway import MAXIMUM_SIZE, decode_gateway, frame_size
 from catenary.wire.mailbox import Mailbox
 
 CHUNK = 4096  # [bytes] received at once
+SEND_BUFFER = 32 << 10  # [bytes] of the kernel, for answers that a client has not read
 
 
 class UdpClient:
@@ -58,6 +59,7 @@ class TcpClient:
 
     def __init__(self, connected: socket.socket, peer: tuple[str, int], now: float) -> None:
         connected.setblocking(False)
+        connected.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, SEND_BUFFER)
         self.open = True
         self.outstanding = 0  # requests without an answer
         self._socket = connected
@@ -83,7 +85,8 @@ class TcpClient:
         Args:
             now: Present time [s].
         """
-        return self.outstanding < OUTSTANDING and now >= self._allowed
+        free = self.outstanding < OUTSTANDING and now >= self._allowed
+        return free and not self._outbox  # a client that does not read need not ask
 
     @property
     def is_full(self) -> bool:

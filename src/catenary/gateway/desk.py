@@ -210,7 +210,7 @@ class Desk:
             outcome, lease.transfer = yield from self._pass(sub, lease.channel, job, transfer)
             return outcome
         finally:
-            lease.leave()
+            lease.leave(keep_turn=self._main.has_loop)
 
     def _pass(
         self, sub: SubDevice, channel: MailboxChannel, job: Job, transfer: Transfer | None
@@ -254,7 +254,8 @@ class Desk:
             self._reporter.written(sub, job.client, before.first, "not completed: replaced")
         if refusal is not None:
             tried = refusal.reason in (Reason.NO_ANSWER, Reason.FAILED)
-            if write is not None and (tried or (before is not None and following is None)):
+            begun = before is not None and following is None and write is before.first
+            if write is not None and (tried or begun):
                 self._reporter.written(sub, job.client, write, refusal.text)
             return self._refuse(sub, job, refusal)
         if write is not None and following is None:
@@ -282,7 +283,8 @@ def written_by(request: Request, before: Transfer | None) -> Request | None:
         request: Message of a client.
         before: Transfer before the message.
     """
-    if request.access in (Access.WRITE, Access.OTHER):
+    repeated = before is not None and before.first.message.data == request.message.data  # BUSY
+    if request.access in (Access.WRITE, Access.OTHER) and not repeated:
         return request
     if request.access is Access.READ or before is None or not before.writes:
         return None

@@ -2,8 +2,12 @@
 
 A lease is a ticket in the queue of the mailbox (`MailboxChannel.turns`), so that transfers of the
 program and of clients take turns. The ticket is added by the procedure of the first message. It is
-removed with the last message, or by any thread while no message is under way. A transfer of the
-program therefore waits for at most LEASE_IDLE longer than one exchange.
+removed with the last message, or by any thread while no message is under way. In a loop, a transfer
+of the program therefore waits for at most LEASE_IDLE longer than one exchange.
+
+Without a loop, the procedures of all threads run one after another, and one that waits for its turn
+stops the others. The ticket is therefore also removed between two messages of a transfer. An SDO
+transfer of the program may then come between two SDO segments of a client, and end its transfer.
 """
 
 from __future__ import annotations
@@ -48,12 +52,18 @@ class Lease:
         """
         return turn_comes_for(self.channel, self._ticket, seconds)
 
-    def leave(self) -> None:
-        """End an exchange. The lease continues if a transfer does."""
+    def leave(self, *, keep_turn: bool) -> None:
+        """End an exchange. The lease continues if a transfer does.
+
+        Args:
+            keep_turn: True to keep the turn until the next message of the transfer.
+        """
         with self._lock:
             self._running = False
             self._touched = time.monotonic()
             if self.transfer is None or self._ended:
+                self._ended = True
+            if self._ended or not keep_turn:
                 self._release()
 
     @property
@@ -84,6 +94,5 @@ class Lease:
         return self._ended
 
     def _release(self) -> None:
-        self._ended = True
         if self._ticket in self.channel.turns:
             self.channel.turns.remove(self._ticket)

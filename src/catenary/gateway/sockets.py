@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 from catenary.errors import ConfigurationError
 
-BACKLOG = 16
+BACKLOG = 128  # connections that the kernel accepts before the next pass
 
 
 class Sockets(NamedTuple):

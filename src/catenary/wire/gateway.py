@@ -4,9 +4,9 @@ A frame is an EtherCAT header of type 5 and one mailbox message (ETG.1000.4 §5.
 
     length (11 bits), reserved bit, type (4 bits) | mailbox header | data
 
-The address in the mailbox header selects the device. In TCP, frames follow each other without a gap.
-The bytes after a message are ignored, as in ethercrab (mailbox_gateway.rs). KickCAT (Gateway.cc)
-also compares only the type and the length.
+The address in the mailbox header selects the device. In TCP, frames follow each other directly. The
+bytes after a message are ignored, as in ethercrab (mailbox_gateway.rs). KickCAT (Gateway.cc) also
+compares only the type and the length.
 """
 
 from __future__ import annotations
