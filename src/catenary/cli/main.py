@@ -23,6 +23,7 @@ from catenary.cli import (
     firmware,
     foe,
     foxglove,
+    gateway,
     graph,
     include,
     init,
@@ -49,7 +50,7 @@ PROGRAM = "catenary"
 DESCRIPTION = "Real-time EtherCAT for Python."
 COMMANDS = (
     *(scan, state, graph, diag, messages, pdos, sdo, foe, firmware, reg, alias, sii, esi),
-    *(init, check, clone, capture),
+    *(gateway, init, check, clone, capture),
     *(demo, shell, dashboard, top, doctor, bench, virtual, realtime),
     *(data, record, merge, plot, foxglove, ros2, include, completion),
 )
