@@ -25,8 +25,8 @@ def add_parser(commands: Commands) -> None:
         "gateway",
         help="let vendors' tools reach the devices (mailbox gateway)",
         description="Serves the EtherCAT mailbox gateway (ETG.8200) over UDP and TCP, without a "
-        "loop, until Ctrl-C. The devices stay in PRE-OP. Only programs on this machine can connect; "
-        "from another machine, use an SSH tunnel. Clients read objects, their descriptions and "
+        "loop, until Ctrl-C. The devices stay in PRE-OP. Clients must run on this machine, or use "
+        "an SSH tunnel. Clients read objects, their descriptions and "
         "files. --write also lets them write to a device. Beside a loop, use cat.Gateway in its "
         "program.",
         example="catenary gateway eth0\ncatenary gateway eth0 --write 2 --write @10",
