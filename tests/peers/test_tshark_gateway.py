@@ -45,7 +45,7 @@ class Pcap:
 
 
 class Recorded(Tool):
-    """Tool whose frames are recorded in their order."""
+    """Tool that records its frames in their order."""
 
     def __init__(self, port: int, *, udp: bool) -> None:
         super().__init__(port, udp=udp)

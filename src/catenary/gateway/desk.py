@@ -292,5 +292,5 @@ def written_by(request: Request, before: Transfer | None) -> Request | None:
 
 
 def _channel(sub: SubDevice) -> MailboxChannel | None:
-    """Return the mailbox for protocols other than FoE; None if there is none now."""
+    """Return the present mailbox for protocols other than FoE; None if the device has none."""
     return sub.channel if sub.error is None and not sub.in_boot else None

@@ -29,7 +29,7 @@ class Desks:
         self._closing = False
 
     def receive(self, client: Client, message: Mailbox) -> None:
-        """Pass a message to the desk of its device, or answer that there is no such device.
+        """Pass a message to the desk of its device. Answer if the device does not exist.
 
         Args:
             client: The client.

@@ -51,9 +51,7 @@ def frame_size(data: bytes | bytearray) -> int | None:
             f"gateway: EtherCAT header 0x{header:04X}, type {header >> 12} instead of {_TYPE}"
         )
     if length < HEADER_SIZE:
-        raise DecodeError(
-            f"gateway: length {length}, but a mailbox header has {HEADER_SIZE} bytes"
-        )
+        raise DecodeError(f"gateway: length {length}, but a mailbox header has {HEADER_SIZE} bytes")
     return ETHERCAT_HEADER_SIZE + length
 
 
