@@ -26,6 +26,7 @@ RETURNED = {
     "catenary.bus.diagnosis": ("Diagnosis",),
     "catenary.bus.event_queue": ("Events",),
     "catenary.drive.values": ("AxisValues",),
+    "catenary.gateway": ("GatewayCounts",),
     "catenary.esi.eni": ("Variable",),
     "catenary.link.interfaces": ("NetworkInterface",),
     "catenary.log": ("Log",),

@@ -39,6 +39,7 @@ from catenary.wire import (
     fmmu,
     foe,
     frame,
+    gateway,
     mailbox,
     pcap,
     pcapng,
@@ -357,6 +358,15 @@ TARGETS = (
         (ads_response.encode_notification(ADS_SAMPLES),),
     ),
     Target("voe.decode_voe", voe.decode_voe, _method, (voe.VoeMessage(2, 1, b"hello").encode(),)),
+    Target(
+        "gateway.decode_gateway",
+        gateway.decode_gateway,
+        gateway.encode_gateway,
+        (
+            bytes.fromhex("10500a00e903002300204180f90200000000"),
+            gateway.encode_gateway(mailbox.Mailbox(mailbox.Type.FOE, bytes(64), 7, 0x1002)),
+        ),
+    ),
     Target(
         "diagnosis_history.decode_diagnosis_message",
         diagnosis_history.decode_diagnosis_message,

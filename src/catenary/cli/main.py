@@ -24,6 +24,7 @@ from catenary.cli import (
     firmware,
     foe,
     foxglove,
+    gateway,
     graph,
     include,
     init,
@@ -50,7 +51,7 @@ PROGRAM = "catenary"
 DESCRIPTION = "Real-time EtherCAT for Python."
 COMMANDS = (
     *(scan, state, graph, diag, messages, pdos, sdo, foe, aoe, firmware, reg, alias, sii, esi),
-    *(init, check, clone, capture),
+    *(gateway, init, check, clone, capture),
     *(demo, shell, dashboard, top, doctor, bench, virtual, realtime),
     *(data, record, merge, plot, foxglove, ros2, include, completion),
 )
