@@ -70,6 +70,12 @@ class Clocks:
         return self._clock.figures()["time"] * NS
 
     @property
+    def cycle_start_ns(self) -> int:
+        """System time of the distributed clocks at the start of the present cycle [ns]."""
+        figures = self._clock.figures()
+        return int(figures["time"]) - int(figures["time_sent"]) + self._engine.cycle_start
+
+    @property
     def differences(self) -> Mapping[int, float]:
         """Offset of each clock from the reference (0x092C) [s], by position; positive: ahead.
 

@@ -18,6 +18,7 @@ from catenary.virtual.devices import (
 from catenary.virtual.devices.described import DescribedDevice, from_esi
 from catenary.virtual.devices.motor import Motor
 from catenary.virtual.devices.servo_quirks import ServoQuirks
+from catenary.virtual.devices.touch_probe import ProbeOptions
 from catenary.virtual.devices.twin import Twin, TwinOptions
 from catenary.virtual.fault_player import FaultEvent, Loss
 from catenary.virtual.faults import Fault
@@ -53,6 +54,7 @@ __all__ = [
     "Motor",
     "Plant",
     "PlantPart",
+    "ProbeOptions",
     "Segment",
     "Served",
     "Server",

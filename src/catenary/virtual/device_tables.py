@@ -20,6 +20,7 @@ from catenary.virtual.devices.model_sensor import ModelSensor
 from catenary.virtual.devices.motor import Motor
 from catenary.virtual.devices.servo import Servo
 from catenary.virtual.devices.servo_quirks import NO_QUIRKS, ServoQuirks
+from catenary.virtual.devices.touch_probe import ProbeOptions
 from catenary.virtual.devices.twin import STANDARD_MOTOR, TwinOptions
 from catenary.virtual.foe.options import DeviceFiles
 from catenary.virtual.mapping_quirks import NO_MAPPING_QUIRKS, MappingQuirks
@@ -179,6 +180,7 @@ class ServoTable(_AppliedTable, tag="servo", frozen=True, kw_only=True):
     following_error_turns: float = 0.25
     position_limits: tuple[float, float] | None = None
     sync_missed_limit: int = 3
+    touch_probe: ProbeOptions | None = None
     diagnosis: HistoryOptions = NO_HISTORY
     quirks: ServoQuirks = NO_QUIRKS
     mapping_quirks: MappingQuirks = NO_MAPPING_QUIRKS
@@ -206,6 +208,7 @@ class ServoTable(_AppliedTable, tag="servo", frozen=True, kw_only=True):
             crystal=self.crystal.crystal(),
             clock_bits=self.clock_bits,
             sync_missed_limit=self.sync_missed_limit,
+            touch_probe=self.touch_probe,
             diagnosis=self.diagnosis,
             quirks=self.quirks,
             mapping_quirks=self.mapping_quirks,
