@@ -214,18 +214,18 @@ def test_a_refused_source_names_the_object() -> None:
 
 
 def test_a_missing_edge_is_reported_after_the_timeout() -> None:
-    with opened(probed_servo()) as (arm, loop):
-        with pytest.raises(MoveError, match=r"touch probe 1 captured no rising edge within 0\.5 s"):
-            loop.wait(arm.probe(), timeout=0.5)
+    text = r"touch probe 1 captured no rising edge within 0\.5 s"
+    with opened(probed_servo()) as (arm, loop), pytest.raises(MoveError, match=text):
+        loop.wait(arm.probe(), timeout=0.5)
 
 
 def test_a_probe_in_use_is_refused() -> None:
     with opened(probed_servo()) as (arm, loop):
         probe = arm.probe()
-        with pytest.raises(ValueError, match="already in use: <Probe 1 of 1 .*arming"):
+        with pytest.raises(ValueError, match=r"already in use: <Probe 1 of 1 .*arming"):
             arm.probe()
         probe.stop()
-        next(loop)
+        cycles(loop, 2)
         assert arm.probe().outcome is None
 
 
@@ -251,9 +251,9 @@ def test_the_end_of_the_loop_fails_an_armed_probe() -> None:
 )
 def test_wrong_arguments(arguments: dict, text: str) -> None:
     option = TouchProbe(edges=("rising",))
-    with opened(probed_servo(), touch_probe=option) as (arm, _):
-        with pytest.raises(ValueError, match=text):
-            arm.probe(**arguments)
+    opening = opened(probed_servo(), touch_probe=option)
+    with opening as (arm, _), pytest.raises(ValueError, match=text):
+        arm.probe(**arguments)
 
 
 @pytest.mark.parametrize("wrong", [{"probes": ()}, {"probes": (3,)}, {"edges": "rising"}])

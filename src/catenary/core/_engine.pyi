@@ -110,10 +110,6 @@ class Engine:
         Pass it to `start` of another engine, to put both on the same grid.
         """
 
-    @property
-    def cycle_start(self) -> int:
-        """Start of the cycle whose values are in the private buffers, on the link's clock [ns]."""
-
     def take_turns(self) -> None:
         """Allow a cycle to begin at any time in its period, for several engines in one thread.
 

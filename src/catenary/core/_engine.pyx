@@ -419,10 +419,6 @@ cdef class Engine:
     def origin(self):
         return self.e.cycle.origin
 
-    @property
-    def cycle_start(self):
-        return self.actual_header().time_ns
-
     def take_turns(self):
         self.e.cycle.patient = not self.native
 

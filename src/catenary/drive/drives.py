@@ -46,10 +46,10 @@ from catenary.drive.touch_probe import (
     FUNCTION_COLUMN,
     SOURCES,
     TouchProbe,
-    check_offered,
     optional_columns,
     required_columns,
     touch_probe_option,
+    with_offered,
 )
 from catenary.drive.values import Array, AxisValues
 from catenary.plan.cycle import Bank, OnLoss
@@ -586,8 +586,8 @@ class Drives(Request):
         if self._is_read:
             return
         if self._touch_probe is not None:
-            for axis, sub in zip(self._axes, self.subs, strict=True):
-                check_offered(axis, sub)
+            pairs = zip(self._axes, self.subs, strict=True)
+            self._axes = tuple(with_offered(axis, sub) for axis, sub in pairs)
         rated = [
             own_objects.with_rated_torque(axis, sub)
             for axis, sub in zip(self._axes, self.subs, strict=True)

@@ -8,13 +8,12 @@ Bits 6, 7, 14 and 15 of 0x60B9 belong to the manufacturer.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from catenary.bus import SubDevice
 from catenary.drive.axis import Axis
 from catenary.drive.objects import AxisObject, Unit
 from catenary.errors import ConfigurationError, SdoAbort
-from catenary.types import UINT
 
 FUNCTION_COLUMN, STATUS_COLUMN = "touch_probe_function", "touch_probe_status"
 FUNCTION = AxisObject(0x60B8, 0, 16, output=True)
@@ -116,8 +115,10 @@ def optional_columns(option: TouchProbe | None) -> dict[str, AxisObject]:
     return found
 
 
-def check_offered(axis: Axis, sub: SubDevice) -> None:
-    """Raise ConfigurationError if a drive has no touch probe.
+def with_offered(axis: Axis, sub: SubDevice) -> Axis:
+    """Read the objects of the touch probes by SDO, and return the axis with those that exist.
+
+    The process data must then contain them, unless the application specified the PDOs.
 
     Args:
         axis: The axis.
@@ -129,14 +130,30 @@ def check_offered(axis: Axis, sub: SubDevice) -> None:
     """
     for base in (FUNCTION.index, STATUS.index):
         index = axis.index(base)
-        try:
-            sub.sdo.read(index, 0, type=UINT)
-        except SdoAbort as abort:
-            if abort.code not in OBJECT_MISSING:
-                raise
+        abort = _abort_of(sub, index)
+        if abort is not None:
             raise ConfigurationError(
                 f"{axis.name}: touch_probe= was requested, but the drive has no object "
                 f"0x{index:04X} (SDO abort 0x{abort.code:08X})",
                 hint="this drive or its firmware has no touch probe: omit touch_probe=; the manual "
                 "may name other objects, which columns= can exchange",
             ) from None
+    if axis.pdos:
+        return axis
+    offered = {
+        name: each
+        for name, each in axis.optional_columns.items()
+        if _abort_of(sub, axis.index(each.index)) is None
+    }
+    return replace(axis, columns={**axis.columns, **offered})
+
+
+def _abort_of(sub: SubDevice, index: int) -> SdoAbort | None:
+    """Return the abort if an object does not exist; None if it does."""
+    try:
+        sub.sdo.read(index, 0)
+    except SdoAbort as abort:
+        if abort.code not in OBJECT_MISSING:
+            raise
+        return abort
+    return None

@@ -73,7 +73,8 @@ class Clocks:
     def cycle_start_ns(self) -> int:
         """System time of the distributed clocks at the start of the present cycle [ns]."""
         figures = self._clock.figures()
-        return int(figures["time"]) - int(figures["time_sent"]) + self._engine.cycle_start
+        started = self._engine.origin + self._engine.time_ns
+        return int(figures["time"]) - int(figures["time_sent"]) + started
 
     @property
     def differences(self) -> Mapping[int, float]:
