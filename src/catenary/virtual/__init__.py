@@ -13,6 +13,7 @@ from catenary.virtual.devices import (
     DigitalOutputs,
     Junction,
     ModelSensor,
+    OversamplingTerminal,
     Servo,
 )
 from catenary.virtual.devices.described import DescribedDevice, from_esi
@@ -52,6 +53,7 @@ __all__ = [
     "MappingQuirks",
     "ModelSensor",
     "Motor",
+    "OversamplingTerminal",
     "Plant",
     "PlantPart",
     "ProbeOptions",

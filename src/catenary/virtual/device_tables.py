@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Literal
 
 import msgspec
 
@@ -18,6 +19,7 @@ from catenary.virtual.devices.digital_outputs import DigitalOutputs
 from catenary.virtual.devices.junction import Junction
 from catenary.virtual.devices.model_sensor import ModelSensor
 from catenary.virtual.devices.motor import Motor
+from catenary.virtual.devices.oversampling import OversamplingTerminal
 from catenary.virtual.devices.servo import Servo
 from catenary.virtual.devices.servo_quirks import NO_QUIRKS, ServoQuirks
 from catenary.virtual.devices.touch_probe import ProbeOptions
@@ -137,6 +139,26 @@ class AnalogInputsTable(_AppliedTable, tag="analog_inputs", frozen=True, kw_only
             mailbox_quirks=self.mailbox_quirks,
             sii_quirks=self.sii_quirks,
             files=self.files,
+        )
+
+
+class OversamplingTable(_ClockedTable, tag="oversampling", frozen=True, kw_only=True):
+    direction: Literal["inputs", "outputs"] = "inputs"
+    channels: int = 2
+    samples: int = 10
+    lrw: bool = True
+
+    def device(self) -> Device:
+        return OversamplingTerminal(
+            direction=self.direction,
+            channels=self.channels,
+            samples=self.samples,
+            name=self.name,
+            alias=self.alias,
+            serial=self.serial,
+            lrw=self.lrw,
+            crystal=self.crystal.crystal(),
+            clock_bits=self.clock_bits,
         )
 
 
@@ -290,6 +312,7 @@ DeviceTable = (
     | DigitalInputsTable
     | AnalogInputsTable
     | ModelSensorTable
+    | OversamplingTable
     | ServoTable
     | EsiTable
     | SiiTable
