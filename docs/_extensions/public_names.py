@@ -18,7 +18,7 @@ INTERNAL = {"catenary.events.emergency", "catenary.virtual.faults.number_of_stat
 
 # Types of what public methods return; programs do not import them.
 RETURNED = {
-    "catenary.bus": ("SubDevices", "Sdo", "Foe", "Pending", "ListType"),
+    "catenary.bus": ("SubDevices", "Sdo", "Foe", "Latch", "LatchEvent", "Pending", "ListType"),
     "catenary.bus.device_diagnosis": ("DeviceDiagnosis",),
     "catenary.bus.diagnosis": ("Diagnosis",),
     "catenary.bus.event_queue": ("Events",),

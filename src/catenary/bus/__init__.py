@@ -3,6 +3,7 @@
 from catenary.bus.acyclic_runner import AcyclicQueue, AcyclicRunner
 from catenary.bus.external_master import Carrier, CycleClock
 from catenary.bus.foe import Foe
+from catenary.bus.latch import Latch, LatchEvent
 from catenary.bus.main_device import MainDevice
 from catenary.bus.pending import Pending
 from catenary.bus.runner import BlockingRunner, FrameCounts, Runner
@@ -19,6 +20,8 @@ __all__ = [
     "CycleClock",
     "Foe",
     "FrameCounts",
+    "Latch",
+    "LatchEvent",
     "ListType",
     "MainDevice",
     "Pending",

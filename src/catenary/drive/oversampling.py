@@ -1,8 +1,8 @@
 """Channels of oversampling terminals: several samples of one object in each cycle.
 
 Terminals map the samples in one of two ways. A PDO has one entry per sample, with consecutive
-subindices (Beckhoff's EL5031-0011, ELM3x0x). Or the PDO of one sample is assigned several times, with
-consecutive indices (EL1262, EL3702, EL4732; `OSFac` in ETG.2000).
+subindices (Beckhoff's EL5031-0011, ELM3x0x). Or the PDO of one sample is assigned several times,
+with consecutive indices (EL1262, EL3702, EL4732; `OSFac` in ETG.2000).
 """
 
 from __future__ import annotations
