@@ -82,7 +82,7 @@ def test_the_array_is_a_view_with_scaled_values() -> None:
             loop.run_for(0.1)
             assert inputs.samples.tolist() == [[1.0] * 5, [-2.0] * 5]
             assert np.shares_memory(inputs.samples, inputs.reals)
-            assert inputs["StartTimeNextLatch"] > 0
+            assert inputs["NextSync1Time StartTimeNextLatch"] > 0
 
 
 def test_times_need_distributed_clocks() -> None:

@@ -1,5 +1,5 @@
 """A terminal samples a wave ten times per cycle, on a clock that drifts, and another one puts a
-wave out. The reconstructed wave has no missing and no repeated sample, and each sample has its time.
+wave out. The reconstructed wave has no missing and no repeated sample. Each sample has its time.
 """
 
 from __future__ import annotations
