@@ -1,8 +1,8 @@
 """Latch unit of distributed clocks, registers 0x09A8 to 0x09CF.
 
 Source: Beckhoff, ESC data sheet, section II, 0x09A8 to 0x09C8. The unit stores the system time of
-an edge. In continuous mode, each edge replaces the last time. In single-event mode, the first edge is
-kept until its time is read.
+an edge. In continuous mode, each edge replaces the last time. In single-event mode, the unit keeps
+the first edge until its time is read.
 """
 
 from __future__ import annotations
