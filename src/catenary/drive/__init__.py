@@ -5,7 +5,8 @@ from catenary.drive.drives import Drives
 from catenary.drive.homing import HomingMethod
 from catenary.drive.io import Inputs, Outputs
 from catenary.drive.move import Move
-from catenary.drive.probe import Probe, ProbeEvent
+from catenary.drive.probe import Probe
+from catenary.drive.probe_port import ProbeEvent
 from catenary.drive.process_data import ProcessData
 from catenary.drive.recovery import Phase, Recovery, Stop
 from catenary.drive.start_up_list import read_start_up

@@ -37,7 +37,8 @@ from catenary.drive.move_request import (
 )
 from catenary.drive.objects import ACTUAL_VELOCITY
 from catenary.drive.port import AxisFacts, AxisPort, PutRate
-from catenary.drive.probe import Edge, Probe, ProbePort, Probes, until_edge
+from catenary.drive.probe import Edge, Probe, Probes, until_edge
+from catenary.drive.probe_port import ProbePort
 from catenary.drive.probe_request import check_probe, chosen_axis, probe_request
 from catenary.drive.rates import RateColumns
 from catenary.drive.request import Request

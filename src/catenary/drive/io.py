@@ -19,6 +19,7 @@ from catenary.drive.arguments import (
 )
 from catenary.drive.channel import Channel, ChannelSpec, make_channels
 from catenary.drive.device_channels import (
+    NamedChannel,
     chosen_channels,
     column,
     mapped_channels,
@@ -101,8 +102,6 @@ class Channels(Request):
     ) -> None:
         super().__init__(subs)
         named = make_channels("channels", channels or {})
-        if oversampling is not None and (named or len(subs) != 1):
-            raise ValueError("oversampling= needs exactly one device, and no channels=")
         self._pdos = {sub.position: self._chosen_pdos(sub, pdos, named) for sub in subs}
         self._required = required
         self._divider = cycles_between("divider", divider)
@@ -111,31 +110,43 @@ class Channels(Request):
         self._units: list[int] = []
         self._arrays: dict[Bank, Reals | Integers | Bytes] | None = None
         self._unit_valid: Bytes | None = None
-        if named:
-            if len(subs) != 1:
-                raise ValueError(
-                    f"channels= needs exactly one device, not {len(subs)}; make one request per "
-                    "device"
-                )
-            if scale is not None:
-                raise ValueError(
-                    "scale= cannot be combined with channels=; give the scale of each channel, "
-                    "(index, subindex, type, scale)"
-                )
-            self._channels = chosen_channels(subs[0], named)
-        else:
-            devices = [self._described(sub) for sub in subs]
-            self._channels = mapped_channels(
-                devices, self.direction, {} if oversampling else scale or {}
-            )
         self._oversampled: Oversampled | None = None
-        if oversampling is not None:
-            count = checked_samples(oversampling)
-            self._oversampled = group_samples(self._channels, count, scale or {})
-            self._channels = self._oversampled.channels
         self._exchange = 0.0  # [s] between two exchanges
         self._system_time: Callable[[], int | None] = lambda: None
+        if oversampling is not None:
+            self._oversampled = self._samples_of(oversampling, named, scale or {})
+            self._channels = self._oversampled.channels
+        else:
+            self._channels = self._chosen_channels(named, scale)
         self._places: dict[str, tuple[Reals | Integers | Bytes, int]] = {}
+
+    def _chosen_channels(
+        self, named: Mapping[str, Channel], scale: Mapping[str, float] | None
+    ) -> tuple[NamedChannel, ...]:
+        """Return the channels of the option `channels`; without it, all mapped channels."""
+        if not named:
+            devices = [self._described(sub) for sub in self.subs]
+            return mapped_channels(devices, self.direction, scale or {})
+        if len(self.subs) != 1:
+            raise ValueError(
+                f"channels= needs exactly one device, not {len(self.subs)}; make one request per "
+                "device"
+            )
+        if scale is not None:
+            raise ValueError(
+                "scale= cannot be combined with channels=; give the scale of each channel, "
+                "(index, subindex, type, scale)"
+            )
+        return chosen_channels(self.subs[0], named)
+
+    def _samples_of(
+        self, samples: int, named: Mapping[str, Channel], scale: Mapping[str, float]
+    ) -> Oversampled:
+        """Return the channels of the option `oversampling`."""
+        if named or len(self.subs) != 1:
+            raise ValueError("oversampling= needs exactly one device, and no channels=")
+        count = checked_samples(samples)
+        return group_samples(self._chosen_channels({}, None), count, scale)
 
     def _chosen_pdos(
         self, sub: SubDevice, pdos: PdoList, named: Mapping[str, Channel]

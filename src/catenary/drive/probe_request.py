@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from catenary.drive.probe import ProbePort, ProbeRequest
+from catenary.drive.probe_port import ProbePort, ProbeRequest
 from catenary.drive.touch_probe import EDGES, PROBES, SOURCE_BITS, TouchProbe
 from catenary.errors import DriveError
 

@@ -48,17 +48,32 @@ def bind_requests(
     arrays = {name: np.asarray(buffers[name]) for name in (*AXIS_BUFFERS, *PART_BUFFERS)}
     unit_valid = np.asarray(buffers["unit_valid"])
     movers: list[Mover] = []
-    functions = {"is_open": is_open, "is_led": is_led, "system_time": system_time}
     used = dict.fromkeys(("axes", *PART_BUFFERS), 0)
     for request, table in zip(requests, tables, strict=True):
         sizes = dict.fromkeys(AXIS_BUFFERS, len(table.axes)) | part_sizes(table)
         starts = {name: used.get(name, used["axes"]) for name in sizes}
         parts = {name: arrays[name][starts[name] :][: sizes[name]] for name in sizes}
-        request.bind(Views(**parts, unit_valid=unit_valid, movers=movers, **functions))
+        request.bind(
+            Views(
+                **parts,
+                unit_valid=unit_valid,
+                movers=movers,
+                is_open=is_open,
+                is_led=is_led,
+                system_time=system_time,
+            )
+        )
         used["axes"] += len(table.axes)
         for name in PART_BUFFERS:
             used[name] += sizes[name]
-    return Views(**arrays, unit_valid=unit_valid, movers=movers, **functions)
+    return Views(
+        **arrays,
+        unit_valid=unit_valid,
+        movers=movers,
+        is_open=is_open,
+        is_led=is_led,
+        system_time=system_time,
+    )
 
 
 def part_sizes(table: RequestTables) -> dict[str, int]:
