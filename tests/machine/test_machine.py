@@ -8,7 +8,12 @@ from pathlib import Path
 
 import pytest
 
-from catenary.errors import IdentityError, MachineFileError, SegmentError
+from catenary.errors import (
+    ConfigurationError,
+    IdentityError,
+    MachineFileError,
+    SegmentError,
+)
 from catenary.loop import Loop, Scheduling, StopPolicy
 from catenary.machine import Machine
 from catenary.types import INT, USINT
