@@ -63,7 +63,7 @@ class Probe:
 
     @property
     def done(self) -> bool:
-        """True when the probe is no longer in use; see `outcome`. `stop` ends a continuous one."""
+        """True after the end of the measurement: see `outcome`. `stop` ends a continuous one."""
         return self._outcome is not None
 
     @property

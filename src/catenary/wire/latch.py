@@ -22,7 +22,7 @@ _BLOCK = struct.Struct("<2B4Q")
 
 
 class LatchControl(IntFlag):
-    """Bits of 0x09A8 and 0x09A9. An edge whose bit is 0 is latched continuously."""
+    """Bits of 0x09A8 and 0x09A9. If the bit of an edge is 0, its mode is continuous."""
 
     SINGLE_RISING = 0x01
     SINGLE_FALLING = 0x02

@@ -50,7 +50,7 @@ static void latch_input(controller *c, int input, int level, int64_t when) {
     latch_events_show(c);
 }
 
-/* Acknowledge the events whose times a frame has read. */
+/* Acknowledge events after a frame has read their times. */
 static void latch_times_read(controller *c, uint32_t first, uint32_t end) {
     for (int value = 0; value < 2 * LATCH_INPUTS; value++) {
         uint32_t at = latch_time_register(value / 2, value % 2);
