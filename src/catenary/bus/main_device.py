@@ -15,7 +15,7 @@ from catenary.bus.external_master import Carrier
 from catenary.bus.frame_master import FrameMaster
 from catenary.bus.master import Complete, Master, MasterSource
 from catenary.bus.pending import Pending
-from catenary.bus.runner import BlockingRunner, FrameCounts, LinkLent, Runner, Watch
+from catenary.bus.runner import BUSY_WAIT, BlockingRunner, FrameCounts, LinkLent, Runner, Watch
 from catenary.bus.sdo import Objects
 from catenary.bus.segment_scan import check_identity
 from catenary.bus.sub_device import SubDevice
@@ -146,7 +146,8 @@ class MainDevice:
         self._link = link
         self._process = os.getpid()
         self._callbacks.in_thread = not lives_in_virtual_time(link)
-        self._blocking = BlockingRunner(link)
+        busy_wait = 0.0 if lives_in_virtual_time(link) else BUSY_WAIT
+        self._blocking = BlockingRunner(link, busy_wait=busy_wait)
         forget_in_child(self)
         return self
 

@@ -189,13 +189,8 @@ class Application:
         facts = description.facts
         self._from_file = facts is not None
         self._channels = channels_of(size) if facts is None else facts.channels
-        self.pdos = PdoObjects(
-            self.dictionary,
-            self._channels,
-            description.rx_pdos,
-            description.tx_pdos,
-            description.mapping_quirks,
-        )
+        mapping = description.rx_pdos, description.tx_pdos, description.mapping_quirks
+        self.pdos = PdoObjects(self.dictionary, self._channels, *mapping)
         self._add_servers(description, quirks)
         self.mailbox = Mailbox(self, scheduler, self._serve, delay_ns=delay_ns, quirks=quirks)
         self._servers = self._start_protocols(protocols, scheduler)
