@@ -17,11 +17,11 @@ PLAIN = ("errors", "events", "types", "virtual.faults")  # no `__all__`: what th
 INTERNAL = {"catenary.events.emergency", "catenary.virtual.faults.number_of_state"}
 
 # Types of what public methods return; programs do not import them.
-AOE_AND_VOE = ("Aoe", "AdsNotifications", "Voe")
+PROTOCOLS = ("Foe", "Aoe", "AdsNotifications", "Voe")
 RETURNED = {
     "catenary.wire.ads_response": ("DeviceInfo", "States", "Sample"),
     "catenary.wire.voe": ("VoeMessage",),
-    "catenary.bus": ("SubDevices", "Sdo", "Foe", *AOE_AND_VOE, "Pending", "ListType"),
+    "catenary.bus": ("SubDevices", "Sdo", *PROTOCOLS, "Latch", "LatchEvent", "Pending", "ListType"),
     "catenary.bus.device_diagnosis": ("DeviceDiagnosis",),
     "catenary.bus.diagnosis": ("Diagnosis",),
     "catenary.bus.event_queue": ("Events",),

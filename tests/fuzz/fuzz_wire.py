@@ -40,6 +40,7 @@ from catenary.wire import (
     foe,
     frame,
     gateway,
+    latch,
     mailbox,
     pcap,
     pcapng,
@@ -375,6 +376,12 @@ TARGETS = (
             bytes.fromhex("020000e1020202371fc59d6131000000050002050080"),
             bytes.fromhex("01e0000001040000000000000000000003100102030220") + b"OK",
         ),
+    ),
+    Target(
+        "latch.decode_latched",
+        lambda data: latch.decode_latched(data, len(data) & 1, 64),
+        None,
+        (bytes([0x01, 0x06]) + bytes(range(32)),),
     ),
     Target(
         "sdo_information.decode_sdo_information",

@@ -5,6 +5,7 @@ from catenary.bus.ads_notifications import AdsNotifications
 from catenary.bus.aoe import Aoe
 from catenary.bus.external_master import Carrier, CycleClock
 from catenary.bus.foe import Foe
+from catenary.bus.latch import Latch, LatchEvent
 from catenary.bus.main_device import MainDevice
 from catenary.bus.pending import Pending
 from catenary.bus.runner import BlockingRunner, FrameCounts, Runner
@@ -24,6 +25,8 @@ __all__ = [
     "CycleClock",
     "Foe",
     "FrameCounts",
+    "Latch",
+    "LatchEvent",
     "ListType",
     "MainDevice",
     "Pending",

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Protocol
 from catenary.bus.aoe import Aoe
 from catenary.bus.device_diagnosis import DeviceDiagnosis
 from catenary.bus.foe import Foe
+from catenary.bus.latch import Latch, LatchEdge
 from catenary.bus.pdo_table import PdoTable
 from catenary.bus.sdo import Conversations, Objects, Sdo
 from catenary.bus.voe import Voe
@@ -141,6 +142,24 @@ class SubDevice:
         self.description = replace(self.description, given_name=name)
         if self.channel is not None:
             self.channel.station = self.station
+
+    def latch(
+        self, number: int = 0, *, edge: LatchEdge = "rising", continuous: bool = False
+    ) -> Latch:
+        """Return a handle of a latch input of the device's clock.
+
+        The first `read` or `request` of the handle sets the input up.
+
+        Args:
+            number: Number of the input, 0 or 1.
+            edge: "rising", "falling" or "both".
+            continuous: True to keep the last edge; False to keep the first since the last reading.
+
+        Raises:
+            ValueError: The input or the edge does not exist.
+            ConfigurationError: The device has no distributed clock.
+        """
+        return Latch(self, number, edge, continuous)
 
     def read_state(self) -> DeviceState:
         """Read the EtherCAT state of the device, and update `state`."""

@@ -111,6 +111,7 @@ class Session:
             self.engine.buffers,
             is_open=lambda: self.is_open,
             is_led=lambda: self.engine.led,
+            system_time=lambda: None if self.clocks is None else self.clocks.cycle_start_ns,
         )
 
     def _make_clocks(self) -> Clocks | None:

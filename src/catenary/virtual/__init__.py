@@ -14,11 +14,13 @@ from catenary.virtual.devices import (
     DigitalOutputs,
     Junction,
     ModelSensor,
+    OversamplingTerminal,
     Servo,
 )
 from catenary.virtual.devices.described import DescribedDevice, from_esi
 from catenary.virtual.devices.motor import Motor
 from catenary.virtual.devices.servo_quirks import ServoQuirks
+from catenary.virtual.devices.touch_probe import ProbeOptions
 from catenary.virtual.devices.twin import Twin, TwinOptions
 from catenary.virtual.fault_player import FaultEvent, Loss
 from catenary.virtual.faults import Fault
@@ -54,8 +56,10 @@ __all__ = [
     "MappingQuirks",
     "ModelSensor",
     "Motor",
+    "OversamplingTerminal",
     "Plant",
     "PlantPart",
+    "ProbeOptions",
     "Segment",
     "Served",
     "Server",

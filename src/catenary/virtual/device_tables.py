@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Literal
 
 import msgspec
 
@@ -19,8 +20,10 @@ from catenary.virtual.devices.digital_outputs import DigitalOutputs
 from catenary.virtual.devices.junction import Junction
 from catenary.virtual.devices.model_sensor import ModelSensor
 from catenary.virtual.devices.motor import Motor
+from catenary.virtual.devices.oversampling import OversamplingTerminal
 from catenary.virtual.devices.servo import Servo
 from catenary.virtual.devices.servo_quirks import NO_QUIRKS, ServoQuirks
+from catenary.virtual.devices.touch_probe import ProbeOptions
 from catenary.virtual.devices.twin import STANDARD_MOTOR, TwinOptions
 from catenary.virtual.foe.options import DeviceFiles
 from catenary.virtual.mapping_quirks import NO_MAPPING_QUIRKS, MappingQuirks
@@ -150,6 +153,26 @@ class AnalogInputsTable(_AppliedTable, tag="analog_inputs", frozen=True, kw_only
         )
 
 
+class OversamplingTable(_ClockedTable, tag="oversampling", frozen=True, kw_only=True):
+    direction: Literal["inputs", "outputs"] = "inputs"
+    channels: int = 2
+    samples: int = 10
+    lrw: bool = True
+
+    def device(self) -> Device:
+        return OversamplingTerminal(
+            direction=self.direction,
+            channels=self.channels,
+            samples=self.samples,
+            name=self.name,
+            alias=self.alias,
+            serial=self.serial,
+            lrw=self.lrw,
+            crystal=self.crystal.crystal(),
+            clock_bits=self.clock_bits,
+        )
+
+
 class ModelSensorTable(_AppliedTable, tag="model_sensor", frozen=True, kw_only=True):
     sensors: tuple[str, ...]
     noise: dict[str, float] = {}
@@ -190,6 +213,7 @@ class ServoTable(_AppliedTable, tag="servo", frozen=True, kw_only=True):
     following_error_turns: float = 0.25
     position_limits: tuple[float, float] | None = None
     sync_missed_limit: int = 3
+    touch_probe: ProbeOptions | None = None
     diagnosis: HistoryOptions = NO_HISTORY
     quirks: ServoQuirks = NO_QUIRKS
     mapping_quirks: MappingQuirks = NO_MAPPING_QUIRKS
@@ -219,6 +243,7 @@ class ServoTable(_AppliedTable, tag="servo", frozen=True, kw_only=True):
             crystal=self.crystal.crystal(),
             clock_bits=self.clock_bits,
             sync_missed_limit=self.sync_missed_limit,
+            touch_probe=self.touch_probe,
             diagnosis=self.diagnosis,
             quirks=self.quirks,
             mapping_quirks=self.mapping_quirks,
@@ -307,6 +332,7 @@ DeviceTable = (
     | DigitalInputsTable
     | AnalogInputsTable
     | ModelSensorTable
+    | OversamplingTable
     | ServoTable
     | EsiTable
     | SiiTable
