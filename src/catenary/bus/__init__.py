@@ -1,6 +1,9 @@
 """MainDevice and SubDevice, and the runners of procedures."""
 
 from catenary.bus.acyclic_runner import AcyclicQueue, AcyclicRunner
+from catenary.bus.eoe import Eoe, SegmentEoe
+from catenary.bus.ethernet_bridge import EthernetBridge
+from catenary.bus.ethernet_port import EthernetCounts
 from catenary.bus.external_master import Carrier, CycleClock
 from catenary.bus.foe import Foe
 from catenary.bus.main_device import MainDevice
@@ -17,6 +20,9 @@ __all__ = [
     "BlockingRunner",
     "Carrier",
     "CycleClock",
+    "Eoe",
+    "EthernetBridge",
+    "EthernetCounts",
     "Foe",
     "FrameCounts",
     "ListType",
@@ -24,6 +30,7 @@ __all__ = [
     "Pending",
     "Runner",
     "Sdo",
+    "SegmentEoe",
     "SubDevice",
     "SubDevices",
 ]

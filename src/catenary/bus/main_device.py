@@ -9,6 +9,7 @@ from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Self, TypeVar
 
 from catenary.bus import event_types
+from catenary.bus.eoe import SegmentEoe
 from catenary.bus.esi_source import EsiPlace, EsiSource, open_source, unchanged
 from catenary.bus.event_queue import Callback, Callbacks, Events
 from catenary.bus.external_master import Carrier
@@ -65,6 +66,7 @@ class MainDevice:
         self.clock_delays_ns: tuple[int | None, ...] = ()  # from the first clock, by position
         self.clock_epoch_ns = 0  # system time of the clocks minus link time
         self.events = Events()  # iterate over it, or call get(timeout=)
+        self.eoe = SegmentEoe(self)  # Ethernet ports of the devices
         self._callbacks = callbacks = Callbacks()
         events = self.events
         events.listen(lambda each: callbacks.report(events.stamped(each)))
@@ -196,6 +198,7 @@ class MainDevice:
         if self._link is None:
             return
         try:
+            self.eoe.close()  # its threads use the link
             if self._leave_loop is not None:
                 self._leave_loop()  # an open loop must not continue without its link
             if self.subs:

@@ -8,6 +8,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Protocol
 
 from catenary.bus.device_diagnosis import DeviceDiagnosis
+from catenary.bus.eoe import Eoe, SegmentEoe
 from catenary.bus.foe import Foe
 from catenary.bus.pdo_table import PdoTable
 from catenary.bus.sdo import Conversations, Objects, Sdo
@@ -30,6 +31,9 @@ class DeviceOwner(Conversations, Protocol):
     @property
     def subs(self) -> Sequence[SubDevice]: ...
 
+    @property
+    def eoe(self) -> SegmentEoe: ...
+
     def require_no_loop(self) -> None: ...
 
     def request_states(
@@ -45,7 +49,8 @@ class SubDevice:
     """Handle of one device, such as `main.scan()[2]`. It stays valid across scans.
 
     Attributes never cause traffic; calls with a verb do. `sub.sdo` reads and writes its objects,
-    `sub.foe` its files. `sub.diagnosis` reads the messages that it stores.
+    `sub.foe` its files. `sub.eoe` is its Ethernet port. `sub.diagnosis` reads the messages that it
+    stores.
     """
 
     def __init__(
@@ -62,6 +67,7 @@ class SubDevice:
         self.esi: EsiDevice | None = None  # ESI that the last scan used for it
         self.sdo = Sdo(self)
         self.foe = Foe(self)
+        self.eoe = Eoe(self)
         self.diagnosis = DeviceDiagnosis(self)
 
     @property

@@ -21,9 +21,16 @@ from catenary.virtual.devices.motor import Motor
 from catenary.virtual.devices.servo import Servo
 from catenary.virtual.devices.servo_quirks import NO_QUIRKS, ServoQuirks
 from catenary.virtual.devices.twin import STANDARD_MOTOR, TwinOptions
+from catenary.virtual.eoe.options import Ethernet
 from catenary.virtual.foe.options import DeviceFiles
 from catenary.virtual.mapping_quirks import NO_MAPPING_QUIRKS, MappingQuirks
+from catenary.virtual.protocols import MailboxProtocol
 from catenary.virtual.sii_quirks import NO_SII_QUIRKS, SiiQuirks
+
+
+def present(*protocols: MailboxProtocol | None) -> tuple[MailboxProtocol, ...]:
+    """Return the protocols that a table contains."""
+    return tuple(each for each in protocols if each is not None)
 
 
 class CrystalTable(msgspec.Struct, forbid_unknown_fields=True, frozen=True, kw_only=True):
@@ -119,6 +126,7 @@ class AnalogInputsTable(_AppliedTable, tag="analog_inputs", frozen=True, kw_only
     second_pdo: SecondPdo = "none"
     mapping_quirks: MappingQuirks = NO_MAPPING_QUIRKS
     files: DeviceFiles | None = None
+    ethernet: Ethernet | None = None
 
     def device(self) -> Device:
         return AnalogInputs(
@@ -136,6 +144,7 @@ class AnalogInputsTable(_AppliedTable, tag="analog_inputs", frozen=True, kw_only
             mailbox_quirks=self.mailbox_quirks,
             sii_quirks=self.sii_quirks,
             files=self.files,
+            protocols=present(self.ethernet),
         )
 
 
@@ -183,6 +192,7 @@ class ServoTable(_AppliedTable, tag="servo", frozen=True, kw_only=True):
     quirks: ServoQuirks = NO_QUIRKS
     mapping_quirks: MappingQuirks = NO_MAPPING_QUIRKS
     files: DeviceFiles | None = None
+    ethernet: Ethernet | None = None
 
     def device(self) -> Device:
         return Servo(
@@ -212,6 +222,7 @@ class ServoTable(_AppliedTable, tag="servo", frozen=True, kw_only=True):
             mailbox_quirks=self.mailbox_quirks,
             sii_quirks=self.sii_quirks,
             files=self.files,
+            protocols=present(self.ethernet),
         )
 
 
@@ -224,6 +235,7 @@ class EsiTable(_ClockedTable, tag="esi", frozen=True, kw_only=True):
     quirks: ServoQuirks = NO_QUIRKS
     motor: Motor = STANDARD_MOTOR
     files: DeviceFiles | None = None
+    ethernet: Ethernet | None = None
     modules: tuple[str | int, ...] | None = None  # "" for an empty slot
 
     def device(self) -> Device:
@@ -242,6 +254,7 @@ class EsiTable(_ClockedTable, tag="esi", frozen=True, kw_only=True):
                 mapping_quirks=self.mapping_quirks,
                 mailbox_quirks=self.mailbox_quirks,
                 files=self.files,
+                protocols=present(self.ethernet),
             ),
         )
 
@@ -259,6 +272,7 @@ class SiiTable(_PlacedTable, tag="sii", frozen=True, kw_only=True):
     quirks: ServoQuirks = NO_QUIRKS
     motor: Motor = STANDARD_MOTOR
     files: DeviceFiles | None = None
+    ethernet: Ethernet | None = None
 
     def device(self) -> Device:
         return Device.from_sii(
@@ -276,6 +290,7 @@ class SiiTable(_PlacedTable, tag="sii", frozen=True, kw_only=True):
                 mapping_quirks=self.mapping_quirks,
                 mailbox_quirks=self.mailbox_quirks,
                 files=self.files,
+                protocols=present(self.ethernet),
             ),
         )
 

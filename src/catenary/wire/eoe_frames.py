@@ -86,16 +86,19 @@ class FrameAssembler:
         self.expire(time_ns)
         last = self._last
         if last is not None and fragment == last:
-            return self._drop(Drop.DUPLICATE, keep=True)
+            self.drops[Drop.DUPLICATE] += 1
+            return None
         if fragment.number == 0:
             if last is not None:
                 self._drop(Drop.INCOMPLETE)
             self._data = bytearray()
             self._limit = min(fragment.blocks * BLOCK, MAX_FRAME)
         elif last is None or not self._continues(last, fragment):
-            return self._drop(Drop.ORDER)
+            self._drop(Drop.ORDER)
+            return None
         if len(self._data) + len(fragment.data) > self._limit:
-            return self._drop(Drop.TOO_LONG)
+            self._drop(Drop.TOO_LONG)
+            return None
         self._data += fragment.data
         self._last, self._time_ns = fragment, time_ns
         return self._complete() if fragment.last else None
@@ -124,10 +127,12 @@ class FrameAssembler:
     def _complete(self) -> bytes | None:
         frame = bytes(self._data)
         self.reset()
-        return frame if len(frame) >= MIN_FRAME else self._drop(Drop.TOO_SHORT)
+        if len(frame) < MIN_FRAME:
+            self.drops[Drop.TOO_SHORT] += 1
+            return None
+        return frame
 
-    def _drop(self, reason: Drop, *, keep: bool = False) -> None:
-        """Count a drop, and forget the incomplete frame unless `keep`."""
+    def _drop(self, reason: Drop) -> None:
+        """Count a drop, and forget the incomplete frame."""
         self.drops[reason] += 1
-        if not keep:
-            self.reset()
+        self.reset()
