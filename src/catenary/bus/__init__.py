@@ -1,7 +1,7 @@
 """MainDevice and SubDevice, and the runners of procedures."""
 
 from catenary.bus.acyclic_runner import AcyclicQueue, AcyclicRunner
-from catenary.bus.eoe import Eoe, SegmentEoe
+from catenary.bus.eoe import Eoe
 from catenary.bus.ethernet_bridge import EthernetBridge
 from catenary.bus.ethernet_port import EthernetCounts
 from catenary.bus.external_master import Carrier, CycleClock
@@ -10,6 +10,7 @@ from catenary.bus.main_device import MainDevice
 from catenary.bus.pending import Pending
 from catenary.bus.runner import BlockingRunner, FrameCounts, Runner
 from catenary.bus.sdo import Sdo
+from catenary.bus.segment_eoe import SegmentEoe
 from catenary.bus.sub_device import SubDevice
 from catenary.bus.sub_devices import SubDevices
 from catenary.wire.sdo_information import ListType

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from ipaddress import IPv4Address, IPv4Interface
-from typing import TYPE_CHECKING, TypeAlias
+from typing import Protocol, TypeAlias
 
 from catenary.bus.ethernet_bridge import EthernetBridge
 from catenary.bus.pending import Pending
-from catenary.errors import ConfigurationError, MailboxError
+from catenary.bus.sdo import Conversations
+from catenary.errors import CatenaryError, ConfigurationError, MailboxError
 from catenary.procedure.eoe import (
     read_address,
     read_filter,
@@ -17,17 +17,48 @@ from catenary.procedure.eoe import (
     write_filter,
 )
 from catenary.procedure.mailbox_channel import MailboxChannel
+from catenary.procedure.station import Station
 from catenary.wire.eoe import BLOCK, HEADER_SIZE
 from catenary.wire.eoe_address import MAC_SIZE, NAME_SIZE, EthernetAddress, MacFilter
 from catenary.wire.eoe_frames import fragment_room
-from catenary.wire.sii import MailboxProtocol
-
-if TYPE_CHECKING:
-    from catenary.bus.main_device import MainDevice
-    from catenary.bus.sub_device import SubDevice
 
 Ip: TypeAlias = str | IPv4Address
 Mac: TypeAlias = str | bytes
+
+
+class TapConnector(Protocol):
+    """Interface to the connections of a segment; `SegmentEoe` implements it."""
+
+    def connect_position(self, tap: str, position: int) -> EthernetBridge: ...
+
+
+class EthernetMain(Conversations, Protocol):
+    """Interface to a MainDevice."""
+
+    @property
+    def eoe(self) -> TapConnector: ...
+
+
+class EthernetOwner(Protocol):
+    """Interface to the device of an Ethernet port; `SubDevice` implements it."""
+
+    @property
+    def main(self) -> EthernetMain: ...
+
+    @property
+    def position(self) -> int: ...
+
+    @property
+    def station(self) -> Station: ...
+
+    @property
+    def channel(self) -> MailboxChannel | None: ...
+
+    @property
+    def in_boot(self) -> bool: ...
+
+    @property
+    def error(self) -> CatenaryError | None: ...
 
 
 class Eoe:
@@ -41,7 +72,7 @@ class Eoe:
     iterating thread uses `request_address` and `request_set_address`, which do not wait.
     """
 
-    def __init__(self, sub: SubDevice, *, unavailable: str = "") -> None:
+    def __init__(self, sub: EthernetOwner, *, unavailable: str = "") -> None:
         """Initialise the access.
 
         Args:
@@ -158,7 +189,7 @@ class Eoe:
             TapError: The TAP does not exist, is down or in use, or belongs to another user.
             MailboxError: The device has no mailbox, or a mailbox that is too small.
         """
-        return self._sub.main.eoe.connect(tap, [self._sub])
+        return self._sub.main.eoe.connect_position(tap, self._sub.position)
 
     def channel(self) -> MailboxChannel:
         """Return the mailbox of the device, and check that it can be used for EoE.
@@ -188,76 +219,6 @@ class Eoe:
                 f"has {room_to(sub.channel)}"
             )
         return sub.channel
-
-
-class SegmentEoe:
-    """Ethernet ports of all devices of a segment: `main.eoe`."""
-
-    def __init__(self, main: MainDevice) -> None:
-        self._main = main
-        self._open: list[EthernetBridge] = []
-
-    def connect(
-        self, tap: str, subs: Sequence[SubDevice] | None = None, *, forward: bool = False
-    ) -> EthernetBridge:
-        """Connect a TAP interface of this machine to devices, in a `with` block.
-
-            with main.eoe.connect("cat0"):
-                ...
-
-        Args:
-            tap: Name of the TAP interface. See `Eoe.connect`.
-            subs: The devices; None for all devices whose SII states EoE.
-            forward: True if frames between these devices are forwarded. Frames are never forwarded
-                to another interface of this machine, unless you bridge it yourself.
-
-        Raises:
-            TapError: The TAP does not exist, is down or in use, or belongs to another user.
-            ConfigurationError: No device states EoE.
-            MailboxError: A device has no mailbox, or a mailbox that is too small.
-            ValueError: `subs` is empty, or contains a device twice.
-        """
-        from catenary.link.tap import Tap
-
-        chosen = self.devices if subs is None else list(subs)
-        if not chosen and subs is None:
-            raise ConfigurationError(
-                "no device of the last scan states EoE in its SII",
-                hint="scan first, or name the devices: main.eoe.connect(tap, [main.subs[1]])",
-            )
-        if not chosen or len({sub.position for sub in chosen}) != len(chosen):
-            raise ValueError("connect needs at least one device, and each device only once")
-        for sub in chosen:
-            sub.eoe.channel()
-        self._check_free(chosen)
-        bridge = EthernetBridge(self._main, chosen, Tap(tap), forward=forward)
-        self._open.append(bridge)
-        return bridge
-
-    @property
-    def devices(self) -> list[SubDevice]:
-        """Devices of the last scan whose SII states EoE."""
-        return [
-            sub
-            for sub in self._main.subs
-            if sub.channel is not None and MailboxProtocol.EOE in sub.channel.layout.protocols
-        ]
-
-    def close(self) -> None:
-        """Close all connections."""
-        for bridge in self._open:
-            bridge.close()
-        self._open.clear()
-
-    def _check_free(self, subs: Sequence[SubDevice]) -> None:
-        self._open = [bridge for bridge in self._open if bridge.is_open]
-        for bridge in self._open:
-            for sub in subs:
-                if sub in bridge.subs:
-                    raise ConfigurationError(
-                        f"{sub.station} is already connected to {bridge.name}",
-                        hint="close that connection first",
-                    )
 
 
 def make_address(

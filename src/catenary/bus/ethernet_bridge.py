@@ -5,15 +5,17 @@ from __future__ import annotations
 import threading
 import time
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Protocol, Self
+from typing import Protocol, Self
 
-from catenary.bus.ethernet_port import EthernetCounts, EthernetPort
+from catenary.bus.ethernet_port import (
+    EthernetCounts,
+    EthernetPort,
+    PortDevice,
+    PortMain,
+    Report,
+)
 from catenary.bus.mac_table import MacTable, is_group
 from catenary.bus.thread_priority import step_behind
-
-if TYPE_CHECKING:
-    from catenary.bus.main_device import MainDevice
-    from catenary.bus.sub_device import SubDevice
 
 ACTIVE_MAX = 2  # ports that use acyclic frames at the same time: at most half of those of a cycle
 BURST = 32  # frames that are read in a row
@@ -47,10 +49,11 @@ class EthernetBridge:
 
     def __init__(
         self,
-        main: MainDevice,
-        subs: Sequence[SubDevice],
+        main: PortMain,
+        subs: Sequence[PortDevice],
         interface: FrameInterface,
         *,
+        report: Report,
         forward: bool = False,
     ) -> None:
         """Start the threads.
@@ -59,14 +62,14 @@ class EthernetBridge:
             main: The MainDevice.
             subs: The devices.
             interface: The open interface. `close` closes it.
+            report: Function that reports dropped frames of a device.
             forward: True if frames between the devices are forwarded.
         """
         slots = threading.BoundedSemaphore(ACTIVE_MAX)
-        self._main = main
         self._interface = interface
         self._forward = forward
         self._table: MacTable[EthernetPort] = MacTable()
-        self._ports = [EthernetPort(sub, main, self._receive, slots) for sub in subs]
+        self._ports = [EthernetPort(sub, main, self._receive, slots, report) for sub in subs]
         self._ended = False
         self._thread = threading.Thread(target=self._serve, name="catenary tap", daemon=True)
         for port in self._ports:
@@ -79,9 +82,9 @@ class EthernetBridge:
         return self._interface.name
 
     @property
-    def subs(self) -> tuple[SubDevice, ...]:
-        """Connected devices."""
-        return tuple(port.sub for port in self._ports)
+    def positions(self) -> tuple[int, ...]:
+        """Positions of the connected devices."""
+        return tuple(port.sub.position for port in self._ports)
 
     @property
     def counts(self) -> Mapping[int, EthernetCounts]:

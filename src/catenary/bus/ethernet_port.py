@@ -3,35 +3,61 @@
 from __future__ import annotations
 
 import threading
+import time
 from collections import Counter, deque
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from typing import Protocol, TypeAlias, TypeVar
 
-from catenary.bus.event_types import EthernetDropped
+from catenary.bus.pending import Pending
 from catenary.bus.thread_priority import step_behind
 from catenary.errors import CatenaryError, DecodeError
 from catenary.procedure.eoe import pump, room_to
+from catenary.procedure.exchange import Procedure
 from catenary.procedure.mailbox_channel import MailboxChannel
 from catenary.procedure.mailbox_swap import Outgoing
 from catenary.wire.eoe import FRAME_NUMBERS, Fragment, TimeStamp, decode_eoe
 from catenary.wire.eoe_frames import MAX_FRAME, MIN_FRAME, FrameAssembler, fragments_of
 from catenary.wire.mailbox import Mailbox, Type
 
-if TYPE_CHECKING:
-    from catenary.bus.main_device import MainDevice
-    from catenary.bus.sub_device import SubDevice
+T = TypeVar("T")
 
 QUEUE_MAX = 64  # frames that wait to be sent to a device
 TURNS_MAX = 16  # mailbox messages in a row, before other devices have their turn
 BUSY_PAUSE = 0.2e-3  # [s] between two procedures; without a loop, other threads use the link then
 IDLE_PAUSE, IDLE_PAUSE_MAX = 1e-3, 10e-3  # [s] between two checks while no frame moves
 RETRY_PAUSE = 0.5  # [s] after a failure
-REPORT_NS = 1_000_000_000  # between two events of one device
+REPORT_INTERVAL = 1.0  # [s] between two reports of one device
 CANCEL_CHECK = 0.05  # [s] between two checks whether the port is closed
 
 FULL, SILENT, TAP_DOWN = "queue full", "the device does not answer", "TAP interface down"
 LOST, INVALID, TOO_LARGE = "EtherCAT frames lost", "invalid EoE message", "frame too large"
+
+
+class PortDevice(Protocol):
+    """Interface to the device of a port; `SubDevice` implements it."""
+
+    @property
+    def position(self) -> int: ...
+
+    @property
+    def channel(self) -> MailboxChannel | None: ...
+
+    @property
+    def in_boot(self) -> bool: ...
+
+
+class PortMain(Protocol):
+    """Interface to its MainDevice."""
+
+    @property
+    def is_open(self) -> bool: ...
+
+    def request(self, procedure: Procedure[T]) -> Pending[T]: ...
+
+
+# Receives the position of a device, its new drops by reason, and its present failure, if any.
+Report: TypeAlias = Callable[[int, "Counter[str]", CatenaryError | None], object]
 
 
 @dataclass(slots=True)
@@ -54,10 +80,11 @@ class EthernetPort:
 
     def __init__(
         self,
-        sub: SubDevice,
-        main: MainDevice,
+        sub: PortDevice,
+        main: PortMain,
         receive: Callable[[EthernetPort, bytes], bool],
         slots: threading.Semaphore,
+        report: Report,
     ) -> None:
         """Initialise the port.
 
@@ -66,6 +93,7 @@ class EthernetPort:
             main: Its MainDevice.
             receive: Function that receives the frames; it returns False if it dropped one.
             slots: Limit of the ports that use the acyclic frames at the same time.
+            report: Function that reports drops, at most once per second.
         """
         self.sub = sub
         self.counts = EthernetCounts()
@@ -73,13 +101,14 @@ class EthernetPort:
         self._main = main
         self._receive = receive
         self._slots = slots
+        self._report = report
         self._channel: MailboxChannel | None = None
         self._assembler = FrameAssembler()
         self._frames: deque[bytes] = deque()
         self._fragments: deque[Outgoing] = deque()  # of the frame that is being sent
         self._sending = b""
         self._number = 0
-        self._reported_ns = -REPORT_NS
+        self._report_due = 0.0
         self._reported: Counter[str] = Counter()
         self._wake = threading.Event()
         self._ended = False
@@ -191,7 +220,7 @@ class EthernetPort:
                 raise
             else:
                 pause = BUSY_PAUSE if moved else min(2 * max(pause, IDLE_PAUSE), IDLE_PAUSE_MAX)
-            self._report()
+            self._report_drops()
             self._wake.wait(pause)
             if pause != RETRY_PAUSE:
                 self._wake.clear()
@@ -219,18 +248,9 @@ class EthernetPort:
         self._fragments.clear()
         self.counts.dropped[SILENT] += max(lost, 1)
 
-    def _report(self) -> None:
-        """Report new drops as an event, at most one per second."""
+    def _report_drops(self) -> None:
         new = self.counts.dropped - self._reported
-        if not new or not self._main.is_open:
-            return
-        now = self._main.link.now()
-        if now - self._reported_ns < REPORT_NS:
-            return
-        self._reported_ns, self._reported = now, Counter(self.counts.dropped)
-        reasons = ", ".join(f"{count} × {reason}" for reason, count in sorted(new.items()))
-        cause = f" ({self.error.message})" if self.error is not None and SILENT in new else ""
-        message = f"{self.sub.station}: Ethernet frames dropped: {reasons}{cause}"
-        self._main.events.put(
-            EthernetDropped(now * 1e-9, self.sub, message, new.total(), dict(new))
-        )
+        if new and time.monotonic() >= self._report_due and self._main.is_open:
+            self._report_due = time.monotonic() + REPORT_INTERVAL
+            self._reported = Counter(self.counts.dropped)
+            self._report(self.sub.position, new, self.error)

@@ -9,7 +9,6 @@ from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Self, TypeVar
 
 from catenary.bus import event_types
-from catenary.bus.eoe import SegmentEoe
 from catenary.bus.esi_source import EsiPlace, EsiSource, open_source, unchanged
 from catenary.bus.event_queue import Callback, Callbacks, Events
 from catenary.bus.external_master import Carrier
@@ -18,6 +17,7 @@ from catenary.bus.master import Complete, Master, MasterSource
 from catenary.bus.pending import Pending
 from catenary.bus.runner import BlockingRunner, FrameCounts, LinkLent, Runner, Watch
 from catenary.bus.sdo import Objects
+from catenary.bus.segment_eoe import SegmentEoe
 from catenary.bus.segment_scan import check_identity
 from catenary.bus.sub_device import SubDevice
 from catenary.bus.sub_devices import SubDevices

@@ -8,7 +8,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Protocol
 
 from catenary.bus.device_diagnosis import DeviceDiagnosis
-from catenary.bus.eoe import Eoe, SegmentEoe
+from catenary.bus.eoe import Eoe, TapConnector
 from catenary.bus.foe import Foe
 from catenary.bus.pdo_table import PdoTable
 from catenary.bus.sdo import Conversations, Objects, Sdo
@@ -32,7 +32,7 @@ class DeviceOwner(Conversations, Protocol):
     def subs(self) -> Sequence[SubDevice]: ...
 
     @property
-    def eoe(self) -> SegmentEoe: ...
+    def eoe(self) -> TapConnector: ...
 
     def require_no_loop(self) -> None: ...
 

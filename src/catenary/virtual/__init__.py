@@ -19,7 +19,7 @@ from catenary.virtual.devices.described import DescribedDevice, from_esi
 from catenary.virtual.devices.motor import Motor
 from catenary.virtual.devices.servo_quirks import ServoQuirks
 from catenary.virtual.devices.twin import Twin, TwinOptions
-from catenary.virtual.eoe.options import Ethernet
+from catenary.virtual.eoe.ethernet import Ethernet
 from catenary.virtual.fault_player import FaultEvent, Loss
 from catenary.virtual.faults import Fault
 from catenary.virtual.foe.firmware import make_firmware

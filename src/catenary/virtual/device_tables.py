@@ -21,7 +21,7 @@ from catenary.virtual.devices.motor import Motor
 from catenary.virtual.devices.servo import Servo
 from catenary.virtual.devices.servo_quirks import NO_QUIRKS, ServoQuirks
 from catenary.virtual.devices.twin import STANDARD_MOTOR, TwinOptions
-from catenary.virtual.eoe.options import Ethernet
+from catenary.virtual.eoe.ethernet import Ethernet
 from catenary.virtual.foe.options import DeviceFiles
 from catenary.virtual.mapping_quirks import NO_MAPPING_QUIRKS, MappingQuirks
 from catenary.virtual.protocols import MailboxProtocol

@@ -11,19 +11,12 @@ from typing import Literal
 
 import msgspec
 
-from catenary.virtual.protocols import ProtocolServer, Surroundings
-
-EOE_PROTOCOL = 2
 PAGE = "<!doctype html><title>Virtual device</title><h1>Virtual device</h1><p>It works.</p>\n"
 FLOOD_MAX = 10_000.0  # [frames/s]
-ROOM_MIN = 36  # data of a mailbox message: the header and one block [bytes]
 
 
-class Ethernet(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """Ethernet port of a virtual device. It answers ARP, ping and HTTP.
-
-    Example: `Servo(protocols=[Ethernet(ip="192.168.7.2")])`.
-    """
+class EthernetOptions(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """Addresses, pages and faults of the Ethernet port of a virtual device."""
 
     ip: str = "192.168.7.2"
     mask: str = "255.255.255.0"
@@ -57,16 +50,3 @@ class Ethernet(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=
             raise ValueError(f"flood must be 0 to {FLOOD_MAX:.0f} frames/s, not {self.flood}")
         if self.faulty_every < 1:
             raise ValueError(f"faulty_every must be at least 1, not {self.faulty_every}")
-
-    @property
-    def number(self) -> int:
-        """Type of the protocol in the mailbox header."""
-        return EOE_PROTOCOL
-
-    def start(self, surroundings: Surroundings) -> ProtocolServer:
-        """Make the server. Called at each start of the device."""
-        from catenary.virtual.eoe.server import EthernetServer
-
-        if min(surroundings.receive_room, surroundings.send_room) < ROOM_MIN:
-            raise ValueError(f"EoE needs a mailbox of at least {ROOM_MIN + 6} bytes")
-        return EthernetServer(self, surroundings)

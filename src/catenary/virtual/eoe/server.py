@@ -9,10 +9,11 @@ from ipaddress import IPv4Address
 
 from catenary.virtual.eoe.fragments import Collector, divided, encoded, spoiled
 from catenary.virtual.eoe.host import BROADCAST, Host
-from catenary.virtual.eoe.options import EOE_PROTOCOL, Ethernet
+from catenary.virtual.eoe.options import EthernetOptions
 from catenary.virtual.mailbox import ERROR_TOO_SHORT
 from catenary.virtual.protocols import Surroundings
 
+EOE_PROTOCOL = 2
 FRAGMENT, TIME, SET, SET_RESULT, GET, GET_RESULT = 0, 1, 2, 3, 6, 7
 LAST = 0x100
 SIZES = (6, 4, 4, 4, 4, 32)  # MAC, IP, mask, gateway, name server, name
@@ -27,7 +28,7 @@ PRE_OP, BOOT = 2, 3
 class EthernetServer:
     """Ethernet port of one device: its addresses, and the frames that wait."""
 
-    def __init__(self, options: Ethernet, surroundings: Surroundings) -> None:
+    def __init__(self, options: EthernetOptions, surroundings: Surroundings) -> None:
         self._options = options
         self._surroundings = surroundings
         self._frames: deque[bytes] = deque()
