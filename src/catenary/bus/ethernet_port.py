@@ -23,7 +23,7 @@ from catenary.wire.mailbox import Mailbox, Type
 T = TypeVar("T")
 
 QUEUE_MAX = 64  # frames that wait to be sent to a device
-TURNS_MAX = 16  # mailbox messages in a row, before other devices have their turn
+TURNS_MAX = 32  # mailbox messages in a row, before other devices have their turn
 BUSY_PAUSE = 0.2e-3  # [s] between two procedures; without a loop, other threads use the link then
 IDLE_PAUSE, IDLE_PAUSE_MAX = 1e-3, 10e-3  # [s] between two checks while no frame moves
 RETRY_PAUSE = 0.5  # [s] after a failure

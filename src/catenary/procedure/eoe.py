@@ -35,6 +35,7 @@ from catenary.wire.eoe_address import EthernetAddress, MacFilter
 from catenary.wire.mailbox import Mailbox, Type
 
 Request = GetAddress | GetFilter | SetAddress | SetFilter
+EMPTY_MAX = 3  # turns without a message, until the device is expected to have no more
 T = TypeVar("T", GetAddressResult, GetFilterResult, SetAddressResult, SetFilterResult)
 
 HINTS = {
@@ -144,15 +145,17 @@ def pump(channel: MailboxChannel, source: Source, most: int) -> Procedure[bool]:
         ResponseTimeout: The device does not answer.
         MailboxError: The device violates the protocol, or does not support EoE.
     """
-    moved = received = False
+    moved, empty = False, EMPTY_MAX
     for _ in range(most):
         outgoing = source.next()
-        turn = swap(channel, outgoing, expected=received)
+        # After a first message, the next one is read without checking: it saves an exchange.
+        turn = swap(channel, outgoing, expected=moved)
         sent, received = yield from exclusively(channel, turn)
         if outgoing is not None and (sent or outgoing.given_up):
             source.done(outgoing)
         moved |= sent or received
-        if not (sent or received):
+        empty = 0 if sent or received else empty + 1
+        if empty > EMPTY_MAX or not moved:
             break
     return moved
 

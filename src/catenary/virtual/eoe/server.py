@@ -9,7 +9,7 @@ from ipaddress import IPv4Address
 
 from catenary.virtual.eoe.fragments import Collector, divided, encoded, spoiled
 from catenary.virtual.eoe.host import BROADCAST, Host
-from catenary.virtual.eoe.options import EthernetOptions
+from catenary.virtual.eoe.options import PAGE, EthernetOptions
 from catenary.virtual.mailbox import ERROR_TOO_SHORT
 from catenary.virtual.protocols import Surroundings
 
@@ -42,7 +42,7 @@ class EthernetServer:
             *(_ip_bytes(text) for text in (options.ip, options.mask, options.gateway, options.dns)),
             options.name.encode().ljust(32, b"\0"),
         ]
-        self.host = Host(self.send, surroundings.scheduler, options.pages)
+        self.host = Host(self.send, surroundings.scheduler, options.pages or {"/": PAGE})
         self._configure_host()
         surroundings.mailbox.on_read.append(self._advance)
 
