@@ -68,7 +68,7 @@ class EthernetBridge:
         slots = threading.BoundedSemaphore(ACTIVE_MAX)
         self._interface = interface
         self._forward = forward
-        self._table: MacTable[EthernetPort] = MacTable()
+        self._table: MacTable[EthernetPort | FrameInterface] = MacTable()
         self._ports = [EthernetPort(sub, main, self._receive, slots, report) for sub in subs]
         self._ended = False
         self._thread = threading.Thread(target=self._serve, name="catenary tap", daemon=True)
@@ -128,20 +128,22 @@ class EthernetBridge:
             frame = self._interface.read()
             if frame is None:
                 return FAULT_PAUSE if count == 0 else 0.0
-            accepted &= self._distribute(frame)
+            accepted &= self._distribute(frame, self._interface)
         return 0.0 if accepted else FULL_PAUSE
 
-    def _distribute(self, frame: bytes, source: EthernetPort | None = None) -> bool:
+    def _distribute(self, frame: bytes, source: EthernetPort | FrameInterface) -> bool:
         """Queue a frame for its devices. Return False if a queue is full."""
+        self._table.learn(frame[6:12], source)
         target = None if is_group(frame[:6]) else self._table.find(frame[:6])
-        ports = self._ports if target is None else [target]
-        return all([port.send(frame) for port in ports if port is not source])
+        ports = [each for each in self._ports if target in (None, each) and each is not source]
+        return all([port.send(frame) for port in ports])
 
     def _receive(self, source: EthernetPort, frame: bytes) -> bool:
         """Pass on a frame of a device. Return False if it was dropped."""
-        self._table.learn(frame[6:12], source)
         if self._forward:
             self._distribute(frame, source)
+        else:
+            self._table.learn(frame[6:12], source)
         return self._interface.write(frame)
 
     def __enter__(self) -> Self:

@@ -57,8 +57,9 @@ def spoiled(parts: list[Part], fault: str) -> list[Part]:
     if fault == "longer":
         return [parts[0]._replace(blocks=1), *parts[1:]]
     if fault == "endless":
-        first = parts[0]
-        return [first._replace(number=k % 64, last=False) for k in range(ENDLESS)]
+        data = parts[0].data[: len(parts[0].data) // 32 * 32]
+        offsets = [k * len(data) // 32 & 63 for k in range(ENDLESS)]
+        return [Part(k & 63, offset or 63, False, data) for k, offset in enumerate(offsets)]
     return parts
 
 

@@ -91,7 +91,7 @@ class EthernetServer:
         """Put the next fragments into the mailbox."""
         mailbox = self._surroundings.mailbox
         while mailbox.waiting < WAITING_MAX and self._surroundings.state() not in (1, BOOT):
-            if not self._parts and self._frames:
+            while not self._parts and self._frames:
                 self._divide(self._frames.popleft())
             if not self._parts or not mailbox.send(EOE_PROTOCOL, self._parts[0]):
                 return
