@@ -18,7 +18,10 @@ INTERNAL = {"catenary.events.emergency", "catenary.virtual.faults.number_of_stat
 
 # Types of what public methods return; programs do not import them.
 RETURNED = {
-    "catenary.bus": ("SubDevices", "Sdo", "Foe", "Pending", "ListType"),
+    "catenary.bus": (
+        *("SubDevices", "Sdo", "Foe", "Pending", "ListType"),
+        *("Eoe", "SegmentEoe", "EthernetBridge", "EthernetCounts"),
+    ),
     "catenary.bus.device_diagnosis": ("DeviceDiagnosis",),
     "catenary.bus.diagnosis": ("Diagnosis",),
     "catenary.bus.event_queue": ("Events",),
@@ -51,6 +54,7 @@ RETURNED = {
     ),
     "catenary.wire.al": ("AlState",),
     "catenary.wire.cia402": ("AxisState",),
+    "catenary.wire.eoe_address": ("EthernetAddress", "MacFilter"),
 }
 
 
