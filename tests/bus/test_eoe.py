@@ -126,7 +126,7 @@ def test_devices_that_have_no_port() -> None:
             coupler.eoe.address()
         with pytest.raises(MailboxError, match="needs room for 36 bytes in a mailbox, it has 34"):
             small.eoe.connect("cat0")
-        with pytest.raises(ConfigurationError, match="no device of the last scan states EoE"):
+        with pytest.raises(ConfigurationError, match="no device of the last scan has EoE"):
             main.eoe.connect("cat0")
         with pytest.raises(ValueError, match="at least one device"):
             main.eoe.connect("cat0", [])
@@ -213,7 +213,7 @@ def test_several_devices_share_one_interface(wire: Wire, forward: bool) -> None:
             assert echo(wire.next()) is not None
             counts = bridge.counts
             until(lambda: counts[1].frames_to_device)
-            # The broadcast reached both; the ping only the first one, whose address is known.
+            # The broadcast reached both; the ping only the first one, because its address is known.
             assert (counts[0].frames_to_device, counts[1].frames_to_device) == (2, 1)
 
 

@@ -63,7 +63,7 @@ def test_an_interface_of_another_kind(veth: tuple[str, str]) -> None:
 
 
 def test_an_interface_that_does_not_exist() -> None:
-    with pytest.raises(TapError, match="there is no interface cat77") as caught:
+    with pytest.raises(TapError, match="the interface cat77 does not exist") as caught:
         Tap("cat77")
     assert "ip tuntap add dev cat77 mode tap user" in caught.value.hint
 

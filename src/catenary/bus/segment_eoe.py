@@ -47,7 +47,7 @@ class SegmentEoe:
 
         Args:
             tap: Name of the TAP interface. See `Eoe.connect`.
-            subs: The devices; None for all devices whose SII states EoE.
+            subs: The devices; None for all devices with EoE in their SII.
             forward: True if frames between these devices are forwarded. Frames are never forwarded
                 to another interface of this machine, unless you bridge it yourself.
 
@@ -60,7 +60,7 @@ class SegmentEoe:
         chosen = self.devices if subs is None else list(subs)
         if not chosen and subs is None:
             raise ConfigurationError(
-                "no device of the last scan states EoE in its SII",
+                "no device of the last scan has EoE in its SII",
                 hint="scan first, or name the devices: main.eoe.connect(tap, [main.subs[1]])",
             )
         if not chosen or len({sub.position for sub in chosen}) != len(chosen):
@@ -78,7 +78,7 @@ class SegmentEoe:
 
     @property
     def devices(self) -> list[SubDevice]:
-        """Devices of the last scan whose SII states EoE."""
+        """Devices of the last scan with EoE in their SII."""
         return [
             sub
             for sub in self._main.subs

@@ -53,7 +53,7 @@ def _add_up(group: Commands) -> None:
         "up",
         help="connect a TAP interface to devices, until Ctrl-C",
         description="Brings all devices to PRE-OP, and connects a TAP interface of this machine to "
-        "one device, or without POSITION to all devices whose SII states EoE. Create the TAP "
+        "one device, or without POSITION to all devices with EoE in their SII. Create the TAP "
         "before, and give it an address in the network of the device:\n"
         "  sudo ip tuntap add dev cat0 mode tap user $USER\n"
         "  sudo ip link set cat0 up\n"

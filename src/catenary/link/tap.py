@@ -112,7 +112,7 @@ def _check_interface(name: str) -> None:
         try:
             flags = fcntl.ioctl(asking, SIOCGIFFLAGS, request)
         except OSError as error:
-            raise TapError(f"there is no interface {name}", hint=create) from error
+            raise TapError(f"the interface {name} does not exist", hint=create) from error
     (bits,) = struct.unpack_from("=H", flags, 16)
     if not bits & IFF_UP:
         raise TapError(f"the interface {name} is down", hint=f"sudo ip link set {name} up")

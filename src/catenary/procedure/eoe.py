@@ -129,7 +129,7 @@ def write_filter(channel: MailboxChannel, filter: MacFilter, *, port: int = 0) -
 
 
 def pump(channel: MailboxChannel, source: Source, most: int) -> Procedure[bool]:
-    """Send waiting Ethernet frames, and receive those of the device, until there are none.
+    """Send waiting Ethernet frames, and receive those of the device, until no message waits.
 
     Each message is one turn of the mailbox, so that other procedures wait for at most one message.
 

@@ -24,7 +24,7 @@ class EthernetOptions(msgspec.Struct, frozen=True, forbid_unknown_fields=True, k
     dns: str = ""
     mac: str = "02:00:00:00:07:02"
     name: str = "virtual"
-    pages: Mapping[str, str] = {}  # by path; PAGE, if there is no page
+    pages: Mapping[str, str] = {}  # by path; none: PAGE
 
     # Answer to requests for addresses. "packed": without gaps for absent fields (SOES, esc_eoe.c).
     # "refused": result 0x0201. "silent": none.
