@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 import subprocess
 from pathlib import Path
 
@@ -10,8 +11,17 @@ import pytest
 import catenary as cat
 from catenary.link import Recorder
 from catenary.virtual import AnalogInputs, Coupler, Ethernet, Segment
+from tests.peers.conftest import serving
+from tests.peers.test_soem_programs import (
+    BUILD_SECONDS,
+    INITIALISER,
+    run_or_skip,
+    source,
+)
 from tests.procedure.test_eoe import Host
 from tests.virtual.ethernet_frames import ARP_REQUEST, echo, ping
+
+__all__ = ["source"]  # a fixture
 
 FIELDS = ("type", "fragno", "offset", "frame", "last", "fragment")
 SIZES = (0, 56, 300, 1472)
@@ -75,3 +85,48 @@ def test_the_frames_reassemble_from_the_fields_of_tshark(
         if last == "1":
             found.append(data)
     assert found == expected
+
+
+LINE = """
+[[device]]
+kind = "analog_inputs"
+mailbox_bytes = 256
+ethernet = { gateway = "192.168.7.1" }
+"""
+
+
+@pytest.fixture(scope="module")
+def eoe_test(source: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return the compiled program."""
+    folder = tmp_path_factory.mktemp("soem")
+    shutil.copytree(source / "soem", folder / "soem")
+    root = folder / "soem"
+    main = root / "soem" / "ethercatmain.c"
+    main.write_text(main.read_text().replace(*INITIALISER))
+    parts = [
+        *(root / "soem").glob("*.c"),
+        *(root / "osal" / "linux").glob("*.c"),
+        *(root / "oshw" / "linux").glob("*.c"),
+        root / "test" / "linux" / "eoe_test" / "eoe_test.c",
+    ]
+    places = ("soem", "osal", "osal/linux", "oshw/linux")
+    command = ["gcc", "-w", "-O1", "-o", "eoe_test", *(f"-I{root / each}" for each in places)]
+    command += [*map(str, parts), "-lpthread", "-lrt"]
+    run_or_skip(command, folder, BUILD_SECONDS, "eoe_test cannot be compiled")
+    return folder / "eoe_test"
+
+
+def test_soem_sets_and_reads_the_addresses(
+    eoe_test: Path, veth: tuple[str, str], tmp_path: Path
+) -> None:
+    """SOEM sends the fields without gaps, and understands our fixed places: all are present."""
+    ours, theirs = veth
+    line = tmp_path / "line.toml"
+    line.write_text(LINE)
+    with serving(theirs, line):
+        done = subprocess.run(
+            ["stdbuf", "-oL", str(eoe_test), ours], capture_output=True, text=True, timeout=120
+        )
+    assert "recieved IP (192.168.9.200)" in done.stdout
+    assert "recieved subnet (255.255.255.0)" in done.stdout
+    assert "Operational state reached for all slaves." in done.stdout
