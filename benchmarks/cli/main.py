@@ -32,6 +32,7 @@ def make_parser() -> argparse.ArgumentParser:
     with_wires.add_loop(group)
     with_wires.add_storm(group)
     with_wires.add_foe(group)
+    with_wires.add_eoe(group)
     with_wires.add_share(group)
     with_wires.add_remote(group)
     with_wires.add_cost(group)
