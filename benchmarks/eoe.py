@@ -37,6 +37,7 @@ DRIVES, MAILBOX, PERIOD = 33, 1024, 1e-3
 FRAME, DATA = 1514, 1460  # [bytes] of a full Ethernet frame, and of TCP data in it
 TAP, OWN_IP, IP = "cateoe0", "192.168.7.1/24", "192.168.7.2"
 PAGE = "".join(f"{k:07d}\n" for k in range(50_000))  # 400 kB
+LOST_LIMIT = 1000  # lost cycles in a row: the runs are counted, not stopped
 LIMIT = 60.0  # [s] for one process beyond its run time
 WAYS = "without", "with"
 
@@ -123,7 +124,10 @@ def run(name: str, interface: str, seconds: float) -> Run:
     """Run the loop, and with "with" fetch the page again and again."""
     with cat.MainDevice(interface) as main:
         drives = cat.Drives(main.scan().drives, counts_per_turn=2**20, velocity_limit=100.0)
-        with main.subs[1].eoe.connect(TAP), cat.Loop(drives, period=PERIOD) as loop:
+        with (
+            main.subs[1].eoe.connect(TAP),
+            cat.Loop(drives, period=PERIOD, stop=cat.StopPolicy(lost_limit=LOST_LIMIT)) as loop,
+        ):
             loop.run_in_background()
             start, received = time.monotonic(), 0
             while time.monotonic() - start < seconds:
