@@ -17,11 +17,14 @@ PLAIN = ("errors", "events", "types", "virtual.faults")  # no `__all__`: what th
 INTERNAL = {"catenary.events.emergency", "catenary.virtual.faults.number_of_state"}
 
 # Types of what public methods return; programs do not import them.
-PROTOCOLS = ("Foe", "Aoe", "AdsNotifications", "Voe")
+PROTOCOLS = ("Foe", "Aoe", "AdsNotifications", "Voe", "Eoe", "SegmentEoe")
+ETHERNET = ("EthernetBridge", "EthernetCounts")
 RETURNED = {
     "catenary.wire.ads_response": ("DeviceInfo", "States", "Sample"),
     "catenary.wire.voe": ("VoeMessage",),
-    "catenary.bus": ("SubDevices", "Sdo", *PROTOCOLS, "Latch", "LatchEvent", "Pending", "ListType"),
+    "catenary.bus": (
+        *("SubDevices", "Sdo", *PROTOCOLS, *ETHERNET, "Latch", "LatchEvent", "Pending", "ListType"),
+    ),
     "catenary.bus.device_diagnosis": ("DeviceDiagnosis",),
     "catenary.bus.diagnosis": ("Diagnosis",),
     "catenary.bus.event_queue": ("Events",),
@@ -55,6 +58,7 @@ RETURNED = {
     ),
     "catenary.wire.al": ("AlState",),
     "catenary.wire.cia402": ("AxisState",),
+    "catenary.wire.eoe_address": ("EthernetAddress", "MacFilter"),
 }
 
 

@@ -178,6 +178,19 @@ class AdsError(CatenaryError):
         self.code = code
 
 
+class EoeError(CatenaryError):
+    """A device refused an address or a filter of its Ethernet port (ETG.1000.6 §5.7)."""
+
+    def __init__(self, message: str, *, position: int, result: int, hint: str = "") -> None:
+        super().__init__(message, hint=hint)
+        self.position = position
+        self.result = result
+
+
+class TapError(CatenaryError):
+    """A TAP interface of this machine cannot be used."""
+
+
 class FirmwareError(CatenaryError):
     """A firmware update failed: it was interrupted, or the device does not report the expected
     firmware afterwards."""

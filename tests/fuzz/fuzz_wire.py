@@ -17,6 +17,7 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from ipaddress import IPv4Address
 from typing import Any
 
 from catenary import types
@@ -34,6 +35,8 @@ from catenary.wire import (
     datagram,
     diagnosis_history,
     dl,
+    eoe,
+    eoe_address,
     error_counters,
     features,
     fmmu,
@@ -52,6 +55,8 @@ from catenary.wire import (
     sync_manager,
     voe,
 )
+from catenary.wire.eoe_address import EthernetAddress, MacFilter
+from catenary.wire.eoe_frames import MAX_FRAME, FrameAssembler, fragments_of
 
 
 @dataclass(frozen=True)
@@ -115,6 +120,21 @@ def _ads_request(data: bytes) -> ads.Request:
 
 def _encoded_ads_request(request: ads.Request) -> bytes:
     return bytes((request.command,)) + request.encode()
+
+
+def _assembled(data: bytes) -> list[bytes]:
+    """Return the Ethernet frames of EoE fragments, each with its length in a byte before it."""
+    assembler, frames, rest = FrameAssembler(), [], data
+    while rest:
+        part, rest = rest[1 : 1 + rest[0]], rest[1 + rest[0] :]
+        try:
+            message = eoe.decode_eoe(part)
+        except DecodeError:
+            continue
+        if isinstance(message, eoe.Fragment):
+            frames.append(assembler.add(message, len(rest)) or b"")
+    assert all(len(frame) <= MAX_FRAME for frame in frames)
+    return frames
 
 
 def _word(name: str, decode: Callable[[int], Any], size: int, *values: int) -> Target:
@@ -212,6 +232,11 @@ BRING_UP = tuple(
         )
     )
     for counter, source in ((0, b"\x10" * 6), (1, b"\x12" + b"\x10" * 5))
+)
+EOE_FRAGMENTS = b"".join(
+    len(each.encode()).to_bytes(1, "little") + each.encode()
+    for number in range(3)
+    for each in fragments_of(bytes(300), number, 100)
 )
 FRAMES = b"".join(len(each).to_bytes(2, "little") + each for each in BRING_UP)
 TIMELINE = pcapng.encode_header("eth0") + b"".join(
@@ -369,6 +394,33 @@ TARGETS = (
         ),
     ),
     Target(
+        "eoe.decode_eoe",
+        eoe.decode_eoe,
+        _method,
+        (
+            eoe.Fragment(0, 3, 5, bytes(range(64)), False).encode(),
+            eoe.Fragment(1, 2, 5, bytes(range(9)), time_stamp=7).encode(),
+            eoe.TimeStamp(5, 7).encode(),
+            eoe.SetAddress(EthernetAddress(b"\2" * 6, IPv4Address("10.0.0.2"))).encode(),
+            eoe.GetAddressResult(EthernetAddress(name="drive")).encode(),
+            bytes.fromhex("0701000006000000") + bytes(8),  # without gaps
+            eoe.SetFilter(MacFilter((b"\2" * 6,), (b"\xff" * 6,), True)).encode(),
+            eoe.SetFilterResult(0x0401).encode(),
+        ),
+    ),
+    Target(
+        "eoe_address.decode_address",
+        eoe_address.decode_address,
+        _method,
+        (EthernetAddress(b"\2" * 6, IPv4Address("10.0.0.2"), name="drive").encode(), bytes(4)),
+    ),
+    Target(
+        "eoe_address.decode_filter",
+        eoe_address.decode_filter,
+        _method,
+        (MacFilter((b"\2" * 6,), (b"\xff" * 6,)).encode(),),
+    ),
+    Target(
         "diagnosis_history.decode_diagnosis_message",
         diagnosis_history.decode_diagnosis_message,
         diagnosis_history.DiagnosisMessage.encode,
@@ -411,6 +463,7 @@ TARGETS = (
     Target("pcapng.decode_pcapng", pcapng.decode_pcapng, None, (CAPTURE,)),
     Target("capture.decode_capture", capture.decode_capture, None, (CAPTURE, PCAP)),
     Target("pcap.decode_pcap", pcap.decode_pcap, None, (PCAP,)),
+    Target("eoe_frames.FrameAssembler", _assembled, None, (EOE_FRAGMENTS,)),
     Target("capture.EventStream", _timeline, None, (TIMELINE, PCAP)),
     Target("capture.EventStream of frames", _timeline_of_frames, None, (FRAMES,)),
 )

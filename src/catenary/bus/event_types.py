@@ -81,6 +81,17 @@ class SynchronisationFault(Event):
 
 
 @dataclass(frozen=True, slots=True)
+class EthernetDropped(Event):
+    """Ethernet frames of a device (EoE) that were dropped since the last such event.
+
+    There is at most one event per second and device. See `sub.eoe.connect`.
+    """
+
+    count: int
+    reasons: dict[str, int]  # count by reason
+
+
+@dataclass(frozen=True, slots=True)
 class DeviceLost(Event):
     """Loss of a device: it no longer answers."""
 

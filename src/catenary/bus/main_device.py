@@ -17,6 +17,7 @@ from catenary.bus.master import Complete, Master, MasterSource
 from catenary.bus.pending import Pending
 from catenary.bus.runner import BUSY_WAIT, BlockingRunner, FrameCounts, LinkLent, Runner, Watch
 from catenary.bus.sdo import Objects
+from catenary.bus.segment_eoe import SegmentEoe
 from catenary.bus.segment_scan import check_identity
 from catenary.bus.sub_device import SubDevice
 from catenary.bus.sub_devices import SubDevices
@@ -65,6 +66,7 @@ class MainDevice:
         self.clock_delays_ns: tuple[int | None, ...] = ()  # from the first clock, by position
         self.clock_epoch_ns = 0  # system time of the clocks minus link time
         self.events = Events()  # iterate over it, or call get(timeout=)
+        self.eoe = SegmentEoe(self)  # Ethernet ports of the devices
         self._callbacks = callbacks = Callbacks()
         events = self.events
         events.listen(lambda each: callbacks.report(events.stamped(each)))
@@ -199,6 +201,7 @@ class MainDevice:
         if self._link is None:
             return
         try:
+            self.eoe.close()  # its threads use the link
             if self._leave_loop is not None:
                 self._leave_loop()  # an open loop must not continue without its link
             if self.subs:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Protocol
 
 from catenary.bus.aoe import Aoe
 from catenary.bus.device_diagnosis import DeviceDiagnosis
+from catenary.bus.eoe import Eoe, TapConnector
 from catenary.bus.foe import Foe
 from catenary.bus.latch import Latch, LatchEdge
 from catenary.bus.pdo_table import PdoTable
@@ -33,6 +34,9 @@ class DeviceOwner(Conversations, Protocol):
     @property
     def subs(self) -> Sequence[SubDevice]: ...
 
+    @property
+    def eoe(self) -> TapConnector: ...
+
     def require_no_loop(self) -> None: ...
 
     def request_states(
@@ -49,7 +53,7 @@ class SubDevice:
 
     Attributes never cause traffic; calls with a verb do. `sub.sdo` reads and writes its objects,
     `sub.foe` its files, `sub.aoe` its ADS data. `sub.voe` exchanges vendor-specific messages.
-    `sub.diagnosis` reads the messages that it stores.
+    `sub.eoe` is its Ethernet port. `sub.diagnosis` reads the messages that it stores.
     """
 
     def __init__(
@@ -68,6 +72,7 @@ class SubDevice:
         self.foe = Foe(self)
         self.aoe = Aoe(self)
         self.voe = Voe(self)
+        self.eoe = Eoe(self)
         self.diagnosis = DeviceDiagnosis(self)
 
     @property

@@ -22,6 +22,7 @@ from catenary.virtual.devices.motor import Motor
 from catenary.virtual.devices.servo_quirks import ServoQuirks
 from catenary.virtual.devices.touch_probe import ProbeOptions
 from catenary.virtual.devices.twin import Twin, TwinOptions
+from catenary.virtual.eoe.ethernet import Ethernet
 from catenary.virtual.fault_player import FaultEvent, Loss
 from catenary.virtual.faults import Fault
 from catenary.virtual.foe.firmware import make_firmware
@@ -45,6 +46,7 @@ __all__ = [
     "DeviceFirmware",
     "DigitalInputs",
     "DigitalOutputs",
+    "Ethernet",
     "Fault",
     "FaultEvent",
     "FrameCounters",

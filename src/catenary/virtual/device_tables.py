@@ -25,11 +25,17 @@ from catenary.virtual.devices.servo import Servo
 from catenary.virtual.devices.servo_quirks import NO_QUIRKS, ServoQuirks
 from catenary.virtual.devices.touch_probe import ProbeOptions
 from catenary.virtual.devices.twin import STANDARD_MOTOR, TwinOptions
+from catenary.virtual.eoe.ethernet import Ethernet
 from catenary.virtual.foe.options import DeviceFiles
 from catenary.virtual.mapping_quirks import NO_MAPPING_QUIRKS, MappingQuirks
 from catenary.virtual.protocols import MailboxProtocol
 from catenary.virtual.sii_quirks import NO_SII_QUIRKS, SiiQuirks
 from catenary.virtual.vendor_protocol import VendorEcho
+
+
+def present(*protocols: MailboxProtocol | None) -> tuple[MailboxProtocol, ...]:
+    """Return the protocols that a table contains."""
+    return tuple(each for each in protocols if each is not None)
 
 
 class CrystalTable(msgspec.Struct, forbid_unknown_fields=True, frozen=True, kw_only=True):
@@ -70,11 +76,6 @@ class _AppliedTable(_ClockedTable, frozen=True, kw_only=True):
     lrw: bool = True
     mailbox_quirks: MailboxQuirks = NO_MAILBOX_QUIRKS
     sii_quirks: SiiQuirks = NO_SII_QUIRKS
-
-
-def _given(*protocols: MailboxProtocol | None) -> tuple[MailboxProtocol, ...]:
-    """Return the mailbox protocols that a table has."""
-    return tuple(each for each in protocols if each is not None)
 
 
 class CouplerTable(_ClockedTable, tag="coupler", frozen=True, kw_only=True):
@@ -132,6 +133,7 @@ class AnalogInputsTable(_AppliedTable, tag="analog_inputs", frozen=True, kw_only
     files: DeviceFiles | None = None
     ads: Ads | None = None
     vendor_echo: VendorEcho | None = None
+    ethernet: Ethernet | None = None
 
     def device(self) -> Device:
         return AnalogInputs(
@@ -149,7 +151,7 @@ class AnalogInputsTable(_AppliedTable, tag="analog_inputs", frozen=True, kw_only
             mailbox_quirks=self.mailbox_quirks,
             sii_quirks=self.sii_quirks,
             files=self.files,
-            protocols=_given(self.ads, self.vendor_echo),
+            protocols=present(self.ads, self.vendor_echo, self.ethernet),
         )
 
 
@@ -220,6 +222,7 @@ class ServoTable(_AppliedTable, tag="servo", frozen=True, kw_only=True):
     files: DeviceFiles | None = None
     ads: Ads | None = None
     vendor_echo: VendorEcho | None = None
+    ethernet: Ethernet | None = None
 
     def device(self) -> Device:
         return Servo(
@@ -250,7 +253,7 @@ class ServoTable(_AppliedTable, tag="servo", frozen=True, kw_only=True):
             mailbox_quirks=self.mailbox_quirks,
             sii_quirks=self.sii_quirks,
             files=self.files,
-            protocols=_given(self.ads, self.vendor_echo),
+            protocols=present(self.ads, self.vendor_echo, self.ethernet),
         )
 
 
@@ -265,6 +268,7 @@ class EsiTable(_ClockedTable, tag="esi", frozen=True, kw_only=True):
     files: DeviceFiles | None = None
     ads: Ads | None = None
     vendor_echo: VendorEcho | None = None
+    ethernet: Ethernet | None = None
     modules: tuple[str | int, ...] | None = None  # "" for an empty slot
 
     def device(self) -> Device:
@@ -283,7 +287,7 @@ class EsiTable(_ClockedTable, tag="esi", frozen=True, kw_only=True):
                 mapping_quirks=self.mapping_quirks,
                 mailbox_quirks=self.mailbox_quirks,
                 files=self.files,
-                protocols=_given(self.ads, self.vendor_echo),
+                protocols=present(self.ads, self.vendor_echo, self.ethernet),
             ),
         )
 
@@ -303,6 +307,7 @@ class SiiTable(_PlacedTable, tag="sii", frozen=True, kw_only=True):
     files: DeviceFiles | None = None
     ads: Ads | None = None
     vendor_echo: VendorEcho | None = None
+    ethernet: Ethernet | None = None
 
     def device(self) -> Device:
         return Device.from_sii(
@@ -320,7 +325,7 @@ class SiiTable(_PlacedTable, tag="sii", frozen=True, kw_only=True):
                 mapping_quirks=self.mapping_quirks,
                 mailbox_quirks=self.mailbox_quirks,
                 files=self.files,
-                protocols=_given(self.ads, self.vendor_echo),
+                protocols=present(self.ads, self.vendor_echo, self.ethernet),
             ),
         )
 
