@@ -13,6 +13,8 @@ from catenary.virtual.devices import (
     DigitalOutputs,
     Junction,
     ModelSensor,
+    SafetyLogic,
+    SafetyTerminal,
     Servo,
 )
 from catenary.virtual.devices.described import DescribedDevice, from_esi
@@ -53,6 +55,8 @@ __all__ = [
     "Motor",
     "Plant",
     "PlantPart",
+    "SafetyLogic",
+    "SafetyTerminal",
     "Segment",
     "Served",
     "Server",
