@@ -2,6 +2,7 @@
 
 from catenary.drive.channel import Channel
 from catenary.drive.copies import Copies, Copy
+from catenary.drive.copy_place import CopyPlace
 from catenary.drive.drives import Drives
 from catenary.drive.fsoe import FsoeConnection, FsoeFrames
 from catenary.drive.homing import HomingMethod
@@ -17,6 +18,7 @@ __all__ = [
     "Channel",
     "Copies",
     "Copy",
+    "CopyPlace",
     "DistributedClock",
     "Drives",
     "FsoeConnection",
