@@ -16,7 +16,7 @@ from catenary.virtual import Coupler, SafetyLogic, SafetyTerminal, Segment, Serv
 from catenary.virtual.fsoe import SafetyState
 from tests.scenario.cell import Cell
 
-LOGIC, FIRST, SECOND, SERVO = 1, 2, 3, 4
+FIRST, SECOND, SERVO, LOGIC = 1, 2, 3, 4
 DATA, RESET = SafetyState.DATA, SafetyState.RESET
 WATCHDOG = 0.02
 ZEROS = bytes(2)
@@ -39,7 +39,8 @@ class Line:
     def relay(self, *terminals: int) -> cat.Copies:
         chosen = terminals or (FIRST, SECOND)
         connections = [self.connection(k, each) for k, each in enumerate(chosen, 1)]
-        return cat.Copies(*connections, optional=self.cell.subs[LOGIC : SECOND + 1])
+        optional = [self.cell.subs[k] for k in (FIRST, SECOND, LOGIC)]
+        return cat.Copies(*connections, optional=optional)
 
     @property
     def states(self) -> list[SafetyState]:
@@ -60,11 +61,17 @@ class Line:
 def line() -> Iterator[Line]:
     logic = SafetyLogic(connections=2, watchdog=WATCHDOG)
     terminals = [SafetyTerminal(address=1), SafetyTerminal(address=2, serial=2)]
-    segment = Segment([Coupler(), logic, *terminals, Servo()])
+    segment = Segment([Coupler(), *terminals, Servo(), logic])
     link = FaultInjector(segment)
     with cat.MainDevice(link) as main:
         main.scan()
         yield Line(Cell(segment, link, main), logic, terminals)
+
+
+@cat.law
+def swing(actual, target, memory, time):  # type: ignore[no-untyped-def]
+    for i in range(actual.n):
+        target.position[i] = memory[i] + 0.1 * time
 
 
 def run(loop: cat.Loop, seconds: float) -> None:
@@ -93,15 +100,14 @@ def test_a_session_goes_on_while_a_law_moves_the_drive(line: Line) -> None:
     with cat.Loop(arm, line.relay()) as loop:
         run(loop, 0.1)
 
-        @cat.law
-        def turn(position, target, t):  # type: ignore[no-untyped-def]
-            target.velocity[0] = 0.0
-
-        law = loop.start(turn)
-        law.run(0.2)
+        law = loop.start(swing, memory=arm.actual.position)
+        run(loop, 0.2)
+        assert law.running
         assert line.states == [DATA] * 4
         assert line.outputs == pressed
-        law.stop()
+        line.terminals[0].safe_inputs = b"\x77\x88"
+        run(loop, 0.1)
+        assert line.outputs[0] == b"\x77\x88"
 
 
 def test_a_few_lost_frames_only_delay_the_data(line: Line) -> None:
@@ -151,8 +157,8 @@ def test_the_end_of_the_loop_ends_in_the_safe_state(line: Line) -> None:
         assert line.outputs == pressed
     assert line.outputs == [ZEROS, ZEROS]
     # The zeros of the relay arrive before the watchdog expires.
-    assert [each.connection.faults for each in line.terminals] == [["connection ID 0, not 1"],
-                                                                   ["connection ID 0, not 2"]]  # fmt: skip
+    faults = [each.connection.faults for each in line.terminals]
+    assert faults == [["connection ID 0, not 1"], ["connection ID 0, not 2"]]
     line.cell.assert_safe()
 
 

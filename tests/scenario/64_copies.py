@@ -16,7 +16,7 @@ from catenary.link import FaultInjector
 from catenary.virtual import Coupler, DigitalInputs, DigitalOutputs, Segment, Servo
 from tests.scenario.cell import PRE_OP, SAFE_OP, Cell
 
-BUTTONS, LAMPS, SERVO = 1, 2, 3
+LAMPS, SERVO, BUTTONS = 1, 2, 3
 
 
 @dataclass
@@ -39,7 +39,7 @@ class Line:
 @pytest.fixture
 def line() -> Iterator[Line]:
     buttons, lamps = DigitalInputs(bits=4), DigitalOutputs(bits=8)
-    segment = Segment([Coupler(), buttons, lamps, Servo()])
+    segment = Segment([Coupler(), lamps, Servo(), buttons])
     link = FaultInjector(segment)
     with cat.MainDevice(link) as main:
         main.scan()
@@ -120,4 +120,4 @@ def test_the_program_cannot_write_the_destination(line: Line) -> None:
     with pytest.raises(ConfigurationError, match="two requests write byte 0 of its outputs") as e:
         cat.Loop(line.copies(), outputs).__enter__()
     assert "0x6010:01" in str(e.value)
-    assert "Outputs(2" in str(e.value)
+    assert "Outputs(1" in str(e.value)

@@ -1,4 +1,4 @@
-"""Simplified safety connections: both ends without a segment, each step with the partner's frame."""
+"""Simplified safety connections: both ends, without a segment."""
 
 from __future__ import annotations
 
@@ -136,3 +136,12 @@ def test_garbage_never_connects() -> None:
 def test_impossible_options(make: type[SafetyLogic], message: str) -> None:
     with pytest.raises(ValueError, match=message):
         make()
+
+
+def test_a_reset_in_the_middle_of_a_state_begins_anew() -> None:
+    for steps in range(1, 30):
+        pair = Pair()
+        pair.run(steps)
+        pair.run(1, main=bytes(7), sub=bytes(7))
+        pair.run(100)
+        assert pair.in_data, steps

@@ -155,7 +155,7 @@ class Machine:
 
     @property
     def copies(self) -> Copies | None:
-        """Copies of the tables [[copy]] and [[fsoe]] whose devices are present; None without any."""
+        """Copies of [[copy]] and [[fsoe]] whose devices are present; None if there are none."""
         return self._opened.copies
 
     @property

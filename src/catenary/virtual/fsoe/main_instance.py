@@ -55,6 +55,7 @@ class MainInstance:
 
     def _reset(self) -> None:
         self.state = SafetyState.RESET
+        self._rest = []
         self.inputs = bytes(len(self.inputs))
         self._end.restart()
         self._end.send(FsoeCommand.RESET, b"")
