@@ -9,8 +9,11 @@ import pytest
 import catenary as cat
 from catenary import types
 from catenary.bus import SubDevices
+from catenary.drive.copy_place import CopyPlace
 from catenary.drive.fsoe import FsoeFrames, fsoe_problems
 from catenary.errors import ConfigurationError, MappingError
+from catenary.loop.devices import LoopRequest
+from catenary.plan import Plan
 from catenary.virtual import (
     Coupler,
     DigitalInputs,
@@ -31,9 +34,15 @@ def subs() -> Iterator[SubDevices]:
         yield main.scan()
 
 
+def plan_of(subs: SubDevices, *requests: LoopRequest) -> Plan:
+    main = subs[0].main
+    assert isinstance(main, cat.MainDevice)
+    return main.plan(*requests)
+
+
 def places(subs: SubDevices, *copies: cat.Copy) -> list[tuple[int, int, int]]:
     """Return the copies as bits from the start of the source's inputs and of the outputs."""
-    plan = subs[0].main.plan(cat.Copies(*copies))
+    plan = plan_of(subs, cat.Copies(*copies))
     inputs = [plan.layout.devices[copy.source.position].input_offset * 8 for copy in copies]
     outputs = [plan.layout.devices[copy.destination.position].output_offset * 8 for copy in copies]
     return [
@@ -53,12 +62,12 @@ def places(subs: SubDevices, *copies: cat.Copy) -> list[tuple[int, int, int]]:
         ("0x6020:01", (2, 0, 1)),
     ],
 )
-def test_one_bit(subs: SubDevices, place: cat.drive.CopyPlace, expected: object) -> None:
+def test_one_bit(subs: SubDevices, place: CopyPlace, expected: object) -> None:
     assert places(subs, cat.Copy(subs[BUTTONS], place, subs[LAMPS], "Channel 1")) == [expected]
 
 
 @pytest.mark.parametrize("place", [range(1, 3), "bytes 1 to 2"])
-def test_bytes(subs: SubDevices, place: cat.drive.CopyPlace) -> None:
+def test_bytes(subs: SubDevices, place: CopyPlace) -> None:
     copy = cat.Copy(subs[CURTAIN], place, subs[LAMPS], range(2))
     assert places(subs, copy) == [(8, 0, 16)]
 
@@ -71,16 +80,16 @@ def test_an_object_by_its_name(subs: SubDevices) -> None:
 def test_an_object_that_another_request_maps(subs: SubDevices) -> None:
     copies = cat.Copies(cat.Copy(subs[SERVO], (0x6062, 0), subs[CURTAIN], range(1, 5)))
     with pytest.raises(MappingError, match="0x6062:00: the object is not in the process data"):
-        subs[0].main.plan(copies)
+        plan_of(subs, copies)
     demand = cat.Inputs(subs[SERVO], channels={"demand": (0x6062, 0, types.DINT)})
-    assert len(subs[0].main.plan(demand, copies).cycle.copies) == 1
+    assert len(plan_of(subs, demand, copies).cycle.copies) == 1
 
 
 def test_a_relay_copies_both_ways(subs: SubDevices) -> None:
     relay = cat.Copies(
         cat.FsoeConnection((subs[LOGIC], 0x1A00, 0x1600), (subs[CURTAIN], 0x1A00, 0x1600))
     )
-    plan = subs[0].main.plan(relay)
+    plan = plan_of(subs, relay)
     assert [copy.bit_length for copy in plan.cycle.copies] == [88, 88]
     assert [copy.device for copy in plan.cycle.copies] == [CURTAIN, LOGIC]
     text = str(plan)
@@ -93,7 +102,7 @@ def test_a_relay_copies_both_ways(subs: SubDevices) -> None:
 
 def copy_error(subs: SubDevices, *copies: cat.Copy) -> str:
     with pytest.raises((ConfigurationError, MappingError)) as caught:
-        subs[0].main.plan(cat.Copies(*copies))
+        plan_of(subs, cat.Copies(*copies))
     return str(caught.value)
 
 
@@ -136,7 +145,7 @@ def test_two_requests_cannot_write_one_byte(subs: SubDevices) -> None:
         for k in (1, 2)
     ]
     with pytest.raises(ConfigurationError, match="two requests write byte 0 of its outputs"):
-        subs[0].main.plan(*copies)
+        plan_of(subs, *copies)
 
 
 @pytest.mark.parametrize(
@@ -165,7 +174,7 @@ def test_a_frame_of_fsoe_must_have_its_size(subs: SubDevices) -> None:
         cat.FsoeConnection((subs[LOGIC], range(8), range(8)), (subs[CURTAIN], range(8), range(8)))
     )
     with pytest.raises(ConfigurationError, match=r"\(64 bits, .*is not an FSoE frame"):
-        subs[0].main.plan(relay)
+        plan_of(subs, relay)
 
 
 def test_wrong_arguments(subs: SubDevices) -> None:

@@ -2,7 +2,6 @@
 
 from catenary.drive.channel import Channel
 from catenary.drive.copies import Copies, Copy
-from catenary.drive.copy_place import CopyPlace
 from catenary.drive.drives import Drives
 from catenary.drive.fsoe import FsoeConnection, FsoeFrames
 from catenary.drive.homing import HomingMethod
@@ -18,7 +17,6 @@ __all__ = [
     "Channel",
     "Copies",
     "Copy",
-    "CopyPlace",
     "DistributedClock",
     "Drives",
     "FsoeConnection",

@@ -53,24 +53,7 @@ class _SafetyDevice(Device):
         self._last = bytes(frames * self._bytes)
 
     def description(self) -> Description:
-        numbers = [f" {k + 1}" * (self._frames > 1) for k in range(self._frames)]
         total = self._frames * self._bytes
-        receives, sends = (
-            tuple(
-                Pdo(
-                    pdo + k,
-                    name + numbers[k],
-                    _entries(index + 0x10 * k, self.size, name + numbers[k]),
-                    channel,
-                    fixed=True,
-                )
-                for k in range(self._frames)
-            )
-            for pdo, index, name, channel in (
-                (0x1600, 0x7000, self.receives, 0),
-                (0x1A00, 0x6000, self.sends, 1),
-            )
-        )
         return Description(
             name=self.name,
             order=self.order,
@@ -86,13 +69,28 @@ class _SafetyDevice(Device):
                 SyncManagerDefault(INPUTS_AT, total, 0x20, 0x01, 4),
             ),
             fmmus=(1, 2),
-            rx_pdos=receives,
-            tx_pdos=sends,
+            rx_pdos=self._pdos(0x1600, 0x7000, self.receives, 0),
+            tx_pdos=self._pdos(0x1A00, 0x6000, self.sends, 1),
             clock=False,
             ram=0x1000,
             slots=total,
             current_milliampere=90,
             lrw=self.lrw,
+        )
+
+    def _pdos(self, first: int, index: int, name: str, channel: int) -> tuple[Pdo, ...]:
+        """Return the PDO of each frame of a direction.
+
+        Args:
+            first: Index of the first PDO.
+            index: Index of its objects.
+            name: Name of its frame.
+            channel: SyncManager of the direction.
+        """
+        labels = [f"{name} {k + 1}" if self._frames > 1 else name for k in range(self._frames)]
+        return tuple(
+            Pdo(first + k, label, _entries(index + 0x10 * k, self.size, label), channel, fixed=True)
+            for k, label in enumerate(labels)
         )
 
     def started(self, scheduler: Scheduler) -> None:
