@@ -14,6 +14,7 @@ import catenary as cat
 from catenary.errors import ConfigurationError, StateError
 from catenary.link import FaultInjector
 from catenary.virtual import Coupler, DigitalInputs, DigitalOutputs, Segment, Servo
+from catenary.virtual.faults import cut
 from tests.scenario.cell import PRE_OP, SAFE_OP, Cell
 
 LAMPS, SERVO, BUTTONS = 1, 2, 3
@@ -113,6 +114,32 @@ def test_copies_go_on_while_the_axes_are_stopped_and_end_as_zeros(line: Line) ->
     assert line.lamps.core.output_image(LAMPS, 0) == b"\0"
     assert line.cell.states[LAMPS] == PRE_OP
     line.cell.assert_safe()
+
+
+def test_a_ring_is_cut_while_bits_are_copied() -> None:
+    buttons, lamps = DigitalInputs(), DigitalOutputs()
+    segment = Segment([Coupler(), lamps, Servo(), buttons], ring=True)
+    with cat.MainDevice(segment.first, segment.second) as main:
+        subs = main.scan()
+        copies = cat.Copies(cat.Copy(subs[BUTTONS], "Channel 1", subs[LAMPS], "Channel 4"))
+        with cat.Loop(copies, stop=cat.StopPolicy(lost_limit=20)) as loop:
+            for number in range(4):
+                if number == 2:
+                    segment.inject(cut(between=(LAMPS, SERVO), at=0))
+                buttons.inputs = number % 2
+                loop.run_for(0.05)
+                assert lamps.outputs == 8 * (number % 2)
+
+
+def test_a_source_in_safe_op_is_still_copied(line: Line) -> None:
+    """Its inputs are valid in SAFE-OP. The loop goes on, because it is optional."""
+    policy = cat.StopPolicy(on_return="hold")
+    with cat.Loop(line.copies(BUTTONS), stop=policy) as loop:
+        loop.run_for(0.1)
+        line.cell.segment.core.show_al_status(BUTTONS, SAFE_OP | 0x10, 0x1B)
+        line.buttons.inputs = 0b0010
+        loop.run_for(0.1)
+        assert line.lamps.outputs == 1
 
 
 def test_the_program_cannot_write_the_destination(line: Line) -> None:
