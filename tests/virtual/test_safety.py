@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from catenary.virtual import SafetyLogic, SafetyTerminal
+from catenary.virtual import SafetyLogic, SafetyTerminal, read_segment
 from catenary.virtual.fsoe import MainInstance, SafetyState, SubInstance
 
 MS = 1_000_000
@@ -145,3 +147,16 @@ def test_a_reset_in_the_middle_of_a_state_begins_anew() -> None:
         pair.run(1, main=bytes(7), sub=bytes(7))
         pair.run(100)
         assert pair.in_data, steps
+
+
+def test_devices_of_a_segment_file(tmp_path: Path) -> None:
+    path = tmp_path / "line.toml"
+    path.write_text(
+        '[[device]]\nkind = "safety_logic"\nconnections = 2\nsize = 4\nwatchdog = 0.05\n'
+        '[[device]]\nkind = "safety_terminal"\naddress = 7\nsize = 1\nname = "curtain"\n'
+    )
+    logic, terminal = read_segment(path)
+    assert isinstance(logic, SafetyLogic)
+    assert (len(logic.connections), logic.size, logic.watchdog) == (2, 4, 0.05)
+    assert isinstance(terminal, SafetyTerminal)
+    assert (terminal.address, terminal.size, terminal.name) == (7, 1, "curtain")
