@@ -34,7 +34,17 @@ if TYPE_CHECKING:
     )
     from catenary.bus import SubDevice
     from catenary.bus import event_types as events
-    from catenary.drive import DistributedClock, Drives, Inputs, Outputs, ProcessData, StartUp
+    from catenary.drive import (
+        Copies,
+        Copy,
+        DistributedClock,
+        Drives,
+        FsoeConnection,
+        Inputs,
+        Outputs,
+        ProcessData,
+        StartUp,
+    )
     from catenary.errors import (
         CatenaryError,
         ClockError,
@@ -73,11 +83,14 @@ __all__ = [
     "CatenaryError",
     "ClockError",
     "ClockOptions",
+    "Copies",
+    "Copy",
     "Cycle",
     "DistributedClock",
     "DriveError",
     "Drives",
     "ExternalClock",
+    "FsoeConnection",
     "Gateway",
     "Inputs",
     "LawError",
@@ -133,7 +146,17 @@ _MODULES = (
     "types",
     "virtual",
 )
-_DRIVE = ("DistributedClock", "Drives", "Inputs", "Outputs", "ProcessData", "StartUp")
+_DRIVE = (
+    "Copies",
+    "Copy",
+    "DistributedClock",
+    "Drives",
+    "FsoeConnection",
+    "Inputs",
+    "Outputs",
+    "ProcessData",
+    "StartUp",
+)
 _ERRORS = (  # errors that a loop raises; the others are in catenary.errors
     "CatenaryError",
     "ClockError",

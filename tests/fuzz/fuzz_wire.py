@@ -42,6 +42,7 @@ from catenary.wire import (
     fmmu,
     foe,
     frame,
+    fsoe,
     gateway,
     latch,
     mailbox,
@@ -328,6 +329,13 @@ TARGETS = (
     ),
     Target("mailbox.decode_error", mailbox.decode_error, _method, (b"\x01\x00\x04\x00",)),
     Target("coe.decode_coe", coe.decode_coe, _method, COE),
+    Target(
+        "fsoe.decode",
+        fsoe.decode,
+        fsoe.encode,
+        (bytes.fromhex("4e0734120100"), bytes.fromhex("360102aabb0304ccdd0500")),
+        exact=True,
+    ),
     Target(
         "foe.decode_foe",
         foe.decode_foe,

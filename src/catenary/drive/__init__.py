@@ -1,7 +1,9 @@
 """Process-data requests for CiA 402 axes, inputs and outputs, with SI units and arrays."""
 
 from catenary.drive.channel import Channel
+from catenary.drive.copies import Copies, Copy
 from catenary.drive.drives import Drives
+from catenary.drive.fsoe import FsoeConnection, FsoeFrames
 from catenary.drive.homing import HomingMethod
 from catenary.drive.io import Inputs, Outputs
 from catenary.drive.move import Move
@@ -16,8 +18,12 @@ from catenary.plan.start_up_object import StartUp
 
 __all__ = [
     "Channel",
+    "Copies",
+    "Copy",
     "DistributedClock",
     "Drives",
+    "FsoeConnection",
+    "FsoeFrames",
     "HomingMethod",
     "Inputs",
     "Move",

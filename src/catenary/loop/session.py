@@ -391,6 +391,7 @@ class Session:
 
     def _confirm_safe_outputs(self, guard: SignalGuard) -> None:
         if self._opened:
+            self.engine.end_copies()  # after the axes have stopped
             confirm_safe(self.plan.cycle, self.views, self.cycle, guard)
 
     def _end_moves(self, guard: SignalGuard) -> None:

@@ -244,6 +244,38 @@ class ProcessDataTable(Table, frozen=True, kw_only=True):
     clock: Optional[bool | ClockTable] = UNSET
 
 
+CopyPlaceText = Annotated[
+    str | Word,
+    Meta(
+        description="name or index of a PDO, name of an object, object, or bytes",
+        examples=["FSoE main frame", "0x1A00", "0x6000:01", "bytes 0 to 5"],
+    ),
+]
+DeviceName = Annotated[str, Meta(description="name of a device")]
+
+
+class CopyTable(Table, frozen=True, kw_only=True):
+    """[[copy]]: inputs of a device that the cycle sends as outputs of another one (cat.Copy)."""
+
+    source: DeviceName
+    source_place: CopyPlaceText
+    destination: DeviceName
+    destination_place: CopyPlaceText
+    comment: str = ""
+
+
+class FsoeTable(Table, frozen=True, kw_only=True):
+    """[[fsoe]]: safety frames that the cycle relays in both directions (cat.FsoeConnection)."""
+
+    main: Annotated[str, Meta(description="name of the device with the FSoE MainInstance")]
+    main_inputs: CopyPlaceText
+    main_outputs: CopyPlaceText
+    sub: Annotated[str, Meta(description="name of the device with the FSoE SubInstance")]
+    sub_inputs: CopyPlaceText
+    sub_outputs: CopyPlaceText
+    comment: str = ""
+
+
 class MachineTables(Table, frozen=True, kw_only=True):
     """Machine with its devices, drives, process data and loop."""
 
@@ -258,6 +290,8 @@ class MachineTables(Table, frozen=True, kw_only=True):
     device: list[DeviceTable] = []
     drives: dict[str, DrivesTable] = {}
     process_data: dict[str, ProcessDataTable] = {}
+    copy: list[CopyTable] = []
+    fsoe: list[FsoeTable] = []
 
 
 def json_schema() -> dict[str, object]:

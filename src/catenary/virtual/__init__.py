@@ -15,6 +15,8 @@ from catenary.virtual.devices import (
     Junction,
     ModelSensor,
     OversamplingTerminal,
+    SafetyLogic,
+    SafetyTerminal,
     Servo,
 )
 from catenary.virtual.devices.described import DescribedDevice, from_esi
@@ -62,6 +64,8 @@ __all__ = [
     "Plant",
     "PlantPart",
     "ProbeOptions",
+    "SafetyLogic",
+    "SafetyTerminal",
     "Segment",
     "Served",
     "Server",

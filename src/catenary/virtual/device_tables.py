@@ -21,6 +21,7 @@ from catenary.virtual.devices.junction import Junction
 from catenary.virtual.devices.model_sensor import ModelSensor
 from catenary.virtual.devices.motor import Motor
 from catenary.virtual.devices.oversampling import OversamplingTerminal
+from catenary.virtual.devices.safety import SafetyLogic, SafetyTerminal
 from catenary.virtual.devices.servo import Servo
 from catenary.virtual.devices.servo_quirks import NO_QUIRKS, ServoQuirks
 from catenary.virtual.devices.touch_probe import ProbeOptions
@@ -123,6 +124,40 @@ class DigitalInputsTable(_Table, tag="digital_inputs", frozen=True, kw_only=True
     def device(self) -> Device:
         return DigitalInputs(
             bits=self.bits, name=self.name, alias=self.alias, serial=self.serial, lrw=self.lrw
+        )
+
+
+class SafetyLogicTable(_Table, tag="safety_logic", frozen=True, kw_only=True):
+    connections: int = 1
+    size: int = 2
+    watchdog: float = 0.1
+    lrw: bool = True
+
+    def device(self) -> Device:
+        return SafetyLogic(
+            connections=self.connections,
+            size=self.size,
+            watchdog=self.watchdog,
+            name=self.name,
+            alias=self.alias,
+            serial=self.serial,
+            lrw=self.lrw,
+        )
+
+
+class SafetyTerminalTable(_Table, tag="safety_terminal", frozen=True, kw_only=True):
+    address: int = 1
+    size: int = 2
+    lrw: bool = True
+
+    def device(self) -> Device:
+        return SafetyTerminal(
+            address=self.address,
+            size=self.size,
+            name=self.name,
+            alias=self.alias,
+            serial=self.serial,
+            lrw=self.lrw,
         )
 
 
@@ -335,6 +370,8 @@ DeviceTable = (
     | JunctionTable
     | DigitalOutputsTable
     | DigitalInputsTable
+    | SafetyLogicTable
+    | SafetyTerminalTable
     | AnalogInputsTable
     | ModelSensorTable
     | OversamplingTable

@@ -8,6 +8,7 @@ from catenary.virtual.devices.digital_outputs import DigitalOutputs
 from catenary.virtual.devices.junction import Junction
 from catenary.virtual.devices.model_sensor import ModelSensor
 from catenary.virtual.devices.oversampling import OversamplingTerminal
+from catenary.virtual.devices.safety import SafetyLogic, SafetyTerminal
 from catenary.virtual.devices.servo import Servo
 
 __all__ = [
@@ -19,5 +20,7 @@ __all__ = [
     "Junction",
     "ModelSensor",
     "OversamplingTerminal",
+    "SafetyLogic",
+    "SafetyTerminal",
     "Servo",
 ]
