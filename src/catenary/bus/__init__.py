@@ -7,6 +7,7 @@ from catenary.bus.main_device import MainDevice
 from catenary.bus.pending import Pending
 from catenary.bus.runner import BlockingRunner, FrameCounts, Runner
 from catenary.bus.sdo import Sdo
+from catenary.bus.soe import Soe
 from catenary.bus.sub_device import SubDevice
 from catenary.bus.sub_devices import SubDevices
 from catenary.wire.sdo_information import ListType
@@ -24,6 +25,7 @@ __all__ = [
     "Pending",
     "Runner",
     "Sdo",
+    "Soe",
     "SubDevice",
     "SubDevices",
 ]

@@ -11,6 +11,7 @@ from catenary.bus.device_diagnosis import DeviceDiagnosis
 from catenary.bus.foe import Foe
 from catenary.bus.pdo_table import PdoTable
 from catenary.bus.sdo import Conversations, Objects, Sdo
+from catenary.bus.soe import Soe
 from catenary.errors import CatenaryError
 from catenary.model.device import DeviceDescription, Identity
 from catenary.procedure.al_state import DeviceState, read_state
@@ -45,7 +46,8 @@ class SubDevice:
     """Handle of one device, such as `main.scan()[2]`. It stays valid across scans.
 
     Attributes never cause traffic; calls with a verb do. `sub.sdo` reads and writes its objects,
-    `sub.foe` its files. `sub.diagnosis` reads the messages that it stores.
+    `sub.foe` its files, `sub.soe` the IDNs of a SERCOS drive. `sub.diagnosis` reads the messages
+    that it stores.
     """
 
     def __init__(
@@ -62,6 +64,7 @@ class SubDevice:
         self.esi: EsiDevice | None = None  # ESI that the last scan used for it
         self.sdo = Sdo(self)
         self.foe = Foe(self)
+        self.soe = Soe(self)
         self.diagnosis = DeviceDiagnosis(self)
 
     @property

@@ -40,6 +40,7 @@ class SubDevice(bus.SubDevice):
         super().__init__(main, description, None)
         self.sdo: Sdo = Sdo(self)
         self.foe = bus.Foe(self, unavailable="libethercat has no FoE: use ethercat foe_write")
+        self.soe = bus.Soe(self, unavailable="SoE needs frames of Catenary: use ethercat soe_read")
         self.kernel = kernel
         self._emergencies: deque[Emergency] = deque(maxlen=EMERGENCIES_KEPT)
         self._register_busy = False  # True while the register request is in use

@@ -150,7 +150,11 @@ def converse(
 
 
 def further(
-    channel: MailboxChannel, accept: Callable[[Mailbox], T | None], *, timeout: float = READ_TIMEOUT
+    channel: MailboxChannel,
+    accept: Callable[[Mailbox], T | None],
+    *,
+    timeout: float = READ_TIMEOUT,
+    kind: Type = Type.COE,
 ) -> Procedure[T]:
     """Receive the next part of an answer that consists of several messages.
 
@@ -158,6 +162,7 @@ def further(
         channel: The mailbox of the device.
         accept: Function that converts a message. It returns None for an unexpected message.
         timeout: Longest time until the part arrives [s].
+        kind: The protocol of the message, for errors.
 
     Raises:
         ResponseTimeout: No answer within `timeout`, or too many frames were lost.
@@ -167,7 +172,7 @@ def further(
     before, patience = channel.dropped, _patience(channel, timeout)
     answer = yield from _await(channel, accept, Deadline(patience))
     if answer is None:
-        raise _no_answer(channel, Type.COE, patience, channel.dropped - before)
+        raise _no_answer(channel, kind, patience, channel.dropped - before)
     return answer
 
 

@@ -13,6 +13,7 @@ from catenary.virtual.devices import (
     DigitalOutputs,
     Junction,
     ModelSensor,
+    SercosDrive,
     Servo,
 )
 from catenary.virtual.devices.described import DescribedDevice, from_esi
@@ -29,6 +30,7 @@ from catenary.virtual.plant import Plant, PlantPart
 from catenary.virtual.segment import FrameCounters, Segment, demo_segment
 from catenary.virtual.server import Served, Server, serve, serve_all
 from catenary.virtual.sii_quirks import SiiQuirks
+from catenary.virtual.soe.quirks import SoeQuirks
 
 __all__ = [
     "AnalogInputs",
@@ -54,11 +56,13 @@ __all__ = [
     "Plant",
     "PlantPart",
     "Segment",
+    "SercosDrive",
     "Served",
     "Server",
     "Servo",
     "ServoQuirks",
     "SiiQuirks",
+    "SoeQuirks",
     "Twin",
     "TwinOptions",
     "demo_segment",
