@@ -30,6 +30,7 @@ from catenary.model.process_data import (
     mapped_pdos,
 )
 from catenary.model.register_command import RegisterCommand
+from catenary.model.sercos_axis import SercosAxis
 from catenary.wire.features import Information
 from catenary.wire.sii import MailboxProtocol
 from catenary.wire.sii_categories import SyncManagerUse
@@ -178,6 +179,7 @@ class DeviceDescription:
     modular: ModularDevice | None = None  # slots and modules, from an ESI file
     given_name: str = ""  # name in a machine file
     bootstrap: MailboxLayout | None = None  # mailbox in BOOT; None: not stated
+    sercos_axes: tuple[SercosAxis, ...] = ()  # of a device with SoE and without CoE
 
     @property
     def full_name(self) -> str:
@@ -211,6 +213,11 @@ class DeviceDescription:
     def coe(self) -> bool:
         """True if the mailbox supports CoE."""
         return self.mailbox is not None and self.mailbox.coe
+
+    @property
+    def soe(self) -> bool:
+        """True if the mailbox supports SoE."""
+        return self.mailbox is not None and MailboxProtocol.SOE in self.mailbox.protocols
 
     def assignments(self, direction: Direction) -> tuple[Assignment, ...]:
         """Return the assigned PDOs of one direction, by SyncManager."""

@@ -7,8 +7,8 @@ from collections.abc import Callable, Mapping
 
 from catenary.virtual.mailbox import Mailbox
 from catenary.virtual.scheduler import Scheduler
-from catenary.virtual.soe.parameter import Parameter, Refusal
-from catenary.virtual.soe.quirks import SoeQuirks, idn
+from catenary.virtual.soe.parameter import Parameter, Refusal, idn
+from catenary.virtual.soe.quirks import SoeQuirks
 
 PROTOCOL = 5
 SET, ENABLED, PENDING, FAILED = 1, 2, 4, 8

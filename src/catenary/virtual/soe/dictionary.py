@@ -17,6 +17,7 @@ from catenary.virtual.soe.parameter import (
 )
 
 VELOCITY_DECIMALS = 4  # preferred scaling of a rotary velocity: 0.0001 rpm
+VELOCITY_UNITS = 10_000  # per rpm
 RATED = 1000  # torque in 0.1 % of the rated torque
 LARGE_LIST_BYTES = 4096
 ROTARY_PARAMETER_SCALING = 0x000A  # S-0-0076: rotary, parameter scaling (S-0-0079), motor shaft
@@ -159,7 +160,7 @@ def command_parameters() -> Iterator[Parameter]:
 
 
 def _rpm(motor: Motor) -> int:
-    return round(motor.max_velocity * 60 / (2 * math.pi) * 10**VELOCITY_DECIMALS)
+    return round(motor.max_velocity * 60 / (2 * math.pi) * VELOCITY_UNITS)
 
 
 def _torque(motor: Motor) -> int:

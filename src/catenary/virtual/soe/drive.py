@@ -177,12 +177,8 @@ class SercosAxis:
             idn_list(21, "IDN-list of invalid operation data for CP2", read=self._invalid_idns),
             idn_list(22, "IDN-list of invalid operation data for CP3", read=lambda: b""),
             idn_list(25, "IDN-list of all procedure commands", read=self._all_commands),
-            idn_list(
-                187, "IDN-list of configurable data in the AT", read=lambda: self._cyclic(False)
-            ),
-            idn_list(
-                188, "IDN-list of configurable data in the MDT", read=lambda: self._cyclic(True)
-            ),
+            idn_list(187, "IDN-list of configurable data in the AT", read=self._all_in_at),
+            idn_list(188, "IDN-list of configurable data in the MDT", read=self._all_in_mdt),
         ]
 
     def _telegram_list(self, number: int, name: str, *, outputs: bool) -> Parameter:

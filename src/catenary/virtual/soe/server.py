@@ -10,8 +10,16 @@ from collections.abc import Callable, Mapping
 
 from catenary.virtual.mailbox import ERROR_TOO_SHORT
 from catenary.virtual.protocols import Surroundings
-from catenary.virtual.soe.parameter import LIST_MAX, NO_IDN, READ_ONLY, TOO_LONG, Parameter, Refusal
-from catenary.virtual.soe.quirks import SoeQuirks, idn
+from catenary.virtual.soe.parameter import (
+    LIST_MAX,
+    NO_IDN,
+    READ_ONLY,
+    TOO_LONG,
+    Parameter,
+    Refusal,
+    idn,
+)
+from catenary.virtual.soe.quirks import SoeQuirks
 
 HEADER = struct.Struct("<BBH")
 READ_REQUEST, READ_RESPONSE, WRITE_REQUEST, WRITE_RESPONSE, NOTIFICATION, EMERGENCY = range(1, 7)
