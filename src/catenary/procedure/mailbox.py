@@ -375,6 +375,7 @@ def _poll(channel: MailboxChannel) -> Procedure[tuple[bool, Mailbox | None, int]
     )
     status, reply = yield [check, _read_request(channel)]
     if reply.lost:
+        channel.lost_reads += 1
         channel.unsure_ns = reply.time_ns
         return False, None, reply.time_ns
     answered(status, station, "mailbox status")
@@ -422,6 +423,7 @@ def _take(channel: MailboxChannel) -> Procedure[Mailbox | None]:
         if not reply.lost:
             channel.received_ns = reply.time_ns
             return _decoded(channel, reply.data) if reply.working_counter else None
+        channel.lost_reads += 1
         if not (yield from _request_repetition(channel)):
             return None
     raise ResponseTimeout(

@@ -5,6 +5,8 @@ Where the standard is silent:
 - A message with another drive or IDN is not the answer, as in IgH (fsm_soe.c).
 - The number of fragments left decreases by one from fragment to fragment. A constant number is
   accepted, because SOEM (ec_soe.c) and IgH do not read it. Any other number ends the transfer.
+- A fragment with the number of the last one is also accepted, so that lost frames are counted
+  instead: after one, the request is repeated. SOEM and IgH do not notice a lost fragment.
 - After each fragment that this side writes, a refusal may arrive. SOEM also looks for one.
 """
 
@@ -14,7 +16,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import NamedTuple
 
-from catenary.errors import DecodeError, MailboxError, SoeError
+from catenary.errors import DecodeError, MailboxError, ResponseTimeout, SoeError
 from catenary.procedure.exchange import Procedure
 from catenary.procedure.mailbox import (
     MailboxChannel,
@@ -34,6 +36,7 @@ from catenary.wire.soe import HEADER_SIZE, Element, Message, OpCode, decode_soe
 ANSWER_TIMEOUT = 5.0  # [s] for each message: drives write parameters to flash memory
 TRANSFER_TIMEOUT = 60.0  # [s] for all fragments of one answer
 SIZE_MAX = 1 << 18  # [bytes] of an answer: eight elements, of which four may be lists of 64 KiB
+RECOVERIES = 5  # requests of one answer while frames are lost
 LAST_ATTEMPTS = 5  # of a fragment whose frame is lost
 OVERHEAD = mailbox.HEADER_SIZE + HEADER_SIZE
 
@@ -91,11 +94,42 @@ def write(target: Target, data: bytes, element: Element = Element.VALUE) -> Proc
 
 
 def _read(target: Target, request: Message) -> Procedure[bytes]:
+    """Read an answer. Repeat the request if a frame was lost during the fragments.
+
+    The fragment after a lost one can then not be told from it.
+    """
+    channel = target.channel
+    for _ in range(RECOVERIES):
+        lost = channel.lost_reads
+        answer = yield from _read_once(target, request)
+        if not answer.in_fragments or channel.lost_reads == lost:
+            break
+    else:
+        raise ResponseTimeout(
+            f"{target}: frames with fragments were lost in {RECOVERIES} attempts",
+            hint="check the cables: the error counters at 0x0300 show which one is faulty",
+        )
+    if answer.fault:
+        raise _violation(target, answer.fault)
+    return answer.data
+
+
+class _Answer(NamedTuple):
+    """Data of all fragments, and a fault in their numbers."""
+
+    data: bytes
+    in_fragments: bool
+    fault: str
+
+
+def _read_once(target: Target, request: Message) -> Procedure[_Answer]:
+    """Send the request, and receive all fragments, also after a fault in their numbers."""
     channel, accept = target.channel, _acceptor(target, request, OpCode.READ_RESPONSE)
     talk: Procedure[Message] = converse(
         channel, Type.SOE, request.encode(), accept, timeout=target.timeout
     )
     answer = yield from talk
+    in_fragments, fault = answer.incomplete, ""
     data, deadline = bytearray(answer.data), Deadline(TRANSFER_TIMEOUT)
     while answer.incomplete:
         endless = len(data) > SIZE_MAX or deadline.passed_at(channel.received_ns)
@@ -104,11 +138,9 @@ def _read(target: Target, request: Message) -> Procedure[bytes]:
         left = answer.number
         answer = yield from further(channel, accept, timeout=target.timeout, kind=Type.SOE)
         if answer.incomplete and answer.number not in (left, left - 1):
-            raise _violation(
-                target, f"announced {left} more fragments, then {answer.number} in the next one"
-            )
+            fault = f"announced {left} more fragments, then {answer.number} in the next one"
         data += answer.data
-    return bytes(data)
+    return _Answer(bytes(data), in_fragments, fault)
 
 
 def _write(target: Target, request: Message, data: bytes) -> Procedure[None]:
