@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Protocol, TypeVar
 
 from catenary.bus.pending import Pending
 from catenary.bus.sdo import Conversations
 from catenary.errors import CatenaryError, ConfigurationError, MailboxError
+from catenary.model.device import DeviceDescription
 from catenary.model.sercos import Parameter
+from catenary.model.sercos_axis import TELEGRAM_TYPE
 from catenary.procedure.mailbox import MailboxChannel
 from catenary.procedure.sercos import (
     ALL,
@@ -19,6 +22,7 @@ from catenary.procedure.sercos import (
 )
 from catenary.procedure.soe import ANSWER_TIMEOUT, Target, read, write
 from catenary.procedure.station import Station
+from catenary.procedure.telegrams import configure
 from catenary.wire.sercos import idn_number
 from catenary.wire.sercos_values import Value
 from catenary.wire.soe import DRIVES, Element
@@ -27,11 +31,19 @@ T = TypeVar("T")
 ALL_IDNS = 17  # S-0-0017
 
 
+class LoopOwner(Conversations, Protocol):
+    """Interface to the MainDevice."""
+
+    def require_no_loop(self) -> None: ...
+
+
 class DriveOwner(Protocol):
     """Interface to the device of the drives; `SubDevice` implements it."""
 
+    description: DeviceDescription
+
     @property
-    def main(self) -> Conversations: ...
+    def main(self) -> LoopOwner: ...
 
     @property
     def station(self) -> Station: ...
@@ -177,8 +189,39 @@ class Soe:
             ValueError: The IDN, the drive or the time is out of range.
             RuntimeError: The caller is the iterating thread of a loop.
         """
-        target = self._target(idn, drive, min(timeout, ANSWER_TIMEOUT))
-        self._sub.main.converse(run_command(target, timeout))
+        self._sub.main.converse(self._command(idn, drive, timeout))
+
+    def configure_telegrams(
+        self,
+        *,
+        mdt: Sequence[str | int] | None = None,
+        at: Sequence[str | int] | None = None,
+        drive: int = 0,
+    ) -> None:
+        """Choose the process data of a drive (S-0-0015, S-0-0024, S-0-0016) in PRE-OP.
+
+        `ProcessData(sub)` then has the IDNs as names. S-0-0134 and S-0-0135 are always included.
+
+        Args:
+            mdt: IDNs of the outputs, such as ["S-0-0047"]; None: unchanged.
+            at: IDNs of the inputs, such as ["S-0-0051", "S-0-0040"]; None: unchanged.
+            drive: Number of the drive in the device, 0 to 7.
+
+        Raises:
+            SoeError: The drive refuses a list. S-0-0188 and S-0-0187 contain the permitted IDNs.
+            ResponseTimeout: The device does not answer.
+            MailboxError: The device violates the protocol, or does not support SoE.
+            ValueError: An IDN or the drive is out of range.
+            RuntimeError: A loop runs.
+        """
+        self._sub.main.require_no_loop()
+        target = self._target(TELEGRAM_TYPE, drive)
+        numbers = [
+            None if idns is None else [idn_number(each) for each in idns] for idns in (mdt, at)
+        ]
+        self._sub.description = self._sub.main.converse(
+            configure(target.channel, self._sub.description, drive, *numbers)
+        )
 
     def request(self, idn: str | int, *, drive: int = 0) -> Pending[Value]:
         """Read while a loop runs, without waiting: poll `done`, then call `result()`.
@@ -202,16 +245,18 @@ class Soe:
 
         The arguments are those of `command`.
         """
-        target = self._target(idn, drive, min(timeout, ANSWER_TIMEOUT))
-        return self._sub.main.request(run_command(target, timeout))
+        return self._sub.main.request(self._command(idn, drive, timeout))
+
+    def _command(self, idn: str | int, drive: int, timeout: float) -> Procedure[None]:
+        _check(timeout)
+        return run_command(self._target(idn, drive, min(timeout, ANSWER_TIMEOUT)), timeout)
 
     def _target(self, idn: str | int, drive: int, timeout: float = ANSWER_TIMEOUT) -> Target:
         """Return the IDN of the device. Raises the errors of the arguments and of the device."""
         number = idn_number(idn)
         if drive not in DRIVES:
             raise ValueError(f"drive must be 0 to 7, not {drive}")
-        if not 0 < timeout < float("inf"):
-            raise ValueError(f"timeout must be positive and finite, not {timeout} s")
+        _check(timeout)
         sub = self._sub
         if self._unavailable:
             raise ConfigurationError(f"{sub.station}: {self._unavailable}")
@@ -227,3 +272,8 @@ class Soe:
                 hint="only SERCOS drives have IDNs",
             )
         return Target(sub.channel, number, drive, timeout)
+
+
+def _check(timeout: float) -> None:
+    if not 0 < timeout < float("inf"):
+        raise ValueError(f"timeout must be positive and finite, not {timeout} s")

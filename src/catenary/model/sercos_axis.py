@@ -65,6 +65,11 @@ class SercosAxis:
     velocity: Scaling = UNKNOWN
     torque: Scaling = UNKNOWN
 
+    @property
+    def is_configurable(self) -> bool:
+        """True if the lists S-0-0016 and S-0-0024 determine the telegrams."""
+        return self.telegram_type is None or self.telegram_type & CONFIGURABLE == CONFIGURABLE
+
     def output(self, idn: str | int) -> TelegramValue | None:
         """Return a value of the MDT; None if it does not contain the IDN."""
         number = idn_number(idn)

@@ -25,9 +25,9 @@ from catenary.model.sercos_axis import (
 )
 from catenary.procedure.exchange import Procedure
 from catenary.procedure.mailbox import MailboxChannel
-from catenary.procedure.sercos import read_parameter, read_value
+from catenary.procedure.sercos import read_parameter, read_value, write_value
 from catenary.procedure.soe import Target
-from catenary.wire.sercos import Attribute, Display, idn_number
+from catenary.wire.sercos import Attribute, Display, idn_number, idn_text
 from catenary.wire.soe import DRIVES, Element
 
 ENTRIES_MAX = 64  # IDNs in a telegram; SOEM accepts as many (EC_SOE_MAXMAPPING)
@@ -89,6 +89,57 @@ def described(device: DeviceDescription, axes: Sequence[SercosAxis]) -> DeviceDe
         input_pdos=inputs,
         mapping_source="SoE",
     )
+
+
+def configure(
+    channel: MailboxChannel,
+    device: DeviceDescription,
+    drive: int,
+    mdt: Sequence[int] | None,
+    at: Sequence[int] | None,
+) -> Procedure[DeviceDescription]:
+    """Write the telegrams of a drive, and return the description with its new process data.
+
+    Args:
+        channel: The mailbox of the device, in PRE-OP.
+        device: Its description.
+        drive: Number of the drive.
+        mdt: IDNs of the outputs after S-0-0134; None: unchanged.
+        at: IDNs of the inputs after S-0-0135; None: unchanged.
+
+    Raises:
+        SoeError: The drive refuses a list, for example because an IDN cannot be in it.
+        MailboxError: The device violates the protocol.
+        ResponseTimeout: The device does not answer.
+    """
+    yield from write_value(Target(channel, TELEGRAM_TYPE, drive), CONFIGURABLE)
+    for number, idns in ((MDT_LIST, mdt), (AT_LIST, at)):
+        if idns is not None:
+            yield from write_value(
+                Target(channel, number, drive), [idn_text(each) for each in idns]
+            )
+    axes = yield from read_axes(channel)
+    return described(device, axes)
+
+
+def restore(channel: MailboxChannel, device: DeviceDescription) -> Procedure[None]:
+    """Write the telegrams of a device that returned, as far as it has lost them.
+
+    Args:
+        channel: The mailbox of the device, in PRE-OP.
+        device: Its description before it was lost.
+
+    Raises:
+        MappingError: It does not accept them.
+    """
+    present = yield from read_axes(channel, scaling=False)
+    lists = {each.drive: (each.outputs, each.inputs) for each in present}
+    for axis in device.sercos_axes:
+        if lists.get(axis.drive) != (axis.outputs, axis.inputs) and axis.is_configurable:
+            mdt = [each.number for each in axis.outputs[1:]]
+            at = [each.number for each in axis.inputs[1:]]
+            yield from configure(channel, device, axis.drive, mdt, at)
+    yield from check_unchanged(channel, device)
 
 
 def check_unchanged(channel: MailboxChannel, device: DeviceDescription) -> Procedure[None]:
