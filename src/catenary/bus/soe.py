@@ -11,6 +11,7 @@ from catenary.errors import CatenaryError, ConfigurationError, MailboxError
 from catenary.model.device import DeviceDescription
 from catenary.model.sercos import Parameter
 from catenary.model.sercos_axis import TELEGRAM_TYPE
+from catenary.procedure.exchange import Procedure
 from catenary.procedure.mailbox import MailboxChannel
 from catenary.procedure.sercos import (
     ALL,

@@ -83,7 +83,8 @@ def _read_one_by_one(target: Target, elements: Element) -> Procedure[Parameter]:
         try:
             part = yield from read(target, element)
         except SoeError as error:
-            if element in (Element.ATTRIBUTE, Element.VALUE) and not _is_unreadable(error):
+            unreadable = element is Element.VALUE and _is_unreadable(error)
+            if element in (Element.ATTRIBUTE, Element.VALUE) and not unreadable:
                 raise
             continue
         found, data = found | element, data + part
