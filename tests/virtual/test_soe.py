@@ -144,6 +144,7 @@ def test_any_messages_are_survived(messages: list[bytes]) -> None:
 
 
 def test_a_command_runs_and_is_cleared(client: Client) -> None:
+    client.main.let_pass(50)
     written, end = client.ask(WRITE, VALUE, 127, b"\x03\x00")
     assert (written.op_code, written.error) == (OpCode.WRITE_RESPONSE, False)
     assert end == Message(OpCode.NOTIFICATION, 127, Element.STATE, b"\x03\x00")
@@ -230,8 +231,8 @@ def test_the_operation_mode_is_selected_in_the_control_word() -> None:
 def test_a_segment_file_has_the_drive(tmp_path: Path) -> None:
     file = tmp_path / "drive.toml"
     file.write_text(
-        '[[device]]\nkind = "coupler"\n\n[[device]]\nkind = "sercos_drive"\n'
-        'resolution = 4096\nsoe_quirks = { one_element = true, refused = { "S-0-0140" = 0x7005 } }\n'
+        '[[device]]\nkind = "sercos_drive"\nresolution = 4096\n'
+        'soe_quirks = { one_element = true, refused = { "S-0-0140" = 0x7005 } }\n'
     )
     with cat.MainDevice(read_segment(file)) as main:
         [sub] = main.scan()
