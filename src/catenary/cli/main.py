@@ -38,6 +38,7 @@ from catenary.cli import (
     sdo,
     shell,
     sii,
+    soe,
     state,
     top,
     virtual,
@@ -48,7 +49,7 @@ VIRTUAL_TIME = "times are virtual: they come from the segment's clock, not from 
 PROGRAM = "catenary"
 DESCRIPTION = "Real-time EtherCAT for Python."
 COMMANDS = (
-    *(scan, state, graph, diag, messages, pdos, sdo, foe, firmware, reg, alias, sii, esi),
+    *(scan, state, graph, diag, messages, pdos, sdo, foe, soe, firmware, reg, alias, sii, esi),
     *(init, check, clone, capture),
     *(demo, shell, dashboard, top, doctor, bench, virtual, realtime),
     *(data, record, merge, plot, foxglove, ros2, include, completion),
