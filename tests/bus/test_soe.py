@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 
 import pytest
 
@@ -11,6 +12,8 @@ import catenary as cat
 from catenary.bus import MainDevice, SubDevice
 from catenary.bus.event_types import SoeEmergency, SoeNotification
 from catenary.errors import MailboxError, MappingError, ResponseTimeout, SoeError, StateError
+from catenary.model.device import DeviceDescription
+from catenary.model.esi_settings import IdnCommand
 from catenary.virtual import Coupler, Segment, SercosDrive, Servo, SoeQuirks
 from catenary.wire.sercos import Display
 from catenary.wire.soe import Element
@@ -261,6 +264,40 @@ def test_a_drive_without_values_has_its_words(sub: SubDevice) -> None:
         assert len(raw.outputs) == 2
     with pytest.raises(ValueError, match="not an IDN"):
         sub.soe.configure_telegrams(mdt=["47"])
+
+
+# -- start-up commands of an ESI or ENI ------------------------------------------------------------
+
+
+def commanded(main: MainDevice, *commands: IdnCommand) -> SubDevice:
+    """Scan with start-up commands, and return the drive."""
+
+    def settings(device: DeviceDescription) -> DeviceDescription:
+        return replace(device, idn_commands=commands) if device.position else device
+
+    return main.scan(settings=settings)[1]
+
+
+def command(transition: str, number: int, data: str) -> IdnCommand:
+    return IdnCommand((transition,), number, bytes.fromhex(data), source="bus.xml:5")
+
+
+def test_start_up_commands_run_at_their_transitions(main: MainDevice, drive: SercosDrive) -> None:
+    at_safe_op, at_op = command("PS", 2, "d007"), command("SO", 0x800A, "3412")
+    downward = command("SP", 0x800A, "0000")
+    sub = commanded(main, command("IP", 24, "020002002400"), at_safe_op, at_op, downward)
+    assert [each.idn for each in sub.description.sercos_axes[0].outputs] == ["S-0-0134", "S-0-0036"]
+    assert drive.idn_value("S-0-0002") == (1000).to_bytes(2, "little")  # not yet
+    with cat.Loop(cat.ProcessData(sub)) as loop:
+        next(loop)
+        assert drive.idn_value("S-0-0002") == (2000).to_bytes(2, "little")
+        assert drive.idn_value("P-0-0010") == b"\x34\x12"
+
+
+def test_a_refused_start_up_command_names_its_line(main: MainDevice) -> None:
+    sub = commanded(main, command("PS", 51, "00000000"))
+    with pytest.raises(SoeError, match=r"0x7004.*bus.xml:5"), cat.Loop(cat.ProcessData(sub)):
+        pass
 
 
 # -- with a loop -----------------------------------------------------------------------------------

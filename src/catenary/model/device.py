@@ -13,6 +13,7 @@ from typing import NamedTuple
 from catenary.model.esi_settings import (
     NO_TIMEOUTS,
     NO_WATCHDOG_VALUES,
+    IdnCommand,
     InitCommand,
     ModeAssignment,
     NamedMapping,
@@ -172,6 +173,7 @@ class DeviceDescription:
     documented: tuple[ObjectInformation, ...] = ()  # dictionary of its ESI
     init_commands: tuple[InitCommand, ...] = ()
     register_commands: tuple[RegisterCommand, ...] = ()  # of an ENI, at the transitions
+    idn_commands: tuple[IdnCommand, ...] = ()  # of an ESI or ENI, at the transitions
     commands_origin: str = "ESI"  # kind of the file that gives the commands: "ESI" or "ENI"
     named_mappings: tuple[NamedMapping, ...] = ()
     timeouts: Timeouts = NO_TIMEOUTS

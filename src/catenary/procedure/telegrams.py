@@ -12,6 +12,7 @@ from dataclasses import replace
 
 from catenary.errors import CatenaryError, MailboxError, MappingError, SoeError
 from catenary.model.device import Assignment, DeviceDescription, Direction, Entry, Pdo
+from catenary.model.esi_settings import IdnCommand
 from catenary.model.sercos_axis import (
     AT_LIST,
     CONFIGURABLE,
@@ -26,10 +27,11 @@ from catenary.model.sercos_axis import (
 from catenary.procedure.exchange import Procedure
 from catenary.procedure.mailbox import MailboxChannel
 from catenary.procedure.sercos import read_parameter, read_value, write_value
-from catenary.procedure.soe import Target
+from catenary.procedure.soe import Target, write
 from catenary.wire.sercos import Attribute, Display, idn_number, idn_text
 from catenary.wire.soe import DRIVES, Element
 
+PRE_OP_STEPS, SAFE_OP_STEPS = ("IP", "PS"), ("SO",)  # the mailbox is not available in INIT
 ENTRIES_MAX = 64  # IDNs in a telegram; SOEM accepts as many (EC_SOE_MAXMAPPING)
 OUTPUT_MANAGER, INPUT_MANAGER = 2, 3
 WORD = Attribute(2)
@@ -64,11 +66,49 @@ def with_telegrams(
         device: The description without process data.
     """
     try:
+        yield from write_telegrams(channel, device)
         axes = yield from read_axes(channel)
     except CatenaryError as error:
         note = f"no process data, because its telegrams cannot be read: {error.message}"
         return replace(device, notes=(*device.notes, note))
     return described(device, axes)
+
+
+def write_telegrams(channel: MailboxChannel, device: DeviceDescription) -> Procedure[None]:
+    """Write the telegrams that the ESI or ENI of a device requires, before they are read."""
+    own = (TELEGRAM_TYPE, MDT_LIST, AT_LIST)
+    chosen = [each for each in device.idn_commands if each.number in own]
+    yield from run_idn_commands(channel, chosen, PRE_OP_STEPS)
+
+
+def run_idn_commands(
+    channel: MailboxChannel, commands: Sequence[IdnCommand], steps: Sequence[str]
+) -> Procedure[None]:
+    """Write the IDNs of transitions, in their order.
+
+    Args:
+        channel: The mailbox of the device.
+        commands: Commands of all transitions.
+        steps: The transitions, such as "IP" and "PS".
+
+    Raises:
+        SoeError: The drive refuses one. The message names file and line of the command.
+    """
+    for each in commands:
+        if not set(steps).intersection(each.transitions):
+            continue
+        target = Target(channel, each.number, each.drive)
+        try:
+            yield from write(target, each.data, Element(each.element))
+        except SoeError as error:
+            raise SoeError(
+                f"{error.message} (start-up command of {each.source} {each.comment})".rstrip(),
+                position=error.position,
+                idn=error.idn,
+                drive=error.drive,
+                code=error.code,
+                hint=error.hint,
+            ) from error
 
 
 def described(device: DeviceDescription, axes: Sequence[SercosAxis]) -> DeviceDescription:

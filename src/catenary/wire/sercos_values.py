@@ -89,7 +89,7 @@ def _item(attribute: Attribute, data: bytes) -> Item:
     if display is Display.IDN and attribute.size == 2:
         return idn_text(number)
     if _is_scaled(attribute):
-        return number * (attribute.factor or 1) / 10**attribute.decimals
+        return number * (attribute.factor or 1) / float(10**attribute.decimals)
     return number
 
 
@@ -122,7 +122,8 @@ def _raw(attribute: Attribute, value: float) -> int:
     """Return the transmitted integer of a displayed number."""
     if _is_scaled(attribute):
         try:
-            return round(value * 10**attribute.decimals / (attribute.factor or 1))
+            scale: int = 10**attribute.decimals
+            return round(value * scale / (attribute.factor or 1))
         except (OverflowError, ValueError):
             raise ValueError(f"{value} is not a finite number") from None
     if value != value or value in (float("inf"), float("-inf")) or int(value) != value:
