@@ -302,7 +302,7 @@ def test_soe_commands_are_read_for_their_transitions(tmp_path: Path) -> None:
     eni = read_eni(write_eni(tmp_path, ("</CoE>", soe)))
     check_commands(eni)
     [device] = [each for each in eni.devices if any(r.idn is not None for r in each.requests)]
-    found = replace(servo(), identity=device.identity, position=device.position)
+    found = replace(servo(device.position), identity=device.identity)
     [command] = with_eni(found, eni).idn_commands
     assert (command.transitions, command.number, command.drive) == (("PS",), 32796, 1)
     assert (command.data, command.element) == (b"\x01\x02", 0x40)
