@@ -14,11 +14,15 @@ MODULES = (
     "virtual",
 )
 PLAIN = ("errors", "events", "types", "virtual.faults")  # no `__all__`: what they define
-INTERNAL = {"catenary.events.emergency", "catenary.virtual.faults.number_of_state"}
+INTERNAL = {
+    "catenary.events.emergency",
+    "catenary.events.soe_event",
+    "catenary.virtual.faults.number_of_state",
+}
 
 # Types of what public methods return; programs do not import them.
 RETURNED = {
-    "catenary.bus": ("SubDevices", "Sdo", "Foe", "Pending", "ListType"),
+    "catenary.bus": ("SubDevices", "Sdo", "Foe", "Soe", "Pending", "ListType"),
     "catenary.bus.device_diagnosis": ("DeviceDiagnosis",),
     "catenary.bus.diagnosis": ("Diagnosis",),
     "catenary.bus.event_queue": ("Events",),
@@ -34,6 +38,7 @@ RETURNED = {
     "catenary.model.device": ("Identity",),
     "catenary.model.diagnosis_history": ("HistoryMessage", "SyncCounters", "SyncCounter"),
     "catenary.model.finding": ("Finding",),
+    "catenary.model.sercos": ("Parameter",),
     "catenary.plan.stop_reason": ("StopReason",),
     "catenary.procedure.al_state": ("DeviceState",),
     "catenary.remote.messages": (

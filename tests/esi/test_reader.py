@@ -23,8 +23,7 @@ from catenary.esi.reader import (
     read_module,
 )
 from catenary.esi.xml import find_elements
-from tests.esi import corpus
-from tests.esi.esi_file import device, write
+from tests.esi import corpus, esi_file
 
 NAME = "a.xml"
 KEY = DeviceKey(0xABC, 0x1234, 0x10002)
@@ -324,7 +323,7 @@ def test_init_commands_of_soe_have_idn_and_drive(tmp_path: Path) -> None:
         '<InitCmd Chn="9"><Transition>SO</Transition><IDN>2</IDN><Data>00</Data></InitCmd>'
         "</SoE></Mailbox>"
     )
-    [found] = read_esi(write(tmp_path / "a.xml", device(inner=soe))).devices
+    [found] = read_esi(esi_file.write(tmp_path / "a.xml", esi_file.device(inner=soe))).devices
     assert found.mailbox is not None
     first, second = found.mailbox.idn_commands
     assert (first.transitions, first.number, first.data) == (("PS",), 0x800A, b"\x34\x12")

@@ -159,6 +159,7 @@ class Application:
     """Application of one device."""
 
     on_restart: Callable[[], None] | None = None  # called if a new firmware is to start
+    telegrams: Telegrams | None = None  # only of SERCOS drives
 
     def __init__(
         self,
@@ -180,7 +181,6 @@ class Application:
         self.synchronisation: Synchronisation | None = None  # only for devices that support SYNC0
         self.checks_watchdog = False  # see ServoQuirks
         self.module_lists: ModuleLists | None = None  # only of modular devices
-        self.telegrams: Telegrams | None = None  # only of SERCOS drives
         boots, identification = self._bootstrap is not None, description.identification
         self.states = StateMachine(self, scheduler, identification, supports_boot=boots)
         self._files = FileAccess(store, self._box, self._bootstrap, self._state)

@@ -78,13 +78,7 @@ class SercosDrive(MotorDevice):
             rated_torque=rated_torque,
             max_velocity=max_velocity,
         )
-        self._sercos = SercosAxis(
-            motor,
-            soe_quirks,
-            get=lambda slot: self.core.slot(self.position, slot),
-            put=lambda slot, value: self.core.put_slot(self.position, slot, value),
-            motor_state=lambda: self._motors.state(self.position, 0)[3],
-        )
+        self._sercos = self._axis(motor, soe_quirks)
         super().__init__(
             name=name,
             alias=alias,
@@ -98,6 +92,15 @@ class SercosDrive(MotorDevice):
             ),
         )
         self.install_motors([motor])
+
+    def _axis(self, motor: Motor, quirks: SoeQuirks) -> SercosAxis:
+        return SercosAxis(
+            motor,
+            quirks,
+            get=lambda slot: self.core.slot(self.position, slot),
+            put=lambda slot, value: self.core.put_slot(self.position, slot, value),
+            motor_state=lambda: self._motors.state(self.position, 0)[3],
+        )
 
     def description(self) -> Description:
         managers = sync_managers_of(self.mailbox_bytes, (), ())
