@@ -89,7 +89,7 @@ def _missing(element: Element) -> int:
 
 
 def device(answer: Answer) -> MailboxDevice:
-    """Return a device whose drive answers with a function."""
+    """Return a device that answers with a function."""
 
     def respond(message: Mailbox) -> list[Mailbox]:
         request = decode_soe(message.data)

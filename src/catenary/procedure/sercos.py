@@ -39,7 +39,7 @@ _NO_STATE = 0x7014
 def read_parameter(target: Target, elements: Element = ALL) -> Procedure[Parameter]:
     """Read elements of an IDN with one request, without those that the drive does not have.
 
-    A drive that refuses a request for several elements is asked for one element after the other.
+    If a drive refuses a request for several elements, they are read one after the other.
 
     Args:
         target: The IDN.

@@ -37,7 +37,7 @@ ANSWER_TIMEOUT = 5.0  # [s] for each message: drives write parameters to flash m
 TRANSFER_TIMEOUT = 60.0  # [s] for all fragments of one answer
 SIZE_MAX = 1 << 18  # [bytes] of an answer: eight elements, of which four may be lists of 64 KiB
 RECOVERIES = 5  # requests of one answer while frames are lost
-LAST_ATTEMPTS = 5  # of a fragment whose frame is lost
+LAST_ATTEMPTS = 5  # to send a fragment if its frame is lost
 OVERHEAD = mailbox.HEADER_SIZE + HEADER_SIZE
 
 
@@ -96,7 +96,7 @@ def write(target: Target, data: bytes, element: Element = Element.VALUE) -> Proc
 def _read(target: Target, request: Message) -> Procedure[bytes]:
     """Read an answer. Repeat the request if a frame was lost during the fragments.
 
-    The fragment after a lost one can then not be told from it.
+    The fragment after a lost one cannot then be distinguished from it.
     """
     channel = target.channel
     for _ in range(RECOVERIES):

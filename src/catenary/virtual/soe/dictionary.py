@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
+from typing import Protocol
 
 from catenary.virtual import _segment
-from catenary.virtual.devices.motor import Motor
 from catenary.virtual.soe.parameter import (
     BINARY,
     HEX,
@@ -29,6 +29,22 @@ COMMANDS = {
     128: "Communication phase 4 transition check",
     264: "Backup working memory procedure command",
 }
+
+
+class MotorFacts(Protocol):
+    """Facts of a motor; `virtual.devices.motor.Motor` has them."""
+
+    @property
+    def counts_per_turn(self) -> int: ...
+
+    @property
+    def max_velocity(self) -> float: ...
+
+    @property
+    def max_torque_ratio(self) -> float: ...
+
+    @property
+    def following_error_turns(self) -> float: ...
 
 
 def cyclic_parameters(
@@ -78,7 +94,7 @@ def _writer(put: Callable[[int, int], None], slot: int) -> Callable[[bytes], Non
     return lambda data: put(slot, int.from_bytes(data, "little", signed=True))
 
 
-def stored_parameters(motor: Motor) -> Iterator[Parameter]:
+def stored_parameters(motor: MotorFacts) -> Iterator[Parameter]:
     """Yield the IDNs with stored values: scaling, limits, modes, names."""
     for number, name, size, unit, value, low, high, protection in (
         (1, "Control unit cycle time (tNcyc)", 2, "us", 2000, 125, 65000, WHILE_CYCLIC),
@@ -159,13 +175,13 @@ def command_parameters() -> Iterator[Parameter]:
         yield Parameter(number, name, 2, BINARY, is_command=True, protection=0, content=bytes(2))
 
 
-def _rpm(motor: Motor) -> int:
+def _rpm(motor: MotorFacts) -> int:
     return round(motor.max_velocity * 60 / (2 * math.pi) * VELOCITY_UNITS)
 
 
-def _torque(motor: Motor) -> int:
+def _torque(motor: MotorFacts) -> int:
     return min(round(RATED * motor.max_torque_ratio), 0x7FFF)
 
 
-def _window(motor: Motor) -> int:
+def _window(motor: MotorFacts) -> int:
     return round(motor.following_error_turns * motor.counts_per_turn)

@@ -9,10 +9,10 @@ import struct
 from collections.abc import Callable
 
 from catenary.virtual import _segment
-from catenary.virtual.devices.motor import Motor
 from catenary.virtual.protocols import Surroundings
 from catenary.virtual.soe.commands import Commands
 from catenary.virtual.soe.dictionary import (
+    MotorFacts,
     command_parameters,
     cyclic_parameters,
     stored_parameters,
@@ -48,7 +48,7 @@ class SercosAxis:
 
     def __init__(
         self,
-        motor: Motor,
+        motor: MotorFacts,
         quirks: SoeQuirks,
         *,
         get: Callable[[int], int],
@@ -58,7 +58,7 @@ class SercosAxis:
         """Initialise the drive.
 
         Args:
-            motor: Motor of the drive.
+            motor: MotorFacts of the drive.
             quirks: Differences from the standard.
             get: Function that returns the value of a slot.
             put: Function that sets a slot.
@@ -121,7 +121,7 @@ class SercosAxis:
 
     # -- IDNs ----------------------------------------------------------------------------------
 
-    def _add_parameters(self, motor: Motor) -> None:
+    def _add_parameters(self, motor: MotorFacts) -> None:
         for each in (
             *cyclic_parameters(self._slot_reader, self._put),
             *stored_parameters(motor),
