@@ -346,6 +346,25 @@ def test_a_fault_is_an_event_and_is_reset(
         command.result()
 
 
+def test_a_drive_that_returns_gets_its_telegrams_back(sub: SubDevice, drive: SercosDrive) -> None:
+    sub.soe.configure_telegrams(mdt=["S-0-0036"], at=["S-0-0040"])
+    telegrams = drive.application.telegrams
+    assert telegrams is not None
+    raw = cat.ProcessData(sub, required=False)
+    with cat.Loop(raw, period=1e-3) as loop:
+        for cycle in range(3000):
+            next(loop)
+            if cycle == 200:
+                drive.power_off()
+            if cycle == 400:
+                telegrams.lists = {True: (47,), False: (51,)}  # defaults of the drive
+                drive.power_on()
+            if cycle > 500 and raw.present:
+                break
+        assert raw.present
+    assert telegrams.lists == {True: (36,), False: (40,)}
+
+
 def test_elements_are_read_as_bytes(sub: SubDevice) -> None:
     data = sub.soe.read_bytes("S-0-0047", Element.ATTRIBUTE | Element.VALUE)
     assert data == bytes.fromhex("01002200") + bytes(4)
