@@ -14,10 +14,14 @@ MODULES = (
     "virtual",
 )
 PLAIN = ("errors", "events", "types", "virtual.faults")  # no `__all__`: what they define
-INTERNAL = {"catenary.events.emergency", "catenary.virtual.faults.number_of_state"}
+INTERNAL = {
+    "catenary.events.emergency",
+    "catenary.events.soe_event",
+    "catenary.virtual.faults.number_of_state",
+}
 
 # Types of what public methods return; programs do not import them.
-PROTOCOLS = ("Foe", "Aoe", "AdsNotifications", "Voe", "Eoe", "SegmentEoe")
+PROTOCOLS = ("Foe", "Aoe", "AdsNotifications", "Voe", "Eoe", "SegmentEoe", "Soe")
 ETHERNET = ("EthernetBridge", "EthernetCounts")
 RETURNED = {
     "catenary.wire.ads_response": ("DeviceInfo", "States", "Sample"),
@@ -41,6 +45,7 @@ RETURNED = {
     "catenary.model.device": ("Identity",),
     "catenary.model.diagnosis_history": ("HistoryMessage", "SyncCounters", "SyncCounter"),
     "catenary.model.finding": ("Finding",),
+    "catenary.model.sercos": ("Parameter",),
     "catenary.plan.stop_reason": ("StopReason",),
     "catenary.procedure.al_state": ("DeviceState",),
     "catenary.remote.messages": (

@@ -50,9 +50,12 @@ from catenary.wire import (
     pcapng,
     register,
     sdo_information,
+    sercos,
+    sercos_values,
     sii,
     sii_categories,
     sii_interface,
+    soe,
     sync_manager,
     voe,
 )
@@ -84,6 +87,12 @@ def check(target: Target, data: bytes) -> None:
         assert first == data, f"{target.name}: {data.hex()} became {first.hex()}"
     again = target.encode(target.decode(first))
     assert again == first, f"{target.name}: {first.hex()} became {again.hex()}"
+
+
+def _sercos_value(data: bytes) -> tuple[sercos.Attribute, sercos_values.Value]:
+    """Decode an attribute and the value that follows it."""
+    attribute = sercos.decode_attribute(data[:4])
+    return attribute, sercos_values.decode_value(attribute, data[4:])
 
 
 def _method(value: Any) -> bytes:
@@ -427,6 +436,28 @@ TARGETS = (
         eoe_address.decode_filter,
         _method,
         (MacFilter((b"\2" * 6,), (b"\xff" * 6,)).encode(),),
+    ),
+    Target(
+        "soe.decode_soe",
+        soe.decode_soe,
+        _method,
+        (
+            soe.Message(soe.OpCode.READ_REQUEST, 47, soe.Element.VALUE).encode(),
+            soe.Message(soe.OpCode.READ_RESPONSE, 2, data=bytes(9), incomplete=True).encode(),
+            soe.Message(soe.OpCode.WRITE_RESPONSE, 1, data=b"\x05\x70", error=True).encode(),
+        ),
+        exact=True,
+    ),
+    Target("sercos.decode_attribute", sercos.decode_attribute, _method, (b"\x01\x00\x22\x04",)),
+    Target(
+        "sercos_values.decode_value",
+        _sercos_value,
+        lambda pair: pair[0].encode() + sercos_values.encode_value(*pair),
+        (
+            bytes.fromhex("01005500" + "0400080033000a80"),
+            bytes.fromhex("01002204" + "3a300000"),
+            bytes.fromhex("01006300" + "000000000000f83f"),
+        ),
     ),
     Target(
         "diagnosis_history.decode_diagnosis_message",

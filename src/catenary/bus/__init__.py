@@ -14,6 +14,7 @@ from catenary.bus.pending import Pending
 from catenary.bus.runner import BlockingRunner, FrameCounts, Runner
 from catenary.bus.sdo import Sdo
 from catenary.bus.segment_eoe import SegmentEoe
+from catenary.bus.soe import Soe
 from catenary.bus.sub_device import SubDevice
 from catenary.bus.sub_devices import SubDevices
 from catenary.bus.voe import Voe
@@ -40,6 +41,7 @@ __all__ = [
     "Runner",
     "Sdo",
     "SegmentEoe",
+    "Soe",
     "SubDevice",
     "SubDevices",
     "Voe",

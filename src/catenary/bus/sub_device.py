@@ -14,6 +14,7 @@ from catenary.bus.foe import Foe
 from catenary.bus.latch import Latch, LatchEdge
 from catenary.bus.pdo_table import PdoTable
 from catenary.bus.sdo import Conversations, Objects, Sdo
+from catenary.bus.soe import Soe
 from catenary.bus.voe import Voe
 from catenary.errors import CatenaryError
 from catenary.model.device import DeviceDescription, Identity
@@ -52,8 +53,9 @@ class SubDevice:
     """Handle of one device, such as `main.scan()[2]`. It stays valid across scans.
 
     Attributes never cause traffic; calls with a verb do. `sub.sdo` reads and writes its objects,
-    `sub.foe` its files, `sub.aoe` its ADS data. `sub.voe` exchanges vendor-specific messages.
-    `sub.eoe` is its Ethernet port. `sub.diagnosis` reads the messages that it stores.
+    `sub.foe` its files, `sub.aoe` its ADS data, `sub.soe` the IDNs of a SERCOS drive. `sub.voe`
+    exchanges vendor-specific messages. `sub.eoe` is its Ethernet port. `sub.diagnosis` reads the
+    messages that it stores.
     """
 
     def __init__(
@@ -73,6 +75,7 @@ class SubDevice:
         self.aoe = Aoe(self)
         self.voe = Voe(self)
         self.eoe = Eoe(self)
+        self.soe = Soe(self)
         self.diagnosis = DeviceDiagnosis(self)
 
     @property

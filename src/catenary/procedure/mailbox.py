@@ -161,7 +161,11 @@ def converse(
 
 
 def further(
-    channel: MailboxChannel, accept: Callable[[Mailbox], T | None], *, timeout: float = READ_TIMEOUT
+    channel: MailboxChannel,
+    accept: Callable[[Mailbox], T | None],
+    *,
+    timeout: float = READ_TIMEOUT,
+    kind: Type = Type.COE,
 ) -> Procedure[T]:
     """Receive the next part of an answer that consists of several messages.
 
@@ -169,6 +173,7 @@ def further(
         channel: The mailbox of the device.
         accept: Function that converts a message. It returns None for an unexpected message.
         timeout: Longest time until the part arrives [s].
+        kind: The protocol of the message, for errors.
 
     Raises:
         ResponseTimeout: No answer within `timeout`, or too many frames were lost.
@@ -178,7 +183,7 @@ def further(
     before, patience = channel.dropped, _patience(channel, timeout)
     answer = yield from _await(channel, accept, Deadline(patience))
     if answer is None:
-        raise _no_answer(channel, Type.COE, patience, channel.dropped - before)
+        raise _no_answer(channel, kind, patience, channel.dropped - before)
     return answer
 
 
@@ -381,6 +386,7 @@ def poll(channel: MailboxChannel) -> Procedure[tuple[bool, Mailbox | None, int]]
     )
     status, reply = yield [check, read_request(channel)]
     if reply.lost:
+        channel.lost_reads += 1
         channel.unsure_ns = reply.time_ns
         return False, None, reply.time_ns
     answered(status, station, "mailbox status")
@@ -428,6 +434,7 @@ def take(channel: MailboxChannel) -> Procedure[Mailbox | None]:
         if not reply.lost:
             channel.received_ns = reply.time_ns
             return decoded(channel, reply.data) if reply.working_counter else None
+        channel.lost_reads += 1
         if not (yield from _request_repetition(channel)):
             return None
     raise ResponseTimeout(

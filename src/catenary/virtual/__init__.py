@@ -17,6 +17,7 @@ from catenary.virtual.devices import (
     OversamplingTerminal,
     SafetyLogic,
     SafetyTerminal,
+    SercosDrive,
     Servo,
 )
 from catenary.virtual.devices.described import DescribedDevice, from_esi
@@ -35,6 +36,7 @@ from catenary.virtual.plant import Plant, PlantPart
 from catenary.virtual.segment import FrameCounters, Segment, demo_segment
 from catenary.virtual.server import Served, Server, serve, serve_all
 from catenary.virtual.sii_quirks import SiiQuirks
+from catenary.virtual.soe.quirks import SoeQuirks
 from catenary.virtual.vendor_protocol import VendorEcho, VendorMessages
 
 __all__ = [
@@ -67,11 +69,13 @@ __all__ = [
     "SafetyLogic",
     "SafetyTerminal",
     "Segment",
+    "SercosDrive",
     "Served",
     "Server",
     "Servo",
     "ServoQuirks",
     "SiiQuirks",
+    "SoeQuirks",
     "Twin",
     "TwinOptions",
     "VendorEcho",

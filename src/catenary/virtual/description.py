@@ -129,6 +129,7 @@ class Description:
     bootstrap: MailboxDefault | None = field(default=None, repr=False)  # mailbox in BOOT
     serves_files: bool = field(default=False, repr=False)  # FoE
     protocols: tuple[int, ...] = field(default=(), repr=False)  # beside CoE and FoE
+    serves_coe: bool = field(default=True, repr=False)
 
     @property
     def vendor(self) -> int:

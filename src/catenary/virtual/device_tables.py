@@ -22,6 +22,7 @@ from catenary.virtual.devices.model_sensor import ModelSensor
 from catenary.virtual.devices.motor import Motor
 from catenary.virtual.devices.oversampling import OversamplingTerminal
 from catenary.virtual.devices.safety import SafetyLogic, SafetyTerminal
+from catenary.virtual.devices.sercos_drive import SercosDrive
 from catenary.virtual.devices.servo import Servo
 from catenary.virtual.devices.servo_quirks import NO_QUIRKS, ServoQuirks
 from catenary.virtual.devices.touch_probe import ProbeOptions
@@ -31,6 +32,7 @@ from catenary.virtual.foe.options import DeviceFiles
 from catenary.virtual.mapping_quirks import NO_MAPPING_QUIRKS, MappingQuirks
 from catenary.virtual.protocols import MailboxProtocol
 from catenary.virtual.sii_quirks import NO_SII_QUIRKS, SiiQuirks
+from catenary.virtual.soe.quirks import NO_SOE_QUIRKS, SoeQuirks
 from catenary.virtual.vendor_protocol import VendorEcho
 
 
@@ -292,6 +294,33 @@ class ServoTable(_AppliedTable, tag="servo", frozen=True, kw_only=True):
         )
 
 
+class SercosDriveTable(_AppliedTable, tag="sercos_drive", frozen=True, kw_only=True):
+    resolution: int = 1 << 20
+    inertia: float = 5e-4
+    rated_torque: float = 2.0
+    max_velocity: float = 350.0
+    soe_quirks: SoeQuirks = NO_SOE_QUIRKS
+
+    def device(self) -> Device:
+        return SercosDrive(
+            name=self.name or "Catenary virtual SERCOS drive",
+            alias=self.alias,
+            serial=self.serial,
+            resolution=self.resolution,
+            inertia=self.inertia,
+            rated_torque=self.rated_torque,
+            max_velocity=self.max_velocity,
+            mailbox_bytes=self.mailbox_bytes,
+            mailbox_delay=self.mailbox_delay,
+            lrw=self.lrw,
+            crystal=self.crystal.crystal(),
+            clock_bits=self.clock_bits,
+            soe_quirks=self.soe_quirks,
+            mailbox_quirks=self.mailbox_quirks,
+            sii_quirks=self.sii_quirks,
+        )
+
+
 class EsiTable(_ClockedTable, tag="esi", frozen=True, kw_only=True):
     esi: str  # relative to the folder of the segment file
     chosen: str = msgspec.field(default="", name="device")
@@ -375,6 +404,7 @@ DeviceTable = (
     | AnalogInputsTable
     | ModelSensorTable
     | OversamplingTable
+    | SercosDriveTable
     | ServoTable
     | EsiTable
     | SiiTable

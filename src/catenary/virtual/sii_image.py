@@ -87,7 +87,8 @@ def _header(device: Description, size: int, mailbox_size: int | None) -> bytes:
 
 def _protocols(device: Description) -> int:
     """Return the mailbox protocols as the bits of word 0x001C."""
-    found = COE_PROTOCOL | (FOE_PROTOCOL if device.serves_files else 0)
+    found = COE_PROTOCOL if device.serves_coe else 0
+    found |= FOE_PROTOCOL if device.serves_files else 0
     return found | sum(PROTOCOL_BITS[number] for number in device.protocols)
 
 

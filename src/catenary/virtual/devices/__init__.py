@@ -9,6 +9,7 @@ from catenary.virtual.devices.junction import Junction
 from catenary.virtual.devices.model_sensor import ModelSensor
 from catenary.virtual.devices.oversampling import OversamplingTerminal
 from catenary.virtual.devices.safety import SafetyLogic, SafetyTerminal
+from catenary.virtual.devices.sercos_drive import SercosDrive
 from catenary.virtual.devices.servo import Servo
 
 __all__ = [
@@ -22,5 +23,6 @@ __all__ = [
     "OversamplingTerminal",
     "SafetyLogic",
     "SafetyTerminal",
+    "SercosDrive",
     "Servo",
 ]
