@@ -85,6 +85,19 @@ def measure_foe(*, size: int, rounds: int, file: Path | None = None) -> None:
     foe.measure(size=size, rounds=rounds, file=file)
 
 
+def measure_eoe(*, seconds: float, rounds: int, file: Path | None = None) -> None:
+    """Print the rate of a web page through EoE, and the lost cycles of a loop without and with it.
+
+    Args:
+        seconds: Run time of every run [s].
+        rounds: Rounds in which the runs take turns.
+        file: File for the figures.
+    """
+    from benchmarks import eoe
+
+    eoe.measure(seconds=seconds, rounds=rounds, file=file)
+
+
 def measure_share(*, drives: int, rate: int, seconds: float, file: Path | None = None) -> None:
     """Print the time to read a cycle from a share, and the cost of readers for the loop.
 

@@ -164,6 +164,23 @@ def ros2(request: pytest.FixtureRequest, pytestconfig: pytest.Config) -> Path:
 
 
 @pytest.fixture
+def tap(veth: tuple[str, str], pytestconfig: pytest.Config) -> Iterator[str]:
+    """Yield the name of a TAP interface with the address 192.168.7.1/24."""
+    name = "cattap0"
+    try:
+        private_network.run_ip("tuntap", "add", "dev", name, "mode", "tap")
+    except OSError as error:
+        lacking(pytestconfig, "wire", f"no TAP interfaces: {error}")
+    try:
+        private_network.disable_ipv6(name)
+        private_network.run_ip("address", "add", "192.168.7.1/24", "dev", name)
+        private_network.run_ip("link", "set", name, "up")
+        yield name
+    finally:
+        private_network.run_ip("tuntap", "del", "dev", name, "mode", "tap")
+
+
+@pytest.fixture
 def veth(pytestconfig: pytest.Config) -> Iterator[tuple[str, str]]:
     """Yield the names of two connected private network interfaces."""
     state = private_network.state()

@@ -30,6 +30,8 @@ WIDE = {
     "machine/machine.py: Machine.loop": "the options of Loop",
     "virtual/devices/analog_inputs.py: AnalogInputs.__init__": VOCABULARY,
     "virtual/devices/model_sensor.py: ModelSensor.__init__": VOCABULARY,
+    "virtual/devices/oversampling.py: OversamplingTerminal.__init__": VOCABULARY,
+    "virtual/devices/sercos_drive.py: SercosDrive.__init__": VOCABULARY,
     **{
         f"control/{place}": "step of a law, compiled by numba"
         for place in (

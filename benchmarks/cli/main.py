@@ -33,6 +33,7 @@ def make_parser() -> argparse.ArgumentParser:
     with_wires.add_storm(group)
     with_wires.add_foe(group)
     protocols.add_protocols(group)
+    with_wires.add_eoe(group)
     with_wires.add_share(group)
     with_wires.add_remote(group)
     with_wires.add_cost(group)

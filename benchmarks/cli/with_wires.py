@@ -47,6 +47,22 @@ def add_storm(group: Commands) -> None:
     parser.set_defaults(run=run_storm)
 
 
+def add_eoe(group: Commands) -> None:
+    parser = add_command(
+        group,
+        "eoe",
+        help="measure a web page through EoE next to 33 axes",
+        description="Run a loop of 33 axes at 1 kHz, in turn without and with the transfer of a "
+        "web page of one device through EoE. Print lost cycles, the rate, and its ratio to the "
+        "bound that follows from the mailbox and the acyclic queue.",
+        example="python -m benchmarks eoe --seconds 10 --rounds 5 --json eoe.json",
+    )
+    add_seconds(parser, 10.0, "run time of every run")
+    parser.add_argument("--rounds", type=positive_number, default=3, help="rounds (default: 3)")
+    add_file(parser)
+    parser.set_defaults(run=run_eoe)
+
+
 def add_foe(group: Commands) -> None:
     parser = add_command(
         group,
@@ -194,6 +210,15 @@ def run_storm(arguments: argparse.Namespace) -> int:
         seconds=arguments.seconds,
         file=arguments.json,
     )
+    return 0
+
+
+def run_eoe(arguments: argparse.Namespace) -> int:
+    import benchmarks
+    from catenary import bench
+
+    bench.enter_private_network()
+    benchmarks.measure_eoe(seconds=arguments.seconds, rounds=arguments.rounds, file=arguments.json)
     return 0
 
 

@@ -14,18 +14,26 @@ MODULES = (
     "virtual",
 )
 PLAIN = ("errors", "events", "types", "virtual.faults")  # no `__all__`: what they define
-INTERNAL = {"catenary.events.emergency", "catenary.virtual.faults.number_of_state"}
+INTERNAL = {
+    "catenary.events.emergency",
+    "catenary.events.soe_event",
+    "catenary.virtual.faults.number_of_state",
+}
 
 # Types of what public methods return; programs do not import them.
-AOE_AND_VOE = ("Aoe", "AdsNotifications", "Voe")
+PROTOCOLS = ("Foe", "Aoe", "AdsNotifications", "Voe", "Eoe", "SegmentEoe", "Soe")
+ETHERNET = ("EthernetBridge", "EthernetCounts")
 RETURNED = {
     "catenary.wire.ads_response": ("DeviceInfo", "States", "Sample"),
     "catenary.wire.voe": ("VoeMessage",),
-    "catenary.bus": ("SubDevices", "Sdo", "Foe", *AOE_AND_VOE, "Pending", "ListType"),
+    "catenary.bus": (
+        *("SubDevices", "Sdo", *PROTOCOLS, *ETHERNET, "Latch", "LatchEvent", "Pending", "ListType"),
+    ),
     "catenary.bus.device_diagnosis": ("DeviceDiagnosis",),
     "catenary.bus.diagnosis": ("Diagnosis",),
     "catenary.bus.event_queue": ("Events",),
     "catenary.drive.values": ("AxisValues",),
+    "catenary.gateway": ("GatewayCounts",),
     "catenary.esi.eni": ("Variable",),
     "catenary.link.interfaces": ("NetworkInterface",),
     "catenary.log": ("Log",),
@@ -37,6 +45,7 @@ RETURNED = {
     "catenary.model.device": ("Identity",),
     "catenary.model.diagnosis_history": ("HistoryMessage", "SyncCounters", "SyncCounter"),
     "catenary.model.finding": ("Finding",),
+    "catenary.model.sercos": ("Parameter",),
     "catenary.plan.stop_reason": ("StopReason",),
     "catenary.procedure.al_state": ("DeviceState",),
     "catenary.remote.messages": (
@@ -54,6 +63,7 @@ RETURNED = {
     ),
     "catenary.wire.al": ("AlState",),
     "catenary.wire.cia402": ("AxisState",),
+    "catenary.wire.eoe_address": ("EthernetAddress", "MacFilter"),
 }
 
 

@@ -34,7 +34,17 @@ if TYPE_CHECKING:
     )
     from catenary.bus import SubDevice
     from catenary.bus import event_types as events
-    from catenary.drive import DistributedClock, Drives, Inputs, Outputs, ProcessData, StartUp
+    from catenary.drive import (
+        Copies,
+        Copy,
+        DistributedClock,
+        Drives,
+        FsoeConnection,
+        Inputs,
+        Outputs,
+        ProcessData,
+        StartUp,
+    )
     from catenary.errors import (
         CatenaryError,
         ClockError,
@@ -46,6 +56,7 @@ if TYPE_CHECKING:
         StateError,
         WorkingCounterError,
     )
+    from catenary.gateway import Gateway
     from catenary.link.interfaces import interfaces
     from catenary.loop import (
         CaptureOptions,
@@ -72,11 +83,15 @@ __all__ = [
     "CatenaryError",
     "ClockError",
     "ClockOptions",
+    "Copies",
+    "Copy",
     "Cycle",
     "DistributedClock",
     "DriveError",
     "Drives",
     "ExternalClock",
+    "FsoeConnection",
+    "Gateway",
     "Inputs",
     "LawError",
     "LinkError",
@@ -131,7 +146,17 @@ _MODULES = (
     "types",
     "virtual",
 )
-_DRIVE = ("DistributedClock", "Drives", "Inputs", "Outputs", "ProcessData", "StartUp")
+_DRIVE = (
+    "Copies",
+    "Copy",
+    "DistributedClock",
+    "Drives",
+    "FsoeConnection",
+    "Inputs",
+    "Outputs",
+    "ProcessData",
+    "StartUp",
+)
 _ERRORS = (  # errors that a loop raises; the others are in catenary.errors
     "CatenaryError",
     "ClockError",
@@ -160,6 +185,7 @@ _HOMES = {
         ),
         "catenary.loop",
     ),
+    "Gateway": "catenary.gateway",
     "Machine": "catenary.machine",
     "MainDevice": "catenary.target",
     "Segment": "catenary.virtual",

@@ -178,6 +178,32 @@ class AdsError(CatenaryError):
         self.code = code
 
 
+class EoeError(CatenaryError):
+    """A device refused an address or a filter of its Ethernet port (ETG.1000.6 §5.7)."""
+
+    def __init__(self, message: str, *, position: int, result: int, hint: str = "") -> None:
+        super().__init__(message, hint=hint)
+        self.position = position
+        self.result = result
+
+
+class TapError(CatenaryError):
+    """A TAP interface of this machine cannot be used."""
+
+
+class SoeError(CatenaryError):
+    """A SERCOS drive refused access to an IDN, or a procedure command failed (ETG.1000.6 §5.9)."""
+
+    def __init__(
+        self, message: str, *, position: int, idn: int, drive: int, code: int, hint: str = ""
+    ) -> None:
+        super().__init__(message, hint=hint)
+        self.position = position
+        self.idn = idn
+        self.drive = drive
+        self.code = code
+
+
 class FirmwareError(CatenaryError):
     """A firmware update failed: it was interrupted, or the device does not report the expected
     firmware afterwards."""

@@ -28,6 +28,7 @@ OUTPUT_IS_NOT_DATA = {
     "dashboard": "a server",
     "demo": "writes demo.json",
     "foxglove": "a server",
+    "gateway": "a server",
     "include": "prints one path, for a compiler's command line",
     "ros2": "a server",
     "shell": "interactive",
@@ -47,6 +48,11 @@ sdo list virtual 2
 foe read virtual:files.toml 1 log.txt
 foe write virtual:files.toml 1 app.efw --boot
 firmware virtual:files.toml 1 app.efw
+soe read virtual:drive.toml 0 S-0-0051
+soe write virtual:drive.toml 0 S-0-0092 150.5
+soe info virtual:drive.toml 0 S-0-0047
+soe list virtual:drive.toml 0 --values
+soe command virtual:drive.toml 0 S-0-0099
 reg read virtual 2 AL_STATUS
 reg write virtual 2 0x0310 0 --size 4
 alias virtual 2
@@ -131,6 +137,8 @@ def prepare(command: str) -> None:
     elif command in ("foe read", "foe write", "firmware"):
         Path("files.toml").write_text(FILES)
         Path("app.efw").write_bytes(make_firmware(0x0004_0002, "2.0"))
+    elif command.startswith("soe"):
+        Path("drive.toml").write_text('[[device]]\nkind = "sercos_drive"\n')
     elif command.startswith("capture"):
         record(Path("a.pcapng"), pdos=PDOS)
     elif command in ("merge", "plot"):

@@ -19,7 +19,7 @@ COMMANDS = (
     *("rescan", "sdos", "sii_read", "sii_write", "slaves", "soe_read", "soe_write", "states"),
     *("upload", "version", "xml"),
 )
-PLANNED = re.compile(r"(EoE|SoE) is not available yet")
+PLANNED = re.compile(r"(EoE) is not available yet")
 
 
 def rows() -> dict[str, tuple[str, str]]:

@@ -44,6 +44,9 @@ class FakeLayout:
         sizes = (self.outputs if direction is Direction.OUTPUT else self.inputs).get(device, {})
         return range((sum(sizes.values()) + 7) // 8)
 
+    def pdo_bits(self, device: int, direction: Direction, index: int) -> range | None:
+        return None
+
 
 def place(
     objects: dict[int, dict[tuple[int, int], int]], device: int, index: int, subindex: int

@@ -272,9 +272,15 @@ def test_register_commands_of_an_encrypted_file_are_refused(tmp_path: Path) -> N
         ("<Cmd>5</Cmd><Adp>1001</Adp>\n     <Ado>1040</Ado>",
          "<Cmd>11</Cmd><Addr>#x08000000</Addr>", "LWR is not supported"),
         ("<Ccs>1", "<Ccs>2", "Ccs 2 is not supported"),
-        ("</CoE>", "</CoE><SoE><InitCmds><InitCmd><Transition>PS</Transition><OpCode>3</OpCode>"
+        ("</CoE>", "</CoE><SoE><InitCmds><InitCmd><Transition>PS</Transition><OpCode>1</OpCode>"
          "<IDN>32796</IDN><Data>01</Data></InitCmd></InitCmds></SoE>",
-         "P-0-0028 of drive 0: SoE is not supported"),
+         "P-0-0028 of drive 0: OpCode 1 is not supported"),
+        ("</CoE>", "</CoE><SoE><InitCmds><InitCmd><Transition>PS</Transition><OpCode>3</OpCode>"
+         "<Elements>3</Elements><IDN>2</IDN><Data>01</Data></InitCmd></InitCmds></SoE>",
+         "S-0-0002 of drive 0: Elements 0x03 is not supported"),
+        ("</CoE>", "</CoE><SoE><InitCmds><InitCmd><Transition>PS</Transition><OpCode>3</OpCode>"
+         "<DriveNo>8</DriveNo><IDN>2</IDN><Data>01</Data></InitCmd></InitCmds></SoE>",
+         "DriveNo 8 is out of range"),
     ],
 )  # fmt: skip
 def test_commands_that_cannot_be_run_are_refused(
@@ -284,6 +290,23 @@ def test_commands_that_cannot_be_run_are_refused(
     with pytest.raises(MachineFileError, match=message) as caught:
         check_commands(eni)
     assert caught.value.line
+
+
+def test_soe_commands_are_read_for_their_transitions(tmp_path: Path) -> None:
+    soe = (
+        "</CoE><SoE><InitCmds><InitCmd><Transition>PS</Transition><OpCode>3</OpCode><DriveNo>1"
+        "</DriveNo><IDN>32796</IDN><Data>0102</Data></InitCmd><InitCmd><Transition>SO</Transition>"
+        "<OpCode>3</OpCode><IDN>2</IDN><Data>e803</Data><Disabled>1</Disabled></InitCmd>"
+        "</InitCmds></SoE>"
+    )
+    eni = read_eni(write_eni(tmp_path, ("</CoE>", soe)))
+    check_commands(eni)
+    [device] = [each for each in eni.devices if any(r.idn is not None for r in each.requests)]
+    found = replace(servo(device.position), identity=device.identity)
+    [command] = with_eni(found, eni).idn_commands
+    assert (command.transitions, command.number, command.drive) == (("PS",), 32796, 1)
+    assert (command.data, command.element) == (b"\x01\x02", 0x40)
+    assert with_eni(found, eni, ["SoE"]).idn_commands == ()
 
 
 def test_protocols_can_be_left_out(tmp_path: Path) -> None:

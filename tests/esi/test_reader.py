@@ -23,7 +23,7 @@ from catenary.esi.reader import (
     read_module,
 )
 from catenary.esi.xml import find_elements
-from tests.esi import corpus
+from tests.esi import corpus, esi_file
 
 NAME = "a.xml"
 KEY = DeviceKey(0xABC, 0x1234, 0x10002)
@@ -312,3 +312,21 @@ def test_any_removed_element_raises_nothing_but_esi_errors(data: st.DataObject) 
     removed = set(data.draw(st.lists(st.sampled_from(leaves), max_size=30)))
     with suppress(EsiError):
         read("\n".join(part for part in parts if part not in removed).encode())
+
+
+def test_init_commands_of_soe_have_idn_and_drive(tmp_path: Path) -> None:
+    """Those without a value, or for a drive that cannot exist, are warnings."""
+    soe = (
+        "<Mailbox><SoE><InitCmd><Transition>PS</Transition><IDN>#x800A</IDN><Data>3412</Data>"
+        '<Comment>word</Comment></InitCmd><InitCmd Chn="1"><Transition>SO</Transition><IDN>2</IDN>'
+        "<Data>e803</Data></InitCmd><InitCmd><Transition>SO</Transition><IDN>2</IDN></InitCmd>"
+        '<InitCmd Chn="9"><Transition>SO</Transition><IDN>2</IDN><Data>00</Data></InitCmd>'
+        "</SoE></Mailbox>"
+    )
+    [found] = read_esi(esi_file.write(tmp_path / "a.xml", esi_file.device(inner=soe))).devices
+    assert found.mailbox is not None
+    first, second = found.mailbox.idn_commands
+    assert (first.transitions, first.number, first.data) == (("PS",), 0x800A, b"\x34\x12")
+    assert (first.drive, first.comment, second.drive) == (0, "word", 1)
+    warnings = [str(each) for each in found.warnings]
+    assert sum("InitCmd" in each for each in warnings) == 2

@@ -17,6 +17,7 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from ipaddress import IPv4Address
 from typing import Any
 
 from catenary import types
@@ -34,22 +35,32 @@ from catenary.wire import (
     datagram,
     diagnosis_history,
     dl,
+    eoe,
+    eoe_address,
     error_counters,
     features,
     fmmu,
     foe,
     frame,
+    fsoe,
+    gateway,
+    latch,
     mailbox,
     pcap,
     pcapng,
     register,
     sdo_information,
+    sercos,
+    sercos_values,
     sii,
     sii_categories,
     sii_interface,
+    soe,
     sync_manager,
     voe,
 )
+from catenary.wire.eoe_address import EthernetAddress, MacFilter
+from catenary.wire.eoe_frames import MAX_FRAME, FrameAssembler, fragments_of
 
 
 @dataclass(frozen=True)
@@ -76,6 +87,12 @@ def check(target: Target, data: bytes) -> None:
         assert first == data, f"{target.name}: {data.hex()} became {first.hex()}"
     again = target.encode(target.decode(first))
     assert again == first, f"{target.name}: {first.hex()} became {again.hex()}"
+
+
+def _sercos_value(data: bytes) -> tuple[sercos.Attribute, sercos_values.Value]:
+    """Decode an attribute and the value that follows it."""
+    attribute = sercos.decode_attribute(data[:4])
+    return attribute, sercos_values.decode_value(attribute, data[4:])
 
 
 def _method(value: Any) -> bytes:
@@ -113,6 +130,21 @@ def _ads_request(data: bytes) -> ads.Request:
 
 def _encoded_ads_request(request: ads.Request) -> bytes:
     return bytes((request.command,)) + request.encode()
+
+
+def _assembled(data: bytes) -> list[bytes]:
+    """Return the Ethernet frames of EoE fragments, each with its length in a byte before it."""
+    assembler, frames, rest = FrameAssembler(), [], data
+    while rest:
+        part, rest = rest[1 : 1 + rest[0]], rest[1 + rest[0] :]
+        try:
+            message = eoe.decode_eoe(part)
+        except DecodeError:
+            continue
+        if isinstance(message, eoe.Fragment):
+            frames.append(assembler.add(message, len(rest)) or b"")
+    assert all(len(frame) <= MAX_FRAME for frame in frames)
+    return frames
 
 
 def _word(name: str, decode: Callable[[int], Any], size: int, *values: int) -> Target:
@@ -211,6 +243,11 @@ BRING_UP = tuple(
     )
     for counter, source in ((0, b"\x10" * 6), (1, b"\x12" + b"\x10" * 5))
 )
+EOE_FRAGMENTS = b"".join(
+    len(each.encode()).to_bytes(1, "little") + each.encode()
+    for number in range(3)
+    for each in fragments_of(bytes(300), number, 100)
+)
 FRAMES = b"".join(len(each).to_bytes(2, "little") + each for each in BRING_UP)
 TIMELINE = pcapng.encode_header("eth0") + b"".join(
     pcapng.encode_packet(pcapng.Packet(20_000 * i, data)) for i, data in enumerate(BRING_UP)
@@ -302,6 +339,13 @@ TARGETS = (
     Target("mailbox.decode_error", mailbox.decode_error, _method, (b"\x01\x00\x04\x00",)),
     Target("coe.decode_coe", coe.decode_coe, _method, COE),
     Target(
+        "fsoe.decode",
+        fsoe.decode,
+        fsoe.encode,
+        (bytes.fromhex("4e0734120100"), bytes.fromhex("360102aabb0304ccdd0500")),
+        exact=True,
+    ),
+    Target(
         "foe.decode_foe",
         foe.decode_foe,
         _method,
@@ -358,6 +402,64 @@ TARGETS = (
     ),
     Target("voe.decode_voe", voe.decode_voe, _method, (voe.VoeMessage(2, 1, b"hello").encode(),)),
     Target(
+        "gateway.decode_gateway",
+        gateway.decode_gateway,
+        gateway.encode_gateway,
+        (
+            bytes.fromhex("10500a00e903002300204180f90200000000"),
+            gateway.encode_gateway(mailbox.Mailbox(mailbox.Type.FOE, bytes(64), 7, 0x1002)),
+        ),
+    ),
+    Target(
+        "eoe.decode_eoe",
+        eoe.decode_eoe,
+        _method,
+        (
+            eoe.Fragment(0, 3, 5, bytes(range(64)), False).encode(),
+            eoe.Fragment(1, 2, 5, bytes(range(9)), time_stamp=7).encode(),
+            eoe.TimeStamp(5, 7).encode(),
+            eoe.SetAddress(EthernetAddress(b"\2" * 6, IPv4Address("10.0.0.2"))).encode(),
+            eoe.GetAddressResult(EthernetAddress(name="drive")).encode(),
+            bytes.fromhex("0701000006000000") + bytes(8),  # without gaps
+            eoe.SetFilter(MacFilter((b"\2" * 6,), (b"\xff" * 6,), True)).encode(),
+            eoe.SetFilterResult(0x0401).encode(),
+        ),
+    ),
+    Target(
+        "eoe_address.decode_address",
+        eoe_address.decode_address,
+        _method,
+        (EthernetAddress(b"\2" * 6, IPv4Address("10.0.0.2"), name="drive").encode(), bytes(4)),
+    ),
+    Target(
+        "eoe_address.decode_filter",
+        eoe_address.decode_filter,
+        _method,
+        (MacFilter((b"\2" * 6,), (b"\xff" * 6,)).encode(),),
+    ),
+    Target(
+        "soe.decode_soe",
+        soe.decode_soe,
+        _method,
+        (
+            soe.Message(soe.OpCode.READ_REQUEST, 47, soe.Element.VALUE).encode(),
+            soe.Message(soe.OpCode.READ_RESPONSE, 2, data=bytes(9), incomplete=True).encode(),
+            soe.Message(soe.OpCode.WRITE_RESPONSE, 1, data=b"\x05\x70", error=True).encode(),
+        ),
+        exact=True,
+    ),
+    Target("sercos.decode_attribute", sercos.decode_attribute, _method, (b"\x01\x00\x22\x04",)),
+    Target(
+        "sercos_values.decode_value",
+        _sercos_value,
+        lambda pair: pair[0].encode() + sercos_values.encode_value(*pair),
+        (
+            bytes.fromhex("01005500" + "0400080033000a80"),
+            bytes.fromhex("01002204" + "3a300000"),
+            bytes.fromhex("01006300" + "000000000000f83f"),
+        ),
+    ),
+    Target(
         "diagnosis_history.decode_diagnosis_message",
         diagnosis_history.decode_diagnosis_message,
         diagnosis_history.DiagnosisMessage.encode,
@@ -365,6 +467,12 @@ TARGETS = (
             bytes.fromhex("020000e1020202371fc59d6131000000050002050080"),
             bytes.fromhex("01e0000001040000000000000000000003100102030220") + b"OK",
         ),
+    ),
+    Target(
+        "latch.decode_latched",
+        lambda data: latch.decode_latched(data, len(data) & 1, 64),
+        None,
+        (bytes([0x01, 0x06]) + bytes(range(32)),),
     ),
     Target(
         "sdo_information.decode_sdo_information",
@@ -394,6 +502,7 @@ TARGETS = (
     Target("pcapng.decode_pcapng", pcapng.decode_pcapng, None, (CAPTURE,)),
     Target("capture.decode_capture", capture.decode_capture, None, (CAPTURE, PCAP)),
     Target("pcap.decode_pcap", pcap.decode_pcap, None, (PCAP,)),
+    Target("eoe_frames.FrameAssembler", _assembled, None, (EOE_FRAGMENTS,)),
     Target("capture.EventStream", _timeline, None, (TIMELINE, PCAP)),
     Target("capture.EventStream of frames", _timeline_of_frames, None, (FRAMES,)),
 )

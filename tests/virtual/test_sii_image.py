@@ -16,6 +16,8 @@ from catenary.virtual import (
     DigitalOutputs,
     Junction,
     ModelSensor,
+    SafetyLogic,
+    SafetyTerminal,
     Servo,
     ServoQuirks,
     SiiQuirks,
@@ -41,6 +43,8 @@ DEVICES: list[Device] = [
     DigitalInputs(bits=9),
     AnalogInputs(channels=8),
     Junction(port_count=3),
+    SafetyLogic(connections=4, size=4),
+    SafetyTerminal(),
     model_sensor(),
 ]
 
@@ -57,7 +61,7 @@ def test_decoder_returns_the_description(device: Device) -> None:
 
 
 @pytest.mark.parametrize(
-    "device", [Servo, DigitalOutputs, DigitalInputs, AnalogInputs, model_sensor]
+    "device", [Servo, DigitalOutputs, DigitalInputs, AnalogInputs, SafetyTerminal, model_sensor]
 )
 @pytest.mark.parametrize("lrw", [True, False])
 def test_general_category_shows_missing_lrw_support(
@@ -78,6 +82,8 @@ VARIANTS: list[Device] = [
     *(model_sensor(lrw=lrw, mailbox_bytes=size) for lrw in (True, False) for size in (64, 256)),
     *(DigitalOutputs(lrw=lrw, bits=bits) for lrw in (True, False) for bits in (1, 8)),
     *(DigitalInputs(lrw=lrw, bits=bits) for lrw in (True, False) for bits in (1, 8)),
+    *(SafetyTerminal(lrw=lrw, size=size) for lrw in (True, False) for size in (1, 2, 4)),
+    *(SafetyLogic(lrw=lrw, connections=count) for lrw in (True, False) for count in (1, 2)),
 ]
 
 

@@ -45,6 +45,12 @@ from catenary.procedure.profile import read_object
 from catenary.procedure.register_commands import run_commands
 from catenary.procedure.station import within
 from catenary.procedure.sync import bring_together, read_types, stop, write_types
+from catenary.procedure.telegrams import (
+    PRE_OP_STEPS,
+    SAFE_OP_STEPS,
+    check_unchanged,
+    run_idn_commands,
+)
 from catenary.wire.al import AlState
 
 READ_TIMEOUT = 60.0  # [s] to read one device for a plan: hundreds of slow SDOs
@@ -211,6 +217,10 @@ def _prepare(sub: SubDevice, plan: DevicePlan) -> Procedure[None]:
     if plan.downloads:
         writing = _write(_channel(sub), device, plan)
         yield from within(WRITE_TIMEOUT, sub.station, writing, "its configuration was")
+    if device.idn_commands:
+        yield from run_idn_commands(_channel(sub), device.idn_commands, PRE_OP_STEPS)
+    if device.sercos_axes:
+        yield from check_unchanged(_channel(sub), device)
     yield from configure_process_data(sub.station, device, plan)
     yield from run_commands(sub.station, plan.registers, "PS")
 
@@ -219,6 +229,8 @@ def _finish(sub: SubDevice, plan: DevicePlan) -> Procedure[None]:
     if plan.commands.in_safe_op:
         writing = write_in_safe_op(_channel(sub), plan)
         yield from within(WRITE_TIMEOUT, sub.station, writing, "its configuration was")
+    if sub.description.idn_commands:
+        yield from run_idn_commands(_channel(sub), sub.description.idn_commands, SAFE_OP_STEPS)
     yield from run_commands(sub.station, plan.registers, "SO")
 
 

@@ -19,8 +19,9 @@ from typing import TYPE_CHECKING, Literal
 from catenary.model.device import Identity
 from catenary.model.finding import Finding
 from catenary.plan.stop_reason import StopReason
-from catenary.wire import coe
+from catenary.wire import coe, soe
 from catenary.wire.drive_error import error_text
+from catenary.wire.sercos import idn_text
 
 if TYPE_CHECKING:
     from catenary.bus.sub_device import SubDevice
@@ -53,6 +54,28 @@ class Emergency(Event):
 
 
 @dataclass(frozen=True, slots=True)
+class SoeNotification(Event):
+    """Change of a procedure command that a SERCOS drive reports (ETG.1000.6 §5.9)."""
+
+    idn: int
+    drive: int
+    elements: int
+    data: bytes
+
+
+@dataclass(frozen=True, slots=True)
+class SoeEmergency(Event):
+    """Fault reported by a SERCOS drive (ETG.1000.6 §5.9). S-0-0095 has its text.
+
+    The manual of the drive explains the data.
+    """
+
+    idn: int  # number in the header; 0 if the drive does not use it
+    drive: int
+    data: bytes
+
+
+@dataclass(frozen=True, slots=True)
 class DiagnosisReported(Event):
     """New message in the diagnosis history of a device (object 0x10F3); see `Loop(diagnosis=...)`.
 
@@ -78,6 +101,17 @@ class SynchronisationFault(Event):
     counter: str
     count: int  # increase since the last reading
     total: int  # value of the counter
+
+
+@dataclass(frozen=True, slots=True)
+class EthernetDropped(Event):
+    """Ethernet frames of a device (EoE) that were dropped since the last such event.
+
+    There is at most one event per second and device. See `sub.eoe.connect`.
+    """
+
+    count: int
+    reasons: dict[str, int]  # count by reason
 
 
 @dataclass(frozen=True, slots=True)
@@ -220,6 +254,18 @@ class ModeRefused(Event):
 
 
 @dataclass(frozen=True, slots=True)
+class GatewayWrite(Event):
+    """Write access of a client of `cat.Gateway` to a device, after its end."""
+
+    peer: str  # protocol, address and port of the client, such as "TCP 127.0.0.1:50000"
+    what: str  # the access, such as "SDO download 0x6065:00"
+    result: str  # "done", or the answer of the device
+    index: int | None  # object; None for files and other protocols
+    subindex: int | None
+    data: bytes  # its first bytes, at most 16
+
+
+@dataclass(frozen=True, slots=True)
 class Marker(Event):
     """Mark in the sequence of cycles, set by the application with `MainDevice.mark`."""
 
@@ -240,3 +286,26 @@ def emergency(time: float, sub: SubDevice, message: coe.Emergency) -> Emergency:
     )
     rest = f", data {message.data.hex(' ')}" if any(message.data) else ""
     return Emergency(time, sub, f"{sub.station}: {what}{rest}", code, register, message.data)
+
+
+def soe_event(
+    time: float, sub: SubDevice, message: soe.Message
+) -> SoeNotification | SoeEmergency | None:
+    """Return the event for a notification or emergency of a drive; None for other messages.
+
+    Args:
+        time: Time of the message on the link's clock [s].
+        sub: Device that sent it.
+        message: Decoded message.
+    """
+    drive = f" of drive {message.drive}" if message.drive else ""
+    data = f", data {message.data.hex(' ')}" if message.data else ""
+    if message.op_code is soe.OpCode.NOTIFICATION:
+        what = f"{sub.station}: notification of {idn_text(message.number)}{drive}{data}"
+        return SoeNotification(
+            time, sub, what, message.number, message.drive, message.elements, message.data
+        )
+    if message.op_code is soe.OpCode.EMERGENCY:
+        what = f"{sub.station}: SoE emergency{drive}{data}"
+        return SoeEmergency(time, sub, what, message.number, message.drive, message.data)
+    return None

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from functools import partial
 from typing import TYPE_CHECKING
 
@@ -12,7 +13,7 @@ from catenary.bus.runner import BlockingRunner
 from catenary.bus.sdo import Objects, read_each
 from catenary.bus.segment_scan import ScannedDevice, find, oddities, with_places
 from catenary.bus.sub_device import SubDevice
-from catenary.errors import LinkError
+from catenary.errors import DecodeError, LinkError
 from catenary.link import ring_of
 from catenary.model.device import DeviceDescription
 from catenary.procedure.live_outputs import Running, find_refreshed, find_running
@@ -26,6 +27,8 @@ from catenary.procedure.stations import (
     reset,
 )
 from catenary.wire.al import STATE_MASK, AlState
+from catenary.wire.mailbox import Mailbox, Type
+from catenary.wire.soe import decode_soe
 
 if TYPE_CHECKING:  # plan imports NumPy, which a scan does not need
     from catenary.bus.diagnosis import Diagnosis
@@ -201,6 +204,7 @@ class FrameMaster:
         known.description, known.channel = found.description, found.channel
         if known.channel is not None:
             known.channel.listen(partial(self._on_emergency, known))
+            known.channel.subscribers[Type.SOE] = partial(self._on_soe, known)
         known.error = found.error
         known.state = AlState.PRE_OP if found.error is None else None
         return known
@@ -209,3 +213,12 @@ class FrameMaster:
         self._main.events.put(
             event_types.emergency(received.time_ns * 1e-9, sub, received.emergency)
         )
+
+    def _on_soe(self, sub: SubDevice, message: Mailbox, time_ns: int) -> bool:
+        """Turn a notification or emergency into an event. Return False for other messages."""
+        with suppress(DecodeError):
+            event = event_types.soe_event(time_ns * 1e-9, sub, decode_soe(message.data))
+            if event is not None:
+                self._main.events.put(event)
+                return True
+        return False

@@ -17,6 +17,7 @@ from catenary.bus.master import Complete, Master, MasterSource
 from catenary.bus.pending import Pending
 from catenary.bus.runner import BUSY_WAIT, BlockingRunner, FrameCounts, LinkLent, Runner, Watch
 from catenary.bus.sdo import Objects
+from catenary.bus.segment_eoe import SegmentEoe
 from catenary.bus.segment_scan import check_identity
 from catenary.bus.sub_device import SubDevice
 from catenary.bus.sub_devices import SubDevices
@@ -65,6 +66,7 @@ class MainDevice:
         self.clock_delays_ns: tuple[int | None, ...] = ()  # from the first clock, by position
         self.clock_epoch_ns = 0  # system time of the clocks minus link time
         self.events = Events()  # iterate over it, or call get(timeout=)
+        self.eoe = SegmentEoe(self)  # Ethernet ports of the devices
         self._callbacks = callbacks = Callbacks()
         events = self.events
         events.listen(lambda each: callbacks.report(events.stamped(each)))
@@ -76,6 +78,8 @@ class MainDevice:
         self._blocking: BlockingRunner | None = None
         self._attached: Runner | None = None
         self._leave_loop: Callable[[], object] | None = None  # ends the running loop
+        # of the running loop: returns the axes of a device, by position, that have power
+        self._powered: Callable[[int], Sequence[str]] | None = None
         self.master: Master = (
             source.make_master(self)
             if isinstance(source, MasterSource)
@@ -159,7 +163,7 @@ class MainDevice:
         if not self._is_inherited:
             return
         self.master.forget()
-        self._link = self._blocking = self._attached = self._leave_loop = None
+        self._link = self._blocking = self._attached = self._leave_loop = self._powered = None
         if self._ownership is not None:
             self._ownership.release()
 
@@ -197,6 +201,7 @@ class MainDevice:
         if self._link is None:
             return
         try:
+            self.eoe.close()  # its threads use the link
             if self._leave_loop is not None:
                 self._leave_loop()  # an open loop must not continue without its link
             if self.subs:
@@ -488,8 +493,27 @@ class MainDevice:
                 "notebook, before you run its cell again)"
             )
 
+    def powered_axes(self, position: int) -> Sequence[str] | None:
+        """Return the axes of a device that have power, or are requested to be enabled.
+
+        The states are those of the last iteration of the loop.
+
+        Args:
+            position: Position of the device.
+
+        Returns:
+            Names of the axes; None if no loop runs, or it does not report its axes.
+        """
+        powered = self._powered
+        return None if powered is None else powered(position)
+
     @contextlib.contextmanager
-    def attached(self, runner: Runner, leave: Callable[[], object] | None = None) -> Iterator[None]:
+    def attached(
+        self,
+        runner: Runner,
+        leave: Callable[[], object] | None = None,
+        powered: Callable[[int], Sequence[str]] | None = None,
+    ) -> Iterator[None]:
         """Within the block, pass procedures to the runner of a loop and refuse scans.
 
         Entering waits for the procedures of other threads, because the loop needs exclusive use of
@@ -498,10 +522,11 @@ class MainDevice:
         Args:
             runner: Runner of the loop.
             leave: Function that ends the loop.
+            powered: Function that returns the axes of a device, by position, that have power.
         """
         self.require_no_loop()
         blocking = self.runner
-        self._attached, self._leave_loop = runner, leave
+        self._attached, self._leave_loop, self._powered = runner, leave, powered
         blocking.lend()
         try:
             yield
@@ -511,7 +536,7 @@ class MainDevice:
     def _detach(self) -> None:
         if self._blocking is not None:
             self._blocking.take_back()
-        self._attached = self._leave_loop = None
+        self._attached = self._leave_loop = self._powered = None
 
     @property
     def _any_runner(self) -> Runner:

@@ -24,6 +24,7 @@ from catenary.procedure.sii import read_image
 from catenary.procedure.sii_owner import hand_over
 from catenary.procedure.station import Station, station_of, within
 from catenary.procedure.stations import StationRegisters
+from catenary.procedure.telegrams import with_telegrams
 from catenary.wire.al import AlState
 
 READ_TIMEOUT = 30.0  # [s] for the registers and the SII of one device
@@ -97,6 +98,8 @@ def bring_to_pre_op(
         if device.modular is not None:
             device = complete((yield from read_module_lists(channel, device)))
         device = yield from read_first_mapping(channel, device)
+    elif device.soe:
+        device = yield from with_telegrams(channel, device)
     device = yield from name_entries(channel, device)
     return ScannedDevice(device, channel)
 

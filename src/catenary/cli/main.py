@@ -20,10 +20,12 @@ from catenary.cli import (
     demo,
     diag,
     doctor,
+    eoe,
     esi,
     firmware,
     foe,
     foxglove,
+    gateway,
     graph,
     include,
     init,
@@ -39,6 +41,7 @@ from catenary.cli import (
     sdo,
     shell,
     sii,
+    soe,
     state,
     top,
     virtual,
@@ -49,8 +52,8 @@ VIRTUAL_TIME = "times are virtual: they come from the segment's clock, not from 
 PROGRAM = "catenary"
 DESCRIPTION = "Real-time EtherCAT for Python."
 COMMANDS = (
-    *(scan, state, graph, diag, messages, pdos, sdo, foe, aoe, firmware, reg, alias, sii, esi),
-    *(init, check, clone, capture),
+    *(scan, state, graph, diag, messages, pdos, sdo, foe, aoe, soe, firmware, eoe, reg, alias),
+    *(sii, esi, gateway, init, check, clone, capture),
     *(demo, shell, dashboard, top, doctor, bench, virtual, realtime),
     *(data, record, merge, plot, foxglove, ros2, include, completion),
 )

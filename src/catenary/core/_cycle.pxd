@@ -3,6 +3,7 @@ from libc.stdint cimport int32_t, int64_t, uint8_t, uint16_t, uint32_t, uint64_t
 from catenary.core._axes cimport axes_t
 from catenary.core._axis_log cimport axis_log_t
 from catenary.core._clocks cimport clock_t
+from catenary.core._copies cimport copies_t
 from catenary.core._handover cimport actual_t, handover_t, target_t
 from catenary.core._histogram cimport histogram_t
 from catenary.core._acyclic_queue cimport acyclic_queue_t
@@ -61,6 +62,7 @@ cdef struct cycle_t:
     const cat_link *link
     cat_image *image
     axes_t *axes
+    copies_t *copies           # NULL: no copies between devices
     acyclic_queue_t *acyclic
     handover_t *handover
     clock_t *clock             # NULL: no distributed clocks

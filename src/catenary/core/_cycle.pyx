@@ -52,6 +52,7 @@ from catenary.core._axes cimport (
 )
 from catenary.core._axis_log cimport axis_log_put
 from catenary.core._clocks cimport clock_close
+from catenary.core._copies cimport copies_write
 from catenary.core._handover cimport (
     BEFORE_LAW,
     CLOCKS,
@@ -396,6 +397,14 @@ cdef void send(cycle_t *c) noexcept nogil:
         cat_trigger_send(c.trigger.sends, c.scheduled, c.period)
 
 
+cdef inline void write_outputs(cycle_t *c, const target_t *target, bint fresh,
+                               uint64_t number) noexcept nogil:
+    """Write all outputs of cycle `number` into the image."""
+    axes_write(c.axes, target, fresh, number)
+    if c.copies != NULL:
+        copies_write(c.copies)
+
+
 cdef bint take_streamed(cycle_t *c, target_t *target, bint fresh, uint64_t number) noexcept nogil:
     """Take the next row of the stream for the outputs of cycle `number`. Return True for fresh
     set-points. Once a row was taken, an empty stream is an underrun. After the stream was removed,
@@ -571,7 +580,7 @@ cdef bint step_law(cycle_t *c, actual_t *actual, target_t *target) noexcept nogi
 cdef void compute_next(cycle_t *c, actual_t *actual, target_t *target) noexcept nogil:
     """Run a law's part of a cycle: one step, and the outputs of the next cycle."""
     cdef bint fresh = step_law(c, actual, target)
-    axes_write(c.axes, target, fresh, c.number + 1)
+    write_outputs(c, target, fresh, c.number + 1)
     if c.image.fill != NULL:
         c.image.fill(c.image.self)
     c.computed = 1
@@ -611,7 +620,7 @@ cdef void write_committed(cycle_t *c, target_t *committed, bint fresh) noexcept 
         c.process = committed.header.process_ns
         c.input_age = committed.header.input_age_ns
     fresh = take_streamed(c, committed, fresh, c.number)
-    axes_write(c.axes, committed, fresh, c.number)
+    write_outputs(c, committed, fresh, c.number)
     if not fresh and not c.axes.handed_over:
         c.flags |= UNCOMMITTED
         if not committed.header.streamed:  # else an underrun
@@ -697,7 +706,7 @@ cdef void cycle_outputs(cycle_t *c, target_t *target, bint application) noexcept
     target.header.seen = c.number
     target.header.stamp = c.number
     target.header.hold = not application
-    axes_write(c.axes, target, take_streamed(c, target, True, c.number), c.number)
+    write_outputs(c, target, take_streamed(c, target, True, c.number), c.number)
     send(c)
     if c.number > 0 and c.usable != 0:
         record_of(c).send_ns = short_ns(c.sent - done)

@@ -2,6 +2,7 @@ from libc.stdint cimport int64_t, uint16_t, uint32_t, uint64_t
 
 from catenary.core._axes cimport Axes
 from catenary.core._clocks cimport Clock
+from catenary.core._copies cimport Copies
 from catenary.core._cycle cimport cycle_t
 from catenary.core._figures cimport Figures
 from catenary.core._frames cimport Frames
@@ -28,6 +29,7 @@ cdef class Engine:
     cdef tuple owners          # owners of the two tables
     cdef AcyclicQueue acyclic
     cdef Axes axes
+    cdef Copies copies         # between devices; None: none
     cdef readonly Clock clock  # None: no distributed clocks
     cdef Handover handover
     cdef dict _buffers

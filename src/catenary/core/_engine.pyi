@@ -149,6 +149,12 @@ class Engine:
         Any thread may call it.
         """
 
+    def end_copies(self) -> None:
+        """Send zeros instead of the copies between devices, from the next cycle on.
+
+        Any thread may call it.
+        """
+
     def run_until_stopped(self, timeout_ns: int) -> bool:
         """Run until every axis is disabled, in fault or lost.
 

@@ -24,6 +24,7 @@ from libc.string cimport memcpy
 from catenary.core._axes cimport Axes, axes_follow
 from catenary.core._capsules cimport image_in, link_in, sink_in
 from catenary.core._clocks cimport Clock
+from catenary.core._copies cimport Copies
 from catenary.core._cycle cimport (
     INLINE,
     INTERPRETER,
@@ -169,6 +170,8 @@ cdef class Engine:
             self.link = link_in(link)
         self.acyclic = AcyclicQueue(plan.acyclic_ns)
         self.axes = Axes(plan)
+        if plan.copies:
+            self.copies = Copies(plan)
         if plan.clock is not None:
             self.clock = Clock(plan.clock, plan.period_ns)
         self.handover = Handover(
@@ -202,6 +205,9 @@ cdef class Engine:
         c.link = self.link
         c.image = self.image
         c.axes = &self.axes.c
+        if self.copies is not None:
+            self.copies.c.image = self.image
+            c.copies = &self.copies.c
         c.acyclic = &self.acyclic.c
         c.handover = &self.handover.c
         self.virtual = c.link.flags & CAT_LINK_VIRTUAL_TIME != 0
@@ -326,6 +332,8 @@ cdef class Engine:
         if self.frames is not None:
             frames_flush(&self.frames.c)
         self.e.error = 0
+        if self.copies is not None:
+            self.copies.c.ended = 0
         self.e.done = 0
         self.left = -1
         handover_swap(self.h)  # discard the values of an earlier run
@@ -746,6 +754,10 @@ cdef class Engine:
     def quick_stop_all(self):
         cat_add32(&self.axes.c.stop_asked, 1)
 
+    def end_copies(self):
+        if self.copies is not None:
+            cat_store_release32(&self.copies.c.ended, 1)
+
     def run_until_stopped(self, int64_t timeout_ns):
         if not self.running:
             raise self.not_running()
@@ -765,6 +777,8 @@ cdef class Engine:
         if self.clock is not None:
             cat_memory_settle(&self.clock.memory)
         cat_memory_settle(&self.axes.memory)
+        if self.copies is not None:
+            cat_memory_settle(&self.copies.memory)
         cat_memory_settle(&self.handover.memory)
         cat_memory_settle(&self.acyclic.memory)
         cat_memory_settle(&self.figures.memory)
@@ -780,6 +794,8 @@ cdef class Engine:
         if self.clock is not None:
             cat_memory_add_state(&self.clock.memory, &state)
         cat_memory_add_state(&self.axes.memory, &state)
+        if self.copies is not None:
+            cat_memory_add_state(&self.copies.memory, &state)
         cat_memory_add_state(&self.handover.memory, &state)
         cat_memory_add_state(&self.acyclic.memory, &state)
         cat_memory_add_state(&self.figures.memory, &state)

@@ -119,6 +119,18 @@ class EsiInitCommand:
 
 
 @dataclass(frozen=True, slots=True)
+class EsiIdnCommand:
+    """IDN that the MainDevice writes at state transitions (`SoE/InitCmd`)."""
+
+    transitions: tuple[str, ...]
+    number: int  # IDN
+    data: bytes
+    drive: int = 0  # `Chn`
+    comment: str = ""
+    source: Source = NO_SOURCE
+
+
+@dataclass(frozen=True, slots=True)
 class EsiMailbox:
     """Mailbox protocols and their properties (`Mailbox`)."""
 
@@ -132,6 +144,7 @@ class EsiMailbox:
     data_link_layer: bool = False
     drive_channels: int = 0  # DS402Channels
     init_commands: tuple[EsiInitCommand, ...] = ()
+    idn_commands: tuple[EsiIdnCommand, ...] = ()
     source: Source = NO_SOURCE
 
 

@@ -62,9 +62,11 @@ PROFILE: Known = {
 INIT_COMMAND: Known = dict.fromkeys(
     ("Transition", "Index", "SubIndex", "Data", "Comment", "Timeout"), NOTHING
 )
+IDN_COMMAND: Known = dict.fromkeys(("Transition", "IDN", "Data", "Comment", "Timeout"), NOTHING)
 MAILBOX: Known = {
     "CoE": {"InitCmd": INIT_COMMAND},
-    **dict.fromkeys(("AoE", "EoE", "FoE", "SoE", "VoE"), NOTHING),
+    "SoE": {"InitCmd": IDN_COMMAND},
+    **dict.fromkeys(("AoE", "EoE", "FoE", "VoE"), NOTHING),
 }
 MAPPINGS: Known = {
     "AlternativeSmMapping": {"Name": NOTHING, "Sm": {"Pdo": NOTHING}},

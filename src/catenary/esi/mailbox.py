@@ -1,10 +1,10 @@
-"""Mailbox of an ESI device or module, and its CoE InitCmds (`Mailbox`)."""
+"""Mailbox of an ESI device or module, and its InitCmds of CoE and SoE (`Mailbox`)."""
 
 from __future__ import annotations
 
 import re
 
-from catenary.esi.device import EsiInitCommand, EsiMailbox
+from catenary.esi.device import EsiIdnCommand, EsiInitCommand, EsiMailbox
 from catenary.esi.findings import Findings, text_of
 from catenary.esi.values import plain_text, shown
 from catenary.esi.xml import Element
@@ -18,6 +18,7 @@ PROTOCOLS = {
     "SoE": MailboxProtocol.SOE,
     "VoE": MailboxProtocol.VOE,
 }
+DRIVES = tuple("01234567")
 TRANSITION = re.compile("[IPSOB]{2}")
 
 
@@ -46,6 +47,7 @@ def read_mailbox(device: Element, findings: Findings) -> EsiMailbox | None:
         data_link_layer=findings.flag(element, "DataLinkLayer"),
         drive_channels=findings.integer(coe, "DS402Channels", bits=8),
         init_commands=read_init_commands(element, findings),
+        idn_commands=_read_idn_commands(element, findings),
         source=findings.source(element),
     )
 
@@ -81,6 +83,36 @@ def _init_command(element: Element, findings: Findings) -> EsiInitCommand | None
         overwritten_by_module=findings.flag(element, "OverwrittenByModule"),
         depends_on_slot=findings.flag(element.find("Index"), "DependOnSlot"),
         timeout_ms=findings.integer(element.find("Timeout")),
+        comment=text_of(element, "Comment"),
+        source=findings.source(element),
+    )
+
+
+def _read_idn_commands(mailbox: Element, findings: Findings) -> tuple[EsiIdnCommand, ...]:
+    """Return the SoE InitCmds of a mailbox, in the order of the file."""
+    soe = mailbox.find("SoE")
+    elements = soe.all("InitCmd") if soe is not None else ()
+    found = (_idn_command(element, findings) for element in elements)
+    return tuple(command for command in found if command is not None)
+
+
+def _idn_command(element: Element, findings: Findings) -> EsiIdnCommand | None:
+    """Return an InitCmd; None if it cannot be sent."""
+    number = findings.required(element, "IDN", bits=16)
+    data = findings.data(element.find("Data"))
+    transitions = _transitions(element, findings)
+    drive = element.attributes.get("Chn", "0").strip()
+    if number is None or data is None or not transitions:
+        findings.warn(element, "InitCmd without IDN, data or transition is ignored")
+        return None
+    if drive not in DRIVES:
+        findings.warn(element, f"InitCmd with Chn {shown(drive)} is ignored: it must be 0 to 7")
+        return None
+    return EsiIdnCommand(
+        transitions=transitions,
+        number=number,
+        data=data,
+        drive=int(drive),
         comment=text_of(element, "Comment"),
         source=findings.source(element),
     )

@@ -7,6 +7,7 @@ from dataclasses import replace
 from catenary.esi.device import EsiDevice, EsiInitCommand, EsiMailbox, EsiOpMode
 from catenary.model.device import DeviceDescription, MailboxLayout, OpMode
 from catenary.model.esi_settings import (
+    IdnCommand,
     InitCommand,
     ModeAssignment,
     NamedMapping,
@@ -40,6 +41,7 @@ def with_settings(device: DeviceDescription, esi: EsiDevice) -> DeviceDescriptio
         op_modes=_op_modes(device.op_modes, esi.op_modes),
         sii_denies_lrw=device.sii_denies_lrw or esi.use_lrd_lwr,
         init_commands=tuple(map(init_command, commands)),
+        idn_commands=_idn_commands(esi.mailbox),
         named_mappings=tuple(
             NamedMapping(each.name, each.default, each.pdos, str(each.source))
             for each in esi.alternative_mappings
@@ -114,6 +116,20 @@ def init_command(described: EsiInitCommand) -> InitCommand:
         described.fixed,
         described.comment,
         str(described.source),
+    )
+
+
+def _idn_commands(mailbox: EsiMailbox | None) -> tuple[IdnCommand, ...]:
+    return tuple(
+        IdnCommand(
+            each.transitions,
+            each.number,
+            each.data,
+            each.drive,
+            comment=each.comment,
+            source=str(each.source),
+        )
+        for each in (() if mailbox is None else mailbox.idn_commands)
     )
 
 

@@ -42,6 +42,8 @@ class SubDevice(bus.SubDevice):
         self.foe = bus.Foe(self, unavailable="libethercat has no FoE: use ethercat foe_write")
         self.aoe = bus.Aoe(self, unavailable="libethercat has no AoE: use the interface eth0")
         self.voe = bus.Voe(self, unavailable="VoE of libethercat is not used: use eth0")
+        self.eoe = bus.Eoe(self, unavailable="the kernel master has its own interfaces: ip link")
+        self.soe = bus.Soe(self, unavailable="SoE needs frames of Catenary: use ethercat soe_read")
         self.kernel = kernel
         self._emergencies: deque[Emergency] = deque(maxlen=EMERGENCIES_KEPT)
         self._register_busy = False  # True while the register request is in use

@@ -8,7 +8,7 @@ from typing import Protocol
 from catenary.bus import MainDevice, SubDevice
 from catenary.plan.request import ProcessDataRequest
 
-REQUESTS = "Drives, Inputs, Outputs or ProcessData"
+REQUESTS = "Drives, Inputs, Outputs, ProcessData or Copies"
 PARTS = ("subs", "pdos", "tables", "bind")  # attributes of a LoopRequest
 
 

@@ -1,4 +1,7 @@
-"""Safe values of outputs, which a loop sends at its end, before the devices leave OP."""
+"""Safe values of outputs, which a loop sends at its end, before the devices leave OP.
+
+The areas of process data have chosen values. The destinations of copies between devices become 0.
+"""
 
 from __future__ import annotations
 
@@ -42,9 +45,11 @@ def confirm_safe(
     Raises:
         LoopError: A required device did not answer in time.
     """
-    if not plan.output_areas:
+    places = [(area.sync_unit, f"device {area.name}") for area in plan.output_areas]
+    places += [(copy.sync_unit, f"device {copy.device}") for copy in plan.copies]
+    if not places:
         return
-    units = {area.sync_unit for area in plan.output_areas}
+    units = {unit for unit, _ in places}
     missing = required = {unit for unit in units if not plan.sync_units[unit].optional}
     turn = (
         max(plan.sync_units[unit].divider for unit in units) + 2
@@ -58,7 +63,7 @@ def confirm_safe(
             return
     if not missing:
         return
-    names = ", ".join(f"device {a.name}" for a in plan.output_areas if a.sync_unit in missing)
+    names = ", ".join(dict.fromkeys(name for unit, name in places if unit in missing))
     raise LoopError(
         f"{names} did not confirm the safe values of its outputs",
         hint="a device that answers has received them, even if another device of its sync unit is "

@@ -7,12 +7,13 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from catenary.bus import SubDevice
-from catenary.drive import Drives
+from catenary.drive import Copies, Drives
 from catenary.drive.process_data import ProcessData
 from catenary.errors import CatenaryError, IdentityError, SegmentError
 from catenary.loop.devices import LoopRequest
 from catenary.machine.by_name import ByName
 from catenary.machine.comparison import Comparison, expected_identity
+from catenary.machine.copies import make_copies
 from catenary.machine.esi_files import check_esi_files
 from catenary.machine.file import MachineFile
 from catenary.machine.requests import (
@@ -31,6 +32,7 @@ class MachineParts:
     subs: ByName[SubDevice] = field(default_factory=lambda: ByName("device", {}, {}))
     drives: ByName[Drives] = field(default_factory=lambda: ByName("drives", {}, {}))
     process_data: ByName[ProcessData] = field(default_factory=lambda: ByName("data", {}, {}))
+    copies: Copies | None = None  # None: none, or not all of their devices are present
     requests: tuple[LoopRequest, ...] = ()
     variables: Variables = field(default_factory=lambda: Variables({}, {}, {}))  # of an ENI
     notes: tuple[str, ...] = ()  # warnings about an ENI, and its differences from the plan
@@ -91,11 +93,18 @@ def make_found(file: MachineFile, found: Sequence[Comparison[SubDevice]]) -> Mac
     drives = {role: make_drives(file, role, subs) for role in present}
     present, missing_data = _roles(file, "process_data", file.tables.process_data, absent)
     data = {role: make_process_data(file, role, subs) for role in present}
+    copies = make_copies(file, subs)
     return MachineParts(
         subs=ByName("device", subs, absent),
         drives=ByName("drives", drives, missing),
         process_data=ByName("process data", data, missing_data),
-        requests=(*drives.values(), *data.values(), *make_device_requests(file, subs)),
+        copies=copies,
+        requests=(
+            *drives.values(),
+            *data.values(),
+            *([] if copies is None else [copies]),
+            *make_device_requests(file, subs),
+        ),
     )
 
 

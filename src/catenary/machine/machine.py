@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Protocol, Self
 
 from catenary.bus import SubDevice
 from catenary.bus.master import MasterSource
-from catenary.drive import Drives
+from catenary.drive import Copies, Drives
 from catenary.drive.process_data import ProcessData
 from catenary.esi.eni import is_eni
 from catenary.link import LinkSource
@@ -152,6 +152,11 @@ class Machine:
     def process_data(self) -> ByName[ProcessData]:
         """Process data of the tables [process_data.NAME], by name."""
         return self._opened.process_data
+
+    @property
+    def copies(self) -> Copies | None:
+        """Copies of [[copy]] and [[fsoe]] whose devices are present; None if there are none."""
+        return self._opened.copies
 
     @property
     def variables(self) -> Variables:

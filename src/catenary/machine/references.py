@@ -19,6 +19,8 @@ _OBJECT = re.compile(r"0x([0-9A-Fa-f]{4}):([0-9A-Fa-f]{1,2})")
 # Lists that do not have one value per axis.
 WHOLE_LISTS = ("other_modes", "measured", "columns", "pdos", "axes")
 
+COPY_DEVICES = {"copy": ("source", "destination"), "fsoe": ("main", "sub")}
+
 
 class AxisAddress(NamedTuple):
     """Address of an axis in the file."""
@@ -42,6 +44,10 @@ def check_references(file: MachineFile) -> None:
         _check_lists(file, name, table)
     for name, data in file.tables.process_data.items():
         _check_process_data(file, ("process_data", name), data)
+    for kind, keys in COPY_DEVICES.items():
+        for number, table in enumerate(getattr(file.tables, kind)):
+            for key in keys:
+                check_device(file, (kind, number, key), getattr(table, key))
     _check_op_modes(file)
     reference = file.tables.clocks.reference
     if reference is not UNSET:

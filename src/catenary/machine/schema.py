@@ -173,6 +173,16 @@ class HomingTable(Table, frozen=True, kw_only=True):
     offset: Optional[Position] = UNSET
 
 
+class TouchProbeTable(Table, frozen=True, kw_only=True):
+    """`touch_probe` of drives (cat.drive.TouchProbe)."""
+
+    probes: Optional[list[Literal[1, 2]]] = UNSET
+    edges: Optional[list[Literal["rising", "falling"]]] = UNSET
+    times: Optional[bool] = UNSET
+    counters: Optional[bool] = UNSET
+    toggles: Optional[bool] = UNSET
+
+
 class DrivesTable(Table, frozen=True, kw_only=True):
     """[drives.NAME]: drives of one or more axes (cat.Drives). A list has one value per axis."""
 
@@ -202,6 +212,7 @@ class DrivesTable(Table, frozen=True, kw_only=True):
     homing: Optional[PerAxis[HomingTable]] = UNSET
     measured: Optional[list[Literal["position", "velocity", "torque"]]] = UNSET
     columns: Optional[list[str | ColumnTable]] = UNSET
+    touch_probe: Optional[bool | TouchProbeTable] = UNSET
     required: Optional[bool] = UNSET
     divider: Optional[Divider] = UNSET
     clock: Optional[bool | ClockTable] = UNSET
@@ -233,6 +244,38 @@ class ProcessDataTable(Table, frozen=True, kw_only=True):
     clock: Optional[bool | ClockTable] = UNSET
 
 
+CopyPlaceText = Annotated[
+    str | Word,
+    Meta(
+        description="name or index of a PDO, name of an object, object, or bytes",
+        examples=["FSoE main frame", "0x1A00", "0x6000:01", "bytes 0 to 5"],
+    ),
+]
+DeviceName = Annotated[str, Meta(description="name of a device")]
+
+
+class CopyTable(Table, frozen=True, kw_only=True):
+    """[[copy]]: inputs of a device that the cycle sends as outputs of another one (cat.Copy)."""
+
+    source: DeviceName
+    source_place: CopyPlaceText
+    destination: DeviceName
+    destination_place: CopyPlaceText
+    comment: str = ""
+
+
+class FsoeTable(Table, frozen=True, kw_only=True):
+    """[[fsoe]]: safety frames that the cycle relays in both directions (cat.FsoeConnection)."""
+
+    main: Annotated[str, Meta(description="name of the device with the FSoE MainInstance")]
+    main_inputs: CopyPlaceText
+    main_outputs: CopyPlaceText
+    sub: Annotated[str, Meta(description="name of the device with the FSoE SubInstance")]
+    sub_inputs: CopyPlaceText
+    sub_outputs: CopyPlaceText
+    comment: str = ""
+
+
 class MachineTables(Table, frozen=True, kw_only=True):
     """Machine with its devices, drives, process data and loop."""
 
@@ -247,6 +290,8 @@ class MachineTables(Table, frozen=True, kw_only=True):
     device: list[DeviceTable] = []
     drives: dict[str, DrivesTable] = {}
     process_data: dict[str, ProcessDataTable] = {}
+    copy: list[CopyTable] = []
+    fsoe: list[FsoeTable] = []
 
 
 def json_schema() -> dict[str, object]:

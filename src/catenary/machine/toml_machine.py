@@ -58,7 +58,7 @@ class TomlMachine:
             MachineFileError: There are neither drives nor process data with present devices.
             KeyError: The device of `clocks.reference` is absent.
         """
-        if not parts.drives and not parts.process_data:
+        if not (parts.drives or parts.process_data or parts.copies):
             raise self._file.error(
                 (),
                 "no drives or process data have all their devices present",

@@ -13,6 +13,7 @@ from typing import NamedTuple
 from catenary.model.esi_settings import (
     NO_TIMEOUTS,
     NO_WATCHDOG_VALUES,
+    IdnCommand,
     InitCommand,
     ModeAssignment,
     NamedMapping,
@@ -30,6 +31,7 @@ from catenary.model.process_data import (
     mapped_pdos,
 )
 from catenary.model.register_command import RegisterCommand
+from catenary.model.sercos_axis import SercosAxis
 from catenary.wire.features import Information
 from catenary.wire.sii import MailboxProtocol
 from catenary.wire.sii_categories import SyncManagerUse
@@ -171,6 +173,7 @@ class DeviceDescription:
     documented: tuple[ObjectInformation, ...] = ()  # dictionary of its ESI
     init_commands: tuple[InitCommand, ...] = ()
     register_commands: tuple[RegisterCommand, ...] = ()  # of an ENI, at the transitions
+    idn_commands: tuple[IdnCommand, ...] = ()  # of an ESI or ENI, at the transitions
     commands_origin: str = "ESI"  # kind of the file that gives the commands: "ESI" or "ENI"
     named_mappings: tuple[NamedMapping, ...] = ()
     timeouts: Timeouts = NO_TIMEOUTS
@@ -178,6 +181,7 @@ class DeviceDescription:
     modular: ModularDevice | None = None  # slots and modules, from an ESI file
     given_name: str = ""  # name in a machine file
     bootstrap: MailboxLayout | None = None  # mailbox in BOOT; None: not stated
+    sercos_axes: tuple[SercosAxis, ...] = ()  # of a device with SoE and without CoE
 
     @property
     def full_name(self) -> str:
@@ -211,6 +215,11 @@ class DeviceDescription:
     def coe(self) -> bool:
         """True if the mailbox supports CoE."""
         return self.mailbox is not None and self.mailbox.coe
+
+    @property
+    def soe(self) -> bool:
+        """True if the mailbox supports SoE."""
+        return self.mailbox is not None and MailboxProtocol.SOE in self.mailbox.protocols
 
     def assignments(self, direction: Direction) -> tuple[Assignment, ...]:
         """Return the assigned PDOs of one direction, by SyncManager."""

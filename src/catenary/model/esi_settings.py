@@ -42,6 +42,19 @@ class InitCommand:
 
 
 @dataclass(frozen=True, slots=True)
+class IdnCommand:
+    """IDN that an ESI or ENI requires to be written at state transitions (`SoE/InitCmd`)."""
+
+    transitions: tuple[str, ...]  # such as ("PS",): PRE-OP to SAFE-OP
+    number: int  # IDN
+    data: bytes  # a list begins with its lengths
+    drive: int = 0
+    element: int = 0x40  # the value
+    comment: str = ""
+    source: str = ""
+
+
+@dataclass(frozen=True, slots=True)
 class Timeouts:
     """Timeouts of state changes and the mailbox [s]; None if unknown."""
 

@@ -78,6 +78,21 @@ class ImageArea:
     safe: bytes = b""
 
 
+@dataclass(frozen=True, slots=True)
+class ImageCopy:
+    """Bits of the input image that the core sends as outputs in the next cycle.
+
+    They are whole bytes in both images, or at most 64 bits.
+    """
+
+    name: str  # both places as text
+    input_bit: int
+    output_bit: int
+    bit_length: int
+    device: int  # position of the destination on the segment
+    sync_unit: int  # of the destination
+
+
 class DatagramKind(IntEnum):
     """Purpose of a datagram in the cycle."""
 
@@ -229,6 +244,7 @@ class CyclePlan:
     input_columns: tuple[Column, ...] = ()
     output_areas: tuple[ImageArea, ...] = ()
     input_areas: tuple[ImageArea, ...] = ()
+    copies: tuple[ImageCopy, ...] = ()  # between devices, in every cycle
     lost_limit: int = 3  # consecutive bad cycles before WorkingCounterError
     # Time without fresh set-points (at least 3 cycles) before a quick stop; 0: never (not in CST)
     late_limit_position_ns: int = 50_000_000  # CSP

@@ -25,7 +25,15 @@ from dataclasses import dataclass
 from catenary.errors import ConfigurationError, MappingError
 from catenary.model.device import Assignment, DeviceDescription, Direction
 from catenary.plan.cycle import Number
-from catenary.plan.numbers import ANY, MappedNumber, Which, find_number, numbers
+from catenary.plan.numbers import (
+    ANY,
+    MappedNumber,
+    MappedPdo,
+    Which,
+    find_number,
+    mapped_pdos,
+    numbers,
+)
 from catenary.wire.sync_manager import WATCHDOG_TRIGGER
 
 LOGICAL_BASE = 0x0001_0000
@@ -141,6 +149,8 @@ class Layout:
     input_size: int
     outputs: tuple[tuple[MappedNumber, ...], ...]  # by position
     inputs: tuple[tuple[MappedNumber, ...], ...]
+    output_pdos: tuple[tuple[MappedPdo, ...], ...]  # by position
+    input_pdos: tuple[tuple[MappedPdo, ...], ...]
 
     def output(self, device: int, index: int, subindex: int, which: Which = ANY) -> Number | None:
         return find_number(self.outputs[device], index, subindex, which)
@@ -150,6 +160,11 @@ class Layout:
 
     def sync_unit(self, device: int) -> int:
         return self.devices[device].sync_unit
+
+    def pdo_bits(self, device: int, direction: Direction, index: int) -> range | None:
+        """Return the bits of a PDO in the image of a direction; None if it is not assigned."""
+        pdos = (self.output_pdos, self.input_pdos)[direction][device]
+        return next((pdo.bits for pdo in pdos if pdo.index == index), None)
 
     def byte_range(self, device: int, direction: Direction) -> range:
         """Return the bytes of a device in the image of a direction."""
@@ -197,6 +212,8 @@ def make_layout(devices: Sequence[DeviceData], unit_max: int = UNIT_MAX) -> Layo
         input_offset,
         tuple(numbers(data.outputs, place.output_offset) for data, place in both),
         tuple(numbers(data.inputs, place.input_offset) for data, place in both),
+        tuple(mapped_pdos(data.outputs, place.output_offset) for data, place in both),
+        tuple(mapped_pdos(data.inputs, place.input_offset) for data, place in both),
     )
 
 

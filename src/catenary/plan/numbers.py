@@ -47,6 +47,31 @@ def entry_places(assignments: Sequence[Assignment], offset: int) -> Iterator[Ent
 
 
 @dataclass(frozen=True, slots=True)
+class MappedPdo:
+    """One PDO in an image, with its gaps."""
+
+    index: int
+    bits: range  # from the start of the image
+
+
+def mapped_pdos(assignments: Sequence[Assignment], offset: int) -> tuple[MappedPdo, ...]:
+    """Return the PDOs in the order of the image.
+
+    Args:
+        assignments: SyncManagers and their PDOs.
+        offset: First byte of the device in the image.
+    """
+    found = []
+    for assignment in assignments:
+        bit = offset * 8
+        for pdo in assignment.pdos:
+            found.append(MappedPdo(pdo.index, range(bit, bit + pdo.bit_length)))
+            bit += pdo.bit_length
+        offset += assignment.byte_length
+    return tuple(found)
+
+
+@dataclass(frozen=True, slots=True)
 class MappedNumber:
     """One mapped object in an image."""
 

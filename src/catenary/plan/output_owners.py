@@ -63,6 +63,8 @@ def _owned(rank: int, table: RequestTables) -> Iterator[Owned]:
         yield Owned(rank, column.name, _bytes(column.number))
     for area in table.output_areas:
         yield Owned(rank, "", range(area.image_offset, area.image_offset + area.size))
+    for copy in table.copies:
+        yield Owned(rank, f"copy {copy.name}", _byte_range(copy.output_bit, copy.bit_length))
 
 
 def _axis_outputs(axis: AxisPlan) -> Iterator[tuple[str, Number]]:
@@ -73,8 +75,12 @@ def _axis_outputs(axis: AxisPlan) -> Iterator[tuple[str, Number]]:
 
 
 def _bytes(number: Number) -> range:
-    last = number.bit_offset + number.bit_length - 1
-    return range(number.bit_offset // 8, last // 8 + 1)
+    return _byte_range(number.bit_offset, number.bit_length)
+
+
+def _byte_range(bit: int, length: int) -> range:
+    """Return the bytes that contain some bits."""
+    return range(bit // 8, (bit + length - 1) // 8 + 1)
 
 
 def _column_of_axis(
@@ -108,5 +114,6 @@ def _conflict(
     )
     return ConfigurationError(
         f"{device}: two requests write byte {byte - start} of its outputs: {writers}",
-        hint="let one of them write it; ProcessData(sub, outputs={}) only reads",
+        hint="let one of them write it; ProcessData(sub, outputs={}) only reads, and "
+        "Outputs(sub, channels=...) writes only the objects it names",
     )

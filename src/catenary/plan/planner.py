@@ -230,6 +230,7 @@ def _make_cycle(
         input_columns=(*input_columns, *mailboxes.columns),
         output_areas=tuple(area for table in tables for area in table.output_areas),
         input_areas=tuple(area for table in tables for area in table.input_areas),
+        copies=tuple(copy for table in tables for copy in table.copies),
         wire_ns=wire_ns,
         acyclic_ns=acyclic_ns,
     )

@@ -46,6 +46,7 @@ def report(
             *_devices(devices),
             *_start_up(devices),
             *_axes(cycle, axes),
+            *_copies(cycle),
             *clocks,
             *_frames(cycle),
             *_units(layout),
@@ -204,6 +205,16 @@ def _entries(direction: Direction, assignments: Sequence[Assignment], offset: in
         for _, entry, bit in places:
             what = str(entry) if entry.index else f"gap ({entry.bit_length} bits)"
             yield f"        {bit // 8:>5}.{bit % 8}  {what}"
+
+
+def _copies(cycle: CyclePlan) -> Iterator[str]:
+    """Yield the copies between devices."""
+    if cycle.copies:
+        yield "copies between devices, in every cycle"
+    for copy in cycle.copies:
+        whole = copy.bit_length % 8 == 0
+        size = f"{copy.bit_length // 8} bytes" if whole else f"{copy.bit_length} bits"
+        yield f"    {copy.name}, {size}"
 
 
 def _frames(cycle: CyclePlan) -> Iterator[str]:

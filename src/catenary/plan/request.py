@@ -16,7 +16,7 @@ import numpy.typing as npt
 from catenary.model.device import Direction
 from catenary.model.module import ConfiguredModule
 from catenary.plan.axis_report import AxisReport
-from catenary.plan.cycle import AxisPlan, Column, ImageArea, Number
+from catenary.plan.cycle import AxisPlan, Column, ImageArea, ImageCopy, Number
 from catenary.plan.numbers import ANY, Which
 from catenary.plan.start_up_object import StartUp
 
@@ -159,6 +159,9 @@ class ImageLayout(Protocol):
     def byte_range(self, device: int, direction: Direction) -> range:
         """Return the bytes of a device in the image of a direction."""
 
+    def pdo_bits(self, device: int, direction: Direction, index: int) -> range | None:
+        """Return the bits of a PDO in the image of a direction; None if it is not assigned."""
+
 
 @dataclass(frozen=True, slots=True)
 class RequestTables:
@@ -170,6 +173,7 @@ class RequestTables:
     axis_reports: tuple[AxisReport, ...] = ()
     output_areas: tuple[ImageArea, ...] = ()
     input_areas: tuple[ImageArea, ...] = ()
+    copies: tuple[ImageCopy, ...] = ()
 
 
 class Mover(Protocol):
@@ -231,6 +235,9 @@ class Views:
     is_open: Callable[[], bool] = lambda: True
     # Returns True while a law or a stream sets the targets
     is_led: Callable[[], bool] = lambda: False
+    # Returns the system time of the distributed clocks at the start of the present cycle [ns]; None
+    # without distributed clocks
+    system_time: Callable[[], int | None] = lambda: None
 
 
 class ProcessDataRequest(Protocol):

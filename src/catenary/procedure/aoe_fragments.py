@@ -121,9 +121,9 @@ def _next(channel: MailboxChannel, before: Fragment, timeout: float) -> Procedur
     """Return the fragment after `before`. Acknowledge that one if the device waits for this."""
     accept = _acceptor(channel, before)
     if before.flags & Flag.NO_RETURN:
-        return (yield from further(channel, Type.AOE, accept, timeout=timeout))
+        return (yield from further(channel, accept, timeout=timeout, kind=Type.AOE))
     try:
-        return (yield from further(channel, Type.AOE, accept, timeout=GRACE))
+        return (yield from further(channel, accept, timeout=GRACE, kind=Type.AOE))
     except ResponseTimeout:
         acknowledgement = before.acknowledge().encode()
         return (yield from converse(channel, Type.AOE, acknowledgement, accept, timeout=timeout))

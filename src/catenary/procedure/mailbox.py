@@ -90,13 +90,24 @@ def turn_comes(channel: MailboxChannel, seconds: float) -> Procedure[bool]:
     ticket = object()
     channel.turns.append(ticket)
     try:
-        for _ in range(round(seconds / TURN)):
-            if channel.turns[0] is ticket:
-                return True
-            yield after(TURN)
-        return channel.turns[0] is ticket
+        return (yield from turn_comes_for(channel, ticket, seconds))
     finally:
         channel.turns.remove(ticket)
+
+
+def turn_comes_for(channel: MailboxChannel, ticket: object, seconds: float) -> Procedure[bool]:
+    """Wait until a ticket is the first in the queue of a mailbox. Return False if it is too late.
+
+    Args:
+        channel: The mailbox of the device.
+        ticket: Element of `channel.turns`.
+        seconds: Longest time to wait [s].
+    """
+    for _ in range(round(seconds / TURN)):
+        if channel.turns[0] is ticket:
+            return True
+        yield after(TURN)
+    return channel.turns[0] is ticket
 
 
 def converse(
@@ -135,7 +146,7 @@ def converse(
             channel.repetitions = 0  # the mailbox was empty: no repetition is pending
         if sent and channel.answer_delay_ns:
             yield after(channel.answer_delay_ns * 1e-9)
-        if stale and (older := (yield from _take(channel))) is not None:
+        if stale and (older := (yield from take(channel))) is not None:
             _drop_late(channel, older)
         before = channel.dropped
         answer = yield from _await(channel, accept, Deadline(patience if sent else GRACE))
@@ -151,18 +162,18 @@ def converse(
 
 def further(
     channel: MailboxChannel,
-    kind: Type,
     accept: Callable[[Mailbox], T | None],
     *,
     timeout: float = READ_TIMEOUT,
+    kind: Type = Type.COE,
 ) -> Procedure[T]:
     """Receive the next part of an answer that consists of several messages.
 
     Args:
         channel: The mailbox of the device.
-        kind: The protocol of the message.
         accept: Function that converts a message. It returns None for an unexpected message.
         timeout: Longest time until the part arrives [s].
+        kind: The protocol of the message, for errors.
 
     Raises:
         ResponseTimeout: No answer within `timeout`, or too many frames were lost.
@@ -191,7 +202,7 @@ def _await(
         if received is None:
             return None
         channel.owed = False  # also if it is an error or cannot be decoded
-        answer = _sorted(channel, received, accept)
+        answer = accepted(channel, received, accept)
         if answer is not None:
             return answer
         channel.owed = True
@@ -260,8 +271,8 @@ def drain(channel: MailboxChannel, accept: Callable[[Mailbox], T | None]) -> Pro
     for _ in range(UNEXPECTED_MAX):  # a device may send without end; the rest is read later
         if not (yield from _is_full(channel, IN))[0]:
             break
-        received = yield from _take(channel)
-        answer = _sorted(channel, received, accept) if received is not None else None
+        received = yield from take(channel)
+        answer = accepted(channel, received, accept) if received is not None else None
         if answer is not None:
             found.append(answer)
     return found
@@ -334,7 +345,7 @@ def _fetch(channel: MailboxChannel, deadline: Deadline) -> Procedure[Mailbox | N
     pace = Pace(first)
     empty_ns: int | None = None
     while True:
-        arrived, received, time_ns = yield from _poll(channel)
+        arrived, received, time_ns = yield from poll(channel)
         if arrived:
             channel.learn(empty_ns)
         if received is not None:
@@ -350,7 +361,7 @@ def _fetch(channel: MailboxChannel, deadline: Deadline) -> Procedure[Mailbox | N
         yield after(pace.pause())
 
 
-def _poll(channel: MailboxChannel) -> Procedure[tuple[bool, Mailbox | None, int]]:
+def poll(channel: MailboxChannel) -> Procedure[tuple[bool, Mailbox | None, int]]:
     """Read the next message, if there is one.
 
     A small mailbox is read in the same frame as its status, if counters identify repetitions. So
@@ -373,8 +384,9 @@ def _poll(channel: MailboxChannel) -> Procedure[tuple[bool, Mailbox | None, int]
     check = read(EcatCommand.FPRD, station.address, sync_manager_status(IN))._replace(
         repeatable=False
     )
-    status, reply = yield [check, _read_request(channel)]
+    status, reply = yield [check, read_request(channel)]
     if reply.lost:
+        channel.lost_reads += 1
         channel.unsure_ns = reply.time_ns
         return False, None, reply.time_ns
     answered(status, station, "mailbox status")
@@ -382,11 +394,11 @@ def _poll(channel: MailboxChannel) -> Procedure[tuple[bool, Mailbox | None, int]
         channel.punctual = False
         return False, None, reply.time_ns
     channel.received_ns = reply.time_ns
-    return True, _decoded(channel, reply.data), reply.time_ns
+    return True, decoded(channel, reply.data), reply.time_ns
 
 
 def _poll_status_first(channel: MailboxChannel) -> Procedure[tuple[bool, Mailbox | None, int]]:
-    """Do the same as `_poll`, but read a full mailbox in a separate frame."""
+    """Do the same as `poll`, but read a full mailbox in a separate frame."""
     full, status = yield from _is_full(channel, IN)
     unsure_ns = channel.unsure_ns
     if not full and unsure_ns is not None and status.time_ns - unsure_ns > GRACE * 1e9:
@@ -395,7 +407,7 @@ def _poll_status_first(channel: MailboxChannel) -> Procedure[tuple[bool, Mailbox
     if not full:
         return False, None, status.time_ns
     channel.unsure_ns = None
-    return True, (yield from _take(channel)), status.time_ns
+    return True, (yield from take(channel)), status.time_ns
 
 
 def _is_full(channel: MailboxChannel, number: int) -> Procedure[tuple[bool, Reply]]:
@@ -405,23 +417,24 @@ def _is_full(channel: MailboxChannel, number: int) -> Procedure[tuple[bool, Repl
     return Status.MAILBOX_FULL in status, reply
 
 
-def _read_request(channel: MailboxChannel) -> Request:
+def read_request(channel: MailboxChannel) -> Request:
     layout = channel.layout
     return read_memory(
         channel.station.address, layout.send_offset, layout.send_size, repeatable=False
     )
 
 
-def _take(channel: MailboxChannel) -> Procedure[Mailbox | None]:
+def take(channel: MailboxChannel) -> Procedure[Mailbox | None]:
     """Read the mailbox. If the frame is lost, request a repetition.
 
     Return None if the mailbox was empty or contained a message that was already accepted.
     """
     for _ in range(RECOVERIES):
-        [reply] = yield [_read_request(channel)]
+        [reply] = yield [read_request(channel)]
         if not reply.lost:
             channel.received_ns = reply.time_ns
-            return _decoded(channel, reply.data) if reply.working_counter else None
+            return decoded(channel, reply.data) if reply.working_counter else None
+        channel.lost_reads += 1
         if not (yield from _request_repetition(channel)):
             return None
     raise ResponseTimeout(
@@ -430,7 +443,7 @@ def _take(channel: MailboxChannel) -> Procedure[Mailbox | None]:
     )
 
 
-def _decoded(channel: MailboxChannel, data: bytes) -> Mailbox | None:
+def decoded(channel: MailboxChannel, data: bytes) -> Mailbox | None:
     try:
         message = decode_mailbox(data)
     except DecodeError as error:
@@ -481,7 +494,7 @@ def _request_repetition(channel: MailboxChannel) -> Procedure[bool]:
     )
 
 
-def _sorted(
+def accepted(
     channel: MailboxChannel, message: Mailbox, accept: Callable[[Mailbox], T | None]
 ) -> T | None:
     if message.type is Type.ERROR:

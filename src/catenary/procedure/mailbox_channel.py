@@ -51,6 +51,7 @@ class MailboxChannel:
     # Receivers of messages that no procedure expects, by protocol, for example Ethernet frames.
     subscribers: dict[Type, Subscriber] = field(default_factory=dict)
     dropped: int = 0  # unexpected messages and duplicates
+    lost_reads: int = 0  # lost frames that read the mailbox; each may have lost a message
     # Active and waiting procedures; the first one uses the mailbox.
     turns: deque[object] = field(default_factory=deque)
     posted_ns: int | None = None  # time of the last request, until its answer arrives

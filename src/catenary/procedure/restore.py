@@ -23,6 +23,8 @@ from catenary.procedure.sii import read_identity
 from catenary.procedure.sii_owner import hand_over
 from catenary.procedure.station import Station, answered
 from catenary.procedure.stations import FMMU_BLOCK, SYNC_MANAGER_BLOCK
+from catenary.procedure.telegrams import PRE_OP_STEPS, SAFE_OP_STEPS, run_idn_commands
+from catenary.procedure.telegrams import restore as restore_telegrams
 from catenary.wire.al import AlState
 from catenary.wire.datagram import EcatCommand
 from catenary.wire.register import (
@@ -158,12 +160,18 @@ def bring_to_safe_op(
         yield from write_downloads(channel, found, again)
         if again.mapping_changed:
             yield from verify_mapping(channel, device, again)
+    if channel is not None:
+        yield from run_idn_commands(channel, device.idn_commands, PRE_OP_STEPS)
+    if channel is not None and device.sercos_axes:
+        yield from restore_telegrams(channel, device)
     yield from configure_process_data(station, device, plan)
     yield from run_commands(station, plan.registers, "PS")
     if clock is not None:
         yield from clock
     yield from request_state(station, AlState.SAFE_OP)
     yield from write_in_safe_op(channel, plan)
+    if channel is not None:
+        yield from run_idn_commands(channel, device.idn_commands, SAFE_OP_STEPS)
     yield from run_commands(station, plan.registers, "SO")
 
 

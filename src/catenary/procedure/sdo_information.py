@@ -325,7 +325,7 @@ def _exchange(
     deadline = Deadline(ANSWER_TIMEOUT)
     while _is_continued(part):
         try:
-            part = yield from further(channel, Type.COE, accept_part)
+            part = yield from further(channel, accept_part)
             content = _content(channel, part, place)
         except FAILURES as error:
             return bytes(data), error.message.removeprefix(f"{channel.station}: ")

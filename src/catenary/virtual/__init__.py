@@ -14,12 +14,18 @@ from catenary.virtual.devices import (
     DigitalOutputs,
     Junction,
     ModelSensor,
+    OversamplingTerminal,
+    SafetyLogic,
+    SafetyTerminal,
+    SercosDrive,
     Servo,
 )
 from catenary.virtual.devices.described import DescribedDevice, from_esi
 from catenary.virtual.devices.motor import Motor
 from catenary.virtual.devices.servo_quirks import ServoQuirks
+from catenary.virtual.devices.touch_probe import ProbeOptions
 from catenary.virtual.devices.twin import Twin, TwinOptions
+from catenary.virtual.eoe.ethernet import Ethernet
 from catenary.virtual.fault_player import FaultEvent, Loss
 from catenary.virtual.faults import Fault
 from catenary.virtual.foe.firmware import make_firmware
@@ -30,6 +36,7 @@ from catenary.virtual.plant import Plant, PlantPart
 from catenary.virtual.segment import FrameCounters, Segment, demo_segment
 from catenary.virtual.server import Served, Server, serve, serve_all
 from catenary.virtual.sii_quirks import SiiQuirks
+from catenary.virtual.soe.quirks import SoeQuirks
 from catenary.virtual.vendor_protocol import VendorEcho, VendorMessages
 
 __all__ = [
@@ -43,6 +50,7 @@ __all__ = [
     "DeviceFirmware",
     "DigitalInputs",
     "DigitalOutputs",
+    "Ethernet",
     "Fault",
     "FaultEvent",
     "FrameCounters",
@@ -54,14 +62,20 @@ __all__ = [
     "MappingQuirks",
     "ModelSensor",
     "Motor",
+    "OversamplingTerminal",
     "Plant",
     "PlantPart",
+    "ProbeOptions",
+    "SafetyLogic",
+    "SafetyTerminal",
     "Segment",
+    "SercosDrive",
     "Served",
     "Server",
     "Servo",
     "ServoQuirks",
     "SiiQuirks",
+    "SoeQuirks",
     "Twin",
     "TwinOptions",
     "VendorEcho",

@@ -119,7 +119,7 @@ class Description:
     identification: int = 0
     ports: tuple[int, ...] = (0, 1)
     mapping_quirks: MappingQuirks = NO_MAPPING_QUIRKS
-    op_modes: tuple[OpMode, ...] = STANDARD  # for devices with a clock and axes
+    op_modes: tuple[OpMode, ...] = STANDARD  # of a clock; STANDARD only for devices with axes
     loop_control: bool = True  # True if 0x0101 can close the ports
     lrw: bool = True
     sii_variant: str = ""  # differences of the SII from the device
@@ -129,6 +129,7 @@ class Description:
     bootstrap: MailboxDefault | None = field(default=None, repr=False)  # mailbox in BOOT
     serves_files: bool = field(default=False, repr=False)  # FoE
     protocols: tuple[int, ...] = field(default=(), repr=False)  # beside CoE and FoE
+    serves_coe: bool = field(default=True, repr=False)
 
     @property
     def vendor(self) -> int:

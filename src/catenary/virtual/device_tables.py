@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Literal
 
 import msgspec
 
@@ -19,14 +20,25 @@ from catenary.virtual.devices.digital_outputs import DigitalOutputs
 from catenary.virtual.devices.junction import Junction
 from catenary.virtual.devices.model_sensor import ModelSensor
 from catenary.virtual.devices.motor import Motor
+from catenary.virtual.devices.oversampling import OversamplingTerminal
+from catenary.virtual.devices.safety import SafetyLogic, SafetyTerminal
+from catenary.virtual.devices.sercos_drive import SercosDrive
 from catenary.virtual.devices.servo import Servo
 from catenary.virtual.devices.servo_quirks import NO_QUIRKS, ServoQuirks
+from catenary.virtual.devices.touch_probe import ProbeOptions
 from catenary.virtual.devices.twin import STANDARD_MOTOR, TwinOptions
+from catenary.virtual.eoe.ethernet import Ethernet
 from catenary.virtual.foe.options import DeviceFiles
 from catenary.virtual.mapping_quirks import NO_MAPPING_QUIRKS, MappingQuirks
 from catenary.virtual.protocols import MailboxProtocol
 from catenary.virtual.sii_quirks import NO_SII_QUIRKS, SiiQuirks
+from catenary.virtual.soe.quirks import NO_SOE_QUIRKS, SoeQuirks
 from catenary.virtual.vendor_protocol import VendorEcho
+
+
+def present(*protocols: MailboxProtocol | None) -> tuple[MailboxProtocol, ...]:
+    """Return the protocols that a table contains."""
+    return tuple(each for each in protocols if each is not None)
 
 
 class CrystalTable(msgspec.Struct, forbid_unknown_fields=True, frozen=True, kw_only=True):
@@ -67,11 +79,6 @@ class _AppliedTable(_ClockedTable, frozen=True, kw_only=True):
     lrw: bool = True
     mailbox_quirks: MailboxQuirks = NO_MAILBOX_QUIRKS
     sii_quirks: SiiQuirks = NO_SII_QUIRKS
-
-
-def _given(*protocols: MailboxProtocol | None) -> tuple[MailboxProtocol, ...]:
-    """Return the mailbox protocols that a table has."""
-    return tuple(each for each in protocols if each is not None)
 
 
 class CouplerTable(_ClockedTable, tag="coupler", frozen=True, kw_only=True):
@@ -122,6 +129,40 @@ class DigitalInputsTable(_Table, tag="digital_inputs", frozen=True, kw_only=True
         )
 
 
+class SafetyLogicTable(_Table, tag="safety_logic", frozen=True, kw_only=True):
+    connections: int = 1
+    size: int = 2
+    watchdog: float = 0.1
+    lrw: bool = True
+
+    def device(self) -> Device:
+        return SafetyLogic(
+            connections=self.connections,
+            size=self.size,
+            watchdog=self.watchdog,
+            name=self.name,
+            alias=self.alias,
+            serial=self.serial,
+            lrw=self.lrw,
+        )
+
+
+class SafetyTerminalTable(_Table, tag="safety_terminal", frozen=True, kw_only=True):
+    address: int = 1
+    size: int = 2
+    lrw: bool = True
+
+    def device(self) -> Device:
+        return SafetyTerminal(
+            address=self.address,
+            size=self.size,
+            name=self.name,
+            alias=self.alias,
+            serial=self.serial,
+            lrw=self.lrw,
+        )
+
+
 class AnalogInputsTable(_AppliedTable, tag="analog_inputs", frozen=True, kw_only=True):
     channels: int = 2
     second_pdo: SecondPdo = "none"
@@ -129,6 +170,7 @@ class AnalogInputsTable(_AppliedTable, tag="analog_inputs", frozen=True, kw_only
     files: DeviceFiles | None = None
     ads: Ads | None = None
     vendor_echo: VendorEcho | None = None
+    ethernet: Ethernet | None = None
 
     def device(self) -> Device:
         return AnalogInputs(
@@ -146,7 +188,27 @@ class AnalogInputsTable(_AppliedTable, tag="analog_inputs", frozen=True, kw_only
             mailbox_quirks=self.mailbox_quirks,
             sii_quirks=self.sii_quirks,
             files=self.files,
-            protocols=_given(self.ads, self.vendor_echo),
+            protocols=present(self.ads, self.vendor_echo, self.ethernet),
+        )
+
+
+class OversamplingTable(_ClockedTable, tag="oversampling", frozen=True, kw_only=True):
+    direction: Literal["inputs", "outputs"] = "inputs"
+    channels: int = 2
+    samples: int = 10
+    lrw: bool = True
+
+    def device(self) -> Device:
+        return OversamplingTerminal(
+            direction=self.direction,
+            channels=self.channels,
+            samples=self.samples,
+            name=self.name,
+            alias=self.alias,
+            serial=self.serial,
+            lrw=self.lrw,
+            crystal=self.crystal.crystal(),
+            clock_bits=self.clock_bits,
         )
 
 
@@ -190,12 +252,14 @@ class ServoTable(_AppliedTable, tag="servo", frozen=True, kw_only=True):
     following_error_turns: float = 0.25
     position_limits: tuple[float, float] | None = None
     sync_missed_limit: int = 3
+    touch_probe: ProbeOptions | None = None
     diagnosis: HistoryOptions = NO_HISTORY
     quirks: ServoQuirks = NO_QUIRKS
     mapping_quirks: MappingQuirks = NO_MAPPING_QUIRKS
     files: DeviceFiles | None = None
     ads: Ads | None = None
     vendor_echo: VendorEcho | None = None
+    ethernet: Ethernet | None = None
 
     def device(self) -> Device:
         return Servo(
@@ -219,13 +283,41 @@ class ServoTable(_AppliedTable, tag="servo", frozen=True, kw_only=True):
             crystal=self.crystal.crystal(),
             clock_bits=self.clock_bits,
             sync_missed_limit=self.sync_missed_limit,
+            touch_probe=self.touch_probe,
             diagnosis=self.diagnosis,
             quirks=self.quirks,
             mapping_quirks=self.mapping_quirks,
             mailbox_quirks=self.mailbox_quirks,
             sii_quirks=self.sii_quirks,
             files=self.files,
-            protocols=_given(self.ads, self.vendor_echo),
+            protocols=present(self.ads, self.vendor_echo, self.ethernet),
+        )
+
+
+class SercosDriveTable(_AppliedTable, tag="sercos_drive", frozen=True, kw_only=True):
+    resolution: int = 1 << 20
+    inertia: float = 5e-4
+    rated_torque: float = 2.0
+    max_velocity: float = 350.0
+    soe_quirks: SoeQuirks = NO_SOE_QUIRKS
+
+    def device(self) -> Device:
+        return SercosDrive(
+            name=self.name or "Catenary virtual SERCOS drive",
+            alias=self.alias,
+            serial=self.serial,
+            resolution=self.resolution,
+            inertia=self.inertia,
+            rated_torque=self.rated_torque,
+            max_velocity=self.max_velocity,
+            mailbox_bytes=self.mailbox_bytes,
+            mailbox_delay=self.mailbox_delay,
+            lrw=self.lrw,
+            crystal=self.crystal.crystal(),
+            clock_bits=self.clock_bits,
+            soe_quirks=self.soe_quirks,
+            mailbox_quirks=self.mailbox_quirks,
+            sii_quirks=self.sii_quirks,
         )
 
 
@@ -240,6 +332,7 @@ class EsiTable(_ClockedTable, tag="esi", frozen=True, kw_only=True):
     files: DeviceFiles | None = None
     ads: Ads | None = None
     vendor_echo: VendorEcho | None = None
+    ethernet: Ethernet | None = None
     modules: tuple[str | int, ...] | None = None  # "" for an empty slot
 
     def device(self) -> Device:
@@ -258,7 +351,7 @@ class EsiTable(_ClockedTable, tag="esi", frozen=True, kw_only=True):
                 mapping_quirks=self.mapping_quirks,
                 mailbox_quirks=self.mailbox_quirks,
                 files=self.files,
-                protocols=_given(self.ads, self.vendor_echo),
+                protocols=present(self.ads, self.vendor_echo, self.ethernet),
             ),
         )
 
@@ -278,6 +371,7 @@ class SiiTable(_PlacedTable, tag="sii", frozen=True, kw_only=True):
     files: DeviceFiles | None = None
     ads: Ads | None = None
     vendor_echo: VendorEcho | None = None
+    ethernet: Ethernet | None = None
 
     def device(self) -> Device:
         return Device.from_sii(
@@ -295,7 +389,7 @@ class SiiTable(_PlacedTable, tag="sii", frozen=True, kw_only=True):
                 mapping_quirks=self.mapping_quirks,
                 mailbox_quirks=self.mailbox_quirks,
                 files=self.files,
-                protocols=_given(self.ads, self.vendor_echo),
+                protocols=present(self.ads, self.vendor_echo, self.ethernet),
             ),
         )
 
@@ -305,8 +399,12 @@ DeviceTable = (
     | JunctionTable
     | DigitalOutputsTable
     | DigitalInputsTable
+    | SafetyLogicTable
+    | SafetyTerminalTable
     | AnalogInputsTable
     | ModelSensorTable
+    | OversamplingTable
+    | SercosDriveTable
     | ServoTable
     | EsiTable
     | SiiTable

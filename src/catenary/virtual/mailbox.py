@@ -60,6 +60,7 @@ class Mailbox:
         self._quirks = quirks
         self.silent = False
         self.requests = 0
+        self.on_read: list[Callable[[], None]] = []  # called when the MainDevice has read a message
         self.reset()
 
     def reset(self) -> None:
@@ -145,6 +146,13 @@ class Mailbox:
         if self._in_buffer is not None:
             self._last_read, self._in_buffer = self._in_buffer, None
         self._deliver()
+        for listener in self.on_read:
+            listener()
+
+    @property
+    def waiting(self) -> int:
+        """Number of messages that wait until SM1 is empty."""
+        return len(self._waiting)
 
     def repeat_requested(self) -> None:
         """Put the last answer into SM1 again, ahead of all others, and acknowledge the request."""

@@ -9,7 +9,7 @@ import struct
 from collections.abc import Sequence
 
 from catenary.virtual.description import VENDOR_ID, Description, Pdo, SyncManagerDefault
-from catenary.virtual.op_modes import OpMode
+from catenary.virtual.op_modes import STANDARD, OpMode
 from catenary.virtual.sii_quirks import NO_SII_QUIRKS, SiiQuirks
 
 STRINGS, GENERAL, FMMU, SYNC_MANAGER, TX_PDO, RX_PDO, CLOCK, END = (
@@ -87,7 +87,8 @@ def _header(device: Description, size: int, mailbox_size: int | None) -> bytes:
 
 def _protocols(device: Description) -> int:
     """Return the mailbox protocols as the bits of word 0x001C."""
-    found = COE_PROTOCOL | (FOE_PROTOCOL if device.serves_files else 0)
+    found = COE_PROTOCOL if device.serves_coe else 0
+    found |= FOE_PROTOCOL if device.serves_files else 0
     return found | sum(PROTOCOL_BITS[number] for number in device.protocols)
 
 
@@ -162,7 +163,7 @@ def make_sii_image(device: Description, quirks: SiiQuirks = NO_SII_QUIRKS) -> by
     flags = FIXED_CONTENT if device.mapping_quirks.fixed_pdos == "declared" else 0
     parts.append((TX_PDO, _pdos(device.tx_pdos, strings, quirks, flags)))
     parts.append((RX_PDO, _pdos(device.rx_pdos, strings, quirks, flags)))
-    if device.clock and device.axes:
+    if device.clock and (device.axes or device.op_modes is not STANDARD):
         parts.append((CLOCK, _clock(device.op_modes, strings)))
     parts.insert(0, (STRINGS, strings.encode()))
     body = b"".join(_category(kind, content) for kind, content in parts if content)

@@ -20,6 +20,9 @@ from catenary.esi.eni.own_registers import (
 from catenary.esi.eni.values import EniDevice, EniFile, MailboxCommand, RegisterCommand
 from catenary.esi.source import Source
 from catenary.wire.datagram import EcatCommand
+from catenary.wire.soe import DRIVES
+
+SOE_WRITE = 3  # OpCode
 
 
 def check_commands(eni: EniFile, without: Sequence[str] = ()) -> None:
@@ -98,7 +101,9 @@ def _check_request(
 ) -> None:
     what = f" ({request.comment})" if request.comment else ""
     place = f"{device.name}: Mailbox/{request.protocol}/InitCmds/InitCmd{what}"
-    if request.protocol != "CoE":
+    if request.protocol == "SoE" and request.protocol not in without:
+        _check_idn(eni, place, request)
+    elif request.protocol != "CoE":
         if request.protocol not in without:
             _refuse(
                 eni,
@@ -115,6 +120,23 @@ def _check_request(
             f"Ccs {request.operation} is not supported",
             "only downloads (Ccs 1) can be run",
         )
+
+
+def _check_idn(eni: EniFile, place: str, request: MailboxCommand) -> None:
+    """Refuse a SoE command that does not write one element of an IDN."""
+    if request.operation != SOE_WRITE:
+        what, hint = (
+            f"OpCode {request.operation} is not supported",
+            "only writes (OpCode 3) can be run",
+        )
+    elif request.elements.bit_count() != 1:
+        what = f"Elements 0x{request.elements:02X} is not supported"
+        hint = "write one element with each command; 0x40 is the value"
+    elif request.drive not in DRIVES:
+        what, hint = f"DriveNo {request.drive} is out of range", "drives have the numbers 0 to 7"
+    else:
+        return
+    _refuse(eni, place, request.source, f"{request.parameter}: {what}", hint)
 
 
 def _refuse(eni: EniFile, key: str, source: object, message: str, hint: str) -> Never:

@@ -6,9 +6,9 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from catenary.esi.eni.own_registers import WRITES, vendor_commands
-from catenary.esi.eni.values import EniDevice, EniFile, RegisterCommand
+from catenary.esi.eni.values import EniDevice, EniFile, MailboxCommand, RegisterCommand
 from catenary.model.device import DeviceDescription
-from catenary.model.esi_settings import Timeouts, WatchdogValues
+from catenary.model.esi_settings import IdnCommand, Timeouts, WatchdogValues
 from catenary.model.register_command import Validation
 from catenary.wire import register
 
@@ -19,7 +19,9 @@ SII_CONTROL = 0x0502
 REVISION_WORD, SERIAL_WORD = 0x000C, 0x000E  # words of the SII
 
 
-def with_eni(description: DeviceDescription, eni: EniFile) -> DeviceDescription:
+def with_eni(
+    description: DeviceDescription, eni: EniFile, without: Sequence[str] = ()
+) -> DeviceDescription:
     """Return the description with the commands, watchdog and timeouts of an ENI.
 
     The commands replace those of an ESI: the configurator made them from the ESI. A device that is
@@ -28,20 +30,38 @@ def with_eni(description: DeviceDescription, eni: EniFile) -> DeviceDescription:
     Args:
         description: The device.
         eni: The file.
+        without: Mailbox protocols whose commands are left out.
     """
     if description.position >= len(eni.devices):
         return description
     device = eni.devices[description.position]
     if not device.identity.same_kind(description.identity):
         return description
-    requests = (each for each in device.requests if not each.disabled)
+    requests = [each for each in device.requests if not each.disabled]
     return replace(
         description,
         init_commands=tuple(each.download for each in requests if each.download is not None),
         register_commands=vendor_commands(device),
+        idn_commands=() if "SoE" in without else _idn_commands(requests),
         commands_origin="ENI",
         watchdog=watchdog_of(device),
         timeouts=_timeouts(device),
+    )
+
+
+def _idn_commands(requests: Sequence[MailboxCommand]) -> tuple[IdnCommand, ...]:
+    return tuple(
+        IdnCommand(
+            each.transitions,
+            each.idn,
+            each.data,
+            each.drive,
+            each.elements,
+            each.comment,
+            str(each.source),
+        )
+        for each in requests
+        if each.idn is not None
     )
 
 

@@ -83,7 +83,9 @@ class EniMachine:
             _check_masked(eni, found)
         else:
             self._refuse_kernel_master()
-        subs = main.scan(strict=False, esi=False, settings=partial(with_eni, eni=eni))
+        subs = main.scan(
+            strict=False, esi=False, settings=partial(with_eni, eni=eni, without=self._without)
+        )
         found = compare(tables, subs)
         raise_differences(Path(eni.path), found)
         _check_masked(eni, found)

@@ -7,6 +7,9 @@ from catenary.virtual.devices.digital_inputs import DigitalInputs
 from catenary.virtual.devices.digital_outputs import DigitalOutputs
 from catenary.virtual.devices.junction import Junction
 from catenary.virtual.devices.model_sensor import ModelSensor
+from catenary.virtual.devices.oversampling import OversamplingTerminal
+from catenary.virtual.devices.safety import SafetyLogic, SafetyTerminal
+from catenary.virtual.devices.sercos_drive import SercosDrive
 from catenary.virtual.devices.servo import Servo
 
 __all__ = [
@@ -17,5 +20,9 @@ __all__ = [
     "DigitalOutputs",
     "Junction",
     "ModelSensor",
+    "OversamplingTerminal",
+    "SafetyLogic",
+    "SafetyTerminal",
+    "SercosDrive",
     "Servo",
 ]

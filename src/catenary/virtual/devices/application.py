@@ -68,6 +68,7 @@ from catenary.virtual.mailbox import (
 )
 from catenary.virtual.protocols import MailboxProtocol, ProtocolServer, Surroundings
 from catenary.virtual.scheduler import Scheduler
+from catenary.virtual.soe.telegrams import Telegrams
 from catenary.virtual.state_machine import (
     BOOT,
     FATAL_SYNC_ERROR,
@@ -158,6 +159,7 @@ class Application:
     """Application of one device."""
 
     on_restart: Callable[[], None] | None = None  # called if a new firmware is to start
+    telegrams: Telegrams | None = None  # only of SERCOS drives
 
     def __init__(
         self,
@@ -347,7 +349,7 @@ class Application:
             return self._files.serve(payload)
         if self._state() == BOOT:  # only FoE, §6.4.1
             return ERROR_UNSUPPORTED_PROTOCOL
-        if protocol == COE_PROTOCOL:
+        if protocol == COE_PROTOCOL and self._description.serves_coe:
             return ERROR_TOO_SHORT if len(payload) < 3 else self._serve_coe(payload)
         server = self._servers.get(protocol)
         return ERROR_UNSUPPORTED_PROTOCOL if server is None else server.serve(payload)
@@ -412,6 +414,8 @@ class Application:
 
     def _check_channel(self, channel: Channel) -> int:
         """Return 0, or the AL status code of a fault in the mapping or the SyncManager."""
+        if self.telegrams is not None and not self.telegrams.valid():
+            return INVALID_INPUT_MAPPING
         if self.pdos.contradicts(channel.assignment):
             return INVALID_OUTPUT_MAPPING if channel.outputs else INVALID_INPUT_MAPPING
         if self._buffer_is_configured(channel):
@@ -443,7 +447,7 @@ class Application:
         return True
 
     def _buffer_is_configured(self, channel: Channel) -> bool:
-        size = self.pdos.size(channel.assignment)
+        size = self._size(channel)
         too_many = len(self.pdos.placed(channel.assignment)) > _segment.MAPPED_MAX
         if too_many and not self._from_file:
             return False
@@ -499,7 +503,13 @@ class Application:
         return not self._from_file or self._has_outputs()
 
     def _has_outputs(self) -> bool:
-        return any(each.outputs and self.pdos.size(each.assignment) for each in self._channels)
+        return any(each.outputs and self._size(each) for each in self._channels)
+
+    def _size(self, channel: Channel) -> int:
+        """Return the size of the process data of a channel [bytes]."""
+        if self.telegrams is not None:
+            return self.telegrams.size(channel.outputs)
+        return self.pdos.size(channel.assignment)
 
     def _gate(self, *, mailbox: bool, process_data: bool) -> None:
         gates = {} if self._box is None else {0: mailbox, 1: mailbox}
@@ -513,18 +523,25 @@ class Application:
         for channel in self._channels:
             if channel.outputs in mapped:
                 continue
-            entries: list[tuple[int, int, int, bool]] = []
-            for placed in self.pdos.placed(channel.assignment):
-                entry = self.dictionary.known_entry(placed.index, placed.subindex)
-                if entry is None:  # a clone may have PDOs with objects that it does not list
-                    continue
-                if entry.slot >= 0 and entry.mappable & (MAP_RX if channel.outputs else MAP_TX):
-                    entries.append((placed.bit, placed.bits, entry.slot, entry.signed))
+            entries = self._entries(channel)
             n = channel.sync_manager if entries else -1
             entries = entries[: _segment.MAPPED_MAX]  # only devices from files have more
             self._core.map_process_data(self._position, channel.outputs, n, entries)
             if entries:
                 mapped.add(channel.outputs)
+
+    def _entries(self, channel: Channel) -> list[tuple[int, int, int, bool]]:
+        """Return bit offset, size [bits], slot and sign of each mapped value of a channel."""
+        if self.telegrams is not None:
+            return self.telegrams.mapped(channel.outputs)
+        entries: list[tuple[int, int, int, bool]] = []
+        for placed in self.pdos.placed(channel.assignment):
+            entry = self.dictionary.known_entry(placed.index, placed.subindex)
+            if entry is None:  # a clone may have PDOs with objects that it does not list
+                continue
+            if entry.slot >= 0 and entry.mappable & (MAP_RX if channel.outputs else MAP_TX):
+                entries.append((placed.bit, placed.bits, entry.slot, entry.signed))
+        return entries
 
     def put_slot(self, slot: int, value: int) -> None:
         """Set a slot of the model."""

@@ -1,0 +1,157 @@
+"""EthernetBridge: a TAP interface of this machine, and the Ethernet ports of devices (EoE)."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Mapping, Sequence
+from typing import Protocol, Self
+
+from catenary.bus.ethernet_port import (
+    EthernetCounts,
+    EthernetPort,
+    PortDevice,
+    PortMain,
+    Report,
+)
+from catenary.bus.mac_table import MacTable, is_group
+from catenary.bus.thread_priority import step_behind
+
+ACTIVE_MAX = 2  # ports that use acyclic frames at the same time: at most half of those of a cycle
+BURST = 32  # frames that are read in a row
+FULL_PAUSE = 2e-3  # [s] after a full queue: the kernel then drops the frames of a flood
+FAULT_PAUSE = 0.1  # [s] after a failed read: the interface may have been deleted
+
+
+class FrameInterface(Protocol):
+    """Interface to the network stack of this machine; `link.tap.Tap` implements it."""
+
+    @property
+    def name(self) -> str: ...
+
+    def wait(self, seconds: float | None = None) -> bool: ...
+
+    def wake(self) -> None: ...
+
+    def read(self) -> bytes | None: ...
+
+    def write(self, frame: bytes) -> bool: ...
+
+    def close(self) -> None: ...
+
+
+class EthernetBridge:
+    """Open connection between a TAP interface and devices, until the end of its `with` block.
+
+    Frames of this machine go to the device with their destination address, or to all devices if it
+    is not known. Frames of a device go to the TAP. With `forward`, they also go to other devices.
+    """
+
+    def __init__(
+        self,
+        main: PortMain,
+        subs: Sequence[PortDevice],
+        interface: FrameInterface,
+        *,
+        report: Report,
+        forward: bool = False,
+    ) -> None:
+        """Start the threads.
+
+        Args:
+            main: The MainDevice.
+            subs: The devices.
+            interface: The open interface. `close` closes it.
+            report: Function that reports dropped frames of a device.
+            forward: True if frames between the devices are forwarded.
+        """
+        slots = threading.BoundedSemaphore(ACTIVE_MAX)
+        self._interface = interface
+        self._forward = forward
+        self._table: MacTable[EthernetPort | FrameInterface] = MacTable()
+        self._ports = [EthernetPort(sub, main, self._receive, slots, report) for sub in subs]
+        self._ended = False
+        self._thread = threading.Thread(target=self._serve, name="catenary tap", daemon=True)
+        for port in self._ports:
+            port.start()
+        self._thread.start()
+
+    @property
+    def name(self) -> str:
+        """Name of the TAP interface."""
+        return self._interface.name
+
+    @property
+    def positions(self) -> tuple[int, ...]:
+        """Positions of the connected devices."""
+        return tuple(port.sub.position for port in self._ports)
+
+    @property
+    def counts(self) -> Mapping[int, EthernetCounts]:
+        """Statistics by position of the device."""
+        return {port.sub.position: port.counts for port in self._ports}
+
+    @property
+    def errors(self) -> Mapping[int, str]:
+        """Present failures by position of the device; empty if all devices answer."""
+        found = {port.sub.position: port.error for port in self._ports}
+        return {position: str(error) for position, error in found.items() if error is not None}
+
+    @property
+    def is_open(self) -> bool:
+        """True until `close`."""
+        return not self._ended
+
+    def close(self) -> None:
+        """End the threads and detach from the interface. No effect if it is closed."""
+        if self._ended:
+            return
+        self._ended = True
+        self._interface.wake()
+        self._thread.join()
+        for port in self._ports:
+            port.close()
+        self._interface.close()
+
+    def _serve(self) -> None:
+        step_behind()
+        while not self._ended:
+            if self._interface.wait() and not self._ended:
+                pause = self._read_burst()
+                if pause:
+                    time.sleep(pause)
+
+    def _read_burst(self) -> float:
+        """Distribute waiting frames. Return the pause afterwards [s]."""
+        accepted = True
+        for count in range(BURST):
+            frame = self._interface.read()
+            if frame is None:
+                return FAULT_PAUSE if count == 0 else 0.0
+            accepted &= self._distribute(frame, self._interface)
+        return 0.0 if accepted else FULL_PAUSE
+
+    def _distribute(self, frame: bytes, source: EthernetPort | FrameInterface) -> bool:
+        """Queue a frame for its devices. Return False if a queue is full."""
+        self._table.learn(frame[6:12], source)
+        target = None if is_group(frame[:6]) else self._table.find(frame[:6])
+        ports = [each for each in self._ports if target in (None, each) and each is not source]
+        return all([port.send(frame) for port in ports])
+
+    def _receive(self, source: EthernetPort, frame: bytes) -> bool:
+        """Pass on a frame of a device. Return False if it was dropped."""
+        if self._forward:
+            self._distribute(frame, source)
+        else:
+            self._table.learn(frame[6:12], source)
+        return self._interface.write(frame)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *exc_info: object) -> None:
+        self.close()
+
+    def __repr__(self) -> str:
+        state = "open" if self.is_open else "closed"
+        return f"<EthernetBridge {self.name!r}, {len(self._ports)} devices, {state}>"
