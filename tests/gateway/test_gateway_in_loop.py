@@ -166,7 +166,7 @@ def test_an_enabled_axis_of_another_device_counts(line: Line) -> None:
 
 
 def test_a_new_mailbox_releases_the_former_one(line: Line) -> None:
-    """In BOOT, or after another scan, the ticket of a transfer must not block the former mailbox."""
+    """The ticket of a transfer must not block the mailbox, for example that of PRE-OP in BOOT."""
     with cat.Loop(line.arm(), period=1e-3, enable=False) as loop:
         beside = Beside(line, loop)
         sub = line.main.subs[1]
