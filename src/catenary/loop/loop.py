@@ -564,13 +564,14 @@ class Loop:
 
         Raises:
             ValueError: There is no such network, or there are several and `number` is None.
-            RuntimeError: The loop has never been entered, or an axis is in a move.
+            RuntimeError: The loop has never been entered, an axis is in a move, or a touch
+                probe is in use.
         """
         network = chosen_network(self._networks, what, number)
         if network.session.views.movers:
             raise RuntimeError(
-                f"{what} cannot start during a move: first call loop.wait(move), or move.stop() "
-                "and then loop.wait(move)"
+                f"{what} cannot start during a move or while a touch probe is in use: first call "
+                "loop.wait() with the move or the probe, or its stop() and then loop.wait()"
             )
         return network
 

@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 from catenary.errors import ConfigurationError
 from catenary.procedure.exchange import Procedure
 from catenary.procedure.registers import read_register, write_register
 from catenary.procedure.station import Station
 from catenary.wire.clock import CyclicUnit
 from catenary.wire.latch import (
-    BLOCK,
-    BLOCK_SIZE,
+    TIMES_SIZE,
     LatchControl,
-    Latched,
-    decode_latched,
+    LatchStatus,
+    decode_times,
+    status_address,
+    times_address,
 )
 from catenary.wire.register import CYCLIC_UNIT_CONTROL, LATCH0_CONTROL, LATCH1_CONTROL
 
@@ -20,10 +23,19 @@ CONTROLS = (LATCH0_CONTROL, LATCH1_CONTROL)
 OF_PDI = (CyclicUnit.LATCH0_BY_PDI, CyclicUnit.LATCH1_BY_PDI)
 
 
+@dataclass(frozen=True, slots=True)
+class Latched:
+    """Level of a latch input, and the times of its last edges [ns]."""
+
+    active: bool
+    rising_ns: int
+    falling_ns: int
+
+
 def set_up(
     station: Station, number: int, control: LatchControl, clock_bits: int
 ) -> Procedure[Latched]:
-    """Set the mode of a latch input, and return its status and times before.
+    """Set the mode of a latch input, and return its level and times before.
 
     Reading the times acknowledges old events.
 
@@ -55,7 +67,9 @@ def set_up(
 
 
 def read(station: Station, number: int, clock_bits: int) -> Procedure[Latched]:
-    """Read and acknowledge the events of a latch input.
+    """Read the level and the times of a latch input. This acknowledges its events.
+
+    The other input is not read, because that would acknowledge its events too.
 
     Args:
         station: The device.
@@ -63,7 +77,9 @@ def read(station: Station, number: int, clock_bits: int) -> Procedure[Latched]:
         clock_bits: Width of the clock of the device.
 
     Raises:
-        RegisterError: The device refuses the access.
+        RegisterError: The device refuses an access.
     """
-    data = yield from read_register(station, BLOCK, BLOCK_SIZE)
-    return decode_latched(data, number, clock_bits)
+    [status] = yield from read_register(station, status_address(number), 1)
+    data = yield from read_register(station, times_address(number), TIMES_SIZE)
+    rising, falling = decode_times(data, clock_bits)
+    return Latched(bool(status & LatchStatus.PIN), rising, falling)
