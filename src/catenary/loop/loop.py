@@ -279,21 +279,21 @@ class Loop:
         return next(iter(self))
 
     def wait(self, move: Awaited, timeout: float | None = None) -> None:
-        """Iterate until a move is done: `loop.wait(arm.move_to(0.5), timeout=10.0)`.
+        """Iterate until a move or a touch probe is done: `loop.wait(arm.move_to(0.5))`.
 
         The call returns when the axes have reached their targets, or are at rest after
         `move.stop()`. While the loop runs in the background, the call only waits, and any thread
         may use it.
 
         Args:
-            move: Result of `arm.move_to`, `arm.move_by` or `arm.home`.
+            move: Result of `arm.move_to`, `arm.move_by`, `arm.home` or `arm.probe`.
             timeout: Time after which the move is stopped [s]. None: twice the expected duration
-                plus 10 s; for homing 60 s.
+                plus 10 s; for homing and touch probes 60 s.
 
         Raises:
             MoveError: The move took too long or was replaced, or its axis was stopped.
             DriveError: A drive is in fault or was stopped. The iteration may raise other errors.
-            TypeError: `move` is not a move.
+            TypeError: `move` is neither a move nor a touch probe.
             RuntimeError: The loop is not open, or the call is inside `with loop.update():`.
         """
         require_move(move)

@@ -14,12 +14,20 @@ from catenary.wire.latch import (
     LatchControl,
     LatchStatus,
     decode_times,
-    status_address,
-    times_address,
 )
-from catenary.wire.register import CYCLIC_UNIT_CONTROL, LATCH0_CONTROL, LATCH1_CONTROL
+from catenary.wire.register import (
+    CYCLIC_UNIT_CONTROL,
+    LATCH0_CONTROL,
+    LATCH0_STATUS,
+    LATCH0_TIME_POSITIVE,
+    LATCH1_CONTROL,
+    LATCH1_STATUS,
+    LATCH1_TIME_POSITIVE,
+)
 
 CONTROLS = (LATCH0_CONTROL, LATCH1_CONTROL)
+STATUSES = (LATCH0_STATUS, LATCH1_STATUS)
+TIMES = (LATCH0_TIME_POSITIVE, LATCH1_TIME_POSITIVE)  # the first register of each input
 OF_PDI = (CyclicUnit.LATCH0_BY_PDI, CyclicUnit.LATCH1_BY_PDI)
 
 
@@ -79,7 +87,7 @@ def read(station: Station, number: int, clock_bits: int) -> Procedure[Latched]:
     Raises:
         RegisterError: The device refuses an access.
     """
-    [status] = yield from read_register(station, status_address(number), 1)
-    data = yield from read_register(station, times_address(number), TIMES_SIZE)
+    [status] = yield from read_register(station, STATUSES[number].address, 1)
+    data = yield from read_register(station, TIMES[number].address, TIMES_SIZE)
     rising, falling = decode_times(data, clock_bits)
     return Latched(bool(status & LatchStatus.PIN), rising, falling)

@@ -12,8 +12,7 @@ from enum import IntFlag
 
 from catenary.errors import DecodeError
 
-STATUS, TIMES = 0x09AE, 0x09B0
-TIMES_SIZE = 16  # rising edge, then falling edge
+TIMES_SIZE = 16  # of one input: rising edge, then falling edge
 INPUTS = 2
 EDGES = ("rising", "falling")
 _TIMES = struct.Struct("<2Q")
@@ -32,16 +31,6 @@ class LatchStatus(IntFlag):
     RISING = 0x01
     FALLING = 0x02
     PIN = 0x04
-
-
-def status_address(number: int) -> int:
-    """Return the address of the status of an input."""
-    return STATUS + number
-
-
-def times_address(number: int) -> int:
-    """Return the address of the times of an input."""
-    return TIMES + number * TIMES_SIZE
 
 
 def decode_times(data: bytes, clock_bits: int) -> tuple[int, int]:
