@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import pytest
 
 from catenary.errors import MoveError
@@ -58,7 +60,7 @@ def test_an_axis_that_moves_decelerates_while_the_probe_is_being_armed() -> None
             next(loop)
             targets.append(arm.target.position[0])
         cycles(loop, 5)
-        steps = [b - a for a, b in zip(targets, targets[1:], strict=False)]
+        steps = [b - a for a, b in pairwise(targets)]
         assert min(steps) > 0.003  # 5 mrad per cycle before, and no jump to standstill
         move.stop()
         loop.wait(move)

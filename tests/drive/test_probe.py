@@ -83,10 +83,11 @@ def test_units_and_direction_of_the_joint() -> None:
         assert probe.position == pytest.approx(0.1 - 0.2, abs=STEP)
 
 
+@pytest.mark.parametrize("divider", [1, 3])
 @pytest.mark.parametrize("options", [{}, {"keeps_stored": True}])
-def test_a_probe_can_be_armed_again(options: dict[str, bool]) -> None:
+def test_a_probe_can_be_armed_again(options: dict[str, bool], divider: int) -> None:
     servo = probed_servo(**options)
-    with opened(servo) as (arm, loop):
+    with opened(servo, divider=divider) as (arm, loop):
         servo.place_probe_switch(1, 0.2, 0.3)
         first = arm.probe()
         loop.wait(arm.move_to(0.5, velocity=5.0))
@@ -375,7 +376,7 @@ def test_an_interrupted_probe_has_failed(monkeypatch: pytest.MonkeyPatch) -> Non
 def test_a_law_or_a_stream_cannot_start_while_a_probe_is_armed() -> None:
     with opened(probed_servo()) as (arm, loop):
         probe = arm.probe()
-        with pytest.raises(RuntimeError, match="a stream cannot start .* a touch probe is in use"):
+        with pytest.raises(RuntimeError, match=r"a stream cannot start .* a touch probe is in use"):
             loop.stream(100)
         probe.stop()
         loop.wait(probe)

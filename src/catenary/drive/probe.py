@@ -21,6 +21,7 @@ Edge: TypeAlias = Literal["rising", "falling", "both"]
 ProbeOutcome: TypeAlias = Literal["captured", "stopped", "failed"]
 
 ANSWER_TIMEOUT = 1.0  # [s] until 0x60B9 reflects 0x60B8
+ANSWER_EXCHANGES = 1.5  # that the drive needs at least to receive 0x60B8
 PATIENCE = 60.0  # [s] default of `loop.wait(probe)`
 EVENTS_MAX = 1000  # edges that a handle keeps
 COUNTER_SPAN = 1 << 16
@@ -222,11 +223,12 @@ class Probe:
 
     def _await(self, met: Callable[[], bool], what: str, hint: str) -> Steps:
         begun = self._port.now
-        while True:  # at least one cycle, so that the drive receives 0x60B8
+        while True:
             yield
-            if met():
+            waited = self._port.now - begun
+            if met() and waited > ANSWER_EXCHANGES * self._port.exchange:
                 return
-            if self._port.now - begun > ANSWER_TIMEOUT:
+            if waited > ANSWER_TIMEOUT:
                 raise self._port.error(f"{what} (0x60B9 = 0x{self._port.status:02X})", hint)
 
 
