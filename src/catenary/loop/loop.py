@@ -367,8 +367,8 @@ class Loop:
                 exception, a NaN or infinite target, overruns, and a step that does not return.
             ValueError: An argument is impossible, or the budget leaves too little of the period for
                 the frames.
-            RuntimeError: The loop is not open, an axis of the network is in a move, or a touch probe
-                is in use.
+            RuntimeError: The loop is not open, an axis of the network is in a move, or a touch
+                probe is in use.
         """
         laws = self._network("a law", network).session.laws
         return laws.start(made_law(law), memory, parameters, budget, overruns)
@@ -404,8 +404,8 @@ class Loop:
         Raises:
             LawError: The law cannot be compiled, or failed: see `start`.
             ValueError: An argument is impossible.
-            RuntimeError: The loop is not open, an axis of the network is in a move, a touch probe is
-                in use, or a background thread iterates the loop.
+            RuntimeError: The loop is not open, an axis of the network is in a move, a touch probe
+                is in use, or a background thread iterates the loop.
         """
         self._require_foreground()
         one = self._network("a law", network)
@@ -451,8 +451,8 @@ class Loop:
 
         Raises:
             ValueError: An argument is out of range, or `network` is missing.
-            RuntimeError: The loop is not open, an axis of the network is in a move, or a touch probe
-                is in use.
+            RuntimeError: The loop is not open, an axis of the network is in a move, or a touch
+                probe is in use.
         """
         return self._network("a stream", network).stream(capacity)
 
