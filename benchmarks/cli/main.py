@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from collections.abc import Sequence
 
-from benchmarks.cli import table, with_wires, without_wires
+from benchmarks.cli import protocols, table, with_wires, without_wires
 from catenary.cli.main import Parser
 from catenary.cli.main import main as run_command
 
@@ -33,6 +33,7 @@ def make_parser() -> argparse.ArgumentParser:
     with_wires.add_storm(group)
     with_wires.add_foe(group)
     with_wires.add_eoe(group)
+    protocols.add_protocols(group)
     with_wires.add_share(group)
     with_wires.add_remote(group)
     with_wires.add_cost(group)

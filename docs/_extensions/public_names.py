@@ -17,15 +17,19 @@ PLAIN = ("errors", "events", "types", "virtual.faults")  # no `__all__`: what th
 INTERNAL = {"catenary.events.emergency", "catenary.virtual.faults.number_of_state"}
 
 # Types of what public methods return; programs do not import them.
+PROTOCOLS = ("Foe", "Eoe", "Aoe", "AdsNotifications", "Voe")
 RETURNED = {
+    "catenary.wire.ads_response": ("DeviceInfo", "States", "Sample"),
+    "catenary.wire.voe": ("VoeMessage",),
     "catenary.bus": (
-        *("SubDevices", "Sdo", "Foe", "Pending", "ListType"),
-        *("Eoe", "SegmentEoe", "EthernetBridge", "EthernetCounts"),
+        *("SubDevices", "Sdo", *PROTOCOLS, "Latch", "LatchEvent", "Pending", "ListType"),
+        *("SegmentEoe", "EthernetBridge", "EthernetCounts"),
     ),
     "catenary.bus.device_diagnosis": ("DeviceDiagnosis",),
     "catenary.bus.diagnosis": ("Diagnosis",),
     "catenary.bus.event_queue": ("Events",),
     "catenary.drive.values": ("AxisValues",),
+    "catenary.gateway": ("GatewayCounts",),
     "catenary.esi.eni": ("Variable",),
     "catenary.link.interfaces": ("NetworkInterface",),
     "catenary.log": ("Log",),

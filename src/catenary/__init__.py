@@ -46,6 +46,7 @@ if TYPE_CHECKING:
         StateError,
         WorkingCounterError,
     )
+    from catenary.gateway import Gateway
     from catenary.link.interfaces import interfaces
     from catenary.loop import (
         CaptureOptions,
@@ -77,6 +78,7 @@ __all__ = [
     "DriveError",
     "Drives",
     "ExternalClock",
+    "Gateway",
     "Inputs",
     "LawError",
     "LinkError",
@@ -160,6 +162,7 @@ _HOMES = {
         ),
         "catenary.loop",
     ),
+    "Gateway": "catenary.gateway",
     "Machine": "catenary.machine",
     "MainDevice": "catenary.target",
     "Segment": "catenary.virtual",

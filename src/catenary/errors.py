@@ -182,6 +182,15 @@ class TapError(CatenaryError):
     """A TAP interface of this machine cannot be used."""
 
 
+class AdsError(CatenaryError):
+    """A device refused an ADS request (AoE, ETG.1020). `code` is its error code."""
+
+    def __init__(self, message: str, *, position: int, code: int, hint: str = "") -> None:
+        super().__init__(message, hint=hint)
+        self.position = position
+        self.code = code
+
+
 class FirmwareError(CatenaryError):
     """A firmware update failed: it was interrupted, or the device does not report the expected
     firmware afterwards."""

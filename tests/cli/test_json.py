@@ -28,6 +28,7 @@ OUTPUT_IS_NOT_DATA = {
     "dashboard": "a server",
     "demo": "writes demo.json",
     "foxglove": "a server",
+    "gateway": "a server",
     "include": "prints one path, for a compiler's command line",
     "ros2": "a server",
     "shell": "interactive",

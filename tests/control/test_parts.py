@@ -93,3 +93,14 @@ def test_nan_inputs_give_nan_not_a_limit(name: str) -> None:
         assert math.isnan(step(memory, block.parameters, 0, *values, 1e-3))
         control.restart(memory, 0, 1)
         assert math.isfinite(step(memory, block.parameters, 0, *[0.5] * inputs, 1e-3))
+
+
+def test_the_parameters_of_settings_are_computed_once_and_returned_as_copies() -> None:
+    stiffness = np.array([1.0, 2.0])
+    spring = control.Residual(2, gain=stiffness)
+    first = spring.parameters
+    stiffness[:] = -1.0  # invalid, but the settings have been checked before
+    expected = first.tolist()
+    first[1] = 9.0
+    assert spring.parameters.tolist() == expected
+    assert control.Residual(2, gain=[1.0, 2.0]).parameters.tolist() == expected

@@ -19,7 +19,7 @@ def test_the_tree_has_every_command_and_subcommand() -> None:
     text = tree(make_parser())
     top = re.findall(r"^[├└]─ (\S+)", text, re.MULTILINE)
     assert top == [module.__name__.rpartition(".")[2] for module in COMMANDS]
-    assert re.findall(r"^│  [├└]─ (\S+)  +read", text, re.MULTILINE) == ["read"] * 4
+    assert re.findall(r"^│  [├└]─ (\S+)  +read", text, re.MULTILINE) == ["read"] * 5
 
 
 def test_the_pages_name_the_commands_that_reset_the_segment() -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -17,22 +18,25 @@ pytest.importorskip("numba", reason="laws are compiled by Numba: pip install 'ca
 pytest.importorskip("mujoco", reason="the devices move in MuJoCo: pip install 'catenary[sim]'")
 
 
-def figures_of(folder: Path, only: str, *more: str) -> list[dict[str, float]]:
-    """Run networks in virtual time. Return the figures of their rows."""
-    words = ["--headless", "--out", str(folder), "--only", only, *more]
-    program = [sys.executable, str(FOLDER / "teleoperation.py")]
-    subprocess.run([*program, *words], check=True, timeout=300)
-    rows: list[dict[str, float]] = json.loads((folder / "teleoperation.json").read_text())
-    return rows
+Rows = list[dict[str, float]]
 
 
-@pytest.mark.parametrize(
-    ("name", "delay"), [("0 ms", 0), ("100 ms", 200), ("20 ms, 5", 40), ("5 to 45", 50)]
-)
-def test_the_contact_is_felt_without_drift_or_energy(
-    tmp_path: Path, name: str, delay: float
-) -> None:
-    row = figures_of(tmp_path, name)[0]
+@pytest.fixture
+def figures_of(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., Rows]:
+    """Return a function that runs networks in virtual time, and returns their rows."""
+
+    def run(only: str, *more: str) -> Rows:
+        words = ["--headless", "--out", str(tmp_path), "--only", only, *more]
+        monkeypatch.setattr(sys, "argv", ["teleoperation.py", *words])
+        load("teleoperation").main()
+        rows: Rows = json.loads((tmp_path / "teleoperation.json").read_text())
+        return rows
+
+    return run
+
+
+def assert_coupled(row: dict[str, float], delay: float) -> None:
+    """Check that the contact is felt, without drift and without energy from the coupling."""
     assert row["bound"] > delay
     assert row["stiffness"] == pytest.approx(2.0, rel=0.03)
     assert row["felt"] == pytest.approx(1.0, abs=0.03)
@@ -42,16 +46,31 @@ def test_the_contact_is_felt_without_drift_or_energy(
     assert row["losses"] == 0
 
 
-def test_gains_beyond_the_condition_create_energy_which_the_controller_bounds(
-    tmp_path: Path,
+def test_the_program_writes_the_figures_of_a_network(tmp_path: Path) -> None:
+    words = ["--headless", "--out", str(tmp_path), "--only", "0 ms"]
+    program = [sys.executable, str(FOLDER / "teleoperation.py")]
+    subprocess.run([*program, *words], check=True, timeout=300)
+    [row] = json.loads((tmp_path / "teleoperation.json").read_text())
+    assert_coupled(row, 0)
+
+
+@pytest.mark.parametrize(("name", "delay"), [("100 ms", 200), ("20 ms, 5", 40), ("5 to 45", 50)])
+def test_the_contact_is_felt_without_drift_or_energy(
+    figures_of: Callable[..., Rows], name: str, delay: float
 ) -> None:
-    alone, controlled = figures_of(tmp_path, "B of")
+    assert_coupled(figures_of(name)[0], delay)
+
+
+def test_gains_beyond_the_condition_create_energy_which_the_controller_bounds(
+    figures_of: Callable[..., Rows],
+) -> None:
+    alone, controlled = figures_of("B of")
     assert alone["energy"] < 1000 * alone["tolerance"]
     assert controlled["energy"] > alone["energy"] / 10
 
 
-def test_a_link_that_is_off_for_a_second_is_lost_once(tmp_path: Path) -> None:
-    [row] = figures_of(tmp_path, "20 ms, off")
+def test_a_link_that_is_off_for_a_second_is_lost_once(figures_of: Callable[..., Rows]) -> None:
+    [row] = figures_of("20 ms, off")
     assert row["losses"] == 1
     assert row["resting"] < 3.0
 
@@ -69,8 +88,10 @@ def test_the_damping_that_the_program_chooses_always_fulfils_the_condition() -> 
         assert device.gains_for(delay).longest_delay.min() > delay
 
 
-def test_a_leader_with_force_feedback_feels_its_part_of_the_torque(tmp_path: Path) -> None:
-    [row] = figures_of(tmp_path, "20 ms, 5", "--feedback", "0.5")
+def test_a_leader_with_force_feedback_feels_its_part_of_the_torque(
+    figures_of: Callable[..., Rows],
+) -> None:
+    [row] = figures_of("20 ms, 5", "--feedback", "0.5")
     assert row["felt"] == pytest.approx(0.5, abs=0.02)
     assert row["stiffness"] == pytest.approx(1.0, rel=0.03)
     assert row["resting"] < 3.0

@@ -25,7 +25,10 @@ from catenary.capture import EventStream
 from catenary.capture.notes import notes
 from catenary.errors import DecodeError
 from catenary.wire import (
+    ads,
+    ads_response,
     al,
+    aoe,
     capture,
     clock,
     coe,
@@ -39,6 +42,8 @@ from catenary.wire import (
     fmmu,
     foe,
     frame,
+    gateway,
+    latch,
     mailbox,
     pcap,
     pcapng,
@@ -48,6 +53,7 @@ from catenary.wire import (
     sii_categories,
     sii_interface,
     sync_manager,
+    voe,
 )
 from catenary.wire.eoe_address import EthernetAddress, MacFilter
 from catenary.wire.eoe_frames import MAX_FRAME, FrameAssembler, fragments_of
@@ -122,6 +128,15 @@ def _assembled(data: bytes) -> list[bytes]:
     return frames
 
 
+def _ads_request(data: bytes) -> ads.Request:
+    """Decode a request. The first byte is its command."""
+    return ads.decode_request(data[0] if data else 0, data[1:])
+
+
+def _encoded_ads_request(request: ads.Request) -> bytes:
+    return bytes((request.command,)) + request.encode()
+
+
 def _word(name: str, decode: Callable[[int], Any], size: int, *values: int) -> Target:
     """Return the target of a register word of `size` bytes."""
 
@@ -185,6 +200,20 @@ PCAP = (
     + struct.pack("<4I", 1, 2, len(FRAME), len(FRAME))
     + FRAME
 )
+ADS_REQUESTS: tuple[ads.Request, ...] = (
+    ads.Read(0xF302, 0x10180001, 4),
+    ads.Write(0x4020, 0, b"abc"),
+    ads.ReadWrite(0x4020, 0, 4, b"abc"),
+    ads.WriteControl(5, 0, b"x"),
+    ads.AddNotification(0x4020, 0, 4, 4, 0, 10_000),
+    ads.DeleteNotification(1),
+    ads.ReadDeviceInfo(),
+    ads.ReadState(),
+)
+ADDRESSES = (aoe.Address(bytes((1, 2, 3, 4, 5, 6)), 0xFFFF), aoe.Address(bytes(6), 0x8000))
+AOE = tuple(aoe.Message(*ADDRESSES, each.command, each.encode(), 7) for each in ADS_REQUESTS)
+AOE_FRAGMENTS = tuple(aoe.fragments(AOE[2], 48, 1))
+ADS_SAMPLES = (ads_response.Sample(1, 5, b"abcd"), ads_response.Sample(2, 6, b""))
 MAILBOX_DATA = mailbox.Mailbox(mailbox.Type.COE, SDO_DOWNLOAD, 1).encode(64)
 BRING_UP = tuple(
     frame.encode_frame([datagram.Datagram(command, address, data, i, counter)], source=source)
@@ -339,6 +368,59 @@ TARGETS = (
         (MacFilter((b"\2" * 6,), (b"\xff" * 6,)).encode(),),
     ),
     Target(
+        "aoe.decode_aoe",
+        aoe.decode_aoe,
+        _method,
+        tuple(each.encode() for each in (*AOE, *AOE_FRAGMENTS)),
+    ),
+    Target(
+        "ads.decode_request",
+        _ads_request,
+        _encoded_ads_request,
+        tuple(bytes((each.command,)) + each.encode() for each in ADS_REQUESTS),
+    ),
+    Target("ads_response.decode_result", ads_response.decode_result, None, (bytes(4),)),
+    Target(
+        "ads_response.decode_data",
+        ads_response.decode_data,
+        lambda data: ads_response.encode_result(0, data),
+        (ads_response.encode_result(0, b"abcd"),),
+    ),
+    Target(
+        "ads_response.decode_device_info",
+        ads_response.decode_device_info,
+        _method,
+        (ads_response.DeviceInfo("probe", 1, 2, 3).encode(),),
+    ),
+    Target(
+        "ads_response.decode_states",
+        ads_response.decode_states,
+        _method,
+        (ads_response.States(5, 1).encode(),),
+    ),
+    Target(
+        "ads_response.decode_handle",
+        ads_response.decode_handle,
+        ads_response.encode_handle,
+        (ads_response.encode_handle(3),),
+    ),
+    Target(
+        "ads_response.decode_notification",
+        ads_response.decode_notification,
+        ads_response.encode_notification,
+        (ads_response.encode_notification(ADS_SAMPLES),),
+    ),
+    Target("voe.decode_voe", voe.decode_voe, _method, (voe.VoeMessage(2, 1, b"hello").encode(),)),
+    Target(
+        "gateway.decode_gateway",
+        gateway.decode_gateway,
+        gateway.encode_gateway,
+        (
+            bytes.fromhex("10500a00e903002300204180f90200000000"),
+            gateway.encode_gateway(mailbox.Mailbox(mailbox.Type.FOE, bytes(64), 7, 0x1002)),
+        ),
+    ),
+    Target(
         "diagnosis_history.decode_diagnosis_message",
         diagnosis_history.decode_diagnosis_message,
         diagnosis_history.DiagnosisMessage.encode,
@@ -346,6 +428,12 @@ TARGETS = (
             bytes.fromhex("020000e1020202371fc59d6131000000050002050080"),
             bytes.fromhex("01e0000001040000000000000000000003100102030220") + b"OK",
         ),
+    ),
+    Target(
+        "latch.decode_latched",
+        lambda data: latch.decode_latched(data, len(data) & 1, 64),
+        None,
+        (bytes([0x01, 0x06]) + bytes(range(32)),),
     ),
     Target(
         "sdo_information.decode_sdo_information",

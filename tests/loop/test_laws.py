@@ -54,6 +54,15 @@ def count(actual, target, memory, time, parameters, enabled, dt, ok, n):
     return memory[0] > 100.0
 
 
+FACTOR = 2.0
+
+
+@cat.law
+def scaled(memory, parameters):
+    memory[0] = FACTOR * parameters[0]
+    return True
+
+
 @cat.law
 def returns_in_one_branch(memory):
     memory[0] += 1.0
@@ -94,6 +103,33 @@ def test_all_arguments_of_a_law() -> None:
         with opened() as (_, loop):
             memory = loop.run(count, np.zeros(5), [2.0], compiled=compiled)
         assert memory.tolist() == [102.0, 2.0, 1e-3, 1.0, 2.0]
+
+
+def test_loops_use_the_same_code_until_a_global_changes(monkeypatch: pytest.MonkeyPatch) -> None:
+    def result() -> float:
+        with opened() as (_, loop):
+            return float(loop.run(scaled, memory=[0.0], parameters=[3.0])[0])
+
+    assert [result(), result()] == [6.0, 6.0]
+    assert len(scaled.compiled) == 1
+    monkeypatch.setitem(globals(), "FACTOR", 5.0)
+    assert result() == 15.0
+    assert len(scaled.compiled) == 2
+
+
+def test_the_code_of_a_closure_is_not_kept() -> None:
+    factor = 2.0
+
+    @cat.law
+    def law(memory):
+        memory[0] = factor
+        return True
+
+    with opened() as (_, loop):
+        assert loop.run(law, memory=[0.0])[0] == 2.0
+    factor = 3.0
+    with opened() as (_, loop):
+        assert loop.run(law, memory=[0.0])[0] == 3.0
 
 
 def test_watched_while_it_runs_parameters_changed_all_at_once() -> None:

@@ -8,7 +8,12 @@ from pathlib import Path
 
 import pytest
 
-from catenary.errors import IdentityError, MachineFileError, SegmentError
+from catenary.errors import (
+    ConfigurationError,
+    IdentityError,
+    MachineFileError,
+    SegmentError,
+)
 from catenary.loop import Loop, Scheduling, StopPolicy
 from catenary.machine import Machine
 from catenary.types import INT, USINT
@@ -353,6 +358,17 @@ def test_columns_may_be_objects_of_the_manufacturer(tmp_path: Path) -> None:
         next(loop)
         assert machine.drives["arm"].actual["torque_now"].shape == (3,)
         assert machine.drives["arm"].actual["following_error"].shape == (3,)
+
+
+@pytest.mark.parametrize("option", ["true", '{ edges = ["rising"], times = false }'])
+def test_touch_probes_need_drives_that_have_them(tmp_path: Path, option: str) -> None:
+    text = SMALL.replace('["following_error"]', f'["following_error"]\ntouch_probe = {option}')
+    with (
+        Machine(write_small(tmp_path, text)) as machine,
+        pytest.raises(ConfigurationError, match="the drive has no object 0x60B8"),
+        machine.loop(),
+    ):
+        raise AssertionError("the loop was opened")
 
 
 def test_safe_outputs_are_sent_when_the_loop_ends(tmp_path: Path) -> None:

@@ -7,7 +7,14 @@ from pathlib import Path
 import pytest
 
 from catenary.errors import ConfigurationError
-from catenary.virtual import AnalogInputs, Crystal, Servo, read_segment
+from catenary.virtual import (
+    AnalogInputs,
+    Crystal,
+    OversamplingTerminal,
+    ProbeOptions,
+    Servo,
+    read_segment,
+)
 
 GOOD = """
 [[device]]
@@ -22,11 +29,17 @@ counts_per_turn = 4096
 crystal = { ppm = 40.0, jitter = 20e-9 }
 clock_bits = 32
 sync_missed_limit = 7
+touch_probe = { counters = false, keeps_stored = true }
 position_limits = [-1.5, 1.5]
 
 [[device]]
 kind = "analog_inputs"
 channels = 4
+
+[[device]]
+kind = "oversampling"
+direction = "outputs"
+samples = 20
 """
 
 
@@ -34,12 +47,16 @@ def test_segment_is_read_from_toml(tmp_path: Path) -> None:
     path = tmp_path / "cell.toml"
     path.write_text(GOOD)
     segment = read_segment(path)
-    assert [device.kind for device in segment] == ["coupler", "servo", "analog_inputs"]
-    servo, analog = segment[1], segment[2]
+    kinds = ["coupler", "servo", "analog_inputs", "oversampling"]
+    assert [device.kind for device in segment] == kinds
+    servo, analog, terminal = segment[1], segment[2], segment[3]
+    assert isinstance(terminal, OversamplingTerminal)
+    assert (terminal.direction, terminal.channels, terminal.samples) == ("outputs", 2, 20)
     assert isinstance(servo, Servo)
     assert isinstance(analog, AnalogInputs)
     assert (servo.name, servo.alias, servo.axes) == ("shoulder", 10, 2)
     assert (servo.counts_per_turn, servo.position_limits) == (4096, (-1.5, 1.5))
+    assert servo.touch_probe == ProbeOptions(counters=False, keeps_stored=True)
     assert analog.channels == 4
     assert (servo.crystal, analog.crystal) == (Crystal(ppm=40, jitter=20e-9), Crystal())
     assert (servo.clock_bits, analog.clock_bits, servo.sync_missed_limit) == (32, 64, 7)

@@ -231,6 +231,18 @@ class ModeRefused(Event):
 
 
 @dataclass(frozen=True, slots=True)
+class GatewayWrite(Event):
+    """Write access of a client of `cat.Gateway` to a device, after its end."""
+
+    peer: str  # protocol, address and port of the client, such as "TCP 127.0.0.1:50000"
+    what: str  # the access, such as "SDO download 0x6065:00"
+    result: str  # "done", or the answer of the device
+    index: int | None  # object; None for files and other protocols
+    subindex: int | None
+    data: bytes  # its first bytes, at most 16
+
+
+@dataclass(frozen=True, slots=True)
 class Marker(Event):
     """Mark in the sequence of cycles, set by the application with `MainDevice.mark`."""
 

@@ -15,7 +15,7 @@ from catenary.bus.external_master import Carrier
 from catenary.bus.frame_master import FrameMaster
 from catenary.bus.master import Complete, Master, MasterSource
 from catenary.bus.pending import Pending
-from catenary.bus.runner import BlockingRunner, FrameCounts, LinkLent, Runner, Watch
+from catenary.bus.runner import BUSY_WAIT, BlockingRunner, FrameCounts, LinkLent, Runner, Watch
 from catenary.bus.sdo import Objects
 from catenary.bus.segment_eoe import SegmentEoe
 from catenary.bus.segment_scan import check_identity
@@ -78,6 +78,8 @@ class MainDevice:
         self._blocking: BlockingRunner | None = None
         self._attached: Runner | None = None
         self._leave_loop: Callable[[], object] | None = None  # ends the running loop
+        # of the running loop: returns the axes of a device, by position, that have power
+        self._powered: Callable[[int], Sequence[str]] | None = None
         self.master: Master = (
             source.make_master(self)
             if isinstance(source, MasterSource)
@@ -148,7 +150,8 @@ class MainDevice:
         self._link = link
         self._process = os.getpid()
         self._callbacks.in_thread = not lives_in_virtual_time(link)
-        self._blocking = BlockingRunner(link)
+        busy_wait = 0.0 if lives_in_virtual_time(link) else BUSY_WAIT
+        self._blocking = BlockingRunner(link, busy_wait=busy_wait)
         forget_in_child(self)
         return self
 
@@ -160,7 +163,7 @@ class MainDevice:
         if not self._is_inherited:
             return
         self.master.forget()
-        self._link = self._blocking = self._attached = self._leave_loop = None
+        self._link = self._blocking = self._attached = self._leave_loop = self._powered = None
         if self._ownership is not None:
             self._ownership.release()
 
@@ -490,8 +493,27 @@ class MainDevice:
                 "notebook, before you run its cell again)"
             )
 
+    def powered_axes(self, position: int) -> Sequence[str] | None:
+        """Return the axes of a device that have power, or are requested to be enabled.
+
+        The states are those of the last iteration of the loop.
+
+        Args:
+            position: Position of the device.
+
+        Returns:
+            Names of the axes; None if no loop runs, or it does not report its axes.
+        """
+        powered = self._powered
+        return None if powered is None else powered(position)
+
     @contextlib.contextmanager
-    def attached(self, runner: Runner, leave: Callable[[], object] | None = None) -> Iterator[None]:
+    def attached(
+        self,
+        runner: Runner,
+        leave: Callable[[], object] | None = None,
+        powered: Callable[[int], Sequence[str]] | None = None,
+    ) -> Iterator[None]:
         """Within the block, pass procedures to the runner of a loop and refuse scans.
 
         Entering waits for the procedures of other threads, because the loop needs exclusive use of
@@ -500,10 +522,11 @@ class MainDevice:
         Args:
             runner: Runner of the loop.
             leave: Function that ends the loop.
+            powered: Function that returns the axes of a device, by position, that have power.
         """
         self.require_no_loop()
         blocking = self.runner
-        self._attached, self._leave_loop = runner, leave
+        self._attached, self._leave_loop, self._powered = runner, leave, powered
         blocking.lend()
         try:
             yield
@@ -513,7 +536,7 @@ class MainDevice:
     def _detach(self) -> None:
         if self._blocking is not None:
             self._blocking.take_back()
-        self._attached = self._leave_loop = None
+        self._attached = self._leave_loop = self._powered = None
 
     @property
     def _any_runner(self) -> Runner:

@@ -34,6 +34,7 @@ Watch: TypeAlias = Callable[[], object]  # called in the thread that waits for a
 
 FRAME_TIMEOUT = 0.05  # [s]; a frame takes microseconds, scheduling on a busy machine much longer
 ATTEMPTS = 4  # attempts of a repeatable request
+BUSY_WAIT = 100e-6  # [s]; as long as a frame takes on a small segment, and a wake-up at most
 GRID_NS = 50_000  # pauses end on this grid, so that procedures share frames
 WINDOW = 16  # frames in flight; less than the capacity of any receive ring
 
@@ -66,12 +67,27 @@ class BlockingRunner:
     """Runner that uses the link exclusively and blocks its caller until a procedure ends."""
 
     def __init__(
-        self, link: Link, *, frame_timeout: float = FRAME_TIMEOUT, attempts: int = ATTEMPTS
+        self,
+        link: Link,
+        *,
+        frame_timeout: float = FRAME_TIMEOUT,
+        attempts: int = ATTEMPTS,
+        busy_wait: float = 0.0,
     ) -> None:
+        """Initialise the runner.
+
+        Args:
+            link: The link to the segment.
+            frame_timeout: Time after which a frame is lost [s].
+            attempts: Attempts of a repeatable request.
+            busy_wait: Time for which the runner polls the link before it sleeps [s]. A frame
+                returns sooner than a thread wakes up. 0 for links in virtual time.
+        """
         self.counts = FrameCounts()
         self._link = link
         self._timeout_ns = round(frame_timeout * 1e9)
         self._attempts = attempts
+        self._busy_ns = round(busy_wait * 1e9)
         self._indices = indices()
         self._lock = threading.Lock()
         self._lent = False
@@ -172,8 +188,9 @@ class BlockingRunner:
                 watch()
 
     def _sleep_until(self, deadline_ns: int) -> None:
-        while self._link.now() < deadline_ns:
-            self._link.wait_until(deadline_ns, False)
+        while (now := self._link.now()) < deadline_ns:
+            if now < deadline_ns - self._busy_ns:
+                self._link.wait_until(deadline_ns - self._busy_ns, False)
 
     def _wake(self, tasks: Sequence[Task[Any]]) -> None:
         now = self._link.now()
@@ -220,12 +237,14 @@ class BlockingRunner:
         self, under_way: dict[int, tuple[Parcel, list[int]]], replies: dict[int, Reply]
     ) -> None:
         """Receive the frames of one window, until a deadline. Missing frames count as lost."""
-        deadline = self._link.now() + self._timeout_ns
-        while under_way and self._link.now() < deadline:  # it also ends under a flood of frames
+        start = self._link.now()
+        busy_until, deadline = start + self._busy_ns, start + self._timeout_ns
+        # The deadline also ends a flood of frames.
+        while under_way and (now := self._link.now()) < deadline:
             raw = self._link.receive()
             if raw is not None:
                 self._take(raw, under_way, replies)
-            else:
+            elif now >= busy_until:
                 self._link.wait_until(deadline, True)
         for _ in range(WINDOW):  # frames that arrived while this process did not run
             raw = self._link.receive() if under_way else None

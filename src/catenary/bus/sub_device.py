@@ -7,11 +7,14 @@ from contextlib import contextmanager, suppress
 from dataclasses import replace
 from typing import TYPE_CHECKING, Protocol
 
+from catenary.bus.aoe import Aoe
 from catenary.bus.device_diagnosis import DeviceDiagnosis
 from catenary.bus.eoe import Eoe, TapConnector
 from catenary.bus.foe import Foe
+from catenary.bus.latch import Latch, LatchEdge
 from catenary.bus.pdo_table import PdoTable
 from catenary.bus.sdo import Conversations, Objects, Sdo
+from catenary.bus.voe import Voe
 from catenary.errors import CatenaryError
 from catenary.model.device import DeviceDescription, Identity
 from catenary.procedure.al_state import DeviceState, read_state
@@ -49,8 +52,8 @@ class SubDevice:
     """Handle of one device, such as `main.scan()[2]`. It stays valid across scans.
 
     Attributes never cause traffic; calls with a verb do. `sub.sdo` reads and writes its objects,
-    `sub.foe` its files. `sub.eoe` is its Ethernet port. `sub.diagnosis` reads the messages that it
-    stores.
+    `sub.foe` its files, `sub.aoe` its ADS data. `sub.voe` exchanges vendor-specific messages.
+    `sub.eoe` is its Ethernet port. `sub.diagnosis` reads the messages that it stores.
     """
 
     def __init__(
@@ -68,6 +71,8 @@ class SubDevice:
         self.sdo = Sdo(self)
         self.foe = Foe(self)
         self.eoe = Eoe(self)
+        self.aoe = Aoe(self)
+        self.voe = Voe(self)
         self.diagnosis = DeviceDiagnosis(self)
 
     @property
@@ -142,6 +147,24 @@ class SubDevice:
         self.description = replace(self.description, given_name=name)
         if self.channel is not None:
             self.channel.station = self.station
+
+    def latch(
+        self, number: int = 0, *, edge: LatchEdge = "rising", continuous: bool = False
+    ) -> Latch:
+        """Return a handle of a latch input of the device's clock.
+
+        The first `read` or `request` of the handle sets the input up.
+
+        Args:
+            number: Number of the input, 0 or 1.
+            edge: "rising", "falling" or "both".
+            continuous: True to keep the last edge; False to keep the first since the last reading.
+
+        Raises:
+            ValueError: The input or the edge does not exist.
+            ConfigurationError: The device has no distributed clock.
+        """
+        return Latch(self, number, edge, continuous)
 
     def read_state(self) -> DeviceState:
         """Read the EtherCAT state of the device, and update `state`."""

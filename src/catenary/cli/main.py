@@ -9,6 +9,7 @@ from typing import NoReturn
 
 from catenary.cli import (
     alias,
+    aoe,
     bench,
     capture,
     check,
@@ -24,6 +25,7 @@ from catenary.cli import (
     firmware,
     foe,
     foxglove,
+    gateway,
     graph,
     include,
     init,
@@ -49,8 +51,8 @@ VIRTUAL_TIME = "times are virtual: they come from the segment's clock, not from 
 PROGRAM = "catenary"
 DESCRIPTION = "Real-time EtherCAT for Python."
 COMMANDS = (
-    *(scan, state, graph, diag, messages, pdos, sdo, foe, firmware, eoe, reg, alias, sii, esi),
-    *(init, check, clone, capture),
+    *(scan, state, graph, diag, messages, pdos, sdo, foe, aoe, firmware, eoe, reg, alias),
+    *(sii, esi, gateway, init, check, clone, capture),
     *(demo, shell, dashboard, top, doctor, bench, virtual, realtime),
     *(data, record, merge, plot, foxglove, ros2, include, completion),
 )

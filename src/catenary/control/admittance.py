@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from catenary.control.compiles import Row, compiles
-from catenary.control.parts import PerAxis, axis_count, checked, table
+from catenary.control.parts import PerAxis, axis_count, checked, computed_once, table
 from catenary.control.pid import limited
 
 KIND = 8.0
@@ -53,6 +53,7 @@ class NaturalAdmittance:
         _ = self.parameters
 
     @property
+    @computed_once
     def parameters(self) -> Row:
         """Row of parameters, shape (1 + 5 · axes,)."""
         n = axis_count(self.axes)

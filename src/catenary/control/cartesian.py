@@ -10,7 +10,7 @@ import numpy as np
 from catenary.control.compiles import Row, compiles
 from catenary.control.kinematics import COLUMNS, FIRST, JOINT, JOINTS, SOLVER, forward, quaternion
 from catenary.control.null_space import AXIS, DAMPING, GAINS, LIMITS, STIFFNESS, project
-from catenary.control.parts import PerAxis, axis_count, checked
+from catenary.control.parts import PerAxis, axis_count, checked, computed_once
 from catenary.control.pid import limited
 
 KIND = 13.0
@@ -64,6 +64,7 @@ class CartesianImpedance:
         _ = self.parameters
 
     @property
+    @computed_once
     def parameters(self) -> Row:
         """Row of parameters, shape (15 + 2 · axes,): the stiffness from 1, the damping from 7."""
         n = axis_count(self.axes)

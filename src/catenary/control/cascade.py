@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from catenary.control.compiles import Row, compiles
-from catenary.control.parts import table
+from catenary.control.parts import computed_once, table
 from catenary.control.pid import GAINS, STATES, Pid, pid_step
 
 KIND = 2.0
@@ -45,6 +45,7 @@ class Cascade:
         return self.position.axes
 
     @property
+    @computed_once
     def parameters(self) -> Row:
         """Row of parameters, shape (1 + 14 · axes,)."""
         return table(KIND, *self.position.columns(), *self.velocity.columns())

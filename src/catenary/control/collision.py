@@ -8,7 +8,7 @@ import numpy as np
 
 from catenary.control.compiles import Row, compiles
 from catenary.control.dynamics import inverse
-from catenary.control.parts import PerAxis, axis_count, checked, table
+from catenary.control.parts import PerAxis, axis_count, checked, computed_once, table
 
 RESIDUAL = 9.0
 RESIDUAL_GAINS = 2  # gain, inertia
@@ -48,6 +48,7 @@ class Residual:
         _ = self.parameters
 
     @property
+    @computed_once
     def parameters(self) -> Row:
         """Row of parameters, shape (1 + 2 · axes,)."""
         n = axis_count(self.axes)
@@ -166,6 +167,7 @@ class Threshold:
         _ = self.parameters
 
     @property
+    @computed_once
     def parameters(self) -> Row:
         """Row of parameters, shape (1 + 2 · axes,)."""
         n = axis_count(self.axes)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from catenary.control.compiles import Row, compiles
-from catenary.control.parts import PerAxis, axis_count, checked, table
+from catenary.control.parts import PerAxis, axis_count, checked, computed_once, table
 from catenary.control.pid import limited
 
 KIND = 21.0
@@ -98,6 +98,7 @@ class Coupling:
         self._check_delay()
 
     @property
+    @computed_once
     def parameters(self) -> Row:
         """Row of parameters, shape (1 + 6 · axes,)."""
         n = axis_count(self.axes)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from catenary.control.compiles import Row, compiles
-from catenary.control.parts import axis_count
+from catenary.control.parts import axis_count, computed_once
 
 KIND = 15.0
 STATES = 2  # initialised, place of the oldest value; then the values
@@ -36,6 +36,7 @@ class Delay:
         _ = self.parameters
 
     @property
+    @computed_once
     def parameters(self) -> Row:
         """Row of parameters, shape (2 + axes,): the width of the memory of an axis, the delays."""
         steps = self._steps()

@@ -8,7 +8,7 @@ import numpy as np
 
 from catenary.control.compiles import Row, compiles
 from catenary.control.dynamics import inverse
-from catenary.control.parts import axis_count, checked
+from catenary.control.parts import axis_count, checked, computed_once
 
 KIND = 14.0
 STATES = 2  # initialised, residual; then previous velocities and a work area
@@ -47,6 +47,7 @@ class EnergyResidual:
         _ = self.parameters
 
     @property
+    @computed_once
     def parameters(self) -> Row:
         """Row of parameters, shape (3,)."""
         gain = checked("gain", self.gain, 1, above=True)

@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 
 from catenary.control.compiles import Row, compiles
-from catenary.control.parts import PerAxis, axis_count, checked, table
+from catenary.control.parts import PerAxis, axis_count, checked, computed_once, table
 
 FEED_FORWARD = 5.0
 FRICTION = 6.0
@@ -33,6 +33,7 @@ class FeedForward:
         _ = self.parameters
 
     @property
+    @computed_once
     def parameters(self) -> Row:
         """Row of parameters, shape (1 + 2 · axes,)."""
         n = axis_count(self.axes)
@@ -88,6 +89,7 @@ class Friction:
         _ = self.parameters
 
     @property
+    @computed_once
     def parameters(self) -> Row:
         """Row of parameters, shape (1 + 3 · axes,)."""
         n = axis_count(self.axes)

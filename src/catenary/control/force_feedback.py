@@ -9,7 +9,7 @@ import numpy as np
 
 from catenary.control.compiles import Row, compiles
 from catenary.control.coupling import REACTION
-from catenary.control.parts import PerAxis, axis_count, checked, table
+from catenary.control.parts import PerAxis, axis_count, checked, computed_once, table
 from catenary.control.pid import limited
 
 KIND = 22.0
@@ -82,6 +82,7 @@ class ForceFeedback:
         return checked("damping", self.damping, n, above=True) / (stiffness * late)
 
     @property
+    @computed_once
     def parameters(self) -> Row:
         """Row of parameters, shape (1 + 3 · axes,)."""
         n = self.axes

@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from catenary.control.compiles import Row, compiles
-from catenary.control.parts import PerAxis, axis_count, checked, table
+from catenary.control.parts import PerAxis, axis_count, checked, computed_once, table
 
 KIND = 12.0
 NUMBERS = 5  # opening velocity, torque, time, clearance, travel
@@ -69,6 +69,7 @@ class Homing:
         _ = self.parameters
 
     @property
+    @computed_once
     def parameters(self) -> Row:
         """Row of parameters, shape (1 + 5 · axes,)."""
         n = axis_count(self.axes)

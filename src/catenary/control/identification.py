@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from catenary.control.compiles import Row, compiles
-from catenary.control.parts import PerAxis, axis_count, checked, table
+from catenary.control.parts import PerAxis, axis_count, checked, computed_once, table
 
 KIND = 11.0
 NUMBERS = 4  # amplitude, first, last, duration
@@ -47,6 +47,7 @@ class Chirp:
         _ = self.parameters
 
     @property
+    @computed_once
     def parameters(self) -> Row:
         """Row of parameters, shape (1 + 4 · axes,)."""
         n = axis_count(self.axes)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from catenary.control.compiles import Row, compiles
-from catenary.control.parts import PerAxis, axis_count, checked, table
+from catenary.control.parts import PerAxis, axis_count, checked, computed_once, table
 from catenary.control.pid import limited
 
 KIND = 7.0
@@ -60,6 +60,7 @@ class Impedance:
         _ = self.parameters
 
     @property
+    @computed_once
     def parameters(self) -> Row:
         """Row of parameters, shape (1 + 7 · axes,); the stiffness of axis i is at 1 + 7 i."""
         n = axis_count(self.axes)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from catenary.control.compiles import Row, compiles
-from catenary.control.parts import PerAxis, axis_count, checked, table
+from catenary.control.parts import PerAxis, axis_count, checked, computed_once, table
 
 KIND = 4.0
 COEFFICIENTS = 5  # b0, b1, b2, a1, a2
@@ -40,6 +40,7 @@ class LowPass:
         _ = self.parameters  # validates the values
 
     @property
+    @computed_once
     def parameters(self) -> Row:
         """Row of parameters, shape (1 + 5 · axes,)."""
         if not self.period > 0:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable, Sequence
+from typing import TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -11,6 +13,8 @@ from catenary.control.compiles import Row, compiles
 
 PerAxis = float | Sequence[float] | npt.NDArray[np.float64]
 """One value for all axes, or one per axis."""
+
+Settings = TypeVar("Settings")
 
 
 def join(*parts: Sequence[float] | Row) -> Row:
@@ -102,6 +106,26 @@ def checked(name: str, value: PerAxis, n: int, *, least: float = 0.0, above: boo
         if not (number > least if above else number >= least):
             bound = "above" if above else "at least"
             raise ValueError(f"{name} of axis {i} is {number}; it must be {bound} {least}")
+    return row
+
+
+def computed_once(make: Callable[[Settings], Row]) -> Callable[[Settings], Row]:
+    """Compute a row of settings once, and return a copy of it in each call.
+
+    A program may then read the row of parameters in each cycle. Settings do not change.
+
+    Args:
+        make: method that computes the row.
+    """
+    name = f"_{make.__name__}"
+
+    @functools.wraps(make)
+    def row(self: Settings) -> Row:
+        kept: dict[str, Row] = self.__dict__  # a frozen dataclass has no other place
+        if name not in kept:
+            kept[name] = make(self)
+        return kept[name].copy()
+
     return row
 
 

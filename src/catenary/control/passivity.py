@@ -9,7 +9,7 @@ import numpy as np
 
 from catenary.control.compiles import Row, compiles
 from catenary.control.coupling import REACTION
-from catenary.control.parts import PerAxis, axis_count, checked, table
+from catenary.control.parts import PerAxis, axis_count, checked, computed_once, table
 
 KIND = 23.0
 GAINS = 3  # tolerance, largest damping, latency
@@ -92,6 +92,7 @@ class Passivity:
         return checked("stiffness", self.stiffness, n) * wrong**2 / 2
 
     @property
+    @computed_once
     def parameters(self) -> Row:
         """Row of parameters, shape (1 + 3 · axes,)."""
         if self.latency not in (0, 1):

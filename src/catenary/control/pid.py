@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from catenary.control.compiles import Row, compiles
-from catenary.control.parts import PerAxis, axis_count, checked, table
+from catenary.control.parts import PerAxis, axis_count, checked, computed_once, table
 
 KIND = 1.0
 GAINS = 7  # proportional, integral, derivative, derivative_time, limit, rate, 1/tracking_time
@@ -54,6 +54,7 @@ class Pid:
         _ = self.parameters  # validates the values
 
     @property
+    @computed_once
     def parameters(self) -> Row:
         """Row of parameters, shape (1 + 7 · axes,)."""
         return table(KIND, *self.columns())

@@ -49,6 +49,8 @@ class Axis:
     measured: tuple[str, ...] = tuple(MEASURED)
     measured_required: bool = False  # True if the drive must map all of `measured`
     columns: Mapping[str, AxisObject] = field(default_factory=dict)
+    # further columns, which the drive may lack
+    optional_columns: Mapping[str, AxisObject] = field(default_factory=dict)
     divider: int = 1  # n: exchanged in every n-th cycle
     required: bool = True  # if True, a cycle without its device is an error
     homing: HomingMethod | None = None
@@ -119,7 +121,7 @@ class Axis:
             inputs.append(objects.ACTUAL_POSITION)
         if self.uses_profile:
             outputs += objects.PROFILE_OBJECTS.values()
-        for column in self.columns.values():
+        for column in (*self.columns.values(), *self.optional_columns.values()):
             (outputs if column.output else inputs).append(column)
         optional = self._optional()
         return DeviceRequest(
@@ -157,7 +159,7 @@ class Axis:
         optional = set() if self.measured_required else {MEASURED["velocity"], MEASURED["torque"]}
         if len(self.modes) == 1 and not self.holds_on_loss:
             optional |= {objects.MODE_TARGET, objects.MODE_ACTUAL}
-        optional |= set(objects.PROFILE_OBJECTS.values())
+        optional |= set(objects.PROFILE_OBJECTS.values()) | set(self.optional_columns.values())
         return optional - set(self.columns.values())
 
     def plan(self, layout: ImageLayout) -> AxisPlan:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields
 from typing import Any, TypeAlias, TypeVar
 
 from catenary.bus import SubDevice
@@ -95,6 +95,7 @@ class CommonOptions:
     pdos: PdoList
     start_up: Sequence[StartUp]
     modules: Modules | None = None
+    optional_columns: Mapping[str, AxisObject] = field(default_factory=dict)
 
 
 def _pdos(sub: SubDevice, common: CommonOptions) -> tuple[WrittenPdo, ...]:
@@ -135,6 +136,7 @@ def make_axes(
             measured=measured,
             measured_required=common.measured is not None,
             columns=common.columns,
+            optional_columns=common.optional_columns,
             divider=cycles_between("divider", common.divider),
             required=common.required,
             homing=options.each("homing", n)[k],

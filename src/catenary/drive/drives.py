@@ -37,15 +37,27 @@ from catenary.drive.move_request import (
 )
 from catenary.drive.objects import ACTUAL_VELOCITY
 from catenary.drive.port import AxisFacts, AxisPort, PutRate
+from catenary.drive.probe import Edge, Probe, Probes, until_edge
+from catenary.drive.probe_port import ProbePort
+from catenary.drive.probe_request import check_probe, chosen_axis, probe_request
 from catenary.drive.rates import RateColumns
 from catenary.drive.request import Request
 from catenary.drive.state_machine import RequestedState
+from catenary.drive.touch_probe import (
+    FUNCTION_COLUMN,
+    SOURCES,
+    TouchProbe,
+    optional_columns,
+    required_columns,
+    touch_probe_option,
+    with_offered,
+)
 from catenary.drive.values import Array, AxisValues
 from catenary.plan.cycle import Bank, OnLoss
 from catenary.plan.request import DeviceRequest, DistributedClock, ImageLayout, RequestTables, Views
 from catenary.plan.start_up_object import StartUp
 from catenary.plan.stop_reason import StopReason
-from catenary.types import UDINT
+from catenary.types import INT, UDINT
 from catenary.wire.cia402 import IN_FAULT, AxisState
 
 V = TypeVar("V")
@@ -73,6 +85,7 @@ class Drives(Request):
       `{name: (index, subindex, type)}`, with the index for slot 0. Read a column as
       `arm.actual["following_error"]`; write it as `arm.target["torque_offset"] = 0.5`. Objects that
       CiA 402 does not define are inputs, except `Channel(index, subindex, type, output=True)`.
+    - `touch_probe`: True or a `TouchProbe` to exchange the touch probes (0x60B8): see `probe`.
     - `required`: if False, the loop continues without a lost drive. Its axes keep their last
       values. Enable them again when they are `present`.
     - `divider`: n to exchange in every n-th cycle of the loop.
@@ -159,6 +172,7 @@ class Drives(Request):
         homing: PerAxis[HomingMethod | None] = None,
         measured: Sequence[str] | None = None,
         columns: Columns = (),
+        touch_probe: TouchProbe | bool = False,
         required: bool = True,
         divider: int = 1,
         dc: DistributedClock | bool = False,
@@ -168,7 +182,10 @@ class Drives(Request):
     ) -> None:
         sources = axis_sources(subs, modules)
         super().__init__([sub for sub, _ in sources])
-        self._columns = named_columns(columns)
+        self._touch_probe = touch_probe_option(touch_probe)
+        self._columns = {**named_columns(columns), **required_columns(self._touch_probe)}
+        self._optional = optional_columns(self._touch_probe)
+        self._mapped = self._columns  # with those of `_optional` that all drives map
         self._clock = clock_request(dc)
         common = CommonOptions(
             names=names,
@@ -180,6 +197,7 @@ class Drives(Request):
             pdos=pdos,
             start_up=start_up,
             modules=modules,
+            optional_columns=self._optional,
         )
         options = AxisOptions(
             mode=mode,
@@ -213,6 +231,7 @@ class Drives(Request):
         self._measures_velocity: list[bool] = []
         self._ports: tuple[AxisPort, ...] = ()
         self._moves: Moves | None = None
+        self._probes: Probes | None = None
         self._units: npt.NDArray[np.intp] = np.zeros(0, np.intp)
 
     def __len__(self) -> int:
@@ -345,6 +364,7 @@ class Drives(Request):
         velocity: Values | None = None,
         acceleration: Values | None = None,
         jerk: Values | None = None,
+        until: Probe | None = None,
         axes: Axes = ALL,
     ) -> Move:
         """Start to move axes to a position, where they come to rest.
@@ -361,6 +381,8 @@ class Drives(Request):
                 `acceleration_limit`, or for `velocity_limit` / 0.25 s if there is no such limit.
             jerk: largest jerk [rad/s³ or m/s³]; None for a trapezoid. Only for CSP. A value needs
                 `pip install 'catenary[traj]'`.
+            until: probe from `arm.probe`. The move begins when the probe is armed, and stops when
+                the probe has captured its edge. Reaching the goal without an edge is an error.
             axes: numbers of the axes.
 
         Returns:
@@ -376,7 +398,7 @@ class Drives(Request):
         """
         chosen = self._movable(axes)
         goals = values_of("position", position, len(chosen))
-        return self._move(chosen, goals, RateOptions(velocity, acceleration, jerk))
+        return self._move(chosen, goals, RateOptions(velocity, acceleration, jerk), until)
 
     def move_by(
         self,
@@ -385,6 +407,7 @@ class Drives(Request):
         velocity: Values | None = None,
         acceleration: Values | None = None,
         jerk: Values | None = None,
+        until: Probe | None = None,
         axes: Axes = ALL,
     ) -> Move:
         """Start to move axes by a distance from the goal of their present move.
@@ -396,6 +419,7 @@ class Drives(Request):
             velocity: largest velocity, as for `move_to`.
             acceleration: acceleration and deceleration, as for `move_to`.
             jerk: largest jerk, as for `move_to`.
+            until: probe that stops the move, as for `move_to`.
             axes: numbers of the axes.
 
         Returns:
@@ -418,7 +442,7 @@ class Drives(Request):
                 chosen, starts, values_of("distance", distance, len(chosen)), strict=True
             )
         ]
-        return self._move(chosen, goals, RateOptions(velocity, acceleration, jerk))
+        return self._move(chosen, goals, RateOptions(velocity, acceleration, jerk), until)
 
     def home(self, axes: Axes = ALL) -> Move:
         """Start the homing of enabled axes by their drives (mode 6, "hm" in `other_modes`).
@@ -442,10 +466,70 @@ class Drives(Request):
         parts = {i: make_homing_part(self._axes[i], self._ports[i]) for i in chosen}
         return moves.begin(parts, HOMING_TIMEOUT)
 
-    def _move(self, chosen: Sequence[int], goals: Sequence[float], rates: RateOptions) -> Move:
+    def probe(
+        self,
+        number: int = 1,
+        *,
+        edge: Edge = "rising",
+        source: str | int = "input",
+        continuous: bool = False,
+        axis: int | None = None,
+    ) -> Probe:
+        """Arm a touch probe: the drive stores its position at the next edge.
+
+        The drives must be made with `touch_probe=`. The probe works in any state of the axis. A law
+        or a stream cannot start while it is armed.
+
+        Args:
+            number: probe of the drive, 1 or 2.
+            edge: "rising", "falling" or "both", which captures one edge of each kind.
+            source: "input" (that of the probe), "index_pulse" (of the encoder), or a code of the
+                manual for 0x60D0, which is written by SDO.
+            continuous: True to capture all edges until `stop()` of the handle.
+            axis: number of the axis; None for the only one.
+
+        Returns:
+            Handle of the probe: pass it to `loop.wait`, or poll its `done` and `events`.
+
+        Raises:
+            ValueError: An argument is not valid, the probe is in use, or the position of an edge
+                is not in the process data.
+            DriveError: A law or a stream sets the outputs.
+            RuntimeError: The loop is not open.
+        """
+        views = self._of_open_loop("probe()")
+        index = chosen_axis(axis, self.names)
+        request = probe_request(self._touch_probe, number, edge, source, continuous)
+        assert self._probes is not None  # bound together with the views
+        port = ProbePort(
+            self._ports[index],
+            index,
+            number,
+            self.actual.columns,
+            self.target[FUNCTION_COLUMN],
+            system_time=views.system_time if self._clock is not None else lambda: None,
+            write_source=partial(self._write_probe_source, index),
+        )
+        check_probe(port, request)
+        return self._probes.begin(index, Probe(port, request))
+
+    def _write_probe_source(self, index: int, number: int, source: int) -> Pending[None]:
+        place = self._axes[index].index(SOURCES)
+        return self._subs[index].sdo.request_write(place, number, source, type=INT)
+
+    def _move(
+        self,
+        chosen: Sequence[int],
+        goals: Sequence[float],
+        rates: RateOptions,
+        until: Probe | None,
+    ) -> Move:
         moves = self._moving()
         axes, ports = [self._axes[i] for i in chosen], [self._ports[i] for i in chosen]
         parts, timeout = make_parts(axes, ports, goals, rates)
+        if until is not None:
+            for part in parts:
+                part.steps = until_edge(part.steps, part.stop, until, part.port)
         return moves.begin(dict(zip(chosen, parts, strict=True)), timeout)
 
     def _numbers(self, axes: Axes) -> list[int]:
@@ -502,6 +586,9 @@ class Drives(Request):
         """Read rated torque and settings once per plan, although the plan calls `pdos` twice."""
         if self._is_read:
             return
+        if self._touch_probe is not None:
+            pairs = zip(self._axes, self.subs, strict=True)
+            self._axes = tuple(with_offered(axis, sub) for axis, sub in pairs)
         rated = [
             own_objects.with_rated_torque(axis, sub)
             for axis, sub in zip(self._axes, self.subs, strict=True)
@@ -519,6 +606,11 @@ class Drives(Request):
             MappingError: A required object is not in the process data.
         """
         self._is_read = False  # the next plan reads the settings again
+        self._mapped = self._columns | {
+            name: column
+            for name, column in self._optional.items()
+            if all(axis.maps(column, layout) for axis in self._axes)
+        }
         self._units = np.array([layout.sync_unit(axis.device) for axis in self._axes], np.intp)
         self._rates = RateColumns(self._axes, self._columns, layout)
         self._measures_velocity = [axis.maps(ACTUAL_VELOCITY, layout) for axis in self._axes]
@@ -527,7 +619,7 @@ class Drives(Request):
             output_columns=(
                 *(
                     axis.column(name, column, layout)
-                    for name, column in self._columns.items()
+                    for name, column in self._mapped.items()
                     if column.output
                     for axis in self._axes
                 ),
@@ -535,7 +627,7 @@ class Drives(Request):
             ),
             input_columns=tuple(
                 axis.column(name, column, layout)
-                for name, column in self._columns.items()
+                for name, column in self._mapped.items()
                 if not column.output
                 for axis in self._axes
             ),
@@ -563,6 +655,7 @@ class Drives(Request):
         assert rates is not None  # `tables` runs before `bind`
         rates.bind(self.target, views.output_reals)
         self._moves = Moves(views.movers)
+        self._probes = Probes(views.movers)
         self._ports = tuple(
             self._port(views, i, axis, partial(rates.put, i)) for i, axis in enumerate(self._axes)
         )
@@ -582,7 +675,7 @@ class Drives(Request):
         """Return, for each column by name, its part of the bank array."""
         used = {Bank.REAL: 0, Bank.INTEGER: 0}
         slices: dict[str, Array] = {}
-        for name, column in self._columns.items():
+        for name, column in self._mapped.items():
             if column.output is not output:
                 continue
             bank = column_bank(column)

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Generic, TypeVar, overload
 
+import numpy as np
 import numpy.typing as npt
 
 from catenary.bus import SubDevice
+from catenary.core import Cycle
 from catenary.drive.arguments import (
     PdoList,
     clock_request,
@@ -17,12 +19,19 @@ from catenary.drive.arguments import (
 )
 from catenary.drive.channel import Channel, ChannelSpec, make_channels
 from catenary.drive.device_channels import (
+    NamedChannel,
     chosen_channels,
     column,
     mapped_channels,
     with_chosen,
 )
 from catenary.drive.modules import described
+from catenary.drive.oversampling import (
+    Oversampled,
+    checked_samples,
+    group_samples,
+    time_channel,
+)
 from catenary.drive.request import Request
 from catenary.model.device import DeviceDescription, Direction
 from catenary.plan.cycle import Bank
@@ -87,6 +96,7 @@ class Channels(Request):
         required: bool = True,
         divider: int = 1,
         dc: DistributedClock | bool = False,
+        oversampling: int | None = None,
         pdos: PdoList = (),
         start_up: Sequence[StartUp] = (),
     ) -> None:
@@ -100,22 +110,43 @@ class Channels(Request):
         self._units: list[int] = []
         self._arrays: dict[Bank, Reals | Integers | Bytes] | None = None
         self._unit_valid: Bytes | None = None
-        if named:
-            if len(subs) != 1:
-                raise ValueError(
-                    f"channels= needs exactly one device, not {len(subs)}; make one request per "
-                    "device"
-                )
-            if scale is not None:
-                raise ValueError(
-                    "scale= cannot be combined with channels=; give the scale of each channel, "
-                    "(index, subindex, type, scale)"
-                )
-            self._channels = chosen_channels(subs[0], named)
+        self._oversampled: Oversampled | None = None
+        self._exchange = 0.0  # [s] between two exchanges
+        self._system_time: Callable[[], int | None] = lambda: None
+        if oversampling is not None:
+            self._oversampled = self._samples_of(oversampling, named, scale or {})
+            self._channels = self._oversampled.channels
         else:
-            devices = [self._described(sub) for sub in subs]
-            self._channels = mapped_channels(devices, self.direction, scale or {})
+            self._channels = self._chosen_channels(named, scale)
         self._places: dict[str, tuple[Reals | Integers | Bytes, int]] = {}
+
+    def _chosen_channels(
+        self, named: Mapping[str, Channel], scale: Mapping[str, float] | None
+    ) -> tuple[NamedChannel, ...]:
+        """Return the channels of the option `channels`; without it, all mapped channels."""
+        if not named:
+            devices = [self._described(sub) for sub in self.subs]
+            return mapped_channels(devices, self.direction, scale or {})
+        if len(self.subs) != 1:
+            raise ValueError(
+                f"channels= needs exactly one device, not {len(self.subs)}; make one request per "
+                "device"
+            )
+        if scale is not None:
+            raise ValueError(
+                "scale= cannot be combined with channels=; give the scale of each channel, "
+                "(index, subindex, type, scale)"
+            )
+        return chosen_channels(self.subs[0], named)
+
+    def _samples_of(
+        self, samples: int, named: Mapping[str, Channel], scale: Mapping[str, float]
+    ) -> Oversampled:
+        """Return the channels of the option `oversampling`."""
+        if named or len(self.subs) != 1:
+            raise ValueError("oversampling= needs exactly one device, and no channels=")
+        count = checked_samples(samples)
+        return group_samples(self._chosen_channels({}, None), count, scale)
 
     def _chosen_pdos(
         self, sub: SubDevice, pdos: PdoList, named: Mapping[str, Channel]
@@ -161,6 +192,7 @@ class Channels(Request):
 
         Without chosen channels and PDOs, the mapping of the devices does not change.
         """
+        self._exchange = period_ns * 1e-9 * self._divider
         requests: dict[int, DeviceRequest] = {}
         for sub in self.subs:
             mine = tuple(c.channel.reference() for c in self._channels if c.device == sub.position)
@@ -199,7 +231,52 @@ class Channels(Request):
             raise RuntimeError("no process data is exchanged before a Loop is open")
         return tuple(bool(self._unit_valid[unit]) for unit in self._units)
 
-    def _bind(self, reals: Reals, integers: Integers, bits: Bytes, unit_valid: Bytes) -> None:
+    @property
+    def sample_names(self) -> tuple[str, ...]:
+        """Names of the oversampled objects, in the order of `samples`; empty without them."""
+        return self._oversampled.names if self._oversampled else ()
+
+    @property
+    def samples(self) -> Reals | Integers | Bytes:
+        """Samples of one cycle, oldest first (objects, `oversampling`): a view of the array.
+
+        Raises:
+            RuntimeError: The request has no `oversampling=`, or no loop has been opened yet.
+        """
+        if self._oversampled is None:
+            raise RuntimeError(f"{self!r} has no samples: it was made without oversampling=")
+        count, each = len(self._oversampled.names), self._oversampled.samples
+        bank = self._oversampled.channels[0].channel.bank
+        return self.array(bank)[: count * each].reshape(count, each)
+
+    def sample_times(self, cycle: Cycle) -> Reals:
+        """Return the time of each sample on the clock of the loop, as `cycle.time` [s].
+
+        They follow from StartTimeNextLatch (0x1D09:98, or 0x1D09:90), the time at which the next
+        samples begin (Beckhoff, EL5031-0011): the first sample is one exchange older.
+
+        Args:
+            cycle: present cycle.
+
+        Raises:
+            RuntimeError: The device does not exchange this object, the request has no
+                `oversampling=`, or the loop has no distributed clocks.
+        """
+        each = time_channel(self._channels) if self._oversampled else None
+        present = self._system_time()
+        if self._oversampled is None or each is None or present is None:
+            raise RuntimeError(
+                f"{self!r}: the times of samples need oversampling=, dc=, and the object "
+                "StartTimeNextLatch (0x1D09:98) in the process data; choose its PDO with pdos="
+            )
+        span = 1 << each.channel.bit_length
+        age = (present - int(self[each.name]) + span // 2) % span - span // 2
+        count = self._oversampled.samples
+        steps = np.arange(count, dtype=np.float64) / count - 1.0
+        return cycle.time - age * 1e-9 + steps * self._exchange
+
+    def _bind(self, reals: Reals, integers: Integers, bits: Bytes, views: Views) -> None:
+        self._system_time, unit_valid = views.system_time, views.unit_valid
         self._unit_valid = unit_valid
         arrays: dict[Bank, Reals | Integers | Bytes]
         arrays = {Bank.REAL: reals, Bank.INTEGER: integers, Bank.BIT: bits}
@@ -241,6 +318,8 @@ class Inputs(Channels):
             last values: see `present`.
         divider: n to exchange in every n-th cycle of the loop.
         dc: distributed clocks, as for `Drives`.
+        oversampling: number of samples per cycle of an oversampling terminal; see `samples`. The
+            keys of `scale` are then those of `sample_names`.
         pdos: PDOs to assign instead of the present ones, as for `Drives`.
         start_up: objects to write to each device before SAFE-OP.
 
@@ -253,7 +332,7 @@ class Inputs(Channels):
 
     def bind(self, views: Views) -> None:
         """Connect the request to the arrays of a newly opened loop."""
-        self._bind(views.input_reals, views.input_integers, views.input_bits, views.unit_valid)
+        self._bind(views.input_reals, views.input_integers, views.input_bits, views)
 
 
 class Outputs(Channels):
@@ -278,4 +357,4 @@ class Outputs(Channels):
 
     def bind(self, views: Views) -> None:
         """Connect the request to the arrays of a newly opened loop."""
-        self._bind(views.output_reals, views.output_integers, views.output_bits, views.unit_valid)
+        self._bind(views.output_reals, views.output_integers, views.output_bits, views)

@@ -57,6 +57,13 @@ class AxisValues:
         object.__setattr__(self, "mode", mode)
         object.__setattr__(self, "_columns", columns)
 
+    @property
+    def columns(self) -> Mapping[str, Array]:
+        """Further arrays by name. Raises RuntimeError if no loop has been opened yet."""
+        if not hasattr(self, "_columns"):
+            raise RuntimeError(f"{self._owner}.columns has no values before a Loop is open")
+        return self._columns
+
     def __getitem__(self, name: str) -> Array:
         """Return a column (n,): float64 in SI units, or int64 for raw values.
 

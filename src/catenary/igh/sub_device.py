@@ -41,6 +41,8 @@ class SubDevice(bus.SubDevice):
         self.sdo: Sdo = Sdo(self)
         self.foe = bus.Foe(self, unavailable="libethercat has no FoE: use ethercat foe_write")
         self.eoe = bus.Eoe(self, unavailable="the kernel master has its own interfaces: ip link")
+        self.aoe = bus.Aoe(self, unavailable="libethercat has no AoE: use the interface eth0")
+        self.voe = bus.Voe(self, unavailable="VoE of libethercat is not used: use eth0")
         self.kernel = kernel
         self._emergencies: deque[Emergency] = deque(maxlen=EMERGENCIES_KEPT)
         self._register_busy = False  # True while the register request is in use

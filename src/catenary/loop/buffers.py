@@ -19,7 +19,7 @@ COLUMN_BUFFERS: dict[tuple[bool, Bank], str] = {
     (True, Bank.BIT): "output_bits",
 }
 PART_BUFFERS = (*COLUMN_BUFFERS.values(), "input_bytes", "output_bytes")
-OTHERS = (*PART_BUFFERS, "unit_valid", "movers", "is_open", "is_led")
+OTHERS = (*PART_BUFFERS, "unit_valid", "movers", "is_open", "is_led", "system_time")
 AXIS_BUFFERS = tuple(each.name for each in fields(Views) if each.name not in OTHERS)
 
 
@@ -29,6 +29,7 @@ def bind_requests(
     buffers: Mapping[str, memoryview],
     is_open: Callable[[], bool],
     is_led: Callable[[], bool] = lambda: False,
+    system_time: Callable[[], int | None] = lambda: None,
 ) -> Views:
     """Bind every request to its part of the buffers, in the order of the plan.
 
@@ -38,6 +39,8 @@ def bind_requests(
         buffers: Private buffers of the engine by name.
         is_open: Returns True while the loop runs.
         is_led: Returns True while a law or a stream sets the targets.
+        system_time: Returns the system time at the start of the present cycle [ns]; None without
+            distributed clocks.
 
     Returns:
         Views of the whole buffers.
@@ -51,12 +54,26 @@ def bind_requests(
         starts = {name: used.get(name, used["axes"]) for name in sizes}
         parts = {name: arrays[name][starts[name] :][: sizes[name]] for name in sizes}
         request.bind(
-            Views(**parts, unit_valid=unit_valid, movers=movers, is_open=is_open, is_led=is_led)
+            Views(
+                **parts,
+                unit_valid=unit_valid,
+                movers=movers,
+                is_open=is_open,
+                is_led=is_led,
+                system_time=system_time,
+            )
         )
         used["axes"] += len(table.axes)
         for name in PART_BUFFERS:
             used[name] += sizes[name]
-    return Views(**arrays, unit_valid=unit_valid, movers=movers, is_open=is_open, is_led=is_led)
+    return Views(
+        **arrays,
+        unit_valid=unit_valid,
+        movers=movers,
+        is_open=is_open,
+        is_led=is_led,
+        system_time=system_time,
+    )
 
 
 def part_sizes(table: RequestTables) -> dict[str, int]:

@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 
 from catenary.bus import CycleClock, MainDevice, SubDevice
 from catenary.bus.event_types import ClockLocked, ClockUnlocked
-from catenary.core import Engine
+from catenary.core import Cycle, Engine
 from catenary.errors import ClockError
 from catenary.link import ring_of
 from catenary.plan.cycle import ClockPlan
@@ -68,6 +68,28 @@ class Clocks:
         It counts from 2000-01-01 on a NIC, and from the start of the segment in virtual time.
         """
         return self._clock.figures()["time"] * NS
+
+    @property
+    def cycle_start_ns(self) -> int:
+        """System time of the distributed clocks at the start of the present cycle [ns]."""
+        figures = self._clock.figures()
+        started = self._engine.origin + self._engine.time_ns
+        return int(figures["time"]) - int(figures["time_sent"]) + started
+
+    def loop_time(self, system_time_ns: int, cycle: Cycle, *, bits: int = 64) -> float:
+        """Return a system time of the distributed clocks on the clock of the loop, as `cycle.time`.
+
+        Args:
+            system_time_ns: System time, such as `LatchEvent.time_ns` [ns].
+            cycle: Present cycle.
+            bits: Width of the time, 32 or 64. With 32 bits, it must be within 2.1 s of the cycle.
+
+        Returns:
+            The time [s].
+        """
+        half = 1 << bits - 1
+        age = (self.cycle_start_ns - system_time_ns + half) % (2 * half) - half
+        return cycle.time - age * NS
 
     @property
     def differences(self) -> Mapping[int, float]:

@@ -50,6 +50,12 @@ FATAL = CYCLE_WORKING_COUNTER | CYCLE_STOPPED | CYCLE_NONE
 ENABLE_TIMEOUT_NS = 5_000_000_000  # longer than slow mains contactors and brakes take
 ENABLE_CYCLES = 20  # shortest timeout [cycles], for long periods
 SETTLE_CYCLES = 50  # longest wait for the first cycle with all answers
+POWERED = (  # states in which a drive moves or brakes its axis
+    AxisState.OPERATION_ENABLED,
+    AxisState.QUICK_STOP_ACTIVE,
+    AxisState.FAULT_REACTION_ACTIVE,
+)
+REQUESTED_SHIFT = 6  # place of the requested state in `Views.axis_flags`
 STOP_SLICE_NS = 20_000_000  # between checks of `guard.hurry` while the drives brake
 
 
@@ -105,6 +111,7 @@ class Session:
             self.engine.buffers,
             is_open=lambda: self.is_open,
             is_led=lambda: self.engine.led,
+            system_time=lambda: None if self.clocks is None else self.clocks.cycle_start_ns,
         )
 
     def _make_clocks(self) -> Clocks | None:
@@ -172,7 +179,9 @@ class Session:
         Args:
             origin_ns: Cycle start of the schedule to follow [ns]; 0: a new schedule.
         """
-        self._attached.enter_context(self.main.attached(self.service.runner, self._abandon))
+        self._attached.enter_context(
+            self.main.attached(self.service.runner, self._abandon, self.powered_axes)
+        )
         inline = self.plan.cycle.execution == "inline" and self.engine.scheduling != "virtual time"
         if inline and self.switch_interval is not None:
             self._attached.enter_context(switch_interval(self.switch_interval))
@@ -232,6 +241,18 @@ class Session:
                 self.judge(flags, enabling=True)
             if self.engine.now() > deadline:
                 raise self.faults.drive_error(axes, "cannot be enabled")
+
+    def powered_axes(self, position: int) -> list[str]:
+        """Return the axes of a device that have power, or are requested to be enabled.
+
+        A request counts before it is committed. The states are those of the last iteration.
+        """
+        views = self.views
+        powered = np.isin(views.axis_state, POWERED) | (views.requested_state == REQUEST_ENABLED)
+        powered |= views.axis_flags >> REQUESTED_SHIFT == REQUEST_ENABLED
+        powered |= views.jogged != 0
+        axes = self.plan.cycle.axes
+        return [axes[i].name for i in np.flatnonzero(powered) if axes[i].device == position]
 
     def refuse_powered_torque(self, call: str) -> None:
         """Raise LoopError if an axis is powered in CST, since `call` commits no torque."""

@@ -9,7 +9,7 @@ from typing import Any, TypeVar
 from msgspec import UNSET
 
 from catenary.bus import SubDevice
-from catenary.drive import DistributedClock, HomingMethod
+from catenary.drive import DistributedClock, HomingMethod, TouchProbe
 from catenary.drive.arguments import axis_modes, force_and_torque
 from catenary.drive.limits import LimitOptions
 from catenary.drive.units import AxisUnits
@@ -17,7 +17,13 @@ from catenary.loop.options import ClockOptions, Scheduling, StopPolicy
 from catenary.machine.channels import make_columns
 from catenary.machine.file import MachineFile
 from catenary.machine.references import WHOLE_LISTS, axis_addresses, pdo_index
-from catenary.machine.schema import ClockTable, DrivesTable, HomingTable, Optional
+from catenary.machine.schema import (
+    ClockTable,
+    DrivesTable,
+    HomingTable,
+    Optional,
+    TouchProbeTable,
+)
 from catenary.plan.options import period_in_ns
 from catenary.toml_lines import KeyPath
 
@@ -67,6 +73,9 @@ def drives_options(file: MachineFile, role: str) -> dict[str, Any]:
     del options["axes"]
     if "columns" in options:
         options["columns"] = make_columns(file, (*path, "columns"), options["columns"])
+    if isinstance(options.get("touch_probe"), TouchProbeTable):
+        given = file.values(options["touch_probe"], (*path, "touch_probe"))
+        options["touch_probe"] = _made(file, TouchProbe, given, (*path, "touch_probe"))
     if "homing" in options:
         options["homing"] = _homing(file, options["homing"], (*path, "homing"), linear)
     if "pdos" in options and isinstance(options["pdos"], dict):

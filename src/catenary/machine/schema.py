@@ -173,6 +173,16 @@ class HomingTable(Table, frozen=True, kw_only=True):
     offset: Optional[Position] = UNSET
 
 
+class TouchProbeTable(Table, frozen=True, kw_only=True):
+    """`touch_probe` of drives (cat.drive.TouchProbe)."""
+
+    probes: Optional[list[Literal[1, 2]]] = UNSET
+    edges: Optional[list[Literal["rising", "falling"]]] = UNSET
+    times: Optional[bool] = UNSET
+    counters: Optional[bool] = UNSET
+    toggles: Optional[bool] = UNSET
+
+
 class DrivesTable(Table, frozen=True, kw_only=True):
     """[drives.NAME]: drives of one or more axes (cat.Drives). A list has one value per axis."""
 
@@ -202,6 +212,7 @@ class DrivesTable(Table, frozen=True, kw_only=True):
     homing: Optional[PerAxis[HomingTable]] = UNSET
     measured: Optional[list[Literal["position", "velocity", "torque"]]] = UNSET
     columns: Optional[list[str | ColumnTable]] = UNSET
+    touch_probe: Optional[bool | TouchProbeTable] = UNSET
     required: Optional[bool] = UNSET
     divider: Optional[Divider] = UNSET
     clock: Optional[bool | ClockTable] = UNSET

@@ -231,6 +231,9 @@ class Views:
     is_open: Callable[[], bool] = lambda: True
     # Returns True while a law or a stream sets the targets
     is_led: Callable[[], bool] = lambda: False
+    # Returns the system time of the distributed clocks at the start of the present cycle [ns]; None
+    # without distributed clocks
+    system_time: Callable[[], int | None] = lambda: None
 
 
 class ProcessDataRequest(Protocol):

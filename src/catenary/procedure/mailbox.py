@@ -90,13 +90,24 @@ def turn_comes(channel: MailboxChannel, seconds: float) -> Procedure[bool]:
     ticket = object()
     channel.turns.append(ticket)
     try:
-        for _ in range(round(seconds / TURN)):
-            if channel.turns[0] is ticket:
-                return True
-            yield after(TURN)
-        return channel.turns[0] is ticket
+        return (yield from turn_comes_for(channel, ticket, seconds))
     finally:
         channel.turns.remove(ticket)
+
+
+def turn_comes_for(channel: MailboxChannel, ticket: object, seconds: float) -> Procedure[bool]:
+    """Wait until a ticket is the first in the queue of a mailbox. Return False if it is too late.
+
+    Args:
+        channel: The mailbox of the device.
+        ticket: Element of `channel.turns`.
+        seconds: Longest time to wait [s].
+    """
+    for _ in range(round(seconds / TURN)):
+        if channel.turns[0] is ticket:
+            return True
+        yield after(TURN)
+    return channel.turns[0] is ticket
 
 
 def converse(

@@ -93,7 +93,7 @@ class MailboxChannel:
         """
         self.punctual = empty_ns is None
         if empty_ns is None:
-            self.answer_delay_ns = self.answer_delay_ns * 9 // 10
+            self.answer_delay_ns = self.answer_delay_ns * 31 // 32
         elif self.posted_ns is not None:
             # A single slow answer must not delay all further polls.
             limit_ns = max(2 * self.answer_delay_ns, ANSWER_DELAY_FIRST_NS)

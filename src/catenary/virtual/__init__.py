@@ -1,6 +1,7 @@
 """Virtual EtherCAT segments at register level: in virtual time, in real time, or on a NIC."""
 
 from catenary.virtual import faults
+from catenary.virtual.aoe.protocol import Ads
 from catenary.virtual.coe.diagnosis_history import HistoryOptions
 from catenary.virtual.coe.quirks import MailboxQuirks
 from catenary.virtual.configuration import read_segment
@@ -13,11 +14,13 @@ from catenary.virtual.devices import (
     DigitalOutputs,
     Junction,
     ModelSensor,
+    OversamplingTerminal,
     Servo,
 )
 from catenary.virtual.devices.described import DescribedDevice, from_esi
 from catenary.virtual.devices.motor import Motor
 from catenary.virtual.devices.servo_quirks import ServoQuirks
+from catenary.virtual.devices.touch_probe import ProbeOptions
 from catenary.virtual.devices.twin import Twin, TwinOptions
 from catenary.virtual.eoe.ethernet import Ethernet
 from catenary.virtual.fault_player import FaultEvent, Loss
@@ -30,8 +33,10 @@ from catenary.virtual.plant import Plant, PlantPart
 from catenary.virtual.segment import FrameCounters, Segment, demo_segment
 from catenary.virtual.server import Served, Server, serve, serve_all
 from catenary.virtual.sii_quirks import SiiQuirks
+from catenary.virtual.vendor_protocol import VendorEcho, VendorMessages
 
 __all__ = [
+    "Ads",
     "AnalogInputs",
     "Coupler",
     "Crystal",
@@ -53,8 +58,10 @@ __all__ = [
     "MappingQuirks",
     "ModelSensor",
     "Motor",
+    "OversamplingTerminal",
     "Plant",
     "PlantPart",
+    "ProbeOptions",
     "Segment",
     "Served",
     "Server",
@@ -63,6 +70,8 @@ __all__ = [
     "SiiQuirks",
     "Twin",
     "TwinOptions",
+    "VendorEcho",
+    "VendorMessages",
     "demo_segment",
     "faults",
     "from_esi",

@@ -1,9 +1,13 @@
 """Motors of virtual servos (servo.h): parameters, state, injected loads and faults."""
 
 from catenary.virtual._segment cimport (
+    AXIS_SLOTS,
+    PROBES,
     Core,
     cat_segment,
+    controller,
     lock,
+    probe_wire,
     servo_axis,
     servo_place,
     unlock,
@@ -74,6 +78,37 @@ cdef class Motors:
         """Inject a fault with this error code. 0 removes the cause."""
         self._core._axis(position, axis).injected = code
 
+    def set_probe_quirks(self, int position, int axis, *, bint toggles, bint keeps_stored,
+                         bint one_edge):
+        """Set the differences of the touch probes (see devices/touch_probe.py)."""
+        cdef servo_axis *a = self._core._axis(position, axis)
+        a.probe_quirks.toggles, a.probe_quirks.keeps_stored = toggles, keeps_stored
+        a.probe_quirks.one_edge = one_edge
+
+    def set_probe_switch(self, int position, int axis, int number, double first, double end):
+        """Close the switch of a probe input from position `first` to `end` [rad]."""
+        cdef servo_axis *a = self._core._axis(position, axis)
+        check_probe(number)
+        lock(self._segment)
+        a.probes[number].from_, a.probes[number].to = first, end
+        unlock(self._segment)
+
+    def set_probe_input(self, int position, int axis, int number, bint level):
+        """Set the wire of a probe input now."""
+        cdef servo_axis *a = self._core._axis(position, axis)
+        cdef controller *c = self._core._at(position)
+        check_probe(number)
+        lock(self._segment)
+        probe_wire(c, a, c.slots + axis * AXIS_SLOTS, number, level)
+        unlock(self._segment)
+
     def stop_torque(self, int position, int axis, bint active):
         """Activate or deactivate safe torque off (STO)."""
         self._core._axis(position, axis).sto = active
+
+
+cdef int check_probe(int number) except -1:
+    """Raise IndexError unless a probe input exists."""
+    if not 0 <= number < PROBES:
+        raise IndexError(f"probe input must be 0 or {PROBES - 1}, not {number}")
+    return 0

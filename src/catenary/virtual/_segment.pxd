@@ -10,7 +10,7 @@ cdef extern from "clock.h":
 
 cdef extern from "segment_memory.h" nogil:
     int MAX_AXES, MAX_MAPPED, MAX_MEMBERS, MAX_SENSORS, AXIS_SLOTS, MODEL_SERVO, MODEL_SLOTS, PORTS, MAX_FRAME_FAULTS
-    int LOSS_LOG
+    int LOSS_LOG, LATCH_INPUTS, PROBES
     int64_t NEVER
     ctypedef struct sync_manager:
         uint16_t start, length
@@ -87,7 +87,14 @@ cdef extern from "segment_memory.h" nogil:
         double mode_delay
         uint32_t refused_modes
         uint8_t never_bit_12, follows_without_bit_12, ignores_quick_stop, ignores_disable
+    ctypedef struct servo_probe:
+        double from_ "from"
+        double to
+    ctypedef struct probe_quirks:
+        uint8_t toggles, keeps_stored, one_edge
     ctypedef struct servo_axis:
+        servo_probe *probes
+        probe_quirks probe_quirks
         double inertia, viscous, coulomb, load, rated_torque, velocity_limit
         double counts_per_radian, velocity_per_radian, position_gain, velocity_gain, integral_gain
         double radian_per_count, radian_per_velocity, per_inertia, per_torque
@@ -167,6 +174,8 @@ cdef extern from "segment_memory.h" nogil:
     void synchronous_end(controller *)
     void sync_schedule(controller *)
     int64_t dc_system_time(const controller *, int64_t when)
+    void latch_input(controller *, int number, int level, int64_t when)
+    void probe_wire(const controller *, servo_axis *, int64_t *slots, int number, int level)
     void lock(cat_segment *)
     void unlock(cat_segment *)
     int64_t monotonic_now()

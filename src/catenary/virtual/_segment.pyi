@@ -68,6 +68,13 @@ SLOT_POSITION_WINDOW_TIME: Final[int]
 SLOT_VELOCITY_WINDOW: Final[int]
 SLOT_VELOCITY_WINDOW_TIME: Final[int]
 SLOT_VELOCITY_THRESHOLD: Final[int]
+SLOT_PROBE_FUNCTION: Final[int]
+SLOT_PROBE_STATUS: Final[int]
+SLOT_PROBE_SOURCE_1: Final[int]
+SLOT_PROBE_SOURCE_2: Final[int]
+SLOT_PROBE_POSITIONS: Final[int]
+SLOT_PROBE_TIMES: Final[int]
+SLOT_PROBE_COUNTERS: Final[int]
 
 class Core:
     failure: BaseException | None
@@ -138,6 +145,7 @@ class Core:
     def system_time(self, position: int) -> int:
         """Return the exact time of a device's clock [ns], without the scatter that frames read."""
 
+    def latch_input(self, position: int, number: int, level: bool) -> None: ...
     def pulses(self, position: int) -> tuple[int, int]: ...
     def slot(self, position: int, number: int) -> int: ...
     def put_slot(self, position: int, number: int, value: int) -> None: ...

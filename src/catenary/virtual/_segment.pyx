@@ -38,6 +38,8 @@ cdef extern from "segment_memory.h":
         SLOT_PROFILE_VELOCITY, SLOT_ACCELERATION, SLOT_HALT_OPTION, SLOT_POSITION_WINDOW
         SLOT_POSITION_WINDOW_TIME, SLOT_VELOCITY_WINDOW, SLOT_VELOCITY_WINDOW_TIME
         SLOT_VELOCITY_THRESHOLD
+        SLOT_PROBE_FUNCTION, SLOT_PROBE_STATUS, SLOT_PROBE_SOURCE_1, SLOT_PROBE_SOURCE_2
+        SLOT_PROBE_POSITIONS, SLOT_PROBE_TIMES, SLOT_PROBE_COUNTERS
     cpdef enum:
         EVENT_AL_CONTROL, EVENT_MAILBOX_WRITTEN, EVENT_MAILBOX_READ
         EVENT_REPEAT_REQUEST, EVENT_WATCHDOG, EVENT_OUTPUTS
@@ -490,6 +492,19 @@ cdef class Core:
         time = dc_system_time(c, self._segment.now)
         unlock(self._segment)
         return time
+
+    def latch_input(self, int position, int number, bint level):
+        """Set the level of a latch input of a device's clock now.
+
+        Raises:
+            IndexError: The device or the input does not exist.
+        """
+        cdef controller *c = self._at(position)
+        if not 0 <= number < LATCH_INPUTS:
+            raise IndexError(f"latch input must be 0 or 1, not {number}")
+        lock(self._segment)
+        latch_input(c, number, level, self._segment.now)
+        unlock(self._segment)
 
     def pulses(self, int position):
         """Return the numbers of SYNC0 and SYNC1 pulses since the controller was created."""

@@ -119,7 +119,7 @@ class Description:
     identification: int = 0
     ports: tuple[int, ...] = (0, 1)
     mapping_quirks: MappingQuirks = NO_MAPPING_QUIRKS
-    op_modes: tuple[OpMode, ...] = STANDARD  # for devices with a clock and axes
+    op_modes: tuple[OpMode, ...] = STANDARD  # of a clock; STANDARD only for devices with axes
     loop_control: bool = True  # True if 0x0101 can close the ports
     lrw: bool = True
     sii_variant: str = ""  # differences of the SII from the device

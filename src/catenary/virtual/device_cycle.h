@@ -139,7 +139,7 @@ static void model_pulse(controller *c) {
     int fresh = c->outputs_valid && outputs_in_time(c);
     if (fresh || (c->outputs_valid && !c->outputs_taken))
         outputs_accept(c);
-    if (!c->outputs_valid || fresh)
+    if (!c->outputs_valid || fresh || c->outputs.sm < 0)     /* a device without outputs misses none */
         d->missed_in_a_row = 0;
     else
         outputs_missed(c);

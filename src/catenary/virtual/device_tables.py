@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Literal
 
 import msgspec
 
+from catenary.virtual.aoe.protocol import Ads
 from catenary.virtual.coe.diagnosis_history import NO_HISTORY, HistoryOptions
 from catenary.virtual.coe.quirks import NO_MAILBOX_QUIRKS, MailboxQuirks
 from catenary.virtual.crystal import ClockBits, Crystal
@@ -18,19 +20,17 @@ from catenary.virtual.devices.digital_outputs import DigitalOutputs
 from catenary.virtual.devices.junction import Junction
 from catenary.virtual.devices.model_sensor import ModelSensor
 from catenary.virtual.devices.motor import Motor
+from catenary.virtual.devices.oversampling import OversamplingTerminal
 from catenary.virtual.devices.servo import Servo
 from catenary.virtual.devices.servo_quirks import NO_QUIRKS, ServoQuirks
+from catenary.virtual.devices.touch_probe import ProbeOptions
 from catenary.virtual.devices.twin import STANDARD_MOTOR, TwinOptions
 from catenary.virtual.eoe.ethernet import Ethernet
 from catenary.virtual.foe.options import DeviceFiles
 from catenary.virtual.mapping_quirks import NO_MAPPING_QUIRKS, MappingQuirks
 from catenary.virtual.protocols import MailboxProtocol
 from catenary.virtual.sii_quirks import NO_SII_QUIRKS, SiiQuirks
-
-
-def present(*protocols: MailboxProtocol | None) -> tuple[MailboxProtocol, ...]:
-    """Return the protocols that a table contains."""
-    return tuple(each for each in protocols if each is not None)
+from catenary.virtual.vendor_protocol import VendorEcho
 
 
 class CrystalTable(msgspec.Struct, forbid_unknown_fields=True, frozen=True, kw_only=True):
@@ -71,6 +71,11 @@ class _AppliedTable(_ClockedTable, frozen=True, kw_only=True):
     lrw: bool = True
     mailbox_quirks: MailboxQuirks = NO_MAILBOX_QUIRKS
     sii_quirks: SiiQuirks = NO_SII_QUIRKS
+
+
+def _given(*protocols: MailboxProtocol | None) -> tuple[MailboxProtocol, ...]:
+    """Return the mailbox protocols that a table has."""
+    return tuple(each for each in protocols if each is not None)
 
 
 class CouplerTable(_ClockedTable, tag="coupler", frozen=True, kw_only=True):
@@ -127,6 +132,8 @@ class AnalogInputsTable(_AppliedTable, tag="analog_inputs", frozen=True, kw_only
     mapping_quirks: MappingQuirks = NO_MAPPING_QUIRKS
     files: DeviceFiles | None = None
     ethernet: Ethernet | None = None
+    ads: Ads | None = None
+    vendor_echo: VendorEcho | None = None
 
     def device(self) -> Device:
         return AnalogInputs(
@@ -144,7 +151,27 @@ class AnalogInputsTable(_AppliedTable, tag="analog_inputs", frozen=True, kw_only
             mailbox_quirks=self.mailbox_quirks,
             sii_quirks=self.sii_quirks,
             files=self.files,
-            protocols=present(self.ethernet),
+            protocols=_given(self.ethernet, self.ads, self.vendor_echo),
+        )
+
+
+class OversamplingTable(_ClockedTable, tag="oversampling", frozen=True, kw_only=True):
+    direction: Literal["inputs", "outputs"] = "inputs"
+    channels: int = 2
+    samples: int = 10
+    lrw: bool = True
+
+    def device(self) -> Device:
+        return OversamplingTerminal(
+            direction=self.direction,
+            channels=self.channels,
+            samples=self.samples,
+            name=self.name,
+            alias=self.alias,
+            serial=self.serial,
+            lrw=self.lrw,
+            crystal=self.crystal.crystal(),
+            clock_bits=self.clock_bits,
         )
 
 
@@ -188,11 +215,14 @@ class ServoTable(_AppliedTable, tag="servo", frozen=True, kw_only=True):
     following_error_turns: float = 0.25
     position_limits: tuple[float, float] | None = None
     sync_missed_limit: int = 3
+    touch_probe: ProbeOptions | None = None
     diagnosis: HistoryOptions = NO_HISTORY
     quirks: ServoQuirks = NO_QUIRKS
     mapping_quirks: MappingQuirks = NO_MAPPING_QUIRKS
     files: DeviceFiles | None = None
     ethernet: Ethernet | None = None
+    ads: Ads | None = None
+    vendor_echo: VendorEcho | None = None
 
     def device(self) -> Device:
         return Servo(
@@ -216,13 +246,14 @@ class ServoTable(_AppliedTable, tag="servo", frozen=True, kw_only=True):
             crystal=self.crystal.crystal(),
             clock_bits=self.clock_bits,
             sync_missed_limit=self.sync_missed_limit,
+            touch_probe=self.touch_probe,
             diagnosis=self.diagnosis,
             quirks=self.quirks,
             mapping_quirks=self.mapping_quirks,
             mailbox_quirks=self.mailbox_quirks,
             sii_quirks=self.sii_quirks,
             files=self.files,
-            protocols=present(self.ethernet),
+            protocols=_given(self.ethernet, self.ads, self.vendor_echo),
         )
 
 
@@ -236,6 +267,8 @@ class EsiTable(_ClockedTable, tag="esi", frozen=True, kw_only=True):
     motor: Motor = STANDARD_MOTOR
     files: DeviceFiles | None = None
     ethernet: Ethernet | None = None
+    ads: Ads | None = None
+    vendor_echo: VendorEcho | None = None
     modules: tuple[str | int, ...] | None = None  # "" for an empty slot
 
     def device(self) -> Device:
@@ -254,7 +287,7 @@ class EsiTable(_ClockedTable, tag="esi", frozen=True, kw_only=True):
                 mapping_quirks=self.mapping_quirks,
                 mailbox_quirks=self.mailbox_quirks,
                 files=self.files,
-                protocols=present(self.ethernet),
+                protocols=_given(self.ethernet, self.ads, self.vendor_echo),
             ),
         )
 
@@ -273,6 +306,8 @@ class SiiTable(_PlacedTable, tag="sii", frozen=True, kw_only=True):
     motor: Motor = STANDARD_MOTOR
     files: DeviceFiles | None = None
     ethernet: Ethernet | None = None
+    ads: Ads | None = None
+    vendor_echo: VendorEcho | None = None
 
     def device(self) -> Device:
         return Device.from_sii(
@@ -290,7 +325,7 @@ class SiiTable(_PlacedTable, tag="sii", frozen=True, kw_only=True):
                 mapping_quirks=self.mapping_quirks,
                 mailbox_quirks=self.mailbox_quirks,
                 files=self.files,
-                protocols=present(self.ethernet),
+                protocols=_given(self.ethernet, self.ads, self.vendor_echo),
             ),
         )
 
@@ -302,6 +337,7 @@ DeviceTable = (
     | DigitalInputsTable
     | AnalogInputsTable
     | ModelSensorTable
+    | OversamplingTable
     | ServoTable
     | EsiTable
     | SiiTable

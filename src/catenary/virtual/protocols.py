@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import Protocol
 
+from catenary.virtual.coe.dictionary import Dictionary
 from catenary.virtual.mailbox import Mailbox
 from catenary.virtual.scheduler import Scheduler
 
@@ -34,6 +35,8 @@ class Surroundings:
     state: Callable[[], int]  # AL state
     receive_room: int  # longest data of a message to the device [bytes]
     send_room: int  # longest data of a message from the device [bytes]
+    dictionary: Dictionary
+    station_address: Callable[[], int]
 
 
 class MailboxProtocol(Protocol):

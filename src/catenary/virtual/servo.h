@@ -10,6 +10,7 @@
 #include <math.h>
 
 #include "controller/controller.h"
+#include "controller/distributed_clock.h"
 
 /* Slots of one axis, at `AXIS_SLOTS * axis + slot`. devices/servo_objects.py maps objects to them. */
 enum servo_slot {
@@ -26,7 +27,11 @@ enum servo_slot {
     SLOT_HOME_OFFSET, SLOT_HOMING_METHOD, SLOT_HOMING_SPEED, SLOT_HOMING_SLOW,
     SLOT_HOMING_ACCELERATION, SLOT_HOMING_TORQUE, SLOT_ABORT_CONNECTION_OPTION,
     SLOT_PROFILE_VELOCITY, SLOT_ACCELERATION, SLOT_HALT_OPTION, SLOT_POSITION_WINDOW, SLOT_POSITION_WINDOW_TIME,
-    SLOT_VELOCITY_WINDOW, SLOT_VELOCITY_WINDOW_TIME, SLOT_VELOCITY_THRESHOLD, AXIS_SLOTS
+    SLOT_VELOCITY_WINDOW, SLOT_VELOCITY_WINDOW_TIME, SLOT_VELOCITY_THRESHOLD,
+    SLOT_PROBE_FUNCTION, SLOT_PROBE_STATUS, SLOT_PROBE_SOURCE_1, SLOT_PROBE_SOURCE_2,
+    /* four each: probe 1 positive, probe 1 negative, probe 2 positive, probe 2 negative edge */
+    SLOT_PROBE_POSITIONS, SLOT_PROBE_TIMES = SLOT_PROBE_POSITIONS + 4, SLOT_PROBE_COUNTERS = SLOT_PROBE_TIMES + 4,
+    AXIS_SLOTS = SLOT_PROBE_COUNTERS + 4
 };
 
 enum {
@@ -68,6 +73,19 @@ typedef struct servo_profile {
     uint8_t asked, acknowledged, in_process, buffered, reached;
 } servo_profile;
 
+/* Input of a touch probe (servo_probe.h). */
+typedef struct servo_probe {
+    double from, to;                                  /* range in which its switch is closed [rad]; empty: no switch */
+    uint8_t wire;                                     /* level that is applied from outside */
+} servo_probe;
+
+/* Differences of the touch probes of real drives. devices/touch_probe.py lists the sources. */
+typedef struct probe_quirks {
+    uint8_t toggles, keeps_stored, one_edge;
+} probe_quirks;
+
+enum { PROBES = 2 };
+
 typedef struct servo_axis {
     /* parameters, SI units */
     double inertia, viscous, coulomb, load;           /* kg m2, N m s/rad, N m, N m */
@@ -98,6 +116,10 @@ typedef struct servo_axis {
     double bit_12_hidden;                             /* remaining time for which bit 12 is hidden [s] */
     double mode_wait;                                 /* remaining time until the requested mode applies [s] */
     int mode_requested;
+    servo_probe probes[PROBES];
+    probe_quirks probe_quirks;
+    double probed;                                    /* position at the last step [rad] */
+    int64_t probed_at;                                /* system time of the last step [ns] */
 } servo_axis;
 
 static const uint16_t statuswords[] = {
@@ -330,6 +352,7 @@ static double servo_ramp(servo_axis *a, const int64_t *slots, double limit, doub
 }
 
 #include "servo_homing.h"
+#include "servo_probe.h"
 #include "servo_profile.h"
 
 /* Accept the set-points, or hold the last demand if the drive does not follow them. */
@@ -480,10 +503,12 @@ static void servo_step(controller *c, servo_axis *a, int64_t *slots, int fed, in
     servo_command(c, a, slots);
     homing_command(a, slots);
     profile_command(a, slots);
+    probes_command(a, slots);
     servo_supervise(c, a, slots, dt);
     a->torque = servo_powered(a) ? servo_drive(a, slots, fresh, dt, rate) : 0;
     if (a->joint == NULL)
         servo_motor(a, dt);
+    probes_step(c, a, slots);
     servo_standstill(a);
     a->bit_12_hidden = counted_down(a->bit_12_hidden, dt);
 }

@@ -9,7 +9,7 @@ import struct
 from collections.abc import Sequence
 
 from catenary.virtual.description import VENDOR_ID, Description, Pdo, SyncManagerDefault
-from catenary.virtual.op_modes import OpMode
+from catenary.virtual.op_modes import STANDARD, OpMode
 from catenary.virtual.sii_quirks import NO_SII_QUIRKS, SiiQuirks
 
 STRINGS, GENERAL, FMMU, SYNC_MANAGER, TX_PDO, RX_PDO, CLOCK, END = (
@@ -162,7 +162,7 @@ def make_sii_image(device: Description, quirks: SiiQuirks = NO_SII_QUIRKS) -> by
     flags = FIXED_CONTENT if device.mapping_quirks.fixed_pdos == "declared" else 0
     parts.append((TX_PDO, _pdos(device.tx_pdos, strings, quirks, flags)))
     parts.append((RX_PDO, _pdos(device.rx_pdos, strings, quirks, flags)))
-    if device.clock and device.axes:
+    if device.clock and (device.axes or device.op_modes is not STANDARD):
         parts.append((CLOCK, _clock(device.op_modes, strings)))
     parts.insert(0, (STRINGS, strings.encode()))
     body = b"".join(_category(kind, content) for kind, content in parts if content)

@@ -14,6 +14,7 @@ pytest.importorskip("numba", reason="laws need Numba: pip install 'catenary[law]
 pytest.importorskip("ruckig", reason="motions are made by ruckig: pip install 'catenary[traj]'")
 
 import body
+import humanoid
 
 PROGRAM = body.MODEL.with_name("humanoid.py")
 
@@ -38,8 +39,18 @@ def refused(folder: Path, *arguments: str) -> str:
         (["--page", "push"], "--page runs no scenario"),
     ],
 )
-def test_a_mistake_is_named(tmp_path: Path, arguments: list[str], message: str) -> None:
-    assert message in refused(tmp_path, *arguments)
+def test_a_mistake_is_named(
+    arguments: list[str],
+    message: str,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.setattr(sys, "argv", [str(PROGRAM), "--out", str(tmp_path), *arguments])
+    with pytest.raises(SystemExit) as ended:
+        humanoid.main()
+    assert ended.value.code == 2
+    assert message in capsys.readouterr().err.splitlines()[-1]
 
 
 def test_the_model_of_another_robot_is_refused(tmp_path: Path) -> None:

@@ -21,7 +21,11 @@ BEST_EFFORT = ("best_effort", "volatile", 10, None)
 
 
 class NodeProcess:
-    """A process that answers one JSON line per command."""
+    """A process that answers one JSON line per command.
+
+    It starts in the background. The first command waits until it is ready, so that several
+    processes start at the same time.
+    """
 
     def __init__(self, command: list[str], environment: dict[str, str]) -> None:
         self.process = subprocess.Popen(
@@ -31,10 +35,13 @@ class NodeProcess:
             text=True,
             env={**os.environ, **environment},
         )
-        assert self._answer() == "ready"
+        self._is_ready = False
 
     def ask(self, do: str, **arguments: Any) -> Any:
         """Send a command and return its answer."""
+        if not self._is_ready:
+            assert self._answer() == "ready"
+            self._is_ready = True
         assert self.process.stdin is not None
         self.process.stdin.write(json.dumps({"do": do, **arguments}) + "\n")
         self.process.stdin.flush()

@@ -39,9 +39,9 @@ def bridged(graph: Graph, folder: Path, servo: Servo) -> Iterator[tuple[Running,
     file = folder / "ros2.toml"
     file.write_text(PATIENT)
     with (
+        graph.peer() as peer,
         background_machine(servo) as running,
         bridge_under_rclpy(running.name, graph, "--config", str(file)),
-        graph.peer() as peer,
     ):
         eventually(lambda: bool(running.arm.enabled.all()))
         yield running, peer

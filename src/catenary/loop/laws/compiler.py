@@ -7,17 +7,19 @@ per call for a PD law on 12 axes.
 
 from __future__ import annotations
 
+import inspect
+import os
 import re
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
 from importlib import import_module
 from typing import Any
 
 from catenary.errors import LawError
 from catenary.loop.laws.cache import make_cache
 from catenary.loop.laws.checks import check_source
-from catenary.loop.laws.law import Law
+from catenary.loop.laws.dependencies import dependencies
+from catenary.loop.laws.law import CompiledLaw, Law
 from catenary.loop.laws.layout import LawLayout
 
 SOURCES = {
@@ -50,16 +52,12 @@ def shell(actual_at, target_at, memory_at, memory_count, parameters_at, paramete
 """
 
 
-@dataclass(frozen=True, slots=True)
-class CompiledLaw:
-    """Machine code of a law. Keep the object while the address is in use."""
-
-    address: int
-    code: object
-
-
 def compile_law(law: Law, layout: LawLayout) -> CompiledLaw:
-    """Compile a law, or load it from the cache (cache.py).
+    """Compile a law, load it from the cache (cache.py), or return the code of another loop.
+
+    A law from a file is compiled once per layout and values of its globals. Loops that run it one
+    after the other, or at the same time, use the same machine code, because its state is in the
+    memory of each loop.
 
     Args:
         law: Law to compile.
@@ -73,6 +71,23 @@ def compile_law(law: Law, layout: LawLayout) -> CompiledLaw:
     """
     check_source(law.function)
     numba = _numba(law)
+    if not _is_from_file(law.function):
+        return _compile(numba, law, layout)
+    key = (layout, dependencies(law.function))
+    if key not in law.compiled:
+        law.compiled[key] = _compile(numba, law, layout)
+    return law.compiled[key]
+
+
+def _is_from_file(function: Callable[..., Any]) -> bool:
+    """Return True if `dependencies` finds all values and functions that a function uses.
+
+    It does not find values of a closure, and callees that are typed again at a prompt.
+    """
+    return function.__closure__ is None and os.path.exists(inspect.getfile(function))
+
+
+def _compile(numba: Any, law: Law, layout: LawLayout) -> CompiledLaw:
     inner = _inner(numba, law.function)
     try:
         returned = _returned(numba, law, inner, layout)

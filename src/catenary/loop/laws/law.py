@@ -6,7 +6,7 @@ import functools
 import inspect
 import math
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Hashable, Sequence
 from dataclasses import dataclass
 from typing import TypeAlias, overload
 
@@ -47,6 +47,14 @@ class Parameter:
             )
 
 
+@dataclass(frozen=True, slots=True)
+class CompiledLaw:
+    """Machine code of a law. Keep the object while the address is in use."""
+
+    address: int
+    code: object
+
+
 class Law:
     """Control law: a function that runs once per cycle, between the inputs and the outputs.
 
@@ -72,6 +80,7 @@ class Law:
         functools.update_wrapper(self, function)
         self.arguments = arguments_of(function)
         self.parameters = named_parameters(parameters)
+        self.compiled: dict[Hashable, CompiledLaw] = {}  # by layout and dependencies
 
     def __call__(self, *arguments: object, **named: object) -> object:
         return self.function(*arguments, **named)

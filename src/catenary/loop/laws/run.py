@@ -11,8 +11,7 @@ import numpy.typing as npt
 from catenary import core
 from catenary.errors import LawError
 from catenary.log import Log
-from catenary.loop.laws.compiler import CompiledLaw
-from catenary.loop.laws.law import Law
+from catenary.loop.laws.law import CompiledLaw, Law
 
 Numbers = npt.NDArray[np.float64]
 

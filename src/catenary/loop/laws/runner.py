@@ -12,8 +12,8 @@ import numpy as np
 from catenary import core
 from catenary.errors import LawError
 from catenary.log import Log
-from catenary.loop.laws.compiler import SOURCES, CompiledLaw, compile_law, counted_allocations
-from catenary.loop.laws.law import Law
+from catenary.loop.laws.compiler import SOURCES, compile_law, counted_allocations
+from catenary.loop.laws.law import CompiledLaw, Law
 from catenary.loop.laws.layout import law_layout, record_at
 from catenary.loop.laws.run import LawRun, Numbers, numbers
 from catenary.plan.planner import Plan

@@ -179,6 +179,8 @@ static void register_read(controller *c, uint32_t address, uint32_t size, uint8_
     if (c->has_dc && touches(address, end, REG_DC_SYSTEM_TIME, 8))
         dc_refresh(c, passage);
     memcpy(data, c->memory + address, size);
+    if (c->has_dc && touches(address, end, REG_LATCH_TIMES, REG_LATCH_END - REG_LATCH_TIMES))
+        latch_times_read(c, address, end);
     uint8_t *event = c->memory + REG_ECAT_EVENT;
     if (touches(address, end, REG_AL_STATUS, 2))
         store16(event, load16(event) & (uint16_t)~ECAT_EVENT_AL_STATUS);

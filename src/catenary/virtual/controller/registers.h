@@ -69,6 +69,9 @@ enum {
     REG_SYNC0_CYCLE = 0x09A0,
     REG_SYNC1_CYCLE = 0x09A4,
     REG_LATCH_CONTROL = 0x09A8,
+    REG_LATCH_STATUS = 0x09AE,
+    REG_LATCH_TIMES = 0x09B0,
+    REG_LATCH_END = 0x09D0,
     REG_DIGITAL_OUTPUT = 0x0F00,
     REG_DIGITAL_OUTPUT_END = 0x0F04,
     REG_USER_RAM = 0x0F80,
@@ -84,6 +87,7 @@ enum {
 enum {
     DL_CONTROL_TEMPORARY = 0x02,     /* bit 1: loop control is in effect for only one second */
     DL_CONTROL_ALIAS = 0x01,         /* bit 24, in the fourth byte of the register */
+    ECAT_EVENT_LATCH = 0x0001,
     ECAT_EVENT_DL_STATUS = 0x0004,
     ECAT_EVENT_AL_STATUS = 0x0008,
     ECAT_EVENT_SM0 = 0x0010,

@@ -13,6 +13,7 @@
 #define CATENARY_VIRTUAL_SYNC_UNIT_H
 
 #include "controller/distributed_clock.h"
+#include "controller/latch_unit.h"
 
 enum {
     SYNC_ACTIVE = 0x01,              /* in 0x0981 */
@@ -32,6 +33,8 @@ static inline int clock_register_open(const controller *c, uint32_t address) {
     int wide = address < REG_DC_DELAY || (address >= REG_SYNC_START && address < REG_SYNC0_CYCLE);
     if (c->has_dc == 32 && wide && upper && address >= REG_DC_SYSTEM_TIME)
         return 0;
+    if (address >= REG_LATCH_CONTROL && address < REG_LATCH_CONTROL + LATCH_INPUTS)
+        return !latch_by_pdi(c, (int)(address - REG_LATCH_CONTROL));
     if (address < REG_SYNC_ACTIVATION || address >= REG_LATCH_CONTROL)
         return 1;
     if (c->memory[REG_SYNC_CONTROL] & SYNC_BY_PDI)

@@ -7,6 +7,7 @@ from catenary.virtual.devices.digital_inputs import DigitalInputs
 from catenary.virtual.devices.digital_outputs import DigitalOutputs
 from catenary.virtual.devices.junction import Junction
 from catenary.virtual.devices.model_sensor import ModelSensor
+from catenary.virtual.devices.oversampling import OversamplingTerminal
 from catenary.virtual.devices.servo import Servo
 
 __all__ = [
@@ -17,5 +18,6 @@ __all__ = [
     "DigitalOutputs",
     "Junction",
     "ModelSensor",
+    "OversamplingTerminal",
     "Servo",
 ]

@@ -94,7 +94,7 @@ from catenary.virtual.state_machine import (
 EMERGENCY = 1
 ENABLE_AND_MODE = 0x0F  # mask of direction and mode in the control byte of a SyncManager
 WATCHDOG_TRIGGER = 0x40  # bit in the same byte
-AL_STATUS, WATCHDOG_DIVIDER, WATCHDOG_TIME = 0x0130, 0x0400, 0x0420  # registers
+STATION_ADDRESS, AL_STATUS, WATCHDOG_DIVIDER, WATCHDOG_TIME = 0x0010, 0x0130, 0x0400, 0x0420
 RAM_START, RAM_END = 0x1000, 0x3000
 BLOB_BYTES = 2048  # an object larger than any usual mailbox
 
@@ -171,8 +171,7 @@ class Application:
         store: FileStore | None = None,
         protocols: Sequence[MailboxProtocol] = (),
     ) -> None:
-        self._core, self._position = core, position
-        self._description = description
+        self._core, self._position, self._description = core, position, description
         self._buffers = Buffers(core)
         self._box, self._bootstrap = description.mailbox, description.bootstrap
         self._emulation = description.emulation
@@ -189,13 +188,8 @@ class Application:
         facts = description.facts
         self._from_file = facts is not None
         self._channels = channels_of(size) if facts is None else facts.channels
-        self.pdos = PdoObjects(
-            self.dictionary,
-            self._channels,
-            description.rx_pdos,
-            description.tx_pdos,
-            description.mapping_quirks,
-        )
+        mapping = description.rx_pdos, description.tx_pdos, description.mapping_quirks
+        self.pdos = PdoObjects(self.dictionary, self._channels, *mapping)
         self._add_servers(description, quirks)
         self.mailbox = Mailbox(self, scheduler, self._serve, delay_ns=delay_ns, quirks=quirks)
         self._servers = self._start_protocols(protocols, scheduler)
@@ -229,8 +223,13 @@ class Application:
             self._state,
             self._box.receive_size - HEADER.size,
             self._box.send_size - HEADER.size,
+            self.dictionary,
+            self._station_address,
         )
         return {each.number: each.start(surroundings) for each in protocols}
+
+    def _station_address(self) -> int:
+        return int.from_bytes(self._core.peek(self._position, STATION_ADDRESS, 2), "little")
 
     def _state(self) -> int:
         """Return the AL state. With emulation, only the controller knows it."""

@@ -303,6 +303,15 @@ class Device:
             before = self.core.peek(self.position, address, 1)[0]
             self.core.poke(self.position, address, bytes([min(before + number, 255)]))
 
+    def set_latch_input(self, number: int, active: bool) -> None:
+        """Set the level of a latch input of the clock now.
+
+        Args:
+            number: Number of the input, 0 or 1.
+            active: Level of the input.
+        """
+        self.core.latch_input(self.position, number, active)
+
     def write_alias(self, alias: int) -> None:
         """Set the alias register, as a rotary switch on the device would."""
         self.core.poke(self.position, ALIAS, alias.to_bytes(2, "little"))

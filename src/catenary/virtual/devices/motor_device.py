@@ -15,6 +15,7 @@ from catenary.virtual._motors import Motors
 from catenary.virtual.devices.applied import AppliedDevice
 from catenary.virtual.devices.motor import Motor
 from catenary.virtual.devices.servo_quirks import NO_QUIRKS, ServoQuirks
+from catenary.virtual.devices.touch_probe import ProbeOptions
 from catenary.virtual.scheduler import Scheduler
 
 STEP_NS = 250_000  # internal cycle
@@ -55,6 +56,7 @@ class MotorDevice(AppliedDevice):
 
     motors: tuple[Motor, ...] = ()
     quirks: ServoQuirks = NO_QUIRKS
+    touch_probe: ProbeOptions | None = None
 
     def install_motors(self, motors: Sequence[Motor], quirks: ServoQuirks = NO_QUIRKS) -> None:
         """Set the motors of the axes, before the device is added to a segment.
@@ -112,6 +114,14 @@ class MotorDevice(AppliedDevice):
             ignores_quick_stop=quirks.ignores_quick_stop,
             ignores_disable=quirks.ignores_disable,
         )
+        if self.touch_probe is not None:
+            self._motors.set_probe_quirks(
+                self.position,
+                axis,
+                toggles=self.touch_probe.toggles,
+                keeps_stored=self.touch_probe.keeps_stored,
+                one_edge=self.touch_probe.one_edge,
+            )
         for slot, value in self.presets(axis).items():
             self.core.put_slot(self.position, _segment.SLOTS_PER_AXIS * axis + slot, value)
 
@@ -201,6 +211,29 @@ class MotorDevice(AppliedDevice):
             axis: Axis number.
         """
         self._motors.inject(self.position, axis, code)
+
+    def set_probe_input(self, probe: int, active: bool, axis: int = 0) -> None:
+        """Set the input of a touch probe now.
+
+        Args:
+            probe: Number of the input, 1 or 2.
+            active: Level of the input.
+            axis: Axis number.
+        """
+        self._motors.set_probe_input(self.position, axis, probe - 1, active)
+
+    def place_probe_switch(
+        self, probe: int, first: float, end: float = math.inf, axis: int = 0
+    ) -> None:
+        """Place a switch at the input of a touch probe. It is closed from `first` to `end`.
+
+        Args:
+            probe: Number of the input, 1 or 2.
+            first: Position of the motor at which the switch closes in positive direction [rad].
+            end: Position at which it opens again [rad].
+            axis: Axis number.
+        """
+        self._motors.set_probe_switch(self.position, axis, probe - 1, first, end)
 
     def hide_bit_12(self, seconds: float, axis: int = 0) -> None:
         """Hide bit 12 of the statusword from the next step on.

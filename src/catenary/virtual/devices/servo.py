@@ -46,9 +46,11 @@ from catenary.virtual.devices.servo_objects import (
     OBJECTS,
     RW,
     RX,
+    AxisObject,
 )
 from catenary.virtual.devices.servo_quirks import NO_QUIRKS, ServoQuirks
 from catenary.virtual.devices.synchronisation import DC_SYNC0, DC_SYNC1, Synchronisation
+from catenary.virtual.devices.touch_probe import ProbeOptions, add_touch_probes
 from catenary.virtual.foe.options import DeviceFiles
 from catenary.virtual.mapping_quirks import NO_MAPPING_QUIRKS, MappingQuirks
 from catenary.virtual.protocols import MailboxProtocol
@@ -103,6 +105,7 @@ class Servo(MotorDevice):
         clock_bits: ClockBits = 64,
         lrw: bool = True,
         sync_missed_limit: int = 3,
+        touch_probe: ProbeOptions | None = None,
         diagnosis: HistoryOptions = NO_HISTORY,
         quirks: ServoQuirks = NO_QUIRKS,
         mapping_quirks: MappingQuirks = NO_MAPPING_QUIRKS,
@@ -136,6 +139,7 @@ class Servo(MotorDevice):
             lrw: True if the device supports LRW.
             sync_missed_limit: Number of consecutive SYNC pulses without new outputs after which
                 the drive reports a fault.
+            touch_probe: Touch probes of each axis (0x60B8); None: it has none.
             diagnosis: Form of the diagnosis history (0x10F3); the default has none.
             quirks: Differences of the drive from the profile.
             mapping_quirks: Quirks of the PDOs.
@@ -174,6 +178,7 @@ class Servo(MotorDevice):
             mailbox=MailboxOptions(mailbox_bytes, mailbox_delay, mailbox_quirks, files, protocols),
         )
         self.install_motors([motor] * axes, quirks)
+        self.touch_probe = touch_probe
         self.counts_per_turn = counts_per_turn
         self.velocity_counts_per_turn = motor.velocity_counts
         self.inertia = inertia
@@ -272,6 +277,12 @@ class Servo(MotorDevice):
         ]
         dictionary.add_record(0x607D + base, "Software position limit", limits, code=ARRAY)
         add_homing(dictionary, base, slot)
+        if self.touch_probe is not None:
+
+            def variable(each: AxisObject) -> Entry:
+                return slot(each.name, each.data_type, each.slot, each.access)
+
+            add_touch_probes(self.touch_probe, dictionary, base, variable, slot)
         interpolation = [
             slot(
                 "Interpolation time period value", UNSIGNED8, _segment.SLOT_INTERPOLATION_PERIOD, RW
