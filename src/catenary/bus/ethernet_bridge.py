@@ -4,18 +4,22 @@ from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Mapping, Sequence
-from typing import Protocol, Self
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
+from typing import Protocol, Self, TypeVar
 
 from catenary.bus.ethernet_port import (
     EthernetCounts,
     EthernetPort,
     PortDevice,
     PortMain,
-    Report,
 )
 from catenary.bus.mac_table import MacTable, is_group
 from catenary.bus.thread_priority import step_behind
+from catenary.errors import CatenaryError
+
+Device = TypeVar("Device", bound=PortDevice)
 
 ACTIVE_MAX = 2  # ports that use acyclic frames at the same time: at most half of those of a cycle
 BURST = 32  # frames that are read in a row
@@ -50,10 +54,10 @@ class EthernetBridge:
     def __init__(
         self,
         main: PortMain,
-        subs: Sequence[PortDevice],
+        subs: Sequence[Device],
         interface: FrameInterface,
         *,
-        report: Report,
+        report: Callable[[Device, Counter[str], CatenaryError | None], object],
         forward: bool = False,
     ) -> None:
         """Start the threads.
@@ -62,14 +66,16 @@ class EthernetBridge:
             main: The MainDevice.
             subs: The devices.
             interface: The open interface. `close` closes it.
-            report: Function that reports dropped frames of a device.
+            report: Function that reports new drops of a device by reason, and its failure, if any.
             forward: True if frames between the devices are forwarded.
         """
         slots = threading.BoundedSemaphore(ACTIVE_MAX)
         self._interface = interface
         self._forward = forward
         self._table: MacTable[EthernetPort | FrameInterface] = MacTable()
-        self._ports = [EthernetPort(sub, main, self._receive, slots, report) for sub in subs]
+        self._ports = [
+            EthernetPort(sub, main, self._receive, slots, partial(report, sub)) for sub in subs
+        ]
         self._ended = False
         self._thread = threading.Thread(target=self._serve, name="catenary tap", daemon=True)
         for port in self._ports:
@@ -88,7 +94,7 @@ class EthernetBridge:
 
     @property
     def counts(self) -> Mapping[int, EthernetCounts]:
-        """Statistics by position of the device."""
+        """Present statistics by position of the device."""
         return {port.sub.position: port.counts for port in self._ports}
 
     @property
