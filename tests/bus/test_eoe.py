@@ -258,7 +258,7 @@ def test_an_interface_that_is_down_drops_frames(main: MainDevice, wire: Wire) ->
     wire.up = False
     with main.subs[1].eoe.connect("cat0") as bridge:
         wire.to_devices.put(ARP_REQUEST)
-        until(lambda: bridge.counts[1].dropped["TAP interface down"])
+        until(lambda: bridge.counts[1].dropped["TAP interface down or deleted"])
 
 
 def test_a_device_that_hangs_is_reported_and_tried_again(wire: Wire) -> None:

@@ -30,7 +30,7 @@ RETRY_PAUSE = 0.5  # [s] after a failure
 REPORT_INTERVAL = 1.0  # [s] between two reports of one device
 CANCEL_CHECK = 0.05  # [s] between two checks whether the port is closed
 
-FULL, SILENT, TAP_DOWN = "queue full", "the device does not answer", "TAP interface down"
+FULL, SILENT, TAP_DOWN = "queue full", "the device does not answer", "TAP interface down or deleted"
 LOST, INVALID = "EtherCAT frames lost", "invalid EoE message"
 WRONG_SIZE = "too short or too long for an Ethernet frame"
 
@@ -145,6 +145,10 @@ class EthernetPort:
         self._frames.append(frame)
         self._wake.set()
         return True
+
+    def report_tap_down(self) -> None:
+        """Count a drop, so that the failure of the receiver is reported."""
+        self._drop(TAP_DOWN)
 
     # -- messages to the device: the interface `Source` of `pump`
 

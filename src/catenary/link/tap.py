@@ -83,11 +83,20 @@ class Tap:
                 os.write(self._waker, b"\0")
 
     def read(self) -> bytes | None:
-        """Return the next frame; None if there is none, or if the interface is down."""
+        """Return the next frame; None if there is none, or if the interface is down.
+
+        Raises:
+            TapError: The interface was deleted.
+        """
         try:
             return os.read(self._file, READ_SIZE)
-        except OSError:
-            return None  # EAGAIN; EIO or EBADFD: the interface was set down or deleted
+        except OSError as error:
+            if error.errno != errno.EBADFD:
+                return None  # EAGAIN; EIO: the interface was set down
+            raise TapError(
+                f"the interface {self.name} was deleted",
+                hint="create it, and connect again",
+            ) from error
 
     def write(self, frame: bytes) -> bool:
         """Give a frame to the network stack. Return False if it was dropped.
