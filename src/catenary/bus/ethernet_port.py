@@ -227,7 +227,10 @@ class EthernetPort:
             self._exchange()
         except Exception as error:
             if self._main.is_open:  # else it was closed in another thread
-                self.error = CatenaryError(f"the thread of the Ethernet port ended: {error!r}")
+                self.error = CatenaryError(
+                    f"the thread of the Ethernet port ended: {error!r}",
+                    hint="this is a fault of Catenary: report it, with the traceback on stderr",
+                )
                 raise
 
     def _exchange(self) -> None:
@@ -266,7 +269,7 @@ class EthernetPort:
 
     def _fail(self, error: CatenaryError) -> None:
         """Discard the waiting frames: they would be old after the failure."""
-        # At first, the device may have refused a frame that is no longer here.
+        # At first, the device may have refused a frame that has left the queue.
         lost = max(len(self._frames) + bool(self._fragments), self.error is None)
         self.error = error
         self._frames.clear()
