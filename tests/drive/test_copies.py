@@ -213,6 +213,8 @@ def test_a_frame_of_fsoe_must_have_its_size(subs: SubDevices) -> None:
 def test_wrong_arguments(subs: SubDevices) -> None:
     with pytest.raises(ValueError, match="at least one Copy"):
         cat.Copies()
+    with pytest.raises(ValueError, match="optional: no copy uses device 3"):
+        cat.Copies(cat.Copy(subs[BUTTONS], 0x1A00, subs[LAMPS], 0x1600), optional=[subs[LOGIC]])
     with pytest.raises(TypeError, match="takes Copy and FsoeConnection objects"):
         cat.Copies(subs[1])  # type: ignore[arg-type]
     with pytest.raises(TypeError, match="a copy needs SubDevices"):

@@ -100,6 +100,9 @@ class Copies(Request):
         super().__init__(_devices([*ways, *plain]))
         # The areas of the frames are first and in order: see `fsoe_frames`.
         self._pairs = [_pair(way, is_fsoe=True) for way in ways] + [_pair(each) for each in plain]
+        for sub in optional:
+            if sub not in self._subs:
+                raise ValueError(f"optional: no copy uses {sub.station}")
         self._optional = {sub.position for sub in optional}
         self._divider = 0 if divider is None else cycles_between("divider", divider)
         self._areas: tuple[ImageArea, ...] = ()

@@ -28,8 +28,9 @@ def make_copies(file: MachineFile, subs: Subs) -> Copies | None:
                 made.append(_checked(file, (kind, number), _copy(table, subs)))
     if not made:
         return None
-    optional = _optional(file)
-    return Copies(*made, optional=[sub for name, sub in subs.items() if name in optional])
+    optional = {subs[name].position for name in _optional(file) if name in subs}
+    used = Copies(*made).subs
+    return Copies(*made, optional=[sub for sub in used if sub.position in optional])
 
 
 def _optional(file: MachineFile) -> set[str]:
