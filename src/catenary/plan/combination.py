@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 
 from catenary.errors import ConfigurationError
 from catenary.model.module import ConfiguredModule
@@ -32,7 +33,7 @@ def gather_requests(
     gathered: dict[int, DeviceRequest] = {}
     for request in requests:
         for position, pdos in request.pdos(period_ns).items():
-            before = gathered.get(position, DeviceRequest(divider=pdos.divider, required=False))
+            before = gathered.get(position, DeviceRequest(divider=0, required=False))
             gathered[position] = DeviceRequest(
                 _merged(before.outputs, pdos.outputs),
                 _merged(before.inputs, pdos.inputs),
@@ -44,7 +45,10 @@ def gather_requests(
                 _one_start_up(position, before.objects, pdos.objects),
                 _one_list(position, before.modules, pdos.modules),
             )
-    return gathered
+    return {
+        position: request if request.divider else replace(request, divider=1)
+        for position, request in gathered.items()
+    }
 
 
 def _one_clock(
