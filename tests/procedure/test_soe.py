@@ -127,6 +127,44 @@ def test_a_fragment_whose_frame_is_lost_is_sent_again() -> None:
     assert drive.elements == {(47, Element.VALUE): content(5 * ROOM)}
 
 
+@pytest.mark.parametrize("lost", [{1}, {0, 3}, {4}, {5}])
+def test_a_device_that_does_not_recognise_repetitions(lost: set[int]) -> None:
+    """It stores a fragment twice, so all fragments are written again."""
+    drive = Drive()
+    box = MailboxDevice(drive)
+    box.deduplicates = False
+    box.lose_back = lost
+    assert play(write(target(), content(5 * ROOM)), box) is None
+    assert drive.elements == {(47, Element.VALUE): content(5 * ROOM)}
+
+
+def test_a_refusal_because_of_a_repeated_fragment_is_not_reported() -> None:
+    drive = Drive()
+
+    def answer(message: Mailbox) -> list[Mailbox]:
+        answers = drive(message)
+        stored = drive.elements.get((47, Element.VALUE), b"")
+        if answers and len(stored) != 5 * ROOM:
+            return [
+                Mailbox(Type.SOE, each.encode()) for each in refusal(drive.requests[-1], 0x7003)
+            ]
+        return answers
+
+    box = MailboxDevice(answer)
+    box.deduplicates = False
+    box.lose_back = {1}
+    assert play(write(target(), content(5 * ROOM)), box) is None
+    assert drive.elements == {(47, Element.VALUE): content(5 * ROOM)}
+
+
+def test_a_line_that_loses_each_written_fragment_is_reported() -> None:
+    box = MailboxDevice(Drive())
+    box.lose_out = set(range(200))
+    with pytest.raises(ResponseTimeout, match="lost in 5 attempts"):
+        play(write(target(), content(5 * ROOM)), box)
+    assert box.received == []
+
+
 def test_after_a_lost_fragment_the_request_is_repeated() -> None:
     box = MailboxDevice(Drive({(47, Element.VALUE): content(5 * ROOM)}))
     box.lose_back = {3, 9}
@@ -156,17 +194,22 @@ def _refuse(code: int, request: Message) -> list[Message]:
     return refusal(request, code)
 
 
-def test_an_early_refusal_ends_a_write() -> None:
-    """A drive may refuse the first fragment, because the list is too long."""
+@pytest.mark.parametrize("with_idn", [True, False])
+def test_an_early_refusal_ends_a_write(with_idn: bool) -> None:
+    """A drive may refuse the first fragment, because the list is too long.
+
+    The refusal has the IDN, or the number of the fragment.
+    """
     seen: list[Message] = []
 
     def answer(request: Message) -> list[Message]:
         seen.append(request)
-        return [Message(OpCode.WRITE_RESPONSE, 47, request.elements, b"\x03\x70", error=True)]
+        number = 47 if with_idn else request.number
+        return [Message(OpCode.WRITE_RESPONSE, number, request.elements, b"\x03\x70", error=True)]
 
     with pytest.raises(SoeError, match="0x7003: the value is too long"):
         play(write(target(), content(10 * ROOM)), device(answer))
-    assert len(seen) < 4
+    assert len(seen) == 1
 
 
 def test_messages_of_other_drives_and_idns_are_not_the_answer() -> None:
@@ -237,12 +280,16 @@ def test_an_invalid_message_is_reported(data: bytes) -> None:
         play(read(target()), MailboxDevice(lambda _: [Mailbox(Type.SOE, data)]))
 
 
-def test_other_elements_than_requested_are_refused() -> None:
-    def answer(request: Message) -> list[Message]:
-        return [Message(OpCode.READ_RESPONSE, 47, Element.NAME, b"x")]
+def test_other_elements_than_requested_are_not_the_answer() -> None:
+    """They may be a late answer to an earlier request for the same IDN."""
+    late = Message(OpCode.READ_RESPONSE, 47, Element.ATTRIBUTE, b"late")
 
-    with pytest.raises(MailboxError, match="elements 0x02 instead of 0x40"):
-        play(read(target()), device(answer))
+    def answer(request: Message) -> list[Message]:
+        return [late, *fragments(request, b"right")]
+
+    assert play(read(target()), device(answer)) == b"right"
+    with pytest.raises(ResponseTimeout, match="1 other messages arrived"):
+        play(read(target()), device(lambda _: [late]))
 
 
 def test_wrong_arguments_are_refused_before_anything_is_sent() -> None:
@@ -382,11 +429,50 @@ def test_a_command_without_end_is_cancelled() -> None:
     assert command.written == [b"\x03\x00", b"\x00\x00"]
 
 
+def test_a_command_that_cannot_be_cancelled() -> None:
+    class Stubborn(Command):
+        def answer(self, request: Message) -> list[Message]:
+            if request.data == bytes(2):
+                return refusal(request, 0x7011)
+            return super().answer(request)
+
+    with pytest.raises(ResponseTimeout, match="could not be cancelled, and may still run"):
+        play(run_command(target(99), 0.5), MailboxDevice(Stubborn(0x7)))
+
+
+def test_a_command_whose_start_is_not_answered_is_cancelled() -> None:
+    command = Command(0x7)
+
+    def answer(request: Message) -> list[Message]:
+        answers = command.answer(request)
+        return [] if request.data == b"\x03\x00" else answers
+
+    with pytest.raises(ResponseTimeout, match="no answer"):
+        play(run_command(target(99)), device(answer))
+    assert command.written == [b"\x03\x00", b"\x00\x00"]
+
+
+def test_a_refused_start_is_not_cancelled() -> None:
+    """The command may run for another program."""
+    seen: list[Message] = []
+
+    def answer(request: Message) -> list[Message]:
+        seen.append(request)
+        return refusal(request, 0x7010)
+
+    with pytest.raises(SoeError, match="already active"):
+        play(run_command(target(99)), device(answer))
+    assert len(seen) == 1
+
+
 def test_a_state_of_the_wrong_size() -> None:
-    box = device(
-        lambda request: [
-            Message(OpCode(request.op_code + 1), request.number, request.elements, b"1")
-        ]
-    )
+    written: list[bytes] = []
+
+    def answer(request: Message) -> list[Message]:
+        if request.op_code is OpCode.WRITE_REQUEST:
+            written.append(request.data)
+        return [Message(OpCode(request.op_code + 1), request.number, request.elements, b"1")]
+
     with pytest.raises(MailboxError, match="data state: needs 2 bytes, received 1"):
-        play(run_command(target(99)), box)
+        play(run_command(target(99)), device(answer))
+    assert written == [b"\x03\x00", b"\x00\x00"]  # started, cancelled

@@ -87,11 +87,24 @@ def test_a_write_in_fragments_and_a_repeated_fragment(client: Client) -> None:
     assert client.read("P-0-0018")[4:] == content
 
 
+def test_a_write_that_was_not_completed_is_forgotten(client: Client) -> None:
+    content = bytes(range(200))
+    whole = struct.pack("<HH", 200, 200) + content
+    assert client.ask(WRITE | 0x08, VALUE, 7, bytes(ROOM)) == []
+    assert client.ask(WRITE | 0x08, VALUE, 1, whole[:ROOM]) == []
+    assert client.code(WRITE, VALUE, "P-0-0018", whole[ROOM:]) == 0
+    assert client.read("P-0-0018")[4:] == content
+    assert client.ask(WRITE | 0x08, VALUE, 1, bytes(ROOM)) == []
+    assert client.read("S-0-0002") == (1000).to_bytes(2, "little")
+    assert client.code(WRITE, VALUE, "S-0-0002", (500).to_bytes(2, "little")) == 0
+
+
 def test_a_write_without_end_is_refused(client: Client) -> None:
     answers: list[Message] = []
     for left in range(700, 0, -1):
         answers += client.ask(WRITE | 0x08, VALUE, left, bytes(ROOM))
     assert answers[0].code == 0x7003
+    assert answers[0].number > 1  # the number of the fragment
     assert client.read("S-0-0002") == (1000).to_bytes(2, "little")
 
 
@@ -206,6 +219,68 @@ def test_the_state_machine_of_the_control_word() -> None:
             assert raw["S-0-0135"] >> 13 & 1
         assert drive.idn_value("S-0-0011") == b"\x00\x80"
         assert b"7310" in drive.idn_value("S-0-0095")
+
+
+@pytest.mark.parametrize("halted", [False, True])
+@pytest.mark.parametrize(
+    ("word", "brakes"), [(0x6000, True), (0x4000, True), (ON, False), (0, False)]
+)
+def test_bit_15_brakes_and_bit_14_removes_the_torque(word: int, brakes: bool, halted: bool) -> None:
+    """Without bit 15, the drive brakes before it removes the torque; without bit 14, it coasts."""
+    drive = SercosDrive()
+    with cat.MainDevice(Segment([Coupler(), drive])) as main:
+        sub = main.scan()[1]
+        sub.soe.write("S-0-0032", 2)  # velocity mode
+        sub.soe.configure_telegrams(mdt=["S-0-0036"], at=["S-0-0040"])
+        raw = cat.ProcessData(sub)
+        with cat.Loop(raw) as loop:
+
+            def hold(control: int, cycles: int) -> None:
+                raw["S-0-0134"] = control
+                for _ in range(cycles):
+                    next(loop)
+
+            hold(ON, 100)
+            raw["S-0-0036"] = 6_000_000  # 600 rpm
+            hold(RUN, 500)
+            before = drive.velocity_rad_s
+            assert before == pytest.approx(62.83, rel=0.01)
+            if halted:
+                hold(POWER, 20)  # it begins to brake
+                assert drive.status == "OPERATING"
+                before = drive.velocity_rad_s
+                assert before < 60
+            hold(word, 10)
+            if brakes:
+                assert drive.status == "OPERATING"
+                assert not raw["S-0-0135"] & 0x08  # it does not follow the command values
+                assert drive.velocity_rad_s < before - 5
+            else:
+                assert drive.status != "OPERATING"
+                assert drive.velocity_rad_s > before - 5
+            hold(word, 500)
+            assert drive.status == ("POWERED" if word & ON else "READY")
+            if brakes:
+                assert abs(drive.velocity_rad_s) < 1
+
+
+def test_a_drive_brakes_when_the_loop_ends() -> None:
+    drive = SercosDrive()
+    with cat.MainDevice(Segment([Coupler(), drive])) as main:
+        sub = main.scan()[1]
+        sub.soe.write("S-0-0032", 2)
+        sub.soe.configure_telegrams(mdt=["S-0-0036"], at=["S-0-0040"])
+        raw = cat.ProcessData(sub)
+        with cat.Loop(raw) as loop:
+            for word in (ON, RUN):
+                raw["S-0-0134"], raw["S-0-0036"] = word, 6_000_000
+                for _ in range(300):
+                    next(loop)
+            assert drive.velocity_rad_s > 60
+        for _ in range(100):
+            sub.soe.read("S-0-0135")
+        assert abs(drive.velocity_rad_s) < 1
+        assert drive.status == "READY"
 
 
 def test_the_operation_mode_is_selected_in_the_control_word() -> None:
