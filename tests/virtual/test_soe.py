@@ -10,7 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import catenary as cat
-from catenary.virtual import Coupler, Segment, SercosDrive, SoeQuirks, read_segment
+from catenary.virtual import Coupler, Segment, SercosDrive, SoeQuirks, _segment, read_segment
+from catenary.virtual.soe.drive_states import DriveStates
 from catenary.virtual.soe.parameter import Parameter, Refusal, idn, packed
 from catenary.wire.sercos import decode_attribute
 from catenary.wire.soe import Element, Message, OpCode, decode_soe
@@ -264,23 +265,24 @@ def test_bit_15_brakes_and_bit_14_removes_the_torque(word: int, brakes: bool, ha
                 assert abs(drive.velocity_rad_s) < 1
 
 
-def test_a_drive_brakes_when_the_loop_ends() -> None:
-    drive = SercosDrive()
-    with cat.MainDevice(Segment([Coupler(), drive])) as main:
-        sub = main.scan()[1]
-        sub.soe.write("S-0-0032", 2)
-        sub.soe.configure_telegrams(mdt=["S-0-0036"], at=["S-0-0040"])
-        raw = cat.ProcessData(sub)
-        with cat.Loop(raw) as loop:
-            for word in (ON, RUN):
-                raw["S-0-0134"], raw["S-0-0036"] = word, 6_000_000
-                for _ in range(300):
-                    next(loop)
-            assert drive.velocity_rad_s > 60
-        for _ in range(100):
-            sub.soe.read("S-0-0135")
-        assert abs(drive.velocity_rad_s) < 1
-        assert drive.status == "READY"
+def test_a_drive_that_leaves_op_brakes() -> None:
+    """Without its MainDevice, the last control word remains, for example after the watchdog."""
+    slots = {_segment.SLOT_VELOCITY: 6_000_000}
+    motor = 4  # OPERATION ENABLED
+    states = DriveStates(
+        lambda slot: slots.get(slot, 0),
+        slots.__setitem__,
+        motor_state=lambda: motor,
+        operation_mode=lambda _: 2,
+        command_changed=lambda: False,
+    )
+    assert states.step(RUN, in_operation=True) >> 14 == 3
+    assert slots[_segment.SLOT_CONTROLWORD] == 0x0F
+    assert states.step(RUN, in_operation=False) & 0x08 == 0  # it does not follow
+    assert slots[_segment.SLOT_CONTROLWORD] == 0x0B  # quick stop
+    slots[_segment.SLOT_VELOCITY], motor = 0, 5  # quick stop active
+    states.step(RUN, in_operation=False)
+    assert slots[_segment.SLOT_CONTROLWORD] == 0  # without torque
 
 
 def test_the_operation_mode_is_selected_in_the_control_word() -> None:
