@@ -17,7 +17,7 @@ from catenary.link import Recorder
 from catenary.virtual import Coupler, Segment, SercosDrive
 from tests.link.dissector import dissect
 
-LARGE = list(range(500))  # 2000 bytes in mailboxes of 128 bytes
+LARGE = list(range(520))  # 2080 bytes in mailboxes of 128 bytes
 ROOM = 128 - 6 - 4
 READ, ANSWER, WRITE, WRITTEN, NOTIFICATION = "1", "2", "3", "4", "5"
 LIST, COMMAND, TORQUE, UNKNOWN = "0x8012", "0x0063", "0x005c", "0x0fff"
