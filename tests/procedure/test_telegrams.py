@@ -1,4 +1,4 @@
-"""Telegrams of a device with several drives, and devices whose telegrams cannot be read."""
+"""Telegrams of a device with several drives, and telegrams that cannot be read."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ from catenary.procedure.telegrams import ENTRIES_MAX, read_axes
 from catenary.wire.mailbox import Mailbox, Type
 from catenary.wire.sercos import Attribute, Display, encode_list
 from catenary.wire.soe import Element, Message, OpCode, decode_soe
+from tests.procedure.drives import fragments
 from tests.procedure.player import MailboxDevice, channel, play
-from tests.procedure.test_soe import fragments
 
 IDNS = Attribute(2, is_list=True, display=Display.IDN)
 WORD = Attribute(2, display=Display.HEXADECIMAL)
@@ -23,7 +23,7 @@ def idns(*numbers: int) -> tuple[Attribute, bytes]:
 
 
 def configurable(mdt: tuple[int, ...], at: tuple[int, ...]) -> Values:
-    """Return a drive whose lists determine its telegrams."""
+    """Return a drive with configurable telegrams."""
     values = {each: (LONG, bytes(4)) for each in (36, 40, 47, 51)}
     values[80] = WORD, bytes(2)
     return {**values, 15: (WORD, b"\x07\x00"), 24: idns(*mdt), 16: idns(*at)}
