@@ -52,6 +52,7 @@ class MailboxChannel:
     subscribers: dict[Type, Subscriber] = field(default_factory=dict)
     dropped: int = 0  # unexpected messages and duplicates
     lost_reads: int = 0  # lost frames that read the mailbox; each may have lost a message
+    lost_writes: int = 0  # lost frames that wrote the mailbox; each message may have arrived
     # Active and waiting procedures; the first one uses the mailbox.
     turns: deque[object] = field(default_factory=deque)
     posted_ns: int | None = None  # time of the last request, until its answer arrives

@@ -19,6 +19,8 @@ CLASS_1, CHANGE, FOLLOWS = 1 << 13, 1 << 5, 1 << 3
 FAULT_STATES = (6, 7)  # indices in `motor_device.STATES`
 SWITCH_ON_DISABLED, READY_TO_SWITCH_ON, SWITCHED_ON, OPERATION, QUICK_STOP = range(1, 6)
 SHUTDOWN, SWITCH_ON, ENABLE_OPERATION, HALT, RESET = 0x06, 0x07, 0x0F, 0x0B, 0x80
+DISABLE_VOLTAGE = 0
+STANDSTILL = 10_000  # [0.0001 rpm]
 HOLD_AFTER_QUICK_STOP = 6  # 0x605A
 MODES = {1: 10, 2: 9, 3: 8, 4: 8}  # lower bits of S-0-0032 → CST, CSV, CSP
 
@@ -64,10 +66,10 @@ class DriveStates:
 
         Args:
             control: S-0-0134.
-            in_operation: True in OP; otherwise the control word has no effect.
+            in_operation: True in OP; otherwise the drive brakes, as without bit 15.
         """
         state = self._motor_state()
-        word = control if in_operation else 0
+        word = control if in_operation else control & ~ON
         self._put(_segment.SLOT_MODE, self._mode(word))
         self._put(_segment.SLOT_QUICK_STOP_OPTION, HOLD_AFTER_QUICK_STOP)
         self._put(_segment.SLOT_CONTROLWORD, self._controlword(word, state))
@@ -80,9 +82,13 @@ class DriveStates:
         if state in FAULT_STATES:
             resets, self._resets = self._resets, False
             return RESET if resets else 0
-        if not control & ON:
-            return SHUTDOWN
-        if state < READY_TO_SWITCH_ON:
+        if state in (OPERATION, QUICK_STOP):
+            if not control & ENABLE:
+                return DISABLE_VOLTAGE  # the torque is removed at once
+            if not control & ON:  # the drive brakes, then removes the torque
+                moves = abs(self._get(_segment.SLOT_VELOCITY)) > STANDSTILL
+                return HALT if moves else DISABLE_VOLTAGE
+        if not control & ON or state < READY_TO_SWITCH_ON:
             return SHUTDOWN
         if not control & ENABLE or state == READY_TO_SWITCH_ON:
             return SWITCH_ON
@@ -96,7 +102,7 @@ class DriveStates:
         if state in FAULT_STATES:
             return CLASS_1 | mode | change
         if state in (OPERATION, QUICK_STOP):
-            follows = FOLLOWS if state == OPERATION else 0
+            follows = FOLLOWS if state == OPERATION and control & ON else 0
             return OPERATING | mode | change | follows
         if state == SWITCHED_ON:
             return POWERED | mode | change
