@@ -66,7 +66,7 @@ def test_page_frozen(shared_rig: Rig) -> None:
         life.send("Page.setWebLifecycleState", {"state": "frozen"})
         life.send("Debugger.enable")  # Chromium freezes no visible page, so this stops its scripts
         paused: list[object] = []
-        life.on("Debugger.paused", paused.append)
+        life.on("Debugger.paused", lambda event: paused.append(event))
         life.send("Debugger.pause")
         assert shared_rig.stands()
         position = shared_rig.position()
