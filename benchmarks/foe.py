@@ -41,6 +41,7 @@ PERIOD = 1e-3  # [s]
 CYCLES_PER_PACKET = 2
 SECONDS = 120.0  # [s] limit of one process
 TIMEOUT_US = 5_000_000
+ATTEMPTS = 3  # PySOEM returns part of a file without an error after a late frame
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,9 +76,12 @@ def measure(*, size: int, rounds: int, file: Path | None) -> None:
     need("pysoem")
     with served() as interface:
         found: dict[str, list[Transfer]] = {name: [] for name in WAYS}
+        failed = dict.fromkeys(WAYS, 0)
         for _ in range(rounds):
             for name in WAYS:
-                found[name].append(once(name, interface, size))
+                transfer, failures = repeated(name, interface, size)
+                found[name].append(transfer)
+                failed[name] += failures
     medians = {
         name: Transfer(name, size, statistics.median(each.seconds for each in transfers))
         for name, transfers in found.items()
@@ -89,8 +93,14 @@ def measure(*, size: int, rounds: int, file: Path | None) -> None:
     print(f"  {'bound next to a loop':20} {bound(size):7.3f} s\n")
     for name, quotient in quotients.items():
         print(f"  {name}: {quotient:.3f}")
+    for name, count in failed.items():
+        if count:
+            print(f"  {name}: {count} transfers failed and were repeated")
     figures = [asdict(transfer) for transfers in found.values() for transfer in transfers]
-    write_figures(file, {"machine": machine(), "ratios": quotients, "transfers": figures})
+    write_figures(
+        file,
+        {"machine": machine(), "ratios": quotients, "failed": failed, "transfers": figures},
+    )
 
 
 def ratios(medians: dict[str, Transfer]) -> dict[str, float]:
@@ -114,6 +124,16 @@ def served() -> Iterator[str]:
             if server.read_line(START_SECONDS) is None:
                 raise LinkError("the segment of the benchmark did not start: see its message above")
             yield ours
+
+
+def repeated(name: str, interface: str, size: int) -> tuple[Transfer, int]:
+    """Run one transfer until it is complete. Return it, and the number of failed ones."""
+    for failures in range(ATTEMPTS - 1):
+        try:
+            return once(name, interface, size), failures
+        except CatenaryError as error:
+            print(error, file=sys.stderr)
+    return once(name, interface, size), ATTEMPTS - 1
 
 
 def once(name: str, interface: str, size: int) -> Transfer:
