@@ -79,6 +79,7 @@ capture show a.pcapng
 capture diff a.pcapng a.pcapng
 capture sdo a.pcapng --device 1
 doctor lo --seconds 0.05
+report virtual --seconds 0.05 --no-clone --out report.zip
 realtime analyse tasks.toml
 data SHARE
 record SHARE arm.mcap --seconds 0.01

@@ -36,6 +36,7 @@ from catenary.cli import (
     realtime,
     record,
     reg,
+    report,
     ros2,
     scan,
     sdo,
@@ -46,7 +47,8 @@ from catenary.cli import (
     top,
     virtual,
 )
-from catenary.cli.failure import USAGE, report, silence_stdout
+from catenary.cli.failure import USAGE, silence_stdout
+from catenary.cli.failure import report as report_error
 
 VIRTUAL_TIME = "times are virtual: they come from the segment's clock, not from this machine's"
 PROGRAM = "catenary"
@@ -54,7 +56,7 @@ DESCRIPTION = "Real-time EtherCAT for Python."
 COMMANDS = (
     *(scan, state, graph, diag, messages, pdos, sdo, foe, aoe, soe, firmware, eoe, reg, alias),
     *(sii, esi, gateway, init, check, clone, capture),
-    *(demo, shell, dashboard, top, doctor, bench, virtual, realtime),
+    *(demo, shell, dashboard, top, doctor, bench, report, virtual, realtime),
     *(data, record, merge, plot, foxglove, ros2, include, completion),
 )
 EPILOG = """\
@@ -128,7 +130,7 @@ def main(
     except Exception as error:
         if debug:
             raise
-        return report(error, program)
+        return report_error(error, program)
 
 
 def note_virtual_time(target: str) -> None:
