@@ -8,6 +8,7 @@
 # serves the operator's page of a simulated cobot, or of a target: DASHBOARD=eth0. PORT=8711 selects its
 # port. `make rtlab` runs the benchmarks on a real-time kernel in QEMU. TABLE=quick or
 # TABLE=pyigh,tasks selects tables, and RTLAB="--out FOLDER" selects the folder of the results.
+# `make release` checks a release and writes its files into out/release; RELEASE=--quick only checks.
 # TABLE=igh needs IGH=path, the path of a build of IgH's master.
 # TABLE=gpio needs GPIO=path, a folder with configfs.ko and gpio-sim.ko for the guest's kernel.
 PYTHON ?= python3
@@ -22,6 +23,7 @@ TABLE ?= all
 RTLAB ?=
 IGH ?=
 GPIO ?=
+RELEASE ?=
 SOURCES := CMakeLists.txt pyproject.toml \
            $(shell find src -name '*.pyx' -o -name '*.pxd' -o -name '*.pxi' -o -name '*.h')
 CHECKED := src tests tools examples benchmarks docs
@@ -40,7 +42,7 @@ ifeq ($(wildcard $(VENV)/.built)$(filter clean,$(MAKECMDGOALS)),)
   endif
 endif
 
-.PHONY: demo cobot humanoid teleoperation dashboard rtlab test lint docs hooks build clean
+.PHONY: demo cobot humanoid teleoperation dashboard rtlab test lint docs release hooks build clean
 
 demo: $(VENV)/.built
 	@$(VENV)/bin/catenary demo
@@ -76,6 +78,9 @@ docs: $(VENV)/.with-docs
 	if [ -n "$$missing" ]; then echo "$$missing" >&2; exit 1; fi
 	@$(VENV)/bin/python -m sphinx -q -W --keep-going -b html -d out/docs-cache docs out/docs
 	@echo "out/docs/index.html"
+
+release: $(VENV)/.with-test $(VENV)/.with-lint $(VENV)/.with-docs
+	@$(VENV)/bin/python -m tools.release $(RELEASE)
 
 hooks: $(VENV)/.with-lint
 	@$(VENV)/bin/pre-commit install

@@ -20,7 +20,10 @@ NAMED = sorted(set(re.findall(r"`([^`\n]+)`", CONTRIBUTING)))
 PATH = re.compile(r"\.?[\w./-]+(\.(py|pyx|pyi|h|md|toml|yaml)|/)|[\w-]+/[\w-]+")
 FUNCTION = re.compile(r"(\w+)\(\)")
 EXAMPLE = re.compile(r"NAME|KIND")  # a file that the reader adds
-TEMPLATES = sorted((ROOT / ".github" / "ISSUE_TEMPLATE").glob("*.md"))
+GITHUB = ROOT / ".github"
+FORMS = sorted([*GITHUB.glob("ISSUE_TEMPLATE/*.yml"), *GITHUB.glob("DISCUSSION_TEMPLATE/*.yml")])
+COMMAND = re.compile(r"^ {12}catenary (?!--version)(.+)$", re.MULTILINE)
+WITH_COMMANDS = {"bug", "device", "hardware_report", "q-a"}
 HOOK = ROOT / "tools" / "commit_subject"
 
 
@@ -37,12 +40,34 @@ def test_functions_exist(name: str) -> None:
     assert any(pattern in path.read_text() for path in SOURCES.rglob("*.py"))
 
 
-@pytest.mark.parametrize("template", TEMPLATES, ids=lambda path: path.stem)
-def test_commands_of_issue_templates_parse(template: Path) -> None:
-    calls = re.findall(r"^ {4}catenary (?!--version)(.+)$", template.read_text(), re.MULTILINE)
+@pytest.mark.parametrize("form", FORMS, ids=lambda path: path.stem)
+def test_commands_of_forms_parse(form: Path) -> None:
+    calls = COMMAND.findall(form.read_text())
     for call in calls:
-        make_parser().parse_args(shlex.split(call.partition(" > ")[0]))
-    assert calls
+        make_parser().parse_args(shlex.split(call))
+    assert bool(calls) == (form.stem in WITH_COMMANDS)
+
+
+@pytest.mark.parametrize("form", FORMS, ids=lambda path: path.stem)
+def test_forms_have_the_structure_that_github_requires(form: Path) -> None:
+    yaml = pytest.importorskip("yaml")
+    content = yaml.safe_load(form.read_text())
+    if form.stem == "config":
+        assert content == {"blank_issues_enabled": False}
+        return
+    if form.parent.name == "ISSUE_TEMPLATE":
+        assert content["name"]
+        assert content["description"]
+    fields = [each for each in content["body"] if each["type"] != "markdown"]
+    identifiers = [each["id"] for each in fields]
+    assert fields
+    assert len(set(identifiers)) == len(identifiers)
+    for each in fields:
+        assert each["attributes"]["label"]
+        assert each["type"] in ("input", "textarea", "dropdown", "checkboxes")
+        assert all(
+            isinstance(option, str | dict) for option in each["attributes"].get("options", [""])
+        )
 
 
 def test_the_version_is_the_same_everywhere() -> None:

@@ -19,7 +19,7 @@ TESTS = Path(__file__).resolve().parent.parent / "tests"
 VIRTUAL = (
     *("bus", "capture", "cli", "control", "core", "docs", "drive", "esi", "examples", "fuzz"),
     *("igh", "line", "machine", "model", "plan", "procedure", "programs", "pyigh", "quirk"),
-    *("record", "virtual", "wire"),
+    *("record", "release", "virtual", "wire"),
 )
 PYTEST = (sys.executable, "-m", "catenary.realtime.private_network", "-m", "pytest")
 LOW_PRIORITY = 5  # nice(1)

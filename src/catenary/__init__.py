@@ -76,7 +76,7 @@ if TYPE_CHECKING:
     from catenary.target import MainDevice, clone
     from catenary.virtual import Segment
 
-__version__ = "0.1.0"
+__version__ = "1.0.0rc1"
 
 __all__ = [
     "CaptureOptions",

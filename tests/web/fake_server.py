@@ -54,7 +54,7 @@ class FakeServer:
         self.methods: dict[str, Callable[[Message], object]] = {
             "devices": lambda _: make_devices(devices, self.axes),
             "axes": lambda _: [make_axis(at, name) for at, name in enumerate(self.axes)],
-            "hello": lambda _: {"virtual": True, "version": "0.1.0"},
+            "hello": lambda _: {"virtual": True, "version": "1.0.0rc1"},
             "clocks": lambda _: make_clocks(devices),
             "objects": make_objects,
             "sdo_read": lambda _: {"data": "", "value": 8, "type": "SINT", "text": "8"},
@@ -120,7 +120,7 @@ class FakeServer:
                     "role": self.role,
                     "share": "arm",
                     "reason_no_jog": self.reason_no_jog,
-                    "version": "0.1.0",
+                    "version": "1.0.0rc1",
                 }
             )
         elif path == "/scene":

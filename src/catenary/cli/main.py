@@ -7,6 +7,7 @@ import sys
 from collections.abc import Callable, Sequence
 from typing import NoReturn
 
+from catenary import __version__
 from catenary.cli import (
     alias,
     aoe,
@@ -85,12 +86,10 @@ class Parser(argparse.ArgumentParser):
 
 
 class ShowVersion(argparse.Action):
-    """Action that prints the version. Its slow import runs only on request."""
+    """Action that prints the version."""
 
     def __call__(self, parser: argparse.ArgumentParser, *_: object) -> None:
-        from importlib.metadata import version
-
-        print(f"catenary {version('catenary')}")
+        print(f"catenary {__version__}")
         parser.exit()
 
 

@@ -8,7 +8,9 @@ from collections.abc import Iterator, Sequence
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
-PACKAGES = ("catenary", "numpy", "msgspec", "numba")
+from catenary import __version__
+
+PACKAGES = ("numpy", "msgspec", "numba")
 CPUS = Path("/sys/devices/system/cpu")
 BOARD = Path("/sys/class/dmi/id")
 MEGABYTE = 1_000_000
@@ -37,7 +39,11 @@ def machine_facts(nics: Sequence[str]) -> dict[str, object]:
 
 def versions() -> dict[str, str]:
     """Return the versions of Python, the C library and the installed packages."""
-    found = {"python": platform.python_version(), "libc": " ".join(platform.libc_ver())}
+    found = {
+        "catenary": __version__,
+        "python": platform.python_version(),
+        "libc": " ".join(platform.libc_ver()),
+    }
     for name in PACKAGES:
         try:
             found[name] = version(name)
