@@ -16,7 +16,19 @@ def test_the_example_is_the_one_in_the_repository() -> None:
     assert block == (ROOT / "examples" / "three_drives.py").read_text()
 
 
-@pytest.mark.parametrize("link", sorted(set(re.findall(r"\]\(([^)#]+)\)", README))))
+LINK = re.compile(r"\]\(([^)#]+)(?:#[\w-]+)?\)|src=\"([^\"]+)\"")
+LINKS = sorted({link or image for link, image in LINK.findall(README)})
+FIRST_SCREEN = 35  # lines
+
+
+def test_the_first_screen_has_all_that_a_newcomer_needs() -> None:
+    screen = "\n".join(README.splitlines()[:FIRST_SCREEN])
+    for needed in ("EtherCAT for Python", "never a real device", "<img ", "make demo", "```python"):
+        assert needed in screen
+    assert screen.count("```") == 2  # the whole program
+
+
+@pytest.mark.parametrize("link", LINKS)
 def test_the_links_of_the_readme_exist(link: str) -> None:
     assert link.startswith("https://") or (ROOT / link).exists()
 

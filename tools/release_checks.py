@@ -13,6 +13,7 @@ UNRELEASED = "## Unreleased"
 DATED = re.compile(r"^## (\S+) \((\d{4}-\d\d-\d\d)\)$", re.MULTILINE)
 INIT = re.compile(r'^__version__ = "([^"]+)"$', re.MULTILINE)
 PAGE = re.compile(r"This is version ([^\s,]+)")
+STATUS = re.compile(r"^\*\*Status: (\S+)\. ", re.MULTILINE)
 PACKAGE = re.compile(r"<version>([^<]+)</version>")
 MACHINES = 1  # folders of machines with results
 
@@ -42,6 +43,7 @@ def versions(release: Release) -> Iterator[tuple[str, str]]:
     for name, pattern in (
         ("src/catenary/__init__.py", INIT),
         ("docs/reference/versions.md", PAGE),
+        ("README.md", STATUS),
         ("CHANGELOG.md", DATED),
         ("examples/ros2_control/package.xml", PACKAGE),
     ):

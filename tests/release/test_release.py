@@ -18,6 +18,7 @@ FILES = {
     "docs/reference/versions.md": (
         "This is version 1.2.0rc1, [x](../../benchmarks/results/a/d/b.json)"
     ),
+    "README.md": "**Status: 1.2.0rc1. It is",
     "CHANGELOG.md": "# Changelog\n\n## Unreleased\n\n## 1.2.0rc1 (2026-01-02)\n\n- One.\n- Two.\n",
     "examples/ros2_control/package.xml": "<version>1.2.0</version>",
     "examples/one.py": "print(1)\n",
@@ -42,7 +43,7 @@ def test_a_complete_clone_passes_all_checks(release: Release) -> None:
     texts = [step(release) for step in CHECKS.values()]
     assert texts[0].startswith("clean, at ")
     assert texts[1:] == [
-        "1.2.0rc1 in pyproject.toml and 4 other files",
+        "1.2.0rc1 in pyproject.toml and 5 other files",
         "2 changes, 2026-01-02",
         "1 files of a",
         "1 programs compile",
