@@ -202,6 +202,26 @@ def measure_ros2(*, axes: int, file: Path | None = None) -> None:
     ros2_publish.measure(axes=axes, file=file)
 
 
+def measure_everything(*, minutes: float, wire: bool, seed: int, file: Path | None = None) -> bool:
+    """Run all parts of Catenary together, and print the results and the memory of all processes.
+
+    Args:
+        minutes: Duration of the loop [min].
+        wire: True for network interfaces, real time and load; False for virtual time.
+        seed: Seed of the places where the ring is cut.
+        file: File for the figures.
+
+    Returns:
+        True if nothing failed or grew.
+    """
+    from catenary.bench import enter_private_network
+
+    enter_private_network()
+    from benchmarks.together import run
+
+    return run.measure(minutes=minutes, wire=wire, seed=seed, file=file)
+
+
 def measure_soak(
     *,
     minutes: float,

@@ -12,6 +12,7 @@ from catenary.cli.arguments import (
     positive_seconds,
 )
 from catenary.cli.bench_options import add_drives, add_file, add_seconds
+from catenary.cli.failure import UsageError
 from catenary.cli.parsers import Commands, add_command
 
 
@@ -98,7 +99,9 @@ def add_soak(group: Commands) -> None:
         "wirings, clocks and modes of operation in turn; the options select some of them. The same "
         "seed and options give the same run. A violation is printed with the command that repeats "
         "its minute. The exit status is 1 after any violation.",
-        example="python -m benchmarks soak --minutes 10 --seed 7 --wiring ring --json soak.json",
+        example="python -m benchmarks soak --minutes 10 --seed 7 --wiring ring --json soak.json\n"
+        "python -m benchmarks soak --everything --minutes 60 --json everything.json\n"
+        "python -m benchmarks soak --everything --wire --minutes 10",
     )
     parser.add_argument(
         "--minutes",
@@ -106,6 +109,18 @@ def add_soak(group: Commands) -> None:
         default=1.0,
         metavar="N",
         help="minutes of virtual time (default: 1)",
+    )
+    parser.add_argument(
+        "--everything",
+        action="store_true",
+        help="run rings, clocks, objects, files, EoE, a share, a recorder, the dashboard and ROS 2 "
+        "together instead; the memory and the descriptors of all processes must not grow",
+    )
+    parser.add_argument(
+        "--wire",
+        action="store_true",
+        help="with --everything: network interfaces and real time, under load of the processors, "
+        "the memory and the network",
     )
     parser.add_argument(
         "--seed",
@@ -226,6 +241,16 @@ def run_ros2(arguments: argparse.Namespace) -> int:
 def run_soak(arguments: argparse.Namespace) -> int:
     import benchmarks
 
+    if arguments.wire and not arguments.everything:
+        raise UsageError("--wire needs --everything")
+    if arguments.everything:
+        held = benchmarks.measure_everything(
+            minutes=arguments.minutes,
+            wire=arguments.wire,
+            seed=arguments.seed,
+            file=arguments.json,
+        )
+        return 0 if held else 1
     held = benchmarks.measure_soak(
         minutes=arguments.minutes,
         seed=arguments.seed,
