@@ -55,10 +55,9 @@ def test_idle_parts_and_failures_are_violations() -> None:
     soaked = Soaked()
     soaked.done.add("cycles", 10)
     soaked.done.fail("files", ValueError("two\nlines"))
-    assert soaked.violations() == [
-        *("objects: none", "file bytes: none", "pings: none", "recordings: none"),
-        "files: two lines",
-    ]
+    idle = ["objects: none", "file bytes: none", "pings: none", "recordings: none"]
+    assert soaked.violations(wire=False) == [*idle, "files: two lines"]
+    assert soaked.violations(wire=True) == idle
 
 
 def test_failures_are_bounded() -> None:
