@@ -23,6 +23,7 @@ class Sample(NamedTuple):
     memory_kb: int  # resident
     descriptors: int
     threads: int
+    ticks: int  # processor time, user and system
 
 
 def sample(pid: int, time: float) -> Sample | None:
@@ -32,10 +33,12 @@ def sample(pid: int, time: float) -> Sample | None:
             line.split(":", 1) for line in Path(f"/proc/{pid}/status").read_text().splitlines()
         )
         descriptors = len(os.listdir(f"/proc/{pid}/fd"))
+        times = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[11:13]
     except (FileNotFoundError, ProcessLookupError, PermissionError):
         return None
     memory = status.get("VmRSS", "0 kB").split()[0]
-    return Sample(time, int(memory), descriptors, int(status["Threads"]))
+    ticks = sum(map(int, times))
+    return Sample(time, int(memory), descriptors, int(status["Threads"]), ticks)
 
 
 @dataclass(slots=True)
@@ -67,7 +70,7 @@ class Resources:
 
 
 def growth(samples: Sequence[Sample]) -> list[str]:
-    """Return what has grown after the warm-up.
+    """Return what has grown after the warm-up, and whether the process did nothing.
 
     The medians of the first and the last quarter are compared, so that single peaks do not count.
     """
@@ -75,7 +78,8 @@ def growth(samples: Sequence[Sample]) -> list[str]:
     if len(rest) < ENOUGH:
         return [f"only {len(samples)} samples: run for longer"]
     quarter = len(rest) // COMPARED
-    found = []
+    idle = rest[-1].ticks == rest[-quarter].ticks
+    found = ["no processor time in the last quarter"] if idle else []
     for name, allowed in (("memory_kb", GROWTH_KB), ("descriptors", MORE), ("threads", MORE)):
         before, after = (
             statistics.median(getattr(each, name) for each in part)

@@ -34,6 +34,8 @@ RECOVER = 500  # cycles between two requests to restore devices and to enable ax
 PATIENT = cat.StopPolicy(
     lost_limit=10_000, late_limit=10.0, raise_faults=False, on_axis_stopped="event"
 )
+DISTURBED = ("not ok", "AxisStopped events", "StateLost events", "DeviceHeld events")
+LOCKED = 0.9  # least part of the checks in which the clocks are locked
 REQUIRED = ("cycles", "objects", "file bytes", "pings", "recordings")
 
 
@@ -56,8 +58,16 @@ class Soaked:
         """
         idle = [f"{name}: none" for name in REQUIRED if not self.done.counts[name]]
         ended = [f"the loop ended: {self.error}"] if self.error else []
-        failures = [] if wire else self.done.failures
+        failures = [] if wire else [*self._disturbances(), *self.done.failures]
         return [*ended, *idle, *failures, *self.resources.judge()]
+
+    def _disturbances(self) -> list[str]:
+        """Return one line for each effect that the cuts of a ring must not have."""
+        counts = self.done.counts
+        found = [f"{counts[name]} {name}" for name in DISTURBED if counts[name]]
+        if counts["clock checks locked"] < LOCKED * counts["clock checks"]:
+            found.append(f"clocks locked in {counts['clock checks locked']} checks only")
+        return found
 
 
 def measure(*, minutes: float, wire: bool, seed: int, file: Path | None) -> bool:
@@ -97,7 +107,7 @@ def soak(seconds: float, *, wire: bool, seed: int) -> Soaked:
             cycles.begin()
             while not cycles.ended.wait(SAMPLE):
                 soaked.resources.take(time.monotonic() - start)
-            count_recordings(others["recorder"], soaked.done)
+                read_output(others, soaked.done)
         soaked.counters = loop.timing.counters
     soaked.seconds = time.monotonic() - start
     return soaked
@@ -220,13 +230,15 @@ class Cycles:
             self._arm.enable(idle)
 
 
-def count_recordings(recorder: Child, done: Done) -> None:
-    """Count the recordings that the recorder has printed, and their lost cycles."""
-    while (line := recorder.read_line(0.0)) is not None:
-        cycles, lost = map(int, line.split())
-        done.add("recordings")
-        done.add("recorded cycles", cycles)
-        done.add("lost in recordings", lost)
+def read_output(others: dict[str, Child], done: Done) -> None:
+    """Empty the pipes of all processes. Count the recordings that the recorder has printed."""
+    for name, child in others.items():
+        while (line := child.read_line(0.0)) is not None:
+            if name == "recorder":
+                cycles, lost = map(int, line.split())
+                done.add("recordings")
+                done.add("recorded cycles", cycles)
+                done.add("lost in recordings", lost)
 
 
 def as_text(soaked: Soaked, *, wire: bool, violations: Sequence[str]) -> str:

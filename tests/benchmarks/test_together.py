@@ -15,7 +15,7 @@ from benchmarks.together.run import Soaked
 
 
 def samples(memory: list[int], descriptors: int = 10, threads: int = 3) -> list[Sample]:
-    return [Sample(k, kilobytes, descriptors, threads) for k, kilobytes in enumerate(memory)]
+    return [Sample(k, kilobytes, descriptors, threads, k) for k, kilobytes in enumerate(memory)]
 
 
 def test_growth_after_the_warm_up_is_found() -> None:
@@ -24,7 +24,9 @@ def test_growth_after_the_warm_up_is_found() -> None:
     assert growth(samples([*flat, 200_000])) == []  # one peak
     grown = [80_000 + 500 * k for k in range(50)]
     assert growth(samples(grown)) == ["memory_kb grew from 90250 to 102750"]
-    leaking = [Sample(k, 1000, 10 + k // 5, 3) for k in range(50)]
+    hung = [Sample(k, 1000, 10, 3, 7) for k in range(50)]
+    assert growth(hung) == ["no processor time in the last quarter"]
+    leaking = [Sample(k, 1000, 10 + k // 5, 3, k) for k in range(50)]
     assert growth(leaking) == ["descriptors grew from 14 to 19"]
     assert growth(samples([1] * 5)) == ["only 5 samples: run for longer"]
 
@@ -57,6 +59,11 @@ def test_idle_parts_and_failures_are_violations() -> None:
     soaked.done.fail("files", ValueError("two\nlines"))
     idle = ["objects: none", "file bytes: none", "pings: none", "recordings: none"]
     assert soaked.violations(wire=False) == [*idle, "files: two lines"]
+    assert soaked.violations(wire=True) == idle
+    soaked.done.add("StateLost events", 2)
+    soaked.done.add("clock checks", 10)
+    disturbed = ["2 StateLost events", "clocks locked in 0 checks only"]
+    assert soaked.violations(wire=False) == [*idle, *disturbed, "files: two lines"]
     assert soaked.violations(wire=True) == idle
 
 

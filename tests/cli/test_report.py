@@ -218,3 +218,5 @@ def test_a_report_of_a_wire_names_the_card(
     assert parts_of(manifest) == {"doctor": "done"} | dict.fromkeys(
         ("scan", "clone", "timing", "capture"), "failed"
     )
+    _, shown, _ = call(f"report --show {tmp_path}/r.zip", capsys)
+    assert f"network card: {veth[0]}, driver veth" in shown

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -125,5 +125,14 @@ def _facts(manifest: Manifest) -> Iterator[str]:
         yield f"{name}: {manifest.machine.get(name)}"
     cards = manifest.machine.get("network_cards")
     for card in cards if isinstance(cards, list) else []:
-        yield f"network card: {card}"
+        if isinstance(card, dict):
+            yield f"network card: {_card(card)}"
     yield ", ".join(f"{name} {version}" for name, version in manifest.versions.items())
+
+
+def _card(card: Mapping[str, object]) -> str:
+    if "error" in card:
+        return f"{card.get('name')}: {card['error']}"
+    speed = card.get("speed_mbit")
+    text = f"{card.get('name')}, driver {card.get('driver') or 'unknown'}"
+    return text if speed is None else f"{text}, {speed} Mbit/s"
