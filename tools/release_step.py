@@ -1,4 +1,4 @@
-"""What the steps of a release share: its folders, its version, and the start of programs."""
+"""Common parts of the steps of a release: folders, version, and the start of programs."""
 
 from __future__ import annotations
 

@@ -71,7 +71,7 @@ class Soaked:
 
 
 def measure(*, minutes: float, wire: bool, seed: int, file: Path | None) -> bool:
-    """Run the soak, print its results, and return True if there is no violation.
+    """Run the soak and print its results. Return False after a violation.
 
     Args:
         minutes: Duration [min], in virtual time unless `wire`.

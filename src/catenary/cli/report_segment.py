@@ -19,7 +19,7 @@ PERIOD = 1e-3  # [s]
 
 
 class Incomplete(Exception):
-    """A part whose files exist but are not complete. The message is the reason."""
+    """Files of a part that are not complete. The message is the reason."""
 
 
 @dataclass(frozen=True, slots=True)
