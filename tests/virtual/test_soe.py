@@ -149,7 +149,7 @@ def test_a_command_runs_and_is_cleared(client: Client) -> None:
     assert (written.op_code, written.error) == (OpCode.WRITE_RESPONSE, False)
     assert end == Message(OpCode.NOTIFICATION, 127, Element.STATE, b"\x03\x00")
     assert client.read("S-0-0127", STATE) == b"\x03\x00"
-    assert int.from_bytes(client.read("S-0-0135"), "little") == 0x4020  # change bit
+    assert int.from_bytes(client.read("S-0-0135"), "little") == 0x8020  # change bit
     assert client.code(WRITE, VALUE, "S-0-0127", b"\x03\x00") == 0x7010
     assert client.code(WRITE, VALUE, "S-0-0127", bytes(2)) == 0
     assert client.read("S-0-0127", STATE) == bytes(2)
@@ -172,7 +172,7 @@ def test_the_eeprom_has_soe_and_no_coe(client: Client) -> None:
 
 # -- states and telegrams --------------------------------------------------------------------------
 
-ON, POWER, RUN = 0x8000, 0xC000, 0xE000
+ON, ENABLE, POWER, RUN = 0x8000, 0x4000, 0xC000, 0xE000
 
 
 def test_the_state_machine_of_the_control_word() -> None:
@@ -192,20 +192,61 @@ def test_the_state_machine_of_the_control_word() -> None:
                 )
                 return drive.status
 
-            assert hold(0) == "READY"
+            assert hold(0) == "POWERED"
             assert hold(ON) == "POWERED"
             assert hold(RUN) == "OPERATING"
             assert raw["S-0-0135"] & 0x08
             assert hold(POWER) == "OPERATING"  # drive halt
             assert not raw["S-0-0135"] & 0x08
             assert hold(RUN) == "OPERATING"
+            assert hold(ENABLE) == "POWERED"  # drive off
+            assert hold(RUN) == "OPERATING"
+            assert hold(POWER) == "OPERATING"
+            assert hold(ENABLE) == "POWERED"  # drive off after a halt
+            assert hold(RUN) == "OPERATING"
             assert hold(ON) == "POWERED"
+            assert hold(RUN) == "OPERATING"
+            drive.switch_mains(False)
+            assert hold(RUN) == "READY"
+            drive.switch_mains(True)
+            assert hold(0) == "POWERED"
+            assert hold(RUN) == "OPERATING"
+            drive.switch_sto(True)
+            assert hold(RUN) == "READY"
+            drive.switch_sto(False)
             assert hold(RUN) == "OPERATING"
             drive.inject_fault(0x7310)
             assert hold(RUN) == "NOT READY"
             assert raw["S-0-0135"] >> 13 & 1
         assert drive.idn_value("S-0-0011") == b"\x00\x80"
         assert b"7310" in drive.idn_value("S-0-0095")
+
+
+@pytest.mark.parametrize(
+    ("word", "brakes"), [(ENABLE, True), (0, False), (ON, False), (POWER, True)]
+)
+def test_drive_off_brakes_and_the_end_of_bit_14_coasts(word: int, brakes: bool) -> None:
+    """Bit 3 ends at once. After drive off, the torque ends at standstill."""
+    drive = SercosDrive()
+    with cat.MainDevice(Segment([Coupler(), drive])) as main:
+        sub = main.scan()[1]
+        sub.soe.write("S-0-0032", 2)
+        sub.soe.configure_telegrams(mdt=["S-0-0036"], at=["S-0-0040"])
+        raw = cat.ProcessData(sub)
+        with cat.Loop(raw) as loop:
+            raw["S-0-0134"], raw["S-0-0036"] = RUN, 1_000_000  # 100 rpm
+            for _ in range(500):
+                next(loop)
+            assert drive.velocity_rad_s == pytest.approx(10.47, rel=0.02)
+            raw["S-0-0134"] = word
+            for _ in range(4):
+                next(loop)
+            assert not raw["S-0-0135"] & 0x08
+            assert (int(raw["S-0-0135"]) >> 14 == 3) == brakes
+            for _ in range(50):
+                next(loop)
+            assert raw["S-0-0135"] >> 14 == (3 if word == POWER else 2)
+            assert (abs(drive.velocity_rad_s) < 0.05) == brakes
 
 
 def test_the_operation_mode_is_selected_in_the_control_word() -> None:

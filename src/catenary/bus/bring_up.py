@@ -18,6 +18,7 @@ from catenary.errors import (
 )
 from catenary.link import RingLink
 from catenary.model.device import DeviceDescription, Direction, mapped_pdos
+from catenary.model.telegram_data import with_process_data
 from catenary.plan.clocks import SYNC_OBJECTS
 from catenary.plan.combination import gather_requests
 from catenary.plan.modules import with_requested_modules
@@ -49,6 +50,7 @@ from catenary.procedure.telegrams import (
     PRE_OP_STEPS,
     SAFE_OP_STEPS,
     check_unchanged,
+    restore,
     run_idn_commands,
 )
 from catenary.wire.al import AlState
@@ -219,7 +221,12 @@ def _prepare(sub: SubDevice, plan: DevicePlan) -> Procedure[None]:
         yield from within(WRITE_TIMEOUT, sub.station, writing, "its configuration was")
     if device.idn_commands:
         yield from run_idn_commands(_channel(sub), device.idn_commands, PRE_OP_STEPS)
-    if device.sercos_axes:
+    if plan.idns:
+        yield from run_idn_commands(_channel(sub), plan.idns, PRE_OP_STEPS)
+    if plan.telegrams:
+        device = sub.description = with_process_data(device, plan.telegrams)
+        yield from restore(_channel(sub), device)
+    elif device.sercos_axes:
         yield from check_unchanged(_channel(sub), device)
     yield from configure_process_data(sub.station, device, plan)
     yield from run_commands(sub.station, plan.registers, "PS")

@@ -98,7 +98,7 @@ cdef void take_mode(axes_t *x, axis_t *a, int8_t mode) noexcept nogil:
     a.flags &= ~MODE_REFUSED
     if a.holding or mode == a.mode_wanted:
         return
-    if enters_without_torque(a, mode):
+    if a.sercos or enters_without_torque(a, mode):  # SERCOS: the mode is a parameter
         refuse_mode(x, a, mode)
         return
     a.mode_wanted = mode
