@@ -3,15 +3,24 @@ By default, this is a DriveError with the error code of the drive, and all drive
 An application may continue. The faulty axis then moves only after a request.
 """
 
+from collections.abc import Iterator
+
 import pytest
 
 import catenary as cat
 from catenary.errors import DriveError
 from catenary.wire.cia402 import AxisState
-from tests.scenario.cell import Cell
+from tests.scenario.cell import KINDS, Cell, cell_with
 from tests.scenario.clocked import clocked_cell
 
 OVER_CURRENT = 0x2310
+
+
+@pytest.fixture(params=KINDS)
+def cell(request: pytest.FixtureRequest) -> Iterator[Cell]:
+    """Yield a cell with drives of each kind."""
+    with cell_with(request.param) as cell:
+        yield cell
 
 
 def test_a_fault_ends_the_loop_with_the_error_code_of_the_drive(cell: Cell) -> None:

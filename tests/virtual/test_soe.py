@@ -154,7 +154,7 @@ def test_a_command_runs_and_is_cleared(client: Client) -> None:
     assert client.code(WRITE, VALUE, "S-0-0127", bytes(2)) == 0
     assert client.read("S-0-0127", STATE) == bytes(2)
     client.main.let_pass(2)
-    assert int.from_bytes(client.read("S-0-0135"), "little") == 0x4000
+    assert int.from_bytes(client.read("S-0-0135"), "little") == 0x8000
 
 
 def test_a_stuck_command_is_interrupted_and_cancelled() -> None:
