@@ -133,15 +133,17 @@ def with_sercos(
             or a drive cannot exchange a value that its axis needs.
         SoeError: A drive refuses to report the attribute of a value.
     """
-    chosen = {
-        sub: [axis for axis, its in zip(axes, subs, strict=True) if its is sub]
-        for sub in dict.fromkeys(subs)
-        if sub.description.sercos_axes
+    pairs = list(zip(axes, subs, strict=True))
+    with_soe = {sub.position: sub for sub in subs if sub.description.sercos_axes}
+    telegrams = {
+        position: _telegrams(sub, [axis for axis, _ in pairs if axis.device == position])
+        for position, sub in with_soe.items()
     }
-    telegrams = {sub: _telegrams(sub, its) for sub, its in chosen.items()}
     return tuple(
-        _with_settings(axis, sub, telegrams[sub], period_ns) if sub in telegrams else axis
-        for axis, sub in zip(axes, subs, strict=True)
+        _with_settings(axis, sub, telegrams[sub.position], period_ns)
+        if sub.position in with_soe
+        else axis
+        for axis, sub in pairs
     )
 
 
