@@ -61,7 +61,7 @@ class Axis:
     objects: tuple[StartUp, ...] = ()  # start-up objects of its device
     modules: tuple[ConfiguredModule, ...] | None = None  # in the slots of its device
     settings: DriveSettings = field(default_factory=DriveSettings)  # read in PRE-OP
-    sercos: SercosSettings | None = None  # of a SERCOS drive, whose number is the slot
+    sercos: SercosSettings | None = None  # of SERCOS drive number `slot`
 
     def index(self, base: int) -> int:
         """Return the index in this slot of the object that has the index `base` in slot 0."""

@@ -1,4 +1,4 @@
-"""Drives: the CiA 402 axes of any devices and slots, as one set of arrays in SI units."""
+"""Drives: CiA 402 axes and SERCOS drives of any devices, as one set of arrays in SI units."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ from catenary.drive.probe_request import check_probe, chosen_axis, probe_request
 from catenary.drive.rates import RateColumns
 from catenary.drive.request import Request
 from catenary.drive.sercos_reset import SercosResets
-from catenary.drive.sercos_settings import with_sercos
+from catenary.drive.sercos_start_up import with_sercos
 from catenary.drive.state_machine import RequestedState
 from catenary.drive.touch_probe import (
     FUNCTION_COLUMN,
@@ -74,7 +74,8 @@ class Drives(Request):
     """Process-data request for n axes.
 
     `subs` is a list of SubDevices with all of their axes, or of `(SubDevice, slot)` for single
-    axes.
+    axes. A SERCOS drive is an axis, too. Its mode is "csp", "csv" or "cst", and options that need
+    CiA 402 are refused (docs/how_to/soe.md).
 
     Options for all axes:
 

@@ -221,7 +221,7 @@ class Session:
         )
 
     def _reset_sercos(self) -> None:
-        """Reset the faults of SERCOS drives, whose control word has no bit for it."""
+        """Reset the faults of SERCOS drives: their control word has no bit for a reset."""
         faulty = np.flatnonzero(self._in_fault()).tolist()
         axes = [k for k in faulty if self.plan.cycle.axes[k].profile == "sercos"]
         for k in axes:
