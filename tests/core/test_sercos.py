@@ -9,7 +9,7 @@ import pytest
 
 from catenary.core import state_of
 from catenary.core._sercos import CONTROL, STATUS, control_word_of, statusword_of
-from catenary.plan.cycle import AxisPlan
+from catenary.plan.cycle import AxisPlan, SyncUnit
 from catenary.plan.stop_reason import StopReason
 from tests.core.rig import Bench, ScriptedDrive, axis, bench
 from tests.core.sercos_drive import (
@@ -332,3 +332,8 @@ def test_impossible_plans_are_refused(change: dict[str, object], message: str) -
     plan: AxisPlan = sercos_axis()
     with pytest.raises(ValueError, match=message):
         bench(replace(plan, **change))
+
+
+def test_a_sync_unit_without_a_divider_is_refused() -> None:
+    with pytest.raises(ValueError, match="divider 0 of its sync unit"):
+        bench(sercos_axis(), sync_units=(SyncUnit("unit 0", (0,), divider=0),))

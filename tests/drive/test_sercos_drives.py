@@ -361,3 +361,59 @@ def test_entering_without_mains_power_fails_with_a_hint(bench: Bench) -> None:
     with pytest.raises(DriveError, match="SWITCH_ON_DISABLED") as caught, cat.Loop(bench.drives()):
         pytest.fail("entered without power")
     assert "main supply" in caught.value.hint
+
+
+def test_a_drive_that_returns_gets_telegrams_and_mode_back(bench: Bench) -> None:
+    """It moves again only after a request."""
+    arm = bench.drives(mode="csv", required=False)
+    drive = bench.drive
+    assert isinstance(drive, SercosDrive)
+    telegrams = drive.application.telegrams
+    policy = cat.StopPolicy(on_axis_stopped="event", raise_faults=False)
+    with cat.Loop(arm, period=1e-3, stop=policy) as loop:
+        for cycle in range(3000):
+            next(loop)
+            arm.target.velocity[:] = 2.0
+            if cycle == 200:
+                drive.power_off()
+            if cycle == 400:
+                telegrams.lists = {True: (47,), False: (51,)}  # defaults of the drive
+                drive._sercos.parameters[32].content = b"\x0b\x00"
+                drive.power_on()
+            if cycle > 500 and arm.present.all():
+                break
+        assert arm.present.all()
+        assert telegrams.lists == {True: (47, 36), False: (51, 40, 84)}
+        assert drive.idn_value("S-0-0032") == b"\x02\x00"
+        for _ in range(200):
+            next(loop)
+            arm.target.velocity[:] = 2.0
+        assert drive.status == "POWERED"
+        assert abs(drive.velocity_rad_s) < 0.1
+        arm.enable()
+        for _ in range(300):
+            next(loop)
+            arm.target.velocity[:] = 2.0
+        assert drive.velocity_rad_s == pytest.approx(2.0, rel=0.05)
+
+
+def stall(bench: Bench, arm: cat.Drives) -> None:
+    """Let the program be late in an inline loop, until the watchdog of the drive expires."""
+    with cat.Loop(arm, execution="inline") as loop:
+        for cycle in loop:
+            arm.target.velocity[:] = 5.0
+            if cycle.number == 300:
+                assert bench.drive.velocity_rad_s == pytest.approx(5.0, rel=0.05)
+                cycle.spend(0.5)
+            assert cycle.number < 320
+
+
+def test_a_watchdog_brakes_the_drive_and_the_next_loop_resets_it(bench: Bench) -> None:
+    arm = bench.drives(mode="csv")
+    with pytest.raises(cat.CatenaryError):
+        stall(bench, arm)
+    assert abs(bench.drive.velocity_rad_s) < 0.05
+    assert bench.drive.status == "NOT READY"
+    with cat.Loop(arm) as loop:
+        next(loop)
+        assert arm.faults == ()

@@ -565,6 +565,9 @@ cdef class Axes:
             raise ValueError(
                 f"{name}: no sync unit {plan.sync_unit}, the plan has {len(cycle.sync_units)}"
             )
+        divider = cycle.sync_units[plan.sync_unit].divider
+        if not 1 <= divider <= 0x7FFFFFFF:
+            raise ValueError(f"{name}: divider {divider} of its sync unit, must be at least 1")
         if not -128 <= plan.mode <= 127:
             raise ValueError(f"{name}: mode {plan.mode}, must be -128 to 127")
         self.check_profile(plan, name)
@@ -585,7 +588,7 @@ cdef class Axes:
         make_number(&a.velocity_offset, plan.velocity_offset, outputs, f"{name} velocity_offset")
         self.make_limits(plan, name)
         a.unit = plan.sync_unit
-        a.divider = cycle.sync_units[plan.sync_unit].divider
+        a.divider = divider
         a.mode = a.mode_wanted = plan.mode
         a.mode_refused = NO_MODE
         a.mode_shown = 0
