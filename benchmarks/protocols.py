@@ -166,7 +166,10 @@ def as_text(rows: Mapping[str, Mapping[str, float]]) -> str:
         figures = "".join(f"{row[column]:13.2f}" for column in columns)
         lines.append(f"{name:18}{figures}" + "".join(f"{row[each]:13.0f}" for each in counts))
     slow = [name for name, row in rows.items() if row["delay_us"] > LIMIT_US]
+    unused = [name for name, row in rows.items() if name != NOTHING and not row["uses"]]
     verdict = f"above: {', '.join(slow)}" if slow else "all protocols reach it"
+    if unused:
+        verdict = f"{verdict}; without a completed use: {', '.join(unused)}"
     return "\n".join(
         [*lines, f"\ntarget: the median is delayed by at most {LIMIT_US} us: {verdict}"]
     )

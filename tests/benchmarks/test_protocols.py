@@ -38,6 +38,12 @@ def test_a_slow_protocol_is_named() -> None:
     assert as_text(rows).endswith("at most 1.0 us: above: AoE read")
 
 
+def test_a_protocol_without_a_completed_use_is_named() -> None:
+    unused = Window("AoE read", 10.0, 20.0, 3.0, 0, 0, 0, 100.0)
+    text = as_text(summary([window(NOTHING, 10.0), unused]))
+    assert text.endswith("without a completed use: AoE read")
+
+
 def test_the_order_rotates() -> None:
     orders = [_rotated(number) for number in range(len(NAMES))]
     assert {order[0] for order in orders} == set(NAMES)

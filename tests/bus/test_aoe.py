@@ -8,10 +8,14 @@ import pytest
 
 import catenary as cat
 from catenary.bus import MainDevice, SubDevice
+from catenary.bus.ads_notifications import NotificationQueues
 from catenary.errors import AdsError, ConfigurationError, MailboxError, ResponseTimeout
+from catenary.procedure.exchange import Procedure
 from catenary.virtual import Ads, AnalogInputs, Coupler, Segment, Servo
+from catenary.virtual.aoe.server import AdsServer
 from catenary.wire.ads import WriteControl
-from catenary.wire.ads_response import DeviceInfo, Sample, States
+from catenary.wire.ads_response import DeviceInfo, Sample, States, encode_notification
+from catenary.wire.aoe import Address, Command, Message
 from catenary.wire.mailbox import Mailbox, Type
 
 GROUP, LONG = 0x4020, 0x4021
@@ -130,6 +134,15 @@ def test_the_net_id_is_that_of_the_first_request_or_the_assigned_one(sub: SubDev
     assert sub.aoe.read(GROUP, 0, 1) == b"a"
 
 
+def test_a_refused_net_id_is_not_used(sub: SubDevice, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(AdsServer, "_assigned", lambda *_: b"")
+    assert sub.aoe.read(GROUP, 0, 1) == b"a"
+    with pytest.raises(AdsError, match="assignment of the NetId refused with 0x0007"):
+        sub.aoe.assign_net_id("5.6.7.8.9.10")
+    assert sub.aoe.net_id == "127.0.0.1.16.2"
+    assert sub.aoe.read(GROUP, 0, 1) == b"a"
+
+
 def test_a_device_with_another_net_id_refuses(sub: SubDevice) -> None:
     sub.aoe.assign_net_id("5.6.7.8.9.10")
     other = cat.bus.Aoe(sub)  # it uses the NetId of the station address
@@ -203,7 +216,9 @@ def test_notifications_on_change(sub: SubDevice) -> None:
         assert isinstance(sample, Sample)
         assert (sample.data, sample.handle, changes.dropped) == (b"xy", changes.handle, 0)
     sub.aoe.write(GROUP, 0, b"ab")
-    assert changes.wait(0.1) == []
+    assert changes.ended
+    with pytest.raises(MailboxError, match="notifications of handle 1 have ended"):
+        changes.wait(0.1)
     changes.close()
 
 
@@ -239,8 +254,74 @@ def test_a_restarted_device_has_no_notifications(sub: SubDevice) -> None:
     sub.request_state("INIT")
     sub.request_state("PREOP")
     changes.take()
-    assert changes.wait(0.1) == []
-    changes.close()  # the device does not know the handle
+    assert changes.ended
+    with pytest.raises(MailboxError, match="have ended") as caught:
+        changes.wait(0.1)
+    assert "subscribe again" in caught.value.hint
+    again = sub.aoe.subscribe(GROUP, 4, 1, period=0.01, on_change=False)
+    assert again.handle == changes.handle
+    changes.close()  # does not end the new notifications
+    assert {each.data for each in again.wait()} == {b"e"}
+    assert not again.ended
+    again.close()
+
+
+def test_notifications_end_with_a_scan(sub: SubDevice) -> None:
+    changes = sub.aoe.subscribe(GROUP, 0, 2, period=0.01)
+    assert sub.main.scan()[1] is sub  # type: ignore[attr-defined]
+    assert changes.ended
+    changes.close()
+    with sub.aoe.subscribe(GROUP, 0, 2, period=0.01) as again:
+        assert [each.data for each in again.wait()] == [b"ab"]
+
+
+def test_early_samples_of_a_notification(sub: SubDevice) -> None:
+    queues = NotificationQueues()
+
+    def notification(port: int, handle: int) -> Mailbox:
+        data = encode_notification((Sample(handle, 1, bytes([handle])),))
+        source = Address(bytes(6), port)
+        return Mailbox(Type.AOE, Message(source, source, Command.NOTIFICATION, data).encode())
+
+    def handle() -> Procedure[int]:
+        yield []
+        return 7
+
+    assert not queues.take(notification(1, 7), 0)  # nothing is being requested
+    opening = queues.opened(handle(), 1, 2)
+    next(opening)
+    for port, number in ((1, 7), (2, 7), (1, 8)):
+        assert queues.take(notification(port, number), 0)
+    with pytest.raises(StopIteration) as ended:
+        opening.send([])
+    queue = ended.value.value
+    assert [each.handle for each in queue.samples] == [7]
+    assert not queues.take(notification(1, 8), 0)
+    assert queues.take(notification(1, 7), 0)
+    queues.remove(queue)
+    assert not queues.take(notification(1, 7), 0)
+    assert len(queue.samples) == 2
+
+
+def test_a_notification_is_closed_again_after_a_failure() -> None:
+    servo = Servo(protocols=[Ads(areas={GROUP: b"abcdefgh"})])
+    with MainDevice(Segment([Coupler(), servo])) as main:
+        sub = main.scan()[1]
+        arm = cat.Drives([sub], counts_per_turn=2**20, velocity_limit=10.0)
+        changes = sub.aoe.subscribe(GROUP, 0, 1)
+        with cat.Loop(arm, period=1e-3), pytest.raises(RuntimeError):
+            changes.close()
+        assert not changes.ended
+        changes.close()
+        assert changes.ended
+
+
+@pytest.mark.parametrize("timeout", [-1.0, float("nan"), float("inf")])
+def test_invalid_timeouts(sub: SubDevice, timeout: float) -> None:
+    with pytest.raises(ValueError, match="timeout must be"):
+        sub.aoe.read(GROUP, 0, 1, timeout=timeout)
+    with sub.aoe.subscribe(GROUP, 0, 1) as changes, pytest.raises(ValueError, match="timeout"):
+        changes.wait(timeout)
 
 
 def test_requests_while_a_loop_runs() -> None:

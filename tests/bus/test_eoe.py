@@ -251,14 +251,14 @@ def test_frames_that_no_device_could_accept(main: MainDevice, wire: Wire) -> Non
         wire.to_devices.put(MAC + OWN_MAC + b"\x08")
         wire.to_devices.put(ARP_REQUEST)
         assert wire.next() == ARP_ANSWER
-        assert bridge.counts[1].dropped == {"frame too large": 2}
+        assert bridge.counts[1].dropped == {"too short or too long for an Ethernet frame": 2}
 
 
 def test_an_interface_that_is_down_drops_frames(main: MainDevice, wire: Wire) -> None:
     wire.up = False
     with main.subs[1].eoe.connect("cat0") as bridge:
         wire.to_devices.put(ARP_REQUEST)
-        until(lambda: bridge.counts[1].dropped["TAP interface down"])
+        until(lambda: bridge.counts[1].dropped["TAP interface down or deleted"])
 
 
 def test_a_device_that_hangs_is_reported_and_tried_again(wire: Wire) -> None:

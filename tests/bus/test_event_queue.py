@@ -10,7 +10,7 @@ import pytest
 
 import catenary as cat
 from catenary.bus.event_queue import Callbacks, Events
-from catenary.bus.event_types import DeviceLost, Emergency, Event
+from catenary.bus.event_types import DeviceLost, Emergency, Event, GatewayWrite
 from catenary.procedure.mailbox import ReceivedEmergency
 from catenary.virtual import Servo, demo_segment
 from catenary.wire import coe
@@ -35,6 +35,22 @@ def test_get_returns_the_oldest_event_or_none() -> None:
     events.put(first)
     events.put(second)
     assert [events.get(), events.get(), events.get()] == [first, second, None]
+
+
+def test_writes_of_tools_give_way_to_other_events() -> None:
+    events = Events(capacity=10)
+    others = numbered(5)
+    for event in others:
+        events.put(event)
+    for number in range(100):
+        events.put(GatewayWrite(5.0 + number, None, "", "", "", "", None, None, b""))
+    assert events.dropped == 95
+    assert list(events)[:5] == others
+    for number in range(10):
+        events.put(GatewayWrite(5.0 + number, None, "", "", "", "", None, None, b""))
+    for event in others * 2:
+        events.put(event)
+    assert list(events) == others * 2
 
 
 def test_get_waits_for_another_thread() -> None:

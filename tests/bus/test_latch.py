@@ -9,9 +9,10 @@ from typing import Any
 import pytest
 
 import catenary as cat
+from catenary.bus.latch import _is_later
 from catenary.errors import ConfigurationError, DecodeError
 from catenary.virtual import Coupler, DigitalInputs, Segment, Servo
-from catenary.wire.latch import BLOCK_SIZE, LatchStatus, decode_latched
+from catenary.wire.latch import decode_times
 
 
 @contextmanager
@@ -112,13 +113,31 @@ def test_a_device_without_a_clock_is_refused() -> None:
             subs[1].latch(0, edge="up")
 
 
-def test_the_registers_are_decoded() -> None:
-    # layout of the ESC data sheet, section II, 0x09AE to 0x09CF
-    data = bytes([0x01, 0x06]) + b"".join((k << 32 | k).to_bytes(8, "little") for k in range(1, 5))
-    first, second = decode_latched(data, 0, 64), decode_latched(data, 1, 32)
-    assert (first.status, first.rising_ns) == (LatchStatus.RISING, 1 << 32 | 1)
-    assert first.falling_ns == 2 << 32 | 2
-    assert (second.status, second.rising_ns) == (LatchStatus.FALLING | LatchStatus.PIN, 3)
-    assert second.falling_ns == 4
-    with pytest.raises(DecodeError, match=f"needs {BLOCK_SIZE} bytes"):
-        decode_latched(data[1:], 0, 64)
+def test_the_inputs_keep_their_own_events() -> None:
+    with scanned() as (servo, subs):
+        first, second = subs[1].latch(0), subs[1].latch(1)
+        first.read()
+        second.read()
+        servo.set_latch_input(0, True)
+        servo.set_latch_input(1, True)
+        time = now(servo)
+        assert [each.time_ns for each in first.read()] == [time]
+        subs[1].read_state()  # time passes
+        servo.set_latch_input(1, False)
+        servo.set_latch_input(1, True)  # the first edge is kept: reading LATCH0 does not release it
+        assert [each.time_ns for each in second.read()] == [time]
+
+
+def test_edges_are_in_the_order_of_time_although_32_bits_wrap() -> None:
+    assert _is_later(5, 0xFFFF_FFF0, 32)
+    assert not _is_later(0xFFFF_FFF0, 5, 32)
+    assert _is_later(0xFFFF_FFF0, 5, 64)
+
+
+def test_the_times_are_decoded() -> None:
+    # layout of the ESC data sheet, section II, 0x09B0 to 0x09CF
+    data = (1 << 32 | 2).to_bytes(8, "little") + (3 << 32 | 4).to_bytes(8, "little")
+    assert decode_times(data, 64) == (1 << 32 | 2, 3 << 32 | 4)
+    assert decode_times(data, 32) == (2, 4)
+    with pytest.raises(DecodeError, match="need 16 bytes, received 15"):
+        decode_times(data[1:], 64)

@@ -294,6 +294,16 @@ def test_start_up_commands_run_at_their_transitions(main: MainDevice, drive: Ser
         assert drive.idn_value("P-0-0010") == b"\x34\x12"
 
 
+def test_start_up_commands_run_in_the_order_of_the_transitions(
+    main: MainDevice, drive: SercosDrive
+) -> None:
+    """A command of IP comes before one of PS, whatever their order in the file."""
+    sub = commanded(main, command("PS", 0x800A, "0200"), command("IP", 0x800A, "0100"))
+    with cat.Loop(cat.ProcessData(sub)) as loop:
+        next(loop)
+        assert drive.idn_value("P-0-0010") == b"\x02\x00"
+
+
 def test_a_refused_start_up_command_names_its_line(main: MainDevice) -> None:
     sub = commanded(main, command("PS", 51, "00000000"))
     with pytest.raises(SoeError, match=r"0x7004.*bus.xml:5"), cat.Loop(cat.ProcessData(sub)):
@@ -341,13 +351,13 @@ def test_a_fault_is_an_event_and_is_reset(
         drive.inject_fault(0)
         command = sub.soe.request_command("S-0-0099")
         for _ in loop:
-            if command.done and raw["S-0-0135"] >> 14 == 1:
+            if command.done and raw["S-0-0135"] >> 14 == 2:
                 break
         command.result()
 
 
-def test_a_drive_that_returns_gets_its_telegrams_back(sub: SubDevice, drive: SercosDrive) -> None:
-    sub.soe.configure_telegrams(mdt=["S-0-0036"], at=["S-0-0040"])
+def returned(sub: SubDevice, drive: SercosDrive, kind: int) -> None:
+    """Switch a drive off and on while a loop runs. Its telegrams then have their defaults."""
     telegrams = drive.application.telegrams
     assert telegrams is not None
     raw = cat.ProcessData(sub, required=False)
@@ -357,12 +367,29 @@ def test_a_drive_that_returns_gets_its_telegrams_back(sub: SubDevice, drive: Ser
             if cycle == 200:
                 drive.power_off()
             if cycle == 400:
-                telegrams.lists = {True: (47,), False: (51,)}  # defaults of the drive
+                telegrams.kind = kind
+                telegrams.lists = {True: (47,), False: (51,)}
                 drive.power_on()
             if cycle > 500 and raw.present:
                 break
         assert raw.present
-    assert telegrams.lists == {True: (36,), False: (40,)}
+
+
+def test_a_drive_that_returns_gets_its_telegrams_back(sub: SubDevice, drive: SercosDrive) -> None:
+    sub.soe.configure_telegrams(mdt=["S-0-0036"], at=["S-0-0040"])
+    returned(sub, drive, 7)
+    assert drive.application.telegrams is not None
+    assert drive.application.telegrams.lists == {True: (36,), False: (40,)}
+
+
+def test_a_drive_that_returns_gets_its_telegram_type_back(
+    main: MainDevice, sub: SubDevice, drive: SercosDrive
+) -> None:
+    sub.soe.write("S-0-0015", 5)
+    sub = main.scan()[1]
+    returned(sub, drive, 7)
+    assert drive.application.telegrams is not None
+    assert drive.application.telegrams.kind == 5
 
 
 def test_elements_are_read_as_bytes(sub: SubDevice) -> None:

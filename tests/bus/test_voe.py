@@ -40,6 +40,8 @@ def test_an_exchange(sub: SubDevice) -> None:
         sub.voe.exchange(7, bytes(room + 1))
     with pytest.raises(ValueError, match="does not fit"):
         sub.voe.exchange(1 << 16)
+    with pytest.raises(ValueError, match="timeout"):
+        sub.voe.exchange(1, timeout=float("nan"))
 
 
 def test_a_message_without_an_answer(sub: SubDevice) -> None:
@@ -123,11 +125,13 @@ def test_requests_while_a_loop_runs() -> None:
                 if answer.done:
                     break
             assert answer.result().data == b"cba"
+            sent = sub.voe.request_send(99, b"abc")
             messages.send(VENDOR, 5)
             for _ in loop:
-                if (found := sub.voe.take()) is not None:
+                if sent.done and (found := sub.voe.take()) is not None:
                     break
             assert found == VoeMessage(VENDOR, 5)
+            assert sent.result() is None
             with pytest.raises(RuntimeError):
                 sub.voe.exchange(1)
 

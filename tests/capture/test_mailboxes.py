@@ -14,6 +14,7 @@ from catenary.capture.mailbox_contents import (
     SdoInformationRead,
     SdoTransfer,
 )
+from catenary.wire import aoe
 from catenary.wire.coe import (
     Abort,
     DownloadRequest,
@@ -28,9 +29,13 @@ from catenary.wire.coe import (
 )
 from catenary.wire.mailbox import ErrorReply, Type
 from catenary.wire.sdo_information import ListType, Opcode, SdoInformation, list_request
+from catenary.wire.voe import VoeMessage
 from tests.capture.made import IN, MAILBOX_SIZE, Conversation
 
 LONG = bytes(range(30))
+HERE = aoe.Address(bytes(6), 0xFFFF)
+READ = aoe.Message(HERE, HERE, aoe.Command.READ, bytes(12), 7)
+PART = aoe.Fragment(HERE, HERE, 1, 3, b"ab")
 
 
 @pytest.fixture
@@ -177,6 +182,14 @@ def test_an_emergency_between_request_and_answer(made: Conversation) -> None:
         (Type.SOE, struct.pack("<BBH", 0x23, 0x40, 0x8001), "SoE write request P-0-0001 drive 1"),
         (Type.EOE, b"\x00\x01\x00\x00", "EoE frame fragment"),
         (Type.AOE, b"\x00" * 8, "AoE"),
+        (Type.AOE, READ.encode(), "AoE read request 7 at port 65535"),
+        (Type.AOE, READ.answered(bytes(8)).encode(), "AoE read response 7, 8 bytes"),
+        (Type.AOE, READ.answered(b"", 6).encode(), "AoE read response 7, 0 bytes, error 0x0006"),
+        (Type.AOE, aoe.Message(HERE, HERE, 8).encode(), "AoE notification at port 65535, 0 bytes"),
+        (Type.AOE, PART.encode(), "AoE fragment 3, 2 bytes"),
+        (Type.AOE, PART.acknowledge().encode(), "AoE acknowledge fragment 3, 0 bytes"),
+        (Type.VOE, VoeMessage(0x1B9, 5, b"abc").encode(), "VoE vendor 0x1B9 type 5, 3 bytes"),
+        (Type.VOE, b"abc", "VoE"),
     ],
 )
 def test_other_protocols_are_named(made: Conversation, kind: Type, data: bytes, text: str) -> None:

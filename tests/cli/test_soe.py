@@ -79,6 +79,27 @@ def test_info(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert (found["command"], found["state"], found["unit"]) == (True, 0, "")
 
 
+def test_info_shows_zeros(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    _, out, _ = call(f"soe info {DRIVE} S-0-0092", capsys)
+    assert "minimum        0.0" in out
+    _, out, _ = call(f"soe info {DRIVE} S-0-0044", capsys)
+    assert "value          2" in out
+    _, out, _ = call(f"soe info {DRIVE} S-0-0043", capsys)
+    assert "value          0" in out
+    assert "list " not in out
+
+
+def test_a_list_with_an_invalid_value(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """The other values are shown, too."""
+    quirks = 'soe_quirks = { lying_lists = ["S-0-0142"] }'
+    (folder / "cell.toml").write_text(f'[[device]]\nkind = "sercos_drive"\n{quirks}\n')
+    status, out, _ = call("soe list virtual:cell.toml 0 --values", capsys)
+    assert status == 0
+    [line] = [each for each in out.splitlines() if each.startswith("S-0-0142")]
+    assert "its header states" in line
+    assert "S-0-0187  IDN-list of configurable data in the AT" in out
+
+
 def test_list(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     _, out, _ = call(f"soe list {DRIVE}", capsys)
     assert "S-0-0051" in out.splitlines()

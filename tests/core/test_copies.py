@@ -124,6 +124,21 @@ def test_copies_go_on_in_a_hand_over_and_end_with_zeros(execution: str) -> None:
     assert destination.first == [0, 1, 2, 3, 4, 5, 0, 0]
 
 
+def test_after_a_law_one_more_frame_has_the_copies() -> None:
+    """A law prepares the outputs of the next cycle, so the zeros follow one cycle later."""
+    b, _, destination = pair(BYTE)
+
+    def nothing(frame: Frame) -> int:
+        return 0
+
+    b.engine.start_law(make_law(b, nothing))
+    b.steps(4)
+    b.engine.stop_law()
+    b.engine.end_copies()
+    b.steps(3)
+    assert destination.first == [0, 1, 2, 3, 4, 0, 0]
+
+
 def test_neighbours_of_copied_bytes_and_bits_do_not_change() -> None:
     at = 8 * SIZE
     bits, odd = copy(8 + 2, at + 8 * 3 + 1, 5), copy(8 + 3, at + 8 * 5 + 7, 12)

@@ -72,6 +72,39 @@ def test_bytes(subs: SubDevices, place: CopyPlace) -> None:
     assert places(subs, copy) == [(8, 0, 16)]
 
 
+def test_the_plan_counts_bits_and_bytes(subs: SubDevices) -> None:
+    plan = plan_of(
+        subs,
+        cat.Copies(
+            cat.Copy(subs[BUTTONS], "Channel 3", subs[LAMPS], "Channel 1"),
+            cat.Copy(subs[CURTAIN], range(1), subs[LAMPS], range(1, 2)),
+        ),
+    )
+    assert "PDO 0x1600 Channel 1, 1 bit\n" in str(plan)
+    assert "bytes 1 to 1, 1 byte\n" in str(plan)
+
+
+@pytest.mark.parametrize(("own", "expected"), [(None, (1, 4)), (2, (2, 2)), (8, (8, 4))])
+def test_a_divider_of_another_request_remains(
+    subs: SubDevices, own: int | None, expected: tuple[int, int]
+) -> None:
+    copies = cat.Copies(cat.Copy(subs[BUTTONS], 0x1A00, subs[LAMPS], 0x1600), divider=own)
+    other = cat.ProcessData(subs[LAMPS], outputs={}, divider=4)
+    layout = plan_of(subs, other, copies).layout
+    dividers = [layout.units[layout.sync_unit(k)].divider for k in (BUTTONS, LAMPS)]
+    assert tuple(dividers) == expected
+
+
+@pytest.mark.parametrize(
+    ("place", "text"),
+    [(0x1A00, "0x1A00"), ((0x6000, 1), "0x6000:01"), (range(7), "bytes 0 to 6"), ("FSoE", "FSoE")],
+)
+def test_a_connection_names_its_places(subs: SubDevices, place: CopyPlace, text: str) -> None:
+    connection = cat.FsoeConnection((subs[LOGIC], place, 0x1600), (subs[CURTAIN], 0x1A00, 0x1600))
+    assert f"virtual safety logic), {text} ↔ device 4" in str(connection)
+    assert str(connection).endswith(", 0x1A00")
+
+
 def test_an_object_by_its_name(subs: SubDevices) -> None:
     copy = cat.Copy(subs[CURTAIN], "FSoE sub frame CRC_1", subs[LAMPS], range(2))
     assert places(subs, copy) == [(56, 0, 16)]
@@ -93,7 +126,7 @@ def test_a_relay_copies_both_ways(subs: SubDevices) -> None:
     assert [copy.bit_length for copy in plan.cycle.copies] == [88, 88]
     assert [copy.device for copy in plan.cycle.copies] == [CURTAIN, LOGIC]
     text = str(plan)
-    assert "copies between devices, in every cycle" in text
+    assert "copies between devices\n" in text
     assert "inputs of 3 Catenary virtual safety logic, PDO 0x1A00 FSoE main frame → outputs of 4" \
         in text  # fmt: skip
     with pytest.raises(RuntimeError, match="before a Loop is open"):
@@ -180,6 +213,8 @@ def test_a_frame_of_fsoe_must_have_its_size(subs: SubDevices) -> None:
 def test_wrong_arguments(subs: SubDevices) -> None:
     with pytest.raises(ValueError, match="at least one Copy"):
         cat.Copies()
+    with pytest.raises(ValueError, match="optional: no copy uses device 3"):
+        cat.Copies(cat.Copy(subs[BUTTONS], 0x1A00, subs[LAMPS], 0x1600), optional=[subs[LOGIC]])
     with pytest.raises(TypeError, match="takes Copy and FsoeConnection objects"):
         cat.Copies(subs[1])  # type: ignore[arg-type]
     with pytest.raises(TypeError, match="a copy needs SubDevices"):

@@ -108,3 +108,23 @@ def test_a_request_without_samples() -> None:
             cat.Inputs(subs[1], oversampling=1)
         with pytest.raises(ValueError, match="unknown object 'x'"):
             cat.Inputs(subs[1], oversampling=5, scale={"x": 1.0})
+
+
+def test_the_times_on_a_clock_of_32_bits() -> None:
+    terminal = OversamplingTerminal(channels=1, samples=5, clock_bits=32)
+    counter = iter(range(1 << 30))
+    terminal.apply_wave(0, lambda _: next(counter))
+    with scanned(terminal) as subs:
+        dc = cat.DistributedClock(op_mode="DcSync5")
+        inputs = cat.Inputs(subs[1], dc=dc, oversampling=5)
+        with cat.Loop(inputs, period=1e-3) as loop:
+            loop.wait_locked()
+            begun = next(loop).time
+            times, values = [], []
+            for cycle in loop:  # the times of the device wrap every 4.29 s
+                times.append(inputs.sample_times(cycle))
+                values.append(inputs.samples[0].copy())
+                if cycle.time > begun + 4.4:
+                    break
+    assert np.diff(np.concatenate(times)) == pytest.approx(2e-4, abs=1e-6)
+    assert (np.diff(np.concatenate(values).astype(np.int16)) == 1).all()

@@ -83,10 +83,11 @@ def test_units_and_direction_of_the_joint() -> None:
         assert probe.position == pytest.approx(0.1 - 0.2, abs=STEP)
 
 
+@pytest.mark.parametrize("divider", [1, 3])
 @pytest.mark.parametrize("options", [{}, {"keeps_stored": True}])
-def test_a_probe_can_be_armed_again(options: dict[str, bool]) -> None:
+def test_a_probe_can_be_armed_again(options: dict[str, bool], divider: int) -> None:
     servo = probed_servo(**options)
-    with opened(servo) as (arm, loop):
+    with opened(servo, divider=divider) as (arm, loop):
         servo.place_probe_switch(1, 0.2, 0.3)
         first = arm.probe()
         loop.wait(arm.move_to(0.5, velocity=5.0))
@@ -156,28 +157,6 @@ def test_the_index_pulse_and_a_source_of_0x60d0() -> None:
         loop.wait(arm.move_to(7.0, velocity=10.0))
         assert index.position == pytest.approx(turn, abs=STEP)
         assert other.position == pytest.approx(2.0, abs=STEP)
-
-
-def test_a_move_stops_at_the_edge() -> None:
-    servo = probed_servo()
-    with opened(servo) as (arm, loop):
-        servo.place_probe_switch(1, 0.4)
-        probe = arm.probe()
-        loop.wait(arm.move_to(1.0, velocity=1.0, until=probe))
-        assert probe.position == pytest.approx(0.4, abs=STEP)
-        assert 0.4 < arm.actual.position[0] < 0.6
-        cycles(loop, 50)
-        assert arm.actual.velocity[0] == pytest.approx(0.0, abs=1e-2)
-
-
-def test_a_move_without_an_edge_fails_at_its_goal() -> None:
-    servo = probed_servo()
-    with opened(servo) as (arm, loop):
-        probe = arm.probe()
-        with pytest.raises(MoveError, match=r"reached its goal without an edge of <Probe 1"):
-            loop.wait(arm.move_by(0.1, velocity=1.0, until=probe))
-        next(loop)
-        assert probe.outcome == "stopped"
 
 
 def test_a_drive_without_touch_probes_is_refused_before_the_loop() -> None:
@@ -323,3 +302,82 @@ def test_the_time_of_an_edge_on_the_clock_of_the_loop() -> None:
         assert event.time is not None
         # read in one of the next cycles, never before the edge
         assert 0 <= event.cycle_time - event.time < 5e-3
+
+
+def test_the_time_of_an_edge_after_a_jump_of_the_system_time() -> None:
+    servo = probed_servo()
+    with opened(servo) as (arm, loop):
+        arm.probe()
+        cycles(loop, 10)
+        before = arm.actual.position[0]
+        offset = 10**18  # of 0x0920, as another master would write it
+        servo.core.poke(servo.position, 0x0920, offset.to_bytes(8, "little"))
+        servo.set_probe_input(1, True)
+        expected = servo.core.system_time(servo.position) & 0xFFFF_FFFF
+        cycles(loop, 5)
+        assert arm.actual["touch_probe_1_rising"][0] == pytest.approx(before, abs=10 * STEP)
+        assert arm.actual["touch_probe_1_rising_time"][0] == expected
+
+
+def test_the_time_of_an_edge_on_a_clock_of_32_bits() -> None:
+    servo = Servo(clock_bits=32, touch_probe=ProbeOptions())
+    with opened(servo, dc=True) as (arm, loop):
+        loop.wait_locked()
+        probe = arm.probe(continuous=True)
+        times = []
+        for cycle in loop:  # the stamps wrap every 4.29 s
+            if probe.armed and cycle.number % 500 == 0:
+                times.append(cycle.time)
+                servo.set_probe_input(1, True)
+                servo.set_probe_input(1, False)
+            if len(times) == 12 and len(probe.events) == 12:
+                break
+            assert cycle.time < 10.0
+        assert times[-1] - times[0] > 4.3
+        assert [event.time for event in probe.events] == pytest.approx(times, abs=1e-3)
+
+
+def test_a_linear_axis_measures_metres() -> None:
+    servo = probed_servo()
+    with opened(servo, metres_per_turn=0.01, velocity_limit=0.1) as (arm, loop):
+        servo.place_probe_switch(1, 3.141592653589793)
+        probe = arm.probe()
+        loop.wait(arm.move_to(0.02, velocity=0.05, until=probe))
+        assert probe.position == pytest.approx(0.005, abs=1e-8)
+
+
+def test_edges_before_the_first_reading_are_counted() -> None:
+    servo = probed_servo()
+    with opened(servo) as (arm, loop):
+        probe = arm.probe(continuous=True)
+        cycles(loop, 10)
+        for level in (True, False) * 3:
+            servo.set_probe_input(1, level)
+        cycles(loop, 5)
+        assert (len(probe.events), probe.missed) == (1, 2)
+
+
+def test_an_interrupted_probe_has_failed(monkeypatch: pytest.MonkeyPatch) -> None:
+    with opened(probed_servo()) as (arm, loop):
+        probe = arm.probe()
+        cycles(loop, 5)
+        with monkeypatch.context() as patch:
+
+            def interrupted(self: object, edge: str) -> bool:
+                raise KeyboardInterrupt
+
+            patch.setattr("catenary.drive.probe.Probe._stored", interrupted)
+            with pytest.raises(KeyboardInterrupt):
+                next(loop)
+        assert probe.outcome == "failed"
+        assert "was interrupted" in str(probe.error)
+
+
+def test_a_law_or_a_stream_cannot_start_while_a_probe_is_armed() -> None:
+    with opened(probed_servo()) as (arm, loop):
+        probe = arm.probe()
+        with pytest.raises(RuntimeError, match=r"a stream cannot start .* a touch probe is in use"):
+            loop.stream(100)
+        probe.stop()
+        loop.wait(probe)
+        loop.stream(100).close()

@@ -469,10 +469,10 @@ TARGETS = (
         ),
     ),
     Target(
-        "latch.decode_latched",
-        lambda data: latch.decode_latched(data, len(data) & 1, 64),
+        "latch.decode_times",
+        lambda data: latch.decode_times(data, 32 << (len(data) & 1)),
         None,
-        (bytes([0x01, 0x06]) + bytes(range(32)),),
+        (bytes(range(16)),),
     ),
     Target(
         "sdo_information.decode_sdo_information",

@@ -9,6 +9,7 @@ import pytest
 
 import catenary as cat
 from catenary.errors import ConfigurationError
+from catenary.gateway import device_queue
 from catenary.virtual.faults import MailboxSilent
 from tests.gateway.line import CONTENT, Line
 from tests.gateway.tool import COE, EOE, ERROR, FOE, SOE, Aborted, Tool
@@ -215,6 +216,30 @@ def test_a_device_that_does_not_answer(line: Line) -> None:
     assert "device 1" in event.result
     with line.tool(address=0x1003) as tool:
         assert tool.upload(0x1018, 4) == bytes(4)
+
+
+def test_an_unexpected_error_does_not_block_the_device(
+    line: Line, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with line.tool() as tool:
+        tool.begin_download(0x6065, 0, 4)
+        with monkeypatch.context() as patch:
+            patch.setattr(device_queue, "forward", lambda *_: 1 // 0)
+            with pytest.raises(Aborted) as caught:
+                tool.segment(bytes(4), last=True)
+        assert caught.value.code == 0x08000000
+        with line.tool() as other:
+            assert other.upload(0x1018, 4) == bytes(4)
+    [event] = line.writes
+    assert "division" in event.result
+
+
+def test_a_write_that_close_ends_is_an_event(line: Line) -> None:
+    with line.tool() as tool:
+        tool.begin_download(0x6065, 0, 4)
+        line.gateway.close()
+    [event] = line.writes
+    assert event.result == "not completed: the gateway was closed"
 
 
 def test_only_loopback_addresses(line: Line) -> None:

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import dataclasses
 import struct
 import threading
+from collections import deque
 from collections.abc import Callable, Iterator
 
 import pytest
@@ -143,6 +145,40 @@ def test_an_axis_that_the_loop_does_not_know(line: Line) -> None:
         beside.run(lambda tool: tool.download(0x6060, 0, CSV))
     [event] = line.writes
     assert event.index == 0x6060
+
+
+def test_an_enabled_axis_of_another_device_counts(line: Line) -> None:
+    other = cat.Drives([line.main.subs[2]], counts_per_turn=2**20, velocity_limit=100.0)
+    with cat.Loop(other, period=1e-3) as loop:
+        beside = Beside(line, loop)
+        for write in (
+            lambda tool: tool.download(0x6060, 0, CSV),
+            lambda tool: tool.download(0x1C12, 0, bytes(1)),
+            lambda tool: tool.write_file("app", CONTENT),
+        ):
+            with pytest.raises(Aborted):
+                beside.run(write)
+        other.disable()
+        loop.run_for(0.1)
+        beside.run(lambda tool: tool.download(0x6060, 0, CSV))
+    [event] = line.writes
+    assert event.index == 0x6060
+
+
+def test_a_new_mailbox_releases_the_former_one(line: Line) -> None:
+    """The ticket of a transfer must not block the mailbox, for example that of PRE-OP in BOOT."""
+    with cat.Loop(line.arm(), period=1e-3, enable=False) as loop:
+        beside = Beside(line, loop)
+        sub = line.main.subs[1]
+        former = sub.channel
+        with line.tool() as tool:
+            beside.run(lambda _: tool.begin_download(0x6065, 0, 4))
+            assert len(former.turns) == 1
+            sub.channel = dataclasses.replace(former, turns=deque())
+            assert beside.run(lambda _: tool.upload(0x1018, 4)) == bytes(4)
+            assert len(former.turns) == 0
+    [event] = line.writes
+    assert event.result == "not completed: the device has another mailbox now"
 
 
 def test_before_during_and_after_a_loop(line: Line) -> None:

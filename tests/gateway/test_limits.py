@@ -6,15 +6,18 @@ import random
 import socket
 import struct
 import time
+from collections.abc import Iterator
 
 import pytest
 
 from catenary.gateway import clients
-from catenary.gateway.limits import CLIENTS
+from catenary.gateway.clients import TcpClient
+from catenary.gateway.limits import BURST, CLIENTS, FRAME_TIMEOUT, OUTSTANDING, RATE
 from tests.gateway.line import Line
 from tests.gateway.tool import COE, Tool
 
 UPLOAD = struct.pack("<HBHB4x", 0x2000, 0x40, 0x1018, 4)
+FRAME = struct.pack("<HHHBB", 5 << 12 | 16, 10, 0x1002, 0, COE) + UPLOAD
 PATIENCE = 60.0  # [s] for a machine under load
 
 
@@ -136,6 +139,41 @@ def test_a_client_that_never_reads(line: Line, monkeypatch: pytest.MonkeyPatch) 
             send_for_ever(other, frame)
     assert line.gateway.counts.disconnected == 1
     assert still_serves(line)
+
+
+@pytest.fixture
+def pair() -> Iterator[tuple[socket.socket, TcpClient]]:
+    """Yield a socket, and the client at its other end at the time 0."""
+    own, connected = socket.socketpair()
+    with own, connected:
+        yield own, TcpClient(connected, ("127.0.0.1", 1), 0.0)
+
+
+def test_the_rate_of_a_stream_is_bounded(pair: tuple[socket.socket, TcpClient]) -> None:
+    own, client = pair
+    accepted = 0
+    own.sendall(FRAME * 2000)
+    for step in range(2000):
+        now = step * 1e-3
+        client.receive(now)
+        while client.wants(now) and client.next_message(now) is not None:
+            accepted += 1
+    assert BURST + 1.9 * RATE < accepted <= BURST + 2 * RATE
+
+
+def test_a_frame_may_wait_while_requests_have_no_answer(
+    pair: tuple[socket.socket, TcpClient],
+) -> None:
+    """The device is slow, not the client."""
+    own, client = pair
+    own.sendall(FRAME + FRAME[:5])
+    client.receive(0.0)
+    assert client.next_message(0.0) is not None
+    client.outstanding = OUTSTANDING
+    assert not client.is_late(2 * FRAME_TIMEOUT)
+    client.outstanding = 0
+    assert not client.is_late(2.5 * FRAME_TIMEOUT)
+    assert client.is_late(3.5 * FRAME_TIMEOUT)
 
 
 def test_a_flood_of_datagrams_is_bounded(line: Line) -> None:

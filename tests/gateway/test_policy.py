@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 
-from catenary.gateway.policy import is_dangerous, is_read
+from catenary.gateway.policy import Policy, axis_slots, is_dangerous, is_read
 from catenary.gateway.request import Access, read_request
-from catenary.gateway.transfer import Kind, Transfer, continues
+from catenary.gateway.transfer import Kind, Transfer, continues, has_answer
 from catenary.model.device import DeviceDescription
 from catenary.wire import coe, foe
 from catenary.wire.mailbox import Mailbox, Type
@@ -116,3 +118,42 @@ def test_packets_of_a_file_are_judged_by_their_transfer(device: DeviceDescriptio
     assert not continues(writing, acknowledge)
     assert not is_read(data, writing)
     assert is_dangerous(data, writing, device)
+
+
+def test_only_the_protocol_of_a_transfer_ends_it() -> None:
+    reading = Transfer(Kind.FILE_READ, read_request(READS["file"]))
+    error = read_request(Mailbox(Type.FOE, foe.Error(0x8000).encode()))
+    abort = read_request(Mailbox(Type.COE, coe.Abort(0x6040, 0, 0x08000000).encode()))
+    assert continues(reading, error)
+    assert not continues(reading, abort)
+    assert not continues(None, abort)
+
+
+def test_the_request_of_a_file_is_repeated_after_busy() -> None:
+    request = read_request(READS["file"])
+    reading = Transfer(Kind.FILE_READ, request)
+    assert continues(reading, read_request(READS["file"]))
+    assert not continues(reading, read_request(Mailbox(Type.FOE, foe.ReadRequest("b").encode())))
+    # After the last packet, the same request begins a new transfer
+    assert not continues(replace(reading, ends=True), request)
+    assert has_answer(None, request)
+
+
+def test_a_permission_ends_if_another_device_is_found_at_the_position() -> None:
+    with Line() as line:
+        sub = line.main.subs[1]
+        policy = Policy(line.main, [1])
+        first = sub.description
+        assert policy.permits(sub)
+        assert not policy.permits(line.main.subs[2])
+        for part, permitted in (("revision", True), ("serial", False), ("product", False)):
+            other = first.identity._replace(**{part: 77})
+            sub.description = replace(first, identity=other)
+            assert policy.permits(sub) == permitted
+
+
+def test_a_device_that_receives_a_controlword_has_an_axis(device: DeviceDescription) -> None:
+    assert axis_slots(device) == (0,)
+    assert axis_slots(replace(device, slots=())) == (0,)
+    assert axis_slots(replace(device, slots=(), outputs=())) == ()
+    assert axis_slots(replace(device, slots=(0, 2))) == (0, 2)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 import os
+import resource
 import socket
 
 import pytest
@@ -104,3 +105,45 @@ def test_a_forked_child_does_not_keep_the_interface(tap: str) -> None:
         os.waitpid(child, 0)
         for each in (read, write, running, started):
             os.close(each)
+
+
+def test_a_closed_interface_ignores_late_calls(tap: str) -> None:
+    opened = Tap(tap)
+    number = opened._file
+    opened.close()
+    other = os.memfd_create("other")
+    try:
+        os.dup2(other, number)  # the descriptor now belongs to another file
+        opened.wake()
+        assert not opened.write(FRAME)
+        assert os.fstat(other).st_size == 0
+    finally:
+        os.close(number)
+        if other != number:
+            os.close(other)
+
+
+def test_an_interface_that_is_deleted_later(tap: str) -> None:
+    with Tap(tap) as opened:
+        run_ip("link", "delete", tap)
+        assert opened.wait(0)
+        with pytest.raises(TapError, match="was deleted"):
+            opened.read()
+        assert not opened.write(FRAME)
+    run_ip("tuntap", "add", "dev", tap, "mode", "tap")  # the fixture deletes it
+
+
+def test_a_program_with_many_open_files(tap: str) -> None:
+    soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
+    if hard <= 1100:
+        pytest.skip(f"at most {hard} files can be open")
+    resource.setrlimit(resource.RLIMIT_NOFILE, (max(soft, 1101), hard))
+    files = [os.open(os.devnull, os.O_RDONLY) for _ in range(1030)]
+    try:
+        with Tap(tap) as opened:
+            opened.wake()
+            assert not opened.wait()
+    finally:
+        for each in files:
+            os.close(each)
+        resource.setrlimit(resource.RLIMIT_NOFILE, (soft, hard))

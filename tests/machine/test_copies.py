@@ -91,6 +91,16 @@ def test_copies_of_absent_devices_are_left_out(tmp_path: Path) -> None:
         assert machine.copies is None
 
 
+def test_a_role_may_continue_without_its_device(tmp_path: Path) -> None:
+    role = '\n[process_data.logic]\ndevice = "logic"\noutputs = {}\nrequired = false\ndivider = 4\n'
+    segment = Segment([SafetyLogic(), SafetyTerminal(), DigitalInputs(), DigitalOutputs()])
+    with Machine(write(tmp_path, MACHINE + role), target=segment) as machine:
+        units = machine.main.plan(*machine.requests).cycle.sync_units
+    found = {unit.devices: (unit.optional, unit.divider) for unit in units}
+    assert found[0,] == (True, 4)
+    assert found[2,] == (False, 1)
+
+
 @pytest.mark.parametrize(
     ("old", "new", "line", "message"),
     [

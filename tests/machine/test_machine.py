@@ -323,7 +323,7 @@ def test_a_machine_without_roles_has_no_loop(tmp_path: Path) -> None:
     text = SMALL[: SMALL.index("[drives.arm]")]
     with (
         Machine(write_small(tmp_path, text)) as machine,
-        pytest.raises(MachineFileError, match="no drives or process data have"),
+        pytest.raises(MachineFileError, match="no drives, process data or copies have"),
     ):
         machine.loop()
 

@@ -64,7 +64,7 @@ def test_the_time_is_that_of_the_edge_on_drifting_clocks() -> None:
             assert falling.cycle_time > falling.time > rising.time
 
 
-def test_a_measuring_move_stops_behind_the_part() -> None:
+def test_a_measuring_move_stops_after_the_edge() -> None:
     with probing_cell() as cell:
         [servo] = cell.servos
         arm = cell.drives(touch_probe=True, acceleration_limit=50.0)

@@ -5,8 +5,11 @@ the last valid values, and zeros at the end.
 
 from __future__ import annotations
 
+import os
+import signal
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import pairwise
 
 import pytest
 
@@ -18,6 +21,12 @@ from catenary.virtual.faults import cut
 from tests.scenario.cell import PRE_OP, SAFE_OP, Cell
 
 LAMPS, SERVO, BUTTONS = 1, 2, 3
+
+
+@cat.law
+def stay(actual, target, memory, time):  # type: ignore[no-untyped-def]
+    for i in range(actual.n):
+        target.position[i] = target.position[i]
 
 
 @dataclass
@@ -114,6 +123,54 @@ def test_copies_go_on_while_the_axes_are_stopped_and_end_as_zeros(line: Line) ->
     assert line.lamps.core.output_image(LAMPS, 0) == b"\0"
     assert line.cell.states[LAMPS] == PRE_OP
     line.cell.assert_safe()
+
+
+@pytest.mark.parametrize("execution", ["threaded", "inline"])
+@pytest.mark.parametrize("reason", [ValueError, KeyboardInterrupt, SystemExit])
+def test_every_end_of_the_loop_sends_zeros(
+    line: Line, execution: str, reason: type[BaseException]
+) -> None:
+    signals = {KeyboardInterrupt: signal.SIGINT, SystemExit: signal.SIGTERM}
+    with pytest.raises(reason), cat.Loop(line.copies(), execution=execution) as loop:
+        line.buttons.inputs = 0b1110
+        loop.run_for(0.01)
+        assert line.lamps.outputs == 0b1100_0001
+        if reason in signals:
+            os.kill(os.getpid(), signals[reason])
+            loop.run_for(1.0)
+        raise ValueError
+    assert line.lamps.core.output_image(LAMPS, 0) == b"\0"
+
+
+def test_zeros_follow_while_a_law_runs(line: Line) -> None:
+    with cat.Loop(line.cell.drives(), line.copies()) as loop:
+        line.buttons.inputs = 0b0010
+        loop.start(stay)
+        loop.run_for(0.01)
+        assert line.lamps.outputs == 1
+    assert line.lamps.core.output_image(LAMPS, 0) == b"\0"
+
+
+def test_the_program_reads_the_source_too(line: Line) -> None:
+    buttons = cat.Inputs(line.cell.subs[BUTTONS])
+    with cat.Loop(line.copies(), buttons) as loop:
+        line.buttons.inputs = 0b0010
+        loop.run_for(0.01)
+        assert line.lamps.outputs == 1
+        assert list(buttons.bits) == [0, 1, 0, 0]
+
+
+def test_a_divided_destination_receives_every_nth_value(line: Line) -> None:
+    divided = cat.ProcessData(line.cell.subs[LAMPS], outputs={}, divider=4)
+    received = []
+    with cat.Loop(line.copies(), divided) as loop:
+        for number in range(40):
+            line.buttons.inputs = 0b0010 * (number % 2)
+            next(loop)
+            received.append(line.lamps.outputs)
+    changes = sum(a != b for a, b in pairwise(received))
+    assert changes <= 40 // 4
+    assert line.lamps.core.output_image(LAMPS, 0) == b"\0"
 
 
 def test_a_ring_is_cut_while_bits_are_copied() -> None:

@@ -12,7 +12,15 @@ from catenary.drive import ProcessData
 from catenary.errors import DriveError, ShareError
 from catenary.loop.publishing import one_sink_each
 from catenary.share.reader import Reader
-from catenary.virtual import AnalogInputs, Coupler, DigitalOutputs, Segment, Servo
+from catenary.virtual import (
+    AnalogInputs,
+    Coupler,
+    DigitalOutputs,
+    SafetyLogic,
+    SafetyTerminal,
+    Segment,
+    Servo,
+)
 from tests.force_sensor import ForceSensor
 from tests.share.names import state_file
 
@@ -163,6 +171,24 @@ def test_rows_contain_raw_process_data(name: str) -> None:
                 assert now["input_bytes"].tolist() == list(sensor.inputs)
                 assert now["output_bytes of device 1"].tolist() == [0, 0x34, 0x12]
                 assert now["output_bytes of device 2"].tolist() == [5]
+
+
+def test_rows_contain_the_safety_frames_of_copies(name: str) -> None:
+    segment = Segment([SafetyLogic(), SafetyTerminal(), ForceSensor()])
+    with cat.MainDevice(segment) as main:
+        subs = main.scan()
+        sensor = ProcessData(subs[2])
+        ends = [(sub, 0x1A00, 0x1600) for sub in subs[:2]]
+        relay = cat.Copies(cat.FsoeConnection(*ends))
+        with cat.Share(name) as share, cat.Loop(relay, sensor, sink=share) as loop:
+            for _ in range(5):
+                next(loop)
+            [frames] = relay.fsoe_frames
+            with cat.attach(name) as reader:
+                now = reader.read()
+                assert bytes(now["fsoe_frame of device 0"]) == frames.main
+                assert bytes(now["fsoe_frame of device 1"]) == frames.sub
+                assert now["input_bytes"].tolist() == list(sensor.inputs)
 
 
 def test_waiting_ends_with_the_loop(name: str) -> None:

@@ -1,4 +1,4 @@
-"""SoE of a virtual drive at message level, its states, and its segment table."""
+"""SoE of a virtual drive at message level, and its segment table."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import catenary as cat
-from catenary.virtual import Coupler, Segment, SercosDrive, SoeQuirks, read_segment
+from catenary.virtual import Segment, SercosDrive, SoeQuirks, read_segment
 from catenary.virtual.soe.parameter import Parameter, Refusal, idn, packed
 from catenary.wire.sercos import decode_attribute
 from catenary.wire.soe import Element, Message, OpCode, decode_soe
@@ -87,11 +87,24 @@ def test_a_write_in_fragments_and_a_repeated_fragment(client: Client) -> None:
     assert client.read("P-0-0018")[4:] == content
 
 
+def test_a_write_that_was_not_completed_is_forgotten(client: Client) -> None:
+    content = bytes(range(200))
+    whole = struct.pack("<HH", 200, 200) + content
+    assert client.ask(WRITE | 0x08, VALUE, 7, bytes(ROOM)) == []
+    assert client.ask(WRITE | 0x08, VALUE, 1, whole[:ROOM]) == []
+    assert client.code(WRITE, VALUE, "P-0-0018", whole[ROOM:]) == 0
+    assert client.read("P-0-0018")[4:] == content
+    assert client.ask(WRITE | 0x08, VALUE, 1, bytes(ROOM)) == []
+    assert client.read("S-0-0002") == (1000).to_bytes(2, "little")
+    assert client.code(WRITE, VALUE, "S-0-0002", (500).to_bytes(2, "little")) == 0
+
+
 def test_a_write_without_end_is_refused(client: Client) -> None:
     answers: list[Message] = []
     for left in range(700, 0, -1):
         answers += client.ask(WRITE | 0x08, VALUE, left, bytes(ROOM))
     assert answers[0].code == 0x7003
+    assert answers[0].number > 1  # the number of the fragment
     assert client.read("S-0-0002") == (1000).to_bytes(2, "little")
 
 
@@ -168,105 +181,6 @@ def test_a_stuck_command_is_interrupted_and_cancelled() -> None:
 def test_the_eeprom_has_soe_and_no_coe(client: Client) -> None:
     image = SercosDrive().sii_image()
     assert int.from_bytes(image[0x38:0x3A], "little") == 0x0010
-
-
-# -- states and telegrams --------------------------------------------------------------------------
-
-ON, ENABLE, POWER, RUN = 0x8000, 0x4000, 0xC000, 0xE000
-
-
-def test_the_state_machine_of_the_control_word() -> None:
-    drive = SercosDrive()
-    with cat.MainDevice(Segment([Coupler(), drive])) as main:
-        raw = cat.ProcessData(main.scan()[1])
-        with cat.Loop(raw) as loop:
-
-            def hold(word: int, cycles: int = 50) -> str:
-                raw["S-0-0134"] = word
-                raw["S-0-0047"] = raw["S-0-0051"]
-                for _ in range(cycles):
-                    next(loop)
-                assert (
-                    drive.status
-                    == ("NOT READY", "READY", "POWERED", "OPERATING")[int(raw["S-0-0135"]) >> 14]
-                )
-                return drive.status
-
-            assert hold(0) == "POWERED"
-            assert hold(ON) == "POWERED"
-            assert hold(RUN) == "OPERATING"
-            assert raw["S-0-0135"] & 0x08
-            assert hold(POWER) == "OPERATING"  # drive halt
-            assert not raw["S-0-0135"] & 0x08
-            assert hold(RUN) == "OPERATING"
-            assert hold(ENABLE) == "POWERED"  # drive off
-            assert hold(RUN) == "OPERATING"
-            assert hold(POWER) == "OPERATING"
-            assert hold(ENABLE) == "POWERED"  # drive off after a halt
-            assert hold(RUN) == "OPERATING"
-            assert hold(ON) == "POWERED"
-            assert hold(RUN) == "OPERATING"
-            drive.switch_mains(False)
-            assert hold(RUN) == "READY"
-            drive.switch_mains(True)
-            assert hold(0) == "POWERED"
-            assert hold(RUN) == "OPERATING"
-            drive.switch_sto(True)
-            assert hold(RUN) == "READY"
-            drive.switch_sto(False)
-            assert hold(RUN) == "OPERATING"
-            drive.inject_fault(0x7310)
-            assert hold(RUN) == "NOT READY"
-            assert raw["S-0-0135"] >> 13 & 1
-        assert drive.idn_value("S-0-0011") == b"\x00\x80"
-        assert b"7310" in drive.idn_value("S-0-0095")
-
-
-@pytest.mark.parametrize(
-    ("word", "brakes"), [(ENABLE, True), (0, False), (ON, False), (POWER, True)]
-)
-def test_drive_off_brakes_and_the_end_of_bit_14_coasts(word: int, brakes: bool) -> None:
-    """Bit 3 ends at once. After drive off, the torque ends at standstill."""
-    drive = SercosDrive()
-    with cat.MainDevice(Segment([Coupler(), drive])) as main:
-        sub = main.scan()[1]
-        sub.soe.write("S-0-0032", 2)
-        sub.soe.configure_telegrams(mdt=["S-0-0036"], at=["S-0-0040"])
-        raw = cat.ProcessData(sub)
-        with cat.Loop(raw) as loop:
-            raw["S-0-0134"], raw["S-0-0036"] = RUN, 1_000_000  # 100 rpm
-            for _ in range(500):
-                next(loop)
-            assert drive.velocity_rad_s == pytest.approx(10.47, rel=0.02)
-            raw["S-0-0134"] = word
-            for _ in range(4):
-                next(loop)
-            assert not raw["S-0-0135"] & 0x08
-            assert (int(raw["S-0-0135"]) >> 14 == 3) == brakes
-            for _ in range(50):
-                next(loop)
-            assert raw["S-0-0135"] >> 14 == (3 if word == POWER else 2)
-            assert (abs(drive.velocity_rad_s) < 0.05) == brakes
-
-
-def test_the_operation_mode_is_selected_in_the_control_word() -> None:
-    """Bits 8 and 9 select S-0-0033, the velocity mode."""
-    drive = SercosDrive()
-    with cat.MainDevice(Segment([Coupler(), drive])) as main:
-        sub = main.scan()[1]
-        sub.soe.configure_telegrams(mdt=["S-0-0036"], at=["S-0-0040", "S-0-0051"])
-        raw = cat.ProcessData(sub)
-        with cat.Loop(raw) as loop:
-            for word in (ON, RUN | 0x100):
-                raw["S-0-0134"] = word
-                for _ in range(100):
-                    next(loop)
-            raw["S-0-0036"] = 600_000  # 60 rpm
-            for _ in range(500):
-                next(loop)
-            assert raw["S-0-0135"] >> 8 & 3 == 1
-            assert raw["S-0-0040"] == pytest.approx(600_000, rel=0.01)
-            assert drive.velocity_rad_s == pytest.approx(6.283, rel=0.01)
 
 
 def test_a_segment_file_has_the_drive(tmp_path: Path) -> None:

@@ -199,6 +199,8 @@ def test_notifications() -> None:
         decode_notification(data[:-1])
     with pytest.raises(DecodeError, match="at most 1024"):
         decode_notification(bytes(4) + b"\xff" * 4)
+    with pytest.raises(DecodeError, match=r"notification of \d+ bytes"):
+        decode_notification(b"\xff\xff\0\0" + data[4:])
 
 
 def test_every_error_has_a_text() -> None:

@@ -209,4 +209,6 @@ def test_every_error_code_has_a_meaning() -> None:
     assert error_meaning(0x2005).text == "the name is write-protected at this time"
     assert error_meaning(0x6001).text == "the maximum does not exist"
     assert error_meaning(0x8001).text == "the default value does not exist"
+    assert error_meaning(0x800B).text == "general error"
+    assert error_meaning(0x800C).text == "the request names no element"
     assert error_meaning(0xABCD).text == "code of the vendor"

@@ -5,7 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TypeVar
 
-from catenary.bus.ads_notifications import NOTIFICATIONS_KEPT, AdsNotifications, NotificationQueues
+from catenary.bus.ads_notifications import (
+    NOTIFICATIONS_KEPT,
+    AdsNotifications,
+    NotificationQueues,
+    NotificationSource,
+)
 from catenary.bus.pending import Pending
 from catenary.bus.protocol_channel import MailboxOwner, protocol_channel
 from catenary.procedure.aoe import (
@@ -13,8 +18,8 @@ from catenary.procedure.aoe import (
     DEVICE_PORT,
     AdsPeer,
     Place,
+    answered_as,
     assign_net_id,
-    decoded,
     own_net_id,
     read,
     request,
@@ -76,8 +81,10 @@ class Aoe:
             AdsError: The device refuses the NetId.
             ValueError: `net_id` is not a NetId.
         """
-        self._assigned = None if net_id is None else net_id_of(net_id)
-        self._sub.main.converse(assign_net_id(self._channel(), self._known_peer()))
+        chosen = None if net_id is None else net_id_of(net_id)
+        peer = AdsPeer(chosen or self._own_net_id(), invoke_ids=self._peer.invoke_ids)
+        self._sub.main.converse(assign_net_id(self._channel(), peer))
+        self._assigned = chosen
 
     def read(
         self,
@@ -231,14 +238,14 @@ class Aoe:
         mode = Transmission.ON_CHANGE if on_change else Transmission.CYCLIC
         cycle = round(period * 1e7)
         asked = self._ask(ads.AddNotification(group, offset, size, mode, 0, cycle), port)
-        channel = self._channel()
-        self._queues.listen(channel)
-        handle = self._decoded(asked, decode_handle)
-        main, peer = self._sub.main, self._known_peer()
-        return AdsNotifications(self._queues, channel, main, peer, handle, port=port, kept=kept)
+        source = NotificationSource(self._sub, self._channel(), self._known_peer(), self._queues)
+        self._queues.listen(source.channel)
+        handle = answered_as(source.channel, decode_handle, asked)
+        queue = self._sub.main.converse(self._queues.opened(handle, port, kept))
+        return AdsNotifications(source, queue)
 
     def _decoded(self, asked: Procedure[bytes], decode: Callable[[bytes], T]) -> T:
-        return decoded(self._channel(), decode, self._sub.main.converse(asked))
+        return self._sub.main.converse(answered_as(self._channel(), decode, asked))
 
     def _ask(self, asked: ads.Request, port: int) -> Procedure[bytes]:
         return request(self._channel(), self._known_peer(), asked, port)
@@ -256,8 +263,11 @@ class Aoe:
         return write(self._channel(), self._known_peer(), place, bytes(data), timeout=timeout)
 
     def _known_peer(self) -> AdsPeer:
-        self._peer.net_id = self._assigned or own_net_id(self._sub.station.address)
+        self._peer.net_id = self._assigned or self._own_net_id()
         return self._peer
+
+    def _own_net_id(self) -> bytes:
+        return own_net_id(self._sub.station.address)
 
     def _channel(self) -> MailboxChannel:
         return protocol_channel(self._sub, "AoE", self._unavailable)

@@ -32,6 +32,7 @@ from catenary.procedure.al_state import request_state
 from catenary.procedure.clocks import ClockMeasurement
 from catenary.procedure.configure import configure_process_data
 from catenary.procedure.exchange import Procedure
+from catenary.procedure.idn_commands import PRE_OP_STEPS, SAFE_OP_STEPS, run_idn_commands
 from catenary.procedure.mailbox import MailboxChannel
 from catenary.procedure.modules import check_order, prepare_modules
 from catenary.procedure.names import name_entries
@@ -46,13 +47,7 @@ from catenary.procedure.profile import read_object
 from catenary.procedure.register_commands import run_commands
 from catenary.procedure.station import within
 from catenary.procedure.sync import bring_together, read_types, stop, write_types
-from catenary.procedure.telegrams import (
-    PRE_OP_STEPS,
-    SAFE_OP_STEPS,
-    check_unchanged,
-    restore,
-    run_idn_commands,
-)
+from catenary.procedure.telegrams import check_unchanged, restore
 from catenary.wire.al import AlState
 
 READ_TIMEOUT = 60.0  # [s] to read one device for a plan: hundreds of slow SDOs

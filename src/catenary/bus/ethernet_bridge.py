@@ -4,23 +4,26 @@ from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Mapping, Sequence
-from typing import Protocol, Self
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
+from typing import Protocol, Self, TypeVar
 
 from catenary.bus.ethernet_port import (
     EthernetCounts,
     EthernetPort,
     PortDevice,
     PortMain,
-    Report,
 )
 from catenary.bus.mac_table import MacTable, is_group
 from catenary.bus.thread_priority import step_behind
+from catenary.errors import CatenaryError, TapError
+
+Device = TypeVar("Device", bound=PortDevice)
 
 ACTIVE_MAX = 2  # ports that use acyclic frames at the same time: at most half of those of a cycle
 BURST = 32  # frames that are read in a row
 FULL_PAUSE = 2e-3  # [s] after a full queue: the kernel then drops the frames of a flood
-FAULT_PAUSE = 0.1  # [s] after a failed read: the interface may have been deleted
 
 
 class FrameInterface(Protocol):
@@ -50,10 +53,10 @@ class EthernetBridge:
     def __init__(
         self,
         main: PortMain,
-        subs: Sequence[PortDevice],
+        subs: Sequence[Device],
         interface: FrameInterface,
         *,
-        report: Report,
+        report: Callable[[Device, Counter[str], CatenaryError | None], object],
         forward: bool = False,
     ) -> None:
         """Start the threads.
@@ -62,14 +65,17 @@ class EthernetBridge:
             main: The MainDevice.
             subs: The devices.
             interface: The open interface. `close` closes it.
-            report: Function that reports dropped frames of a device.
+            report: Function that reports new drops of a device by reason, and its failure, if any.
             forward: True if frames between the devices are forwarded.
         """
         slots = threading.BoundedSemaphore(ACTIVE_MAX)
         self._interface = interface
         self._forward = forward
         self._table: MacTable[EthernetPort | FrameInterface] = MacTable()
-        self._ports = [EthernetPort(sub, main, self._receive, slots, report) for sub in subs]
+        self._ports = [
+            EthernetPort(sub, main, self._receive, slots, partial(report, sub)) for sub in subs
+        ]
+        self._fault: TapError | None = None
         self._ended = False
         self._thread = threading.Thread(target=self._serve, name="catenary tap", daemon=True)
         for port in self._ports:
@@ -88,13 +94,16 @@ class EthernetBridge:
 
     @property
     def counts(self) -> Mapping[int, EthernetCounts]:
-        """Statistics by position of the device."""
+        """Present statistics by position of the device."""
         return {port.sub.position: port.counts for port in self._ports}
 
     @property
     def errors(self) -> Mapping[int, str]:
-        """Present failures by position of the device; empty if all devices answer."""
-        found = {port.sub.position: port.error for port in self._ports}
+        """Present failures by position of the device; empty if all devices answer.
+
+        If the TAP interface was deleted, all devices have this failure.
+        """
+        found = {port.sub.position: self._fault or port.error for port in self._ports}
         return {position: str(error) for position, error in found.items() if error is not None}
 
     @property
@@ -115,21 +124,24 @@ class EthernetBridge:
 
     def _serve(self) -> None:
         step_behind()
-        while not self._ended:
-            if self._interface.wait() and not self._ended:
-                pause = self._read_burst()
-                if pause:
-                    time.sleep(pause)
+        try:
+            while not self._ended:
+                if self._interface.wait() and not self._ended and not self._read_burst():
+                    time.sleep(FULL_PAUSE)
+        except TapError as error:
+            self._fault = error
+            for port in self._ports:
+                port.report_tap_down()
 
-    def _read_burst(self) -> float:
-        """Distribute waiting frames. Return the pause afterwards [s]."""
+    def _read_burst(self) -> bool:
+        """Distribute waiting frames. Return False if a queue is full."""
         accepted = True
-        for count in range(BURST):
+        for _ in range(BURST):
             frame = self._interface.read()
             if frame is None:
-                return FAULT_PAUSE if count == 0 else 0.0
+                break
             accepted &= self._distribute(frame, self._interface)
-        return 0.0 if accepted else FULL_PAUSE
+        return accepted
 
     def _distribute(self, frame: bytes, source: EthernetPort | FrameInterface) -> bool:
         """Queue a frame for its devices. Return False if a queue is full."""

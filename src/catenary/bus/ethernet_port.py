@@ -6,12 +6,12 @@ import threading
 import time
 from collections import Counter, deque
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Protocol, TypeAlias, TypeVar
 
 from catenary.bus.pending import Pending
 from catenary.bus.thread_priority import step_behind
-from catenary.errors import CatenaryError, DecodeError
+from catenary.errors import CatenaryError, DecodeError, LoopError
 from catenary.procedure.eoe import pump, room_to
 from catenary.procedure.exchange import Procedure
 from catenary.procedure.mailbox_channel import MailboxChannel
@@ -30,8 +30,9 @@ RETRY_PAUSE = 0.5  # [s] after a failure
 REPORT_INTERVAL = 1.0  # [s] between two reports of one device
 CANCEL_CHECK = 0.05  # [s] between two checks whether the port is closed
 
-FULL, SILENT, TAP_DOWN = "queue full", "the device does not answer", "TAP interface down"
-LOST, INVALID, TOO_LARGE = "EtherCAT frames lost", "invalid EoE message", "frame too large"
+FULL, SILENT, TAP_DOWN = "queue full", "the device does not answer", "TAP interface down or deleted"
+LOST, INVALID = "EtherCAT frames lost", "invalid EoE message"
+WRONG_SIZE = "too short or too long for an Ethernet frame"
 
 
 class PortDevice(Protocol):
@@ -56,8 +57,8 @@ class PortMain(Protocol):
     def request(self, procedure: Procedure[T]) -> Pending[T]: ...
 
 
-# Receives the position of a device, its new drops by reason, and its present failure, if any.
-Report: TypeAlias = Callable[[int, "Counter[str]", CatenaryError | None], object]
+# Receives the new drops of a device by reason, and its present failure, if any.
+Report: TypeAlias = Callable[["Counter[str]", CatenaryError | None], object]
 
 
 @dataclass(slots=True)
@@ -96,12 +97,13 @@ class EthernetPort:
             report: Function that reports drops, at most once per second.
         """
         self.sub = sub
-        self.counts = EthernetCounts()
         self.error: CatenaryError | None = None  # last failure; None after a success
         self._main = main
         self._receive = receive
         self._slots = slots
         self._report = report
+        self._counts = EthernetCounts()
+        self._lock = threading.Lock()  # for the drops, which several threads count
         self._channel: MailboxChannel | None = None
         self._assembler = FrameAssembler()
         self._frames: deque[bytes] = deque()
@@ -110,9 +112,15 @@ class EthernetPort:
         self._number = 0
         self._report_due = 0.0
         self._reported: Counter[str] = Counter()
-        self._wake = threading.Event()
-        self._ended = False
+        self._wake = threading.Event()  # set when a frame waits, and at the end
+        self._ended = threading.Event()
         self._thread = threading.Thread(target=self._serve, name="catenary eoe", daemon=True)
+
+    @property
+    def counts(self) -> EthernetCounts:
+        """Copy of the present statistics."""
+        with self._lock:
+            return replace(self._counts, dropped=Counter(self._counts.dropped))
 
     def start(self) -> None:
         """Start the thread."""
@@ -120,7 +128,7 @@ class EthernetPort:
 
     def close(self) -> None:
         """End the thread, and stop receiving frames. Waiting frames are discarded."""
-        self._ended = True
+        self._ended.set()
         self._wake.set()
         if self._thread.is_alive() and self._thread is not threading.current_thread():
             self._thread.join()
@@ -129,20 +137,24 @@ class EthernetPort:
     def send(self, frame: bytes) -> bool:
         """Queue a frame for the device. Return False if the queue is full."""
         if len(self._frames) >= QUEUE_MAX:
-            self.counts.dropped[FULL] += 1
+            self._drop(FULL)
             return False
         if not MIN_FRAME <= len(frame) <= MAX_FRAME:
-            self.counts.dropped[TOO_LARGE] += 1
+            self._drop(WRONG_SIZE)
             return True
         self._frames.append(frame)
         self._wake.set()
         return True
 
+    def report_tap_down(self) -> None:
+        """Count a drop, so that the failure of the receiver is reported."""
+        self._drop(TAP_DOWN)
+
     # -- messages to the device: the interface `Source` of `pump`
 
     def next(self) -> Outgoing | None:
         """Return the first waiting fragment; None if there is none."""
-        if self._ended:
+        if self._ended.is_set():
             return None
         if not self._fragments and self._frames and self._channel is not None:
             self._sending = self._frames.popleft()
@@ -154,14 +166,14 @@ class EthernetPort:
     def done(self, outgoing: Outgoing) -> None:
         """Remove a fragment that was sent. Drop the frame of one that is given up."""
         if outgoing.given_up:
-            self.counts.dropped[LOST] += 1
+            self._drop(LOST)
             self._fragments.clear()
             return
         if self._fragments:  # else the port was closed
             self._fragments.popleft()
         if not self._fragments:
-            self.counts.frames_to_device += 1
-            self.counts.bytes_to_device += len(self._sending)
+            self._counts.frames_to_device += 1
+            self._counts.bytes_to_device += len(self._sending)
 
     # -- messages from the device
 
@@ -170,21 +182,25 @@ class EthernetPort:
         try:
             decoded = decode_eoe(message.data)
         except DecodeError:
-            self.counts.dropped[INVALID] += 1
+            self._drop(INVALID)
             return True
         if not isinstance(decoded, Fragment):
             return isinstance(decoded, TimeStamp)  # no frame requests one
-        before = self._assembler.drops.total()
         frame = self._assembler.add(decoded, time_ns)
-        if self._assembler.drops.total() != before:
+        if self._assembler.drops:
             for reason, count in self._assembler.drops.items():
-                self.counts.dropped[reason.value] = count
+                self._drop(reason.value, count)
+            self._assembler.drops.clear()
         if frame is not None and self._receive(self, frame):
-            self.counts.frames_from_device += 1
-            self.counts.bytes_from_device += len(frame)
+            self._counts.frames_from_device += 1
+            self._counts.bytes_from_device += len(frame)
         elif frame is not None:
-            self.counts.dropped[TAP_DOWN] += 1
+            self._drop(TAP_DOWN)
         return True
+
+    def _drop(self, reason: str, count: int = 1) -> None:
+        with self._lock:
+            self._counts.dropped[reason] += count
 
     def _subscribe(self) -> MailboxChannel | None:
         """Receive the messages of the device's present mailbox."""
@@ -207,23 +223,34 @@ class EthernetPort:
 
     def _serve(self) -> None:
         step_behind()
+        try:
+            self._exchange()
+        except Exception as error:
+            if self._main.is_open:  # else it was closed in another thread
+                self.error = CatenaryError(
+                    f"the thread of the Ethernet port ended: {error!r}",
+                    hint="this is a fault of Catenary: report it, with the traceback on stderr",
+                )
+                raise
+
+    def _exchange(self) -> None:
+        """Exchange frames until the port is closed."""
         pause = IDLE_PAUSE
-        while not self._ended:
+        while not self._ended.is_set():
             try:
                 moved = self._move()
+            except LoopError:  # it has ended: the next attempt needs no loop
+                self._ended.wait(IDLE_PAUSE_MAX)
+                continue
             except CatenaryError as error:
                 self._fail(error)
-                pause = RETRY_PAUSE
-            except RuntimeError:  # the MainDevice was closed
-                if not self._main.is_open:
-                    return
-                raise
-            else:
-                pause = BUSY_PAUSE if moved else min(2 * max(pause, IDLE_PAUSE), IDLE_PAUSE_MAX)
+                self._report_drops()
+                self._ended.wait(RETRY_PAUSE)  # a waiting frame does not shorten this pause
+                continue
+            pause = BUSY_PAUSE if moved else min(2 * max(pause, IDLE_PAUSE), IDLE_PAUSE_MAX)
             self._report_drops()
             self._wake.wait(pause)
-            if pause != RETRY_PAUSE:
-                self._wake.clear()
+            self._wake.clear()
 
     def _move(self) -> bool:
         """Run the exchange with the device once. Return True if a message moved."""
@@ -233,7 +260,7 @@ class EthernetPort:
         with self._slots:
             pending = self._main.request(pump(channel, self, TURNS_MAX))
             while not pending.wait(CANCEL_CHECK):
-                if self._ended:
+                if self._ended.is_set():
                     pending.cancel()
                     return False
         moved = pending.result()
@@ -242,15 +269,18 @@ class EthernetPort:
 
     def _fail(self, error: CatenaryError) -> None:
         """Discard the waiting frames: they would be old after the failure."""
+        # At first, the device may have refused a frame that has left the queue.
+        lost = max(len(self._frames) + bool(self._fragments), self.error is None)
         self.error = error
-        lost = len(self._frames) + bool(self._fragments)
         self._frames.clear()
         self._fragments.clear()
-        self.counts.dropped[SILENT] += max(lost, 1)
+        if lost:
+            self._drop(SILENT, lost)
 
     def _report_drops(self) -> None:
-        new = self.counts.dropped - self._reported
+        dropped = self.counts.dropped
+        new = dropped - self._reported
         if new and time.monotonic() >= self._report_due and self._main.is_open:
             self._report_due = time.monotonic() + REPORT_INTERVAL
-            self._reported = Counter(self.counts.dropped)
-            self._report(self.sub.position, new, self.error)
+            self._reported = dropped
+            self._report(new, self.error)

@@ -48,6 +48,7 @@ class Events:
         event = main.events.get(timeout=1.0)      # the next one, or None
 
     If events are not fetched, the oldest beyond `capacity` are dropped and counted in `dropped`.
+    Writes of tools (`GatewayWrite`) are dropped before other events.
     Events are put with times of the link's clock. After the first iteration of a loop has begun,
     the events of this loop are fetched with times on the clock of `cycle.time`. Events of the
     start-up then have negative times.
@@ -64,17 +65,22 @@ class Events:
     def put(self, event: Event) -> None:
         """Add an event with a time of the link's clock, and call the listeners with it.
 
-        If the queue is full, the oldest event is dropped; the call never waits for space.
+        If the queue is full, an event is dropped: the oldest one that gives way to others, or else
+        the oldest one. The call never waits for space.
         """
         with self._changed:
             if len(self._pending) >= self._capacity:
-                self._pending.popleft()
+                del self._pending[self._first_to_drop()]
                 self.dropped += 1
             self._pending.append((event, self._clock))
             self._changed.notify()
             listeners = self._listeners
         for listener in listeners:
             listener(event)
+
+    def _first_to_drop(self) -> int:
+        pending = enumerate(self._pending)
+        return next((rank for rank, (event, _) in pending if event.gives_way), 0)
 
     def get(self, timeout: float = 0.0) -> Event | None:
         """Remove and return the oldest event; None if no event arrives within `timeout`.
@@ -93,11 +99,8 @@ class Events:
 
     def __iter__(self) -> Iterator[Event]:
         """Remove and yield the pending events, oldest first."""
-        while self._pending:
-            try:
-                yield _stamped(*self._pending.popleft())
-            except IndexError:  # another thread has fetched the last event
-                return
+        while (event := self.get()) is not None:
+            yield event
 
     def __len__(self) -> int:
         return len(self._pending)

@@ -14,7 +14,7 @@ segment. `message` describes the event as text. The other fields are for program
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, ClassVar, Literal
 
 from catenary.model.device import Identity
 from catenary.model.finding import Finding
@@ -30,6 +30,8 @@ if TYPE_CHECKING:
 @dataclass(frozen=True, slots=True)
 class Event:
     """Base class of all events."""
+
+    gives_way: ClassVar[bool] = False  # True if a full queue drops it before other events
 
     time: float
     sub: SubDevice | None
@@ -255,7 +257,13 @@ class ModeRefused(Event):
 
 @dataclass(frozen=True, slots=True)
 class GatewayWrite(Event):
-    """Write access of a client of `cat.Gateway` to a device, after its end."""
+    """Write access of a client of `cat.Gateway` to a device, after its end.
+
+    A client can write without end. If the queue of events is full, the oldest of these events is
+    therefore dropped before any other event.
+    """
+
+    gives_way: ClassVar[bool] = True
 
     peer: str  # protocol, address and port of the client, such as "TCP 127.0.0.1:50000"
     what: str  # the access, such as "SDO download 0x6065:00"

@@ -11,14 +11,13 @@ from catenary.bus.sdo import Conversations
 from catenary.errors import ConfigurationError
 from catenary.model.device import DeviceDescription
 from catenary.procedure.exchange import Procedure
-from catenary.procedure.latch import read, set_up
+from catenary.procedure.latch import Latched, read, set_up
 from catenary.procedure.station import Station
-from catenary.wire.latch import EDGES, INPUTS, LatchControl, Latched, LatchStatus
+from catenary.wire.latch import EDGES, INPUTS, LatchControl
 
 LatchEdge = Literal["rising", "falling", "both"]
 
 EVENTS_MAX = 1000  # edges that a handle keeps
-EVENT_BITS = {"rising": LatchStatus.RISING, "falling": LatchStatus.FALLING}
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,7 +91,7 @@ class Latch:
     @property
     def active(self) -> bool | None:
         """Level of the input at the last reading; None before the first one."""
-        return None if self._last is None else bool(self._last.status & LatchStatus.PIN)
+        return None if self._last is None else self._last.active
 
     def read(self) -> tuple[LatchEvent, ...]:
         """Read the input, and return the new edges. The first call sets it up.
@@ -126,16 +125,20 @@ class Latch:
                 ("rising", found.rising_ns, self._last.rising_ns),
                 ("falling", found.falling_ns, self._last.falling_ns),
             )
-            if edge in self._edges and self._is_new(found, edge, time != before)
+            # The times show new edges in both modes. The status bits would miss an edge if the
+            # answer to the first reading was lost, because that reading has cleared them.
+            if edge in self._edges and time != before
         ]
         self._last = found
-        new.sort(key=lambda event: event.time_ns)
+        if len(new) == 2 and _is_later(new[0].time_ns, new[1].time_ns, bits):
+            new.reverse()
         self._events.extend(new)
         return tuple(new)
 
-    def _is_new(self, found: Latched, edge: str, changed: bool) -> bool:
-        """Return True for a new edge. In continuous mode, only its time shows it."""
-        return changed if self._continuous else bool(found.status & EVENT_BITS[edge])
-
     def __repr__(self) -> str:
         return f"<Latch {self._number} of {self._sub.station}: {len(self._events)} edges>"
+
+
+def _is_later(one: int, two: int, bits: int) -> bool:
+    """Return True if time `one` is later than `two`. Times of 32 bits wrap every 4.3 s."""
+    return 0 < (one - two) % (1 << bits) < 1 << bits - 1

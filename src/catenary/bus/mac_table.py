@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from typing import Generic, TypeVar
 
 T = TypeVar("T")
@@ -17,11 +18,13 @@ def is_group(address: bytes) -> bool:
 class MacTable(Generic[T]):
     """Table from MAC addresses to ports, learned from the sources of frames.
 
-    Each port has its own limit, so that one device cannot displace the addresses of others.
+    Each port has its own limit, so that one device cannot displace the addresses of others. Any
+    thread may call the methods.
     """
 
     def __init__(self) -> None:
         self._ports: dict[bytes, T] = {}  # oldest first
+        self._lock = threading.Lock()  # for changes
 
     def learn(self, address: bytes, port: T) -> None:
         """Note that frames with this source come from a port.
@@ -32,11 +35,12 @@ class MacTable(Generic[T]):
         """
         if is_group(address) or self._ports.get(address) is port:
             return
-        self._ports.pop(address, None)
-        own = [known for known, other in self._ports.items() if other is port]
-        if len(own) >= PER_PORT_MAX:
-            del self._ports[own[0]]
-        self._ports[address] = port
+        with self._lock:
+            self._ports.pop(address, None)
+            own = [known for known, other in self._ports.items() if other is port]
+            if len(own) >= PER_PORT_MAX:
+                del self._ports[own[0]]
+            self._ports[address] = port
 
     def find(self, address: bytes) -> T | None:
         """Return the port of an address; None if it is not known."""

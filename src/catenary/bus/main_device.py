@@ -78,8 +78,8 @@ class MainDevice:
         self._blocking: BlockingRunner | None = None
         self._attached: Runner | None = None
         self._leave_loop: Callable[[], object] | None = None  # ends the running loop
-        # of the running loop: returns the axes of a device, by position, that have power
-        self._powered: Callable[[int], Sequence[str]] | None = None
+        # of the running loop: returns the axes that have power
+        self._powered: Callable[[], Sequence[str]] | None = None
         self.master: Master = (
             source.make_master(self)
             if isinstance(source, MasterSource)
@@ -493,26 +493,22 @@ class MainDevice:
                 "notebook, before you run its cell again)"
             )
 
-    def powered_axes(self, position: int) -> Sequence[str] | None:
-        """Return the axes of a device that have power, or are requested to be enabled.
+    @property
+    def powered_axes(self) -> Sequence[str] | None:
+        """Names of the axes that have power, or are requested to be enabled.
 
-        The states are those of the last iteration of the loop.
-
-        Args:
-            position: Position of the device.
-
-        Returns:
-            Names of the axes; None if no loop runs, or it does not report its axes.
+        The states are those of the last iteration of the loop. None if no loop runs, or it does not
+        report its axes.
         """
         powered = self._powered
-        return None if powered is None else powered(position)
+        return None if powered is None else powered()
 
     @contextlib.contextmanager
     def attached(
         self,
         runner: Runner,
         leave: Callable[[], object] | None = None,
-        powered: Callable[[int], Sequence[str]] | None = None,
+        powered: Callable[[], Sequence[str]] | None = None,
     ) -> Iterator[None]:
         """Within the block, pass procedures to the runner of a loop and refuse scans.
 
@@ -522,7 +518,7 @@ class MainDevice:
         Args:
             runner: Runner of the loop.
             leave: Function that ends the loop.
-            powered: Function that returns the axes of a device, by position, that have power.
+            powered: Function that returns the axes that have power.
         """
         self.require_no_loop()
         blocking = self.runner

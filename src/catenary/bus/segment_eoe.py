@@ -101,9 +101,9 @@ class SegmentEoe:
                         hint="close that connection first",
                     )
 
-    def _report(self, position: int, new: Counter[str], error: CatenaryError | None) -> None:
+    def _report(self, sub: SubDevice, new: Counter[str], error: CatenaryError | None) -> None:
         """Put an event for new drops of a device."""
-        sub, now = self._main.subs[position], self._main.link.now() * 1e-9
+        now = self._main.link.now() * 1e-9
         reasons = ", ".join(f"{count} × {reason}" for reason, count in sorted(new.items()))
         cause = f" ({error.message})" if error is not None else ""
         message = f"{sub.station}: Ethernet frames dropped: {reasons}{cause}"

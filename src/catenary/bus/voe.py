@@ -10,7 +10,6 @@ from catenary.bus.protocol_channel import MailboxOwner, protocol_channel
 from catenary.errors import DecodeError
 from catenary.model.device import Identity
 from catenary.procedure.delivery import await_delivery
-from catenary.procedure.exchange import Procedure
 from catenary.procedure.mailbox import MailboxChannel
 from catenary.procedure.voe import ANSWER_TIMEOUT, exchange, send
 from catenary.wire.mailbox import Mailbox, Type
@@ -32,7 +31,8 @@ class Voe:
     Example: `answer = sub.voe.exchange(1, b"ping").data`.
 
     `exchange`, `send` and `receive` wait. While a loop runs, any thread except the iterating one
-    may call them. The iterating thread uses `request` and `take`, which do not wait.
+    may call them. The iterating thread uses `request`, `request_send` and `take`, which do not
+    wait.
     """
 
     def __init__(self, sub: VendorDevice, *, unavailable: str = "") -> None:
@@ -90,6 +90,13 @@ class Voe:
         """Send a message that the device does not answer. The arguments are those of `exchange`."""
         self._sub.main.converse(send(self._channel(), self._message(type, data, vendor)))
 
+    def request_send(
+        self, type: int, data: bytes = b"", *, vendor: int | None = None
+    ) -> Pending[None]:
+        """Send a message that the device does not answer, without waiting, as `request` does."""
+        asked = send(self._channel(), self._message(type, data, vendor))
+        return self._sub.main.request(asked)
+
     def receive(self, timeout: float = 1.0) -> VoeMessage | None:
         """Wait for a message that was not requested; None if none arrives.
 
@@ -100,21 +107,17 @@ class Voe:
 
         Raises:
             MailboxError: The device has no mailbox, or sent an invalid message.
+            ValueError: The timeout is negative or infinite.
             RuntimeError: The caller is the iterating thread of a loop.
         """
         if not self._received:
-            self._sub.main.converse(self._wait(timeout))
+            self._sub.main.converse(await_delivery(self._channel(), self._received, timeout))
         return self.take()
 
     def take(self) -> VoeMessage | None:
         """Return and remove the oldest stored message; None if there is none. Does not wait."""
         self._channel()
         return self._received.popleft() if self._received else None
-
-    def _wait(self, timeout: float) -> Procedure[None]:
-        if not 0 <= timeout < float("inf"):
-            raise ValueError(f"timeout must be 0 or more and finite, not {timeout} s")
-        return await_delivery(self._channel(), self._received, timeout)
 
     def _message(self, type: int, data: bytes, vendor: int | None) -> VoeMessage:
         return VoeMessage(

@@ -10,7 +10,14 @@ from catenary.wire.abort import abort_code
 from catenary.wire.mailbox import ErrorReply, Type
 from catenary.wire.sdo_information import Opcode
 
-_PROTOCOLS = {Type.AOE: "AoE", Type.EOE: "EoE", Type.COE: "CoE", Type.FOE: "FoE", Type.SOE: "SoE"}
+_PROTOCOLS = {
+    Type.AOE: "AoE",
+    Type.EOE: "EoE",
+    Type.COE: "CoE",
+    Type.FOE: "FoE",
+    Type.SOE: "SoE",
+    Type.VOE: "VoE",
+}
 
 
 @dataclass(frozen=True, slots=True)

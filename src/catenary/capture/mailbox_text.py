@@ -1,11 +1,12 @@
-"""Services of the mailbox protocols EoE, FoE and SoE, ETG.1000.6 §5."""
+"""Services of the mailbox protocols AoE, EoE, FoE, SoE and VoE, ETG.1000.6 §5, ETG.1020."""
 
 from __future__ import annotations
 
 from catenary.errors import DecodeError
-from catenary.wire import foe
+from catenary.wire import aoe, foe, voe
 from catenary.wire.mailbox import Mailbox, Type
 
+_AOE_SERVICES = {int(each): each.name.lower().replace("_", " ") for each in aoe.Command}
 _FOE_SERVICES = {
     foe.ReadRequest: "read request",
     foe.WriteRequest: "write request",
@@ -45,7 +46,29 @@ def service_text(mailbox: Mailbox) -> str:
         return _soe(mailbox.data)
     if mailbox.type is Type.EOE and mailbox.data:
         return _EOE_SERVICES.get(mailbox.data[0] & 0x0F, "")
+    if mailbox.type is Type.AOE:
+        return _aoe(mailbox.data)
+    if mailbox.type is Type.VOE and len(mailbox.data) >= voe.HEADER_SIZE:
+        message = voe.decode_voe(mailbox.data)
+        return f"vendor 0x{message.vendor:X} type {message.type}, {len(message.data)} bytes"
     return ""
+
+
+def _aoe(data: bytes) -> str:
+    try:
+        message = aoe.decode_aoe(data)
+    except DecodeError:
+        return ""
+    if isinstance(message, aoe.Fragment):
+        kind = "acknowledge fragment" if message.is_response else "fragment"
+        return f"{kind} {message.number}, {len(message.data)} bytes"
+    text = _AOE_SERVICES.get(message.command, f"service {message.command}")
+    if message.command == aoe.Command.NOTIFICATION:
+        return f"{text} at port {message.source.port}, {len(message.data)} bytes"
+    if not message.is_response:
+        return f"{text} request {message.invoke_id} at port {message.target.port}"
+    failure = f", error 0x{message.error:04X}" if message.error else ""
+    return f"{text} response {message.invoke_id}, {len(message.data)} bytes{failure}"
 
 
 def _foe(data: bytes) -> str:

@@ -19,13 +19,11 @@ from catenary.cli.parsers import (
     add_target,
 )
 from catenary.cli.share_target import names_share
+from catenary.cli.soe_values import facts, line, parsed, shown
 from catenary.cli.text import escaped
 
 if TYPE_CHECKING:
     from catenary.bus import SubDevice
-    from catenary.model.sercos import Parameter
-    from catenary.wire.sercos import Attribute
-    from catenary.wire.sercos_values import Item, Value
 
 DRIVES = 8
 
@@ -176,7 +174,7 @@ def run_read(arguments: argparse.Namespace) -> int:
     if arguments.json:
         print(json.dumps({"idn": idn, "drive": arguments.drive, "value": value}))
     else:
-        print(_text(value))
+        print(shown(value))
     return 0
 
 
@@ -187,7 +185,7 @@ def run_write(arguments: argparse.Namespace) -> int:
     idn = _idn(arguments)
     with _device(arguments) as device:
         data = device.soe.read_bytes(idn, Element.ATTRIBUTE, drive=arguments.drive)
-        value = _parsed(arguments.value, decode_attribute(data))
+        value = parsed(arguments.value, decode_attribute(data))
         try:
             device.soe.write(idn, value, drive=arguments.drive)
         except (ValueError, TypeError) as error:
@@ -195,7 +193,7 @@ def run_write(arguments: argparse.Namespace) -> int:
     if arguments.json:
         print(json.dumps({"idn": idn, "drive": arguments.drive, "value": value}))
     else:
-        print(f"{escaped(str(device.station))}: {idn} = {_text(value)}")
+        print(f"{escaped(str(device.station))}: {idn} = {shown(value)}")
     return 0
 
 
@@ -204,30 +202,30 @@ def run_info(arguments: argparse.Namespace) -> int:
     with _device(arguments) as device:
         found = device.soe.describe(idn, drive=arguments.drive)
     if arguments.json:
-        print(json.dumps(_facts(found)))
+        print(json.dumps(facts(found)))
         return 0
-    for name, fact in _facts(found).items():
-        if fact not in (None, "", [], False):
-            print(f"{name:14} {_text(fact) if isinstance(fact, (list, str)) else fact}")
+    for name, fact in facts(found).items():
+        if fact is not False and fact not in (None, "", []):  # 0 == False
+            print(f"{name:14} {shown(fact) if isinstance(fact, (list, str)) else fact}")
     return 0
 
 
 def run_list(arguments: argparse.Namespace) -> int:
-    from catenary.errors import SoeError
+    from catenary.errors import MailboxError, SoeError
 
     with _device(arguments) as device:
         idns = device.soe.list(drive=arguments.drive)
         rows: list[dict[str, object]] = []
         for idn in idns if arguments.values else ():
             try:
-                rows.append(_facts(device.soe.describe(idn, drive=arguments.drive)))
-            except SoeError as error:
+                rows.append(facts(device.soe.describe(idn, drive=arguments.drive)))
+            except (SoeError, MailboxError) as error:
                 rows.append({"idn": idn, "error": one_line(error.message)})
     if arguments.json:
         print(json.dumps(rows if arguments.values else [{"idn": idn} for idn in idns]))
     elif arguments.values:
         for row in rows:
-            print(_line(row))
+            print(line(row))
     else:
         print("\n".join(idns))
     return 0
@@ -242,72 +240,3 @@ def run_command(arguments: argparse.Namespace) -> int:
     else:
         print(f"{escaped(str(device.station))}: {idn} done")
     return 0
-
-
-def _facts(found: Parameter) -> dict[str, object]:
-    """Return the elements of a parameter for JSON."""
-    attribute = found.attribute
-    return {
-        "idn": found.idn,
-        "drive": found.drive,
-        "name": found.name,
-        "value": found.value,
-        "unit": found.unit,
-        "minimum": found.minimum,
-        "maximum": found.maximum,
-        "default": found.default,
-        "format": attribute.display.name.lower(),
-        "size": attribute.size,
-        "list": attribute.is_list,
-        "list_limit": found.list_limit,
-        "command": attribute.is_command,
-        "state": None if found.state is None else int(found.state),
-        "decimals": attribute.decimals,
-        "protected_in": list(found.protected_in),
-    }
-
-
-def _line(row: dict[str, object]) -> str:
-    """Return one line of the list with values."""
-    if "error" in row:
-        return f"{row['idn']}  {row['error']}"
-    value, unit = row["value"], row["unit"]
-    shown = _text(value)
-    name = escaped(str(row["name"]))
-    return f"{row['idn']}  {name}: {shown} {escaped(str(unit))}".rstrip()
-
-
-def _text(value: object) -> str:
-    """Return a value as text; the items of a list with commas."""
-    if isinstance(value, list):
-        return ", ".join(_text(each) for each in value)
-    return escaped(value) if isinstance(value, str) else str(value)
-
-
-def _parsed(text: str, attribute: Attribute) -> Value:
-    """Return the value of a text. Raises UsageError if it is not a number where one is needed."""
-    from catenary.wire.sercos import Display
-
-    if attribute.display is Display.TEXT:
-        return text
-    if attribute.is_list:
-        items = (each.strip() for each in text.split(","))
-        return [_item(each, attribute) for each in items if each]
-    return _item(text, attribute)
-
-
-def _item(text: str, attribute: Attribute) -> Item:
-    from catenary.wire.sercos import Display
-
-    if attribute.display is Display.IDN:
-        return text
-    try:
-        return int(text, 0)
-    except ValueError:
-        pass
-    try:
-        return float(text)
-    except ValueError as error:
-        raise UsageError(
-            f"{text!r} is not a number", hint="write numbers as decimal or 0x..."
-        ) from error

@@ -76,7 +76,8 @@ class Copies(Request):
     Args:
         *copies: `Copy` and `FsoeConnection` objects.
         optional: Devices whose loss does not end the loop.
-        divider: n to exchange the devices in every n-th cycle.
+        divider: n to exchange the devices in every n-th cycle. None: as often as other requests
+            exchange each device; without them, in every cycle.
 
     Raises:
         TypeError: A copy or a place has the wrong type.
@@ -89,7 +90,7 @@ class Copies(Request):
         self,
         *copies: Copy | FsoeConnection,
         optional: Sequence[SubDevice] = (),
-        divider: int = 1,
+        divider: int | None = None,
     ) -> None:
         self._connections = tuple(each for each in copies if isinstance(each, FsoeConnection))
         plain = [_checked(each) for each in copies if not isinstance(each, FsoeConnection)]
@@ -99,8 +100,11 @@ class Copies(Request):
         super().__init__(_devices([*ways, *plain]))
         # The areas of the frames are first and in order: see `fsoe_frames`.
         self._pairs = [_pair(way, is_fsoe=True) for way in ways] + [_pair(each) for each in plain]
+        for sub in optional:
+            if sub not in self._subs:
+                raise ValueError(f"optional: no copy uses {sub.station}")
         self._optional = {sub.position for sub in optional}
-        self._divider = cycles_between("divider", divider)
+        self._divider = 0 if divider is None else cycles_between("divider", divider)
         self._areas: tuple[ImageArea, ...] = ()
         self._frames: list[Bytes] = []
 
@@ -257,5 +261,11 @@ def _check_overlap(pairs: Sequence[_Pair], copies: Sequence[ImageCopy]) -> None:
 
 def _area(pair: _Pair, copy: ImageCopy, layout: ImageLayout) -> ImageArea:
     device = pair.source.device.position
-    size = copy.bit_length // 8
-    return ImageArea(str(pair.source), copy.input_bit // 8, size, device, layout.sync_unit(device))
+    return ImageArea(
+        str(pair.source),
+        copy.input_bit // 8,
+        copy.bit_length // 8,
+        device,
+        layout.sync_unit(device),
+        field="fsoe_frame",
+    )

@@ -110,6 +110,15 @@ def find_place(sub: SubDevice, direction: Direction, place: CopyPlace) -> FoundP
     )
 
 
+def place_text(place: CopyPlace) -> str:
+    """Return a place as text, as a machine file contains it."""
+    if isinstance(place, range):
+        return f"bytes {place.start} to {place.stop - 1}"
+    if isinstance(place, tuple):
+        return f"0x{place[0]:04X}:{place[1]:02X}"
+    return f"0x{place:04X}" if isinstance(place, int) else place
+
+
 def _from_text(device: DeviceDescription, direction: Direction, text: str) -> FoundPlace:
     if (pdo := _PDO.fullmatch(text)) is not None:
         return _pdo(device, direction, int(pdo[1], 16))
@@ -123,8 +132,7 @@ def _from_text(device: DeviceDescription, direction: Direction, text: str) -> Fo
 def _bytes(device: DeviceDescription, direction: Direction, chosen: range) -> FoundPlace:
     if not chosen or chosen.step != 1 or chosen.start < 0:
         raise ValueError(f"{chosen}: a range of bytes must have at least one byte, in order")
-    label = f"bytes {chosen.start} to {chosen.stop - 1}"
-    return FoundPlace(device, direction, label, bytes=chosen)
+    return FoundPlace(device, direction, place_text(chosen), bytes=chosen)
 
 
 def _pdo(device: DeviceDescription, direction: Direction, index: int) -> FoundPlace:
@@ -140,7 +148,7 @@ def _pdo(device: DeviceDescription, direction: Direction, index: int) -> FoundPl
 def _object(
     device: DeviceDescription, direction: Direction, index: int, subindex: int
 ) -> FoundPlace:
-    label = f"0x{index:04X}:{subindex:02X}"
+    label = place_text((index, subindex))
     found = [
         (pdo, entry)
         for pdo, entry in _entries(device, direction)
@@ -179,7 +187,7 @@ def _named(device: DeviceDescription, direction: Direction, name: str) -> FoundP
 
 
 def _entry(device: DeviceDescription, direction: Direction, pdo: Pdo, entry: Entry) -> FoundPlace:
-    label = f"0x{entry.index:04X}:{entry.subindex:02X} {entry.name}".rstrip()
+    label = f"{place_text((entry.index, entry.subindex))} {entry.name}".rstrip()
     which = Which(pdo.index, entry.bit_length)
     return FoundPlace(device, direction, label, entry=(entry.index, entry.subindex, which))
 

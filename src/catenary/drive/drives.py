@@ -25,6 +25,7 @@ from catenary.drive.arguments import (
 from catenary.drive.axis import Axis, column_bank
 from catenary.drive.axis_options import AxisOptions, CommonOptions, PerAxis, make_axes
 from catenary.drive.homing import HomingMethod
+from catenary.drive.measuring_move import end_at_edge
 from catenary.drive.modules import Modules
 from catenary.drive.motions import HALT
 from catenary.drive.move import Move, Moves
@@ -37,7 +38,7 @@ from catenary.drive.move_request import (
 )
 from catenary.drive.objects import ACTUAL_VELOCITY
 from catenary.drive.port import AxisFacts, AxisPort, PutRate
-from catenary.drive.probe import Edge, Probe, Probes, until_edge
+from catenary.drive.probe import Edge, Probe, Probes
 from catenary.drive.probe_port import ProbePort
 from catenary.drive.probe_request import check_probe, chosen_axis, probe_request
 from catenary.drive.rates import RateColumns
@@ -386,7 +387,8 @@ class Drives(Request):
             jerk: largest jerk [rad/s³ or m/s³]; None for a trapezoid. Only for CSP. A value needs
                 `pip install 'catenary[traj]'`.
             until: probe from `arm.probe`. The move begins when the probe is armed, and stops when
-                the probe has captured its edge. Reaching the goal without an edge is an error.
+                the probe has captured its edge. If all axes reach their goals without an edge, the
+                move fails.
             axes: numbers of the axes.
 
         Returns:
@@ -394,7 +396,8 @@ class Drives(Request):
 
         Raises:
             ValueError: A goal or rate is not valid or beyond a limit, a rate has no default,
-                `axes` is empty, or the mode is neither CSP nor PP.
+                `axes` is empty, the mode is neither CSP nor PP, or `until` has already ended or
+                is continuous.
             IndexError: An axis does not exist.
             DriveError: An axis is not enabled, or a law or a stream sets its targets.
             ConfigurationError: `jerk` is given, and ruckig is not installed or finds no motion.
@@ -431,7 +434,8 @@ class Drives(Request):
 
         Raises:
             ValueError: A goal or rate is not valid or beyond a limit, a rate has no default,
-                `axes` is empty, or the mode is neither CSP nor PP.
+                `axes` is empty, the mode is neither CSP nor PP, or `until` has already ended or
+                is continuous.
             IndexError: An axis does not exist.
             DriveError: An axis is not enabled, or a law or a stream sets its targets.
             ConfigurationError: `jerk` is given, and ruckig is not installed or finds no motion.
@@ -532,8 +536,7 @@ class Drives(Request):
         axes, ports = [self._axes[i] for i in chosen], [self._ports[i] for i in chosen]
         parts, timeout = make_parts(axes, ports, goals, rates)
         if until is not None:
-            for part in parts:
-                part.steps = until_edge(part.steps, part.stop, until, part.port)
+            end_at_edge(parts, until)
         return moves.begin(dict(zip(chosen, parts, strict=True)), timeout)
 
     def _numbers(self, axes: Axes) -> list[int]:

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from catenary.bus import SubDevice
-from catenary.drive.copy_place import CopyPlace
+from catenary.drive.copy_place import CopyPlace, place_text
 from catenary.wire.fsoe import command_of, command_text, connection_id_of
 
 Way = tuple[SubDevice, CopyPlace, SubDevice, CopyPlace]
@@ -52,7 +52,8 @@ class FsoeConnection:
         return (main[0], main[1], sub[0], sub[2]), (sub[0], sub[1], main[0], main[2])
 
     def __str__(self) -> str:
-        return f"{self.main[0].station}, {self.main[1]!s} ↔ {self.sub[0].station}, {self.sub[1]!s}"
+        ends = (f"{end[0].station}, {place_text(end[1])}" for end in (self.main, self.sub))
+        return " ↔ ".join(ends)
 
 
 class FsoeFrames(NamedTuple):

@@ -12,7 +12,7 @@ from collections.abc import Callable
 from typing import Literal, TypeAlias
 
 from catenary.drive import touch_probe as bits
-from catenary.drive.port import AxisPort, Failure, Steps
+from catenary.drive.port import Steps
 from catenary.drive.probe_port import ProbeEvent, ProbePort, ProbeRequest
 from catenary.errors import CatenaryError, MoveError
 from catenary.plan.request import Mover
@@ -21,6 +21,7 @@ Edge: TypeAlias = Literal["rising", "falling", "both"]
 ProbeOutcome: TypeAlias = Literal["captured", "stopped", "failed"]
 
 ANSWER_TIMEOUT = 1.0  # [s] until 0x60B9 reflects 0x60B8
+ANSWER_EXCHANGES = 1.5  # that the drive needs at least to receive 0x60B8
 PATIENCE = 60.0  # [s] default of `loop.wait(probe)`
 EVENTS_MAX = 1000  # edges that a handle keeps
 COUNTER_SPAN = 1 << 16
@@ -38,6 +39,7 @@ class Probe:
         self._request = request
         self._events: deque[ProbeEvent] = deque(maxlen=EVENTS_MAX)
         self._steps = self._run()
+        self._counters: dict[str, int | None] = {}  # of the last edge of each kind
         self._armed = False
         self._stop_requested = False
         self._outcome: ProbeOutcome | None = None
@@ -55,6 +57,11 @@ class Probe:
     def number(self) -> int:
         """Number of the probe, 1 or 2."""
         return self._request.number
+
+    @property
+    def continuous(self) -> bool:
+        """True if the probe captures edges until `stop`."""
+        return self._request.continuous
 
     @property
     def armed(self) -> bool:
@@ -127,12 +134,15 @@ class Probe:
             self.finish("captured", None)
         except CatenaryError as error:
             self.finish("failed", error)
+        except BaseException:  # an interrupt has ended the generator
+            self.finish("failed", self._port.error("was interrupted", "arm the probe again"))
+            raise
 
     def end(self) -> None:
         """End the probe because the loop ends."""
         hint = "wait for the probe before you leave the loop: loop.wait(probe)"
         error = self._port.error("was armed when the loop ended", hint)
-        self.finish("stopped" if self._request.continuous else "failed", error)
+        self.finish("stopped" if self.continuous else "failed", error)
 
     def finish(self, outcome: ProbeOutcome, error: CatenaryError | None) -> None:
         """Disable the probe and set its result."""
@@ -172,20 +182,21 @@ class Probe:
                     continue
                 if not self._stored(edge):
                     last.pop(edge, None)
+                    self._counters[edge] = self._port.counter(edge)
                 elif last.get(edge) != self._marks(edge):
-                    self._add(edge, last.get(edge))
+                    self._add(edge)
                     last[edge] = self._marks(edge)
                     missing.discard(edge)
             if not missing and not request.continuous:
                 return
             yield
 
-    def _add(self, edge: str, last: tuple[object, ...] | None) -> None:
-        counter = self._port.counter(edge)
-        if last is not None and counter is not None and edge in {e.edge for e in self._events}:
-            before = last[0]
-            assert isinstance(before, int)
+    def _add(self, edge: str) -> None:
+        """Keep the stored edge, and count the edges that it has replaced."""
+        counter, before = self._port.counter(edge), self._counters.get(edge)
+        if self.continuous and counter is not None and before is not None:
             self.missed += max((counter - before) % COUNTER_SPAN - 1, 0)
+        self._counters[edge] = counter
         self.dropped += len(self._events) == EVENTS_MAX
         self._events.append(self._port.event(edge))
 
@@ -212,11 +223,12 @@ class Probe:
 
     def _await(self, met: Callable[[], bool], what: str, hint: str) -> Steps:
         begun = self._port.now
-        while True:  # at least one cycle, so that the drive receives 0x60B8
+        while True:
             yield
-            if met():
+            waited = self._port.now - begun
+            if met() and waited > ANSWER_EXCHANGES * self._port.exchange:
                 return
-            if self._port.now - begun > ANSWER_TIMEOUT:
+            if waited > ANSWER_TIMEOUT:
                 raise self._port.error(f"{what} (0x60B9 = 0x{self._port.status:02X})", hint)
 
 
@@ -273,34 +285,3 @@ class Probes:
             self._active.clear()
             if self in self._movers:
                 self._movers.remove(self)
-
-
-def until_edge(steps: Steps, stop: Callable[[], Steps], probe: Probe, port: AxisPort) -> Steps:
-    """Move until a probe has captured its edge, then stop. The motion begins when it is armed.
-
-    Args:
-        steps: The motion.
-        stop: Returns the motion that brings the axis to rest.
-        probe: The probe.
-        port: The moving axis.
-
-    Raises:
-        MoveError: The probe failed, or the axis reached its goal without an edge.
-    """
-    try:
-        while not probe.armed and not probe.done:
-            yield
-        while not probe.done:
-            try:
-                next(steps)
-            except StopIteration:
-                what = f"reached its goal without an edge of {probe!r}"
-                hint = "check the probe, its edge and its wiring; or choose a goal beyond the edge"
-                raise port.error(Failure(what, hint)) from None
-            yield
-    finally:
-        steps.close()
-        probe.stop()
-    if probe.error is not None:
-        raise probe.error
-    yield from stop()

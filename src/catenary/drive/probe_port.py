@@ -85,6 +85,11 @@ class ProbePort:
         return self._axis.name
 
     @property
+    def exchange(self) -> float:
+        """Time between two exchanges of the drive [s]."""
+        return self._axis.exchange
+
+    @property
     def is_led(self) -> bool:
         """True if a law or a stream sets the outputs."""
         return self._axis.is_led

@@ -76,8 +76,9 @@ def check_probe(port: ProbePort, request: ProbeRequest) -> None:
             index = 0x60BA + 2 * (request.number - 1) + EDGES.index(edge)
             raise ValueError(
                 f"{port.name}: the position of the {edge} edge of probe {request.number} "
-                f"(0x{index:04X}) is not in its process data; the drive cannot map it with the "
-                "other objects: choose fewer with TouchProbe(...), or write the PDOs with pdos="
+                f"(0x{index:04X}) is not in the process data of all drives: a drive does not have "
+                "the object, or pdos= does not contain it; use another edge or probe, or add the "
+                "object to pdos="
             )
     if port.is_led:
         raise DriveError(

@@ -38,7 +38,8 @@ OBJECT_MISSING = (0x06020000, 0x06090011)  # SDO abort codes: no object, no subi
 class TouchProbe:
     """Objects of the touch probes to exchange: `Drives(touch_probe=TouchProbe(probes=(1, 2)))`.
 
-    The drive must offer 0x60B8 and 0x60B9. The loop omits other objects that it cannot map.
+    The drive must have 0x60B8 and 0x60B9. Other objects are omitted if a drive does not have them,
+    or if `pdos=` does not contain them.
 
     Args:
         probes: Numbers of the probes, 1 and 2.

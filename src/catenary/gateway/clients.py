@@ -123,7 +123,7 @@ class TcpClient:
         self._last = now
 
     def next_message(self, now: float) -> Mailbox | None:
-        """Return the next message; None if none is complete.
+        """Return the next message; None if none is complete, or its rate limit is reached.
 
         Args:
             now: Present time [s].
@@ -134,10 +134,13 @@ class TcpClient:
         size = frame_size(self._inbox)
         if size is None or size > len(self._inbox):
             return None
+        wait = self._limit.wait_for(now)
+        if wait > 0:
+            self._allowed = now + wait
+            return None
         frame = bytes(self._inbox[:size])
         del self._inbox[:size]
         self._begun = now
-        self._allowed = now + self._limit.wait_for(now)
         return decode_gateway(frame)
 
     def is_late(self, now: float) -> bool:
@@ -148,6 +151,8 @@ class TcpClient:
         """
         if self._stalled is not None and now - self._stalled > STALL_TIMEOUT:
             return True
+        if not self.wants(now):
+            self._begun = now  # the gateway does not receive the rest of a frame in the meantime
         if self._inbox and not self.is_full:
             return now - self._begun > FRAME_TIMEOUT
         return self.outstanding == 0 and now - self._last > IDLE_TIMEOUT

@@ -20,7 +20,7 @@ from catenary.procedure.mailbox import (
     send_only,
 )
 from catenary.wire import coe
-from catenary.wire.cia402 import STATE_CODING, AxisState
+from catenary.wire.cia402 import AxisState, state_of
 from catenary.wire.mailbox import Mailbox, Type
 
 FRAGMENTS_MAX = 1100  # of an object list: 64 Ki indices in mailboxes of 128 bytes
@@ -29,11 +29,6 @@ INCOMPLETE = 0x80  # bit of the opcode of an SDO information message
 ABORT_SPECIFIER = 4
 INITIATE = (2, 3)  # command specifiers of responses with an index
 STATUSWORD, SLOT = 0x6041, 0x800
-POWERED = (
-    AxisState.OPERATION_ENABLED,
-    AxisState.QUICK_STOP_ACTIVE,
-    AxisState.FAULT_REACTION_ACTIVE,
-)
 
 
 def forward(
@@ -154,6 +149,4 @@ def read_axis_states(
 def _state(answer: coe.Message) -> AxisState | None:
     if not isinstance(answer, coe.UploadResponse) or len(answer.data) < 2:
         return None
-    word = int.from_bytes(answer.data[:2], "little")
-    found = [state for state, (mask, value) in STATE_CODING.items() if word & mask == value]
-    return found[0] if len(found) == 1 else None
+    return state_of(int.from_bytes(answer.data[:2], "little"))

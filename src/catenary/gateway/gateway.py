@@ -7,9 +7,10 @@ from typing import Self
 
 from catenary.bus import MainDevice, SubDevice
 from catenary.errors import ConfigurationError
-from catenary.gateway.desks import Desks
 from catenary.gateway.limits import GatewayCounts
+from catenary.gateway.policy import Policy
 from catenary.gateway.reports import Reports
+from catenary.gateway.router import Router
 from catenary.gateway.service import Service
 from catenary.gateway.sockets import checked_address, open_sockets
 from catenary.wire.gateway import PORT
@@ -26,9 +27,9 @@ class Gateway:
     It works before, during and after a loop. Messages of tools use the acyclic frames of the loop,
     in turn with the transfers of the program. Clients run on this machine, or use an SSH tunnel.
 
-    Without `write`, clients can read only. Even with `write`, accesses that are dangerous while an
-    axis of the device is enabled are refused then. docs/how_to/gateway.md lists them. Each write is
-    an event `GatewayWrite`.
+    Without `write`, clients can read only. With `write`, accesses that are dangerous while an axis
+    is enabled are refused during this time. docs/how_to/gateway.md lists them. Each write is an
+    event `GatewayWrite`.
 
     Args:
         main: The MainDevice, after its `scan`.
@@ -54,7 +55,7 @@ class Gateway:
         self._address = checked_address(address)
         self._port = port
         self._service: Service | None = None
-        self._desks: Desks | None = None
+        self._router: Router | None = None
 
     def __enter__(self) -> Self:
         return self.open()
@@ -99,8 +100,9 @@ class Gateway:
         sockets = open_sockets(self._address, self._port)
         self._port = sockets.port
         reports = Reports(self._main, self.counts)
-        self._desks = desks = Desks(self._main, self._writable, reports)
-        self._service = Service(sockets, self.counts, desks.receive, desks.forget, desks.sweep)
+        policy = Policy(self._main, self._writable)
+        self._router = router = Router(self._main, policy, reports)
+        self._service = Service(sockets, self.counts, router.receive, router.forget, router.sweep)
         reports.deliver = self._service.answer
         self._service.start()
         return self
@@ -110,8 +112,8 @@ class Gateway:
         service, self._service = self._service, None
         if service is not None:
             service.close()
-        if self._desks is not None:
-            self._desks.close()
+        if self._router is not None:
+            self._router.close()
 
 
 def _position(device: int | SubDevice) -> int:

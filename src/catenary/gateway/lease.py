@@ -3,7 +3,8 @@
 A lease is a ticket in the queue of the mailbox (`MailboxChannel.turns`), so that transfers of the
 program and of clients take turns. The ticket is added by the procedure of the first message. It is
 removed with the last message, or by any thread while no message is under way. In a loop, a transfer
-of the program therefore waits for at most LEASE_IDLE longer than one exchange.
+of the program therefore waits until that of the client ends: at most LEASE_MAX, and LEASE_IDLE if
+the client does not continue.
 
 Without a loop, the procedures of all threads run one after another, and one that waits for its turn
 stops the others. The ticket is therefore also removed between two messages of a transfer. An SDO

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import threading
 import time
 from collections.abc import Callable
 
@@ -25,13 +26,14 @@ LOG_RATE, LOG_BURST = 1.0, 10.0  # refusals in the log per second, and after a p
 
 
 class Reports:
-    """Receiver of the results of all desks. Any thread may call it."""
+    """Receiver of the results of all queues. Any thread may call it."""
 
     def __init__(self, main: MainDevice, counts: GatewayCounts) -> None:
         self.deliver: Callable[[Client, list[Mailbox]], None] = _discard  # the service replaces it
         self._main = main
         self._counts = counts
         self._limit = RateLimit(LOG_RATE, LOG_BURST)
+        self._lock = threading.Lock()  # for the counters and the limit
 
     def refused(self, sub: SubDevice | None, client: Client, refusal: Refusal) -> None:
         """Count and log a refused message.
@@ -41,8 +43,10 @@ class Reports:
             client: The client.
             refusal: The reason.
         """
-        self._counts.refused += 1
-        if self._limit.wait_for(time.monotonic()) == 0:
+        with self._lock:
+            self._counts.refused += 1
+            logged = self._limit.wait_for(time.monotonic()) == 0
+        if logged:
             where = "" if sub is None else f"{sub.station}: "
             log.warning("%s refused: %s%s", client, where, refusal.text)
 
@@ -57,7 +61,8 @@ class Reports:
             request: First message of the write.
             answer: Last answer of the device, or the result as text.
         """
-        self._counts.writes += 1
+        with self._lock:
+            self._counts.writes += 1
         result = answer if isinstance(answer, str) else result_text(answer)
         message = f"{sub.station}: {request.what} through the gateway by {client}: {result}"
         if not self._main.is_open:

@@ -1,4 +1,4 @@
-"""Gateway service: one thread for all sockets, which passes messages to the desks of the devices.
+"""Gateway service: one thread for all sockets, which passes messages to the router.
 
 Theory of operation. The thread runs in passes, with a PAUSE after each, so that clients cannot take
 the interpreter from the program. A pass accepts at most ACCEPTED connections, receives at most
@@ -69,6 +69,7 @@ class Service:
         self._answers: deque[tuple[Client, list[Mailbox]]] = deque()
         self._ended = threading.Event()
         self._wake = os.eventfd(0, os.EFD_CLOEXEC | os.EFD_NONBLOCK)
+        self._wake_lock = threading.Lock()  # no write to the number of a closed file
         self._thread = threading.Thread(target=self._serve, name="catenary gateway", daemon=True)
 
     def start(self) -> None:
@@ -77,8 +78,9 @@ class Service:
 
     def close(self) -> None:
         """Disconnect all clients, and end the thread."""
-        self._ended.set()
-        os.eventfd_write(self._wake, 1)
+        with self._wake_lock:
+            self._ended.set()
+            os.eventfd_write(self._wake, 1)
         self._thread.join(CLOSE_TIMEOUT)
         if not self._thread.is_alive():
             os.close(self._wake)
@@ -96,8 +98,9 @@ class Service:
             answers: Answers; empty if the message has none.
         """
         self._answers.append((client, answers))
-        if not self._ended.is_set():
-            os.eventfd_write(self._wake, 1)
+        with self._wake_lock:
+            if not self._ended.is_set():
+                os.eventfd_write(self._wake, 1)
 
     def _serve(self) -> None:
         leave_real_time()
@@ -105,6 +108,8 @@ class Service:
             while not self._ended.is_set():
                 self._pass(self._poll())
                 self._ended.wait(PAUSE)
+        except Exception:  # a thread has no caller
+            log.exception("the gateway has ended; close it, and open it again")
         finally:
             for client in self._tcp:
                 client.close()

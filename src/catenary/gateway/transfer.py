@@ -54,13 +54,19 @@ class Transfer:
 
 
 def continues(transfer: Transfer | None, request: Request) -> bool:
-    """Return True if a message continues a transfer.
+    """Return True if a message continues or ends a transfer.
 
-    A client may repeat the request of a file, or a packet, after BUSY.
+    After BUSY, a client repeats the request of a file, or a packet.
     """
     if transfer is None:
         return False
-    return isinstance(request.parsed, transfer.kind.value)
+    first = transfer.first.message
+    if request.access is Access.END:
+        return request.message.type is first.type
+    if isinstance(request.parsed, transfer.kind.value):
+        return True
+    repeated = request.message.type is first.type and request.message.data == first.data
+    return repeated and first.type is Type.FOE and not transfer.ends
 
 
 def has_answer(transfer: Transfer | None, request: Request) -> bool:
@@ -72,7 +78,7 @@ def has_answer(transfer: Transfer | None, request: Request) -> bool:
     """
     if request.access is Access.END:
         return False
-    return not (transfer is not None and transfer.ends and continues(transfer, request))
+    return transfer is None or not transfer.ends
 
 
 def next_transfer(

@@ -65,6 +65,13 @@ class SubDevice(bus.SubDevice):
         self.state = AlState(word & 0xF) if known else None
         return DeviceState(self.state, bool(info.error_flag), 0, word)
 
+    def _prepare_boot(self) -> None:
+        """Raise ConfigurationError: the master controls the states."""
+        raise ConfigurationError(
+            f"{self.station}: libethercat cannot bring single devices to BOOT",
+            hint="use IgH's tool: ethercat states BOOT",
+        )
+
     def read_register(self, address: int, size: int) -> Procedure[bytes]:
         """Read registers while a loop runs. Pass the procedure to `main.request(...)`.
 

@@ -16,6 +16,7 @@ import os
 import select
 import socket
 import struct
+import threading
 from typing import Self
 
 from catenary.errors import TapError
@@ -54,7 +55,13 @@ class Tap:
             os.close(self._file)
             raise
         self._woken, self._waker = os.pipe2(os.O_NONBLOCK | os.O_CLOEXEC)
+        self._poll = select.poll()
+        for descriptor in (self._file, self._woken):
+            self._poll.register(descriptor, select.POLLIN)
         self._is_open = True
+        # A thread may still write while another one closes. A closed descriptor may already belong
+        # to another file.
+        self._lock = threading.Lock()
         forget_in_child(self)
 
     def wait(self, seconds: float | None = None) -> bool:
@@ -63,38 +70,57 @@ class Tap:
         Args:
             seconds: Longest time [s]; None: no limit.
         """
-        ready, _, _ = select.select([self._file, self._woken], [], [], seconds)
-        return self._file in ready
+        found = self._poll.poll(None if seconds is None else seconds * 1e3)
+        return any(descriptor == self._file for descriptor, _ in found)
 
     def wake(self) -> None:
-        """End the present or the next call of `wait`. Any thread may call it."""
-        with contextlib.suppress(BlockingIOError):
-            os.write(self._waker, b"\0")
+        """End the present or the next call of `wait`. Any thread may call it.
+
+        No effect if it is detached.
+        """
+        with self._lock, contextlib.suppress(BlockingIOError):
+            if self._is_open:
+                os.write(self._waker, b"\0")
 
     def read(self) -> bytes | None:
-        """Return the next frame; None if there is none, or if the interface is down."""
+        """Return the next frame; None if there is none, or if the interface is down.
+
+        Raises:
+            TapError: The interface was deleted.
+        """
         try:
             return os.read(self._file, READ_SIZE)
-        except OSError:
-            return None  # EAGAIN; EIO or EBADFD: the interface was set down or deleted
+        except OSError as error:
+            if error.errno != errno.EBADFD:
+                return None  # EAGAIN; EIO: the interface was set down
+            raise TapError(
+                f"the interface {self.name} was deleted",
+                hint="create it, and connect again",
+            ) from error
 
     def write(self, frame: bytes) -> bool:
-        """Give a frame to the network stack. Return False if it was dropped."""
-        try:
-            return os.write(self._file, frame) == len(frame)
-        except OSError:
-            return False  # EIO: the interface is down; EINVAL: not a frame; ENOBUFS
+        """Give a frame to the network stack. Return False if it was dropped.
+
+        Any thread may call it, also after `close`.
+        """
+        with self._lock:
+            try:
+                return self._is_open and os.write(self._file, frame) == len(frame)
+            except OSError:
+                return False  # EIO: the interface is down; EINVAL: not a frame; ENOBUFS
 
     def close(self) -> None:
         """Detach from the interface, which continues to exist. No effect if it is detached."""
-        if not self._is_open:
-            return
-        self._is_open = False
-        for descriptor in (self._file, self._woken, self._waker):
-            os.close(descriptor)
+        with self._lock:
+            if not self._is_open:
+                return
+            self._is_open = False
+            for descriptor in (self._file, self._woken, self._waker):
+                os.close(descriptor)
 
     def forget(self) -> None:
         """Close the copies of a forked child, so that the TAP is free when the parent ends."""
+        self._lock = threading.Lock()  # another thread of the parent may have held it
         self.close()
 
     def __enter__(self) -> Self:

@@ -279,21 +279,21 @@ class Loop:
         return next(iter(self))
 
     def wait(self, move: Awaited, timeout: float | None = None) -> None:
-        """Iterate until a move is done: `loop.wait(arm.move_to(0.5), timeout=10.0)`.
+        """Iterate until a move or a touch probe is done: `loop.wait(arm.move_to(0.5))`.
 
         The call returns when the axes have reached their targets, or are at rest after
         `move.stop()`. While the loop runs in the background, the call only waits, and any thread
         may use it.
 
         Args:
-            move: Result of `arm.move_to`, `arm.move_by` or `arm.home`.
+            move: Result of `arm.move_to`, `arm.move_by`, `arm.home` or `arm.probe`.
             timeout: Time after which the move is stopped [s]. None: twice the expected duration
-                plus 10 s; for homing 60 s.
+                plus 10 s; for homing and touch probes 60 s.
 
         Raises:
             MoveError: The move took too long or was replaced, or its axis was stopped.
             DriveError: A drive is in fault or was stopped. The iteration may raise other errors.
-            TypeError: `move` is not a move.
+            TypeError: `move` is neither a move nor a touch probe.
             RuntimeError: The loop is not open, or the call is inside `with loop.update():`.
         """
         require_move(move)
@@ -367,7 +367,8 @@ class Loop:
                 exception, a NaN or infinite target, overruns, and a step that does not return.
             ValueError: An argument is impossible, or the budget leaves too little of the period for
                 the frames.
-            RuntimeError: The loop is not open, or an axis of the network is in a move.
+            RuntimeError: The loop is not open, an axis of the network is in a move, or a touch
+                probe is in use.
         """
         laws = self._network("a law", network).session.laws
         return laws.start(made_law(law), memory, parameters, budget, overruns)
@@ -403,8 +404,8 @@ class Loop:
         Raises:
             LawError: The law cannot be compiled, or failed: see `start`.
             ValueError: An argument is impossible.
-            RuntimeError: The loop is not open, an axis of the network is in a move, or a background
-                thread iterates the loop.
+            RuntimeError: The loop is not open, an axis of the network is in a move, a touch probe
+                is in use, or a background thread iterates the loop.
         """
         self._require_foreground()
         one = self._network("a law", network)
@@ -450,7 +451,8 @@ class Loop:
 
         Raises:
             ValueError: An argument is out of range, or `network` is missing.
-            RuntimeError: The loop is not open, or an axis of the network is in a move.
+            RuntimeError: The loop is not open, an axis of the network is in a move, or a touch
+                probe is in use.
         """
         return self._network("a stream", network).stream(capacity)
 
@@ -564,13 +566,14 @@ class Loop:
 
         Raises:
             ValueError: There is no such network, or there are several and `number` is None.
-            RuntimeError: The loop has never been entered, or an axis is in a move.
+            RuntimeError: The loop has never been entered, an axis is in a move, or a touch
+                probe is in use.
         """
         network = chosen_network(self._networks, what, number)
         if network.session.views.movers:
             raise RuntimeError(
-                f"{what} cannot start during a move: first call loop.wait(move), or move.stop() "
-                "and then loop.wait(move)"
+                f"{what} cannot start during a move or while a touch probe is in use: first call "
+                "loop.wait() with the move or the probe, or its stop() and then loop.wait()"
             )
         return network
 

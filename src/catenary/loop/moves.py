@@ -10,7 +10,7 @@ from catenary.errors import CatenaryError, MoveError
 
 
 class Awaited(Protocol):
-    """Move of some axes: `catenary.drive.move.Move`."""
+    """Move of some axes, or touch probe: `catenary.drive.Move` and `catenary.drive.Probe`."""
 
     @property
     def done(self) -> bool: ...
@@ -28,9 +28,12 @@ class Awaited(Protocol):
 
 
 def require_move(move: object) -> None:
-    """Raise TypeError for anything that is not a move."""
+    """Raise TypeError for anything that is neither a move nor a touch probe."""
     if not hasattr(move, "patience"):
-        raise TypeError(f"loop.wait() needs a move, for example from arm.move_to(), not {move!r}")
+        raise TypeError(
+            "loop.wait() needs a move or a touch probe, for example from arm.move_to() or "
+            f"arm.probe(), not {move!r}"
+        )
 
 
 def wait_for_move(cycles: Iterator[Cycle], move: Awaited, timeout: float | None) -> None:

@@ -186,13 +186,13 @@ def areas_of(
 
     Args:
         block: Block of the core.
-        name: Name of the field.
+        name: Name of the field, unless an area has its own.
         places: Fields of the block by name.
         areas: Areas of the block.
     """
     offset, code, _ = places["bytes"]
     for area in areas:
-        yield SinkField(name, block, offset, code, area.size), area.device
+        yield SinkField(area.field or name, block, offset, code, area.size), area.device
         offset += area.size
 
 

@@ -51,9 +51,8 @@ def confirm_safe(
         return
     units = {unit for unit, _ in places}
     missing = required = {unit for unit in units if not plan.sync_units[unit].optional}
-    turn = (
-        max(plan.sync_units[unit].divider for unit in units) + 2
-    )  # one exchange may be in progress
+    # One exchange may be in progress, and a law that ends has prepared the next one.
+    turn = max(plan.sync_units[unit].divider for unit in units) + 3
     for done in range(max(TIMEOUT_NS // plan.period_ns, EXCHANGES * turn)):
         if cycle() & (CYCLE_STOPPED | CYCLE_NONE):
             missing = required

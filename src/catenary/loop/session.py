@@ -45,17 +45,12 @@ from catenary.plan.request import ProcessDataRequest, Views
 from catenary.plan.sink import Sink
 from catenary.procedure.sercos_fault import reset_fault
 from catenary.wire.al import AlState
-from catenary.wire.cia402 import IN_FAULT, AxisState, Mode
+from catenary.wire.cia402 import IN_FAULT, POWERED, AxisState, Mode
 
 FATAL = CYCLE_WORKING_COUNTER | CYCLE_STOPPED | CYCLE_NONE
 ENABLE_TIMEOUT_NS = 5_000_000_000  # longer than slow mains contactors and brakes take
 ENABLE_CYCLES = 20  # shortest timeout [cycles], for long periods
 SETTLE_CYCLES = 50  # longest wait for the first cycle with all answers
-POWERED = (  # states in which a drive moves or brakes its axis
-    AxisState.OPERATION_ENABLED,
-    AxisState.QUICK_STOP_ACTIVE,
-    AxisState.FAULT_REACTION_ACTIVE,
-)
 REQUESTED_SHIFT = 6  # place of the requested state in `Views.axis_flags`
 STOP_SLICE_NS = 20_000_000  # between checks of `guard.hurry` while the drives brake
 
@@ -257,8 +252,8 @@ class Session:
             if self.engine.now() > deadline:
                 raise self.faults.drive_error(axes, "cannot be enabled")
 
-    def powered_axes(self, position: int) -> list[str]:
-        """Return the axes of a device that have power, or are requested to be enabled.
+    def powered_axes(self) -> list[str]:
+        """Return the axes that have power, or are requested to be enabled.
 
         A request counts before it is committed. The states are those of the last iteration.
         """
@@ -267,7 +262,7 @@ class Session:
         powered |= views.axis_flags >> REQUESTED_SHIFT == REQUEST_ENABLED
         powered |= views.jogged != 0
         axes = self.plan.cycle.axes
-        return [axes[i].name for i in np.flatnonzero(powered) if axes[i].device == position]
+        return [axes[i].name for i in np.flatnonzero(powered)]
 
     def refuse_powered_torque(self, call: str) -> None:
         """Raise LoopError if an axis is powered in CST, since `call` commits no torque."""

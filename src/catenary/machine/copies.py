@@ -6,7 +6,7 @@ from catenary.drive import Copies, Copy, FsoeConnection
 from catenary.errors import CatenaryError
 from catenary.machine.file import MachineFile
 from catenary.machine.references import COPY_DEVICES
-from catenary.machine.requests import Subs
+from catenary.machine.requests import Subs, devices_of
 from catenary.machine.schema import CopyTable, FsoeTable
 from catenary.toml_lines import KeyPath
 
@@ -28,8 +28,22 @@ def make_copies(file: MachineFile, subs: Subs) -> Copies | None:
                 made.append(_checked(file, (kind, number), _copy(table, subs)))
     if not made:
         return None
-    absent = [each.name for each in file.tables.device if not each.required]
-    return Copies(*made, optional=[subs[name] for name in absent if name in subs])
+    optional = {subs[name].position for name in _optional(file) if name in subs}
+    used = Copies(*made).subs
+    return Copies(*made, optional=[sub for sub in used if sub.position in optional])
+
+
+def _optional(file: MachineFile) -> set[str]:
+    """Return the devices with `required = false`, in their own table or in a role.
+
+    Another role of the device may still require it.
+    """
+    tables = file.tables
+    names = {device.name for device in tables.device if not device.required}
+    for role, drives in tables.drives.items():
+        if drives.required is False:
+            names.update(devices_of(file, "drives", role))
+    return names | {data.device for data in tables.process_data.values() if data.required is False}
 
 
 def _copy(table: CopyTable | FsoeTable, subs: Subs) -> Copy | FsoeConnection:

@@ -55,13 +55,13 @@ class TomlMachine:
         """Return the options of the file for a loop.
 
         Raises:
-            MachineFileError: There are neither drives nor process data with present devices.
+            MachineFileError: There are no drives, process data or copies with present devices.
             KeyError: The device of `clocks.reference` is absent.
         """
         if not (parts.drives or parts.process_data or parts.copies):
             raise self._file.error(
                 (),
-                "no drives or process data have all their devices present",
+                "no drives, process data or copies have all their devices present",
                 hint="connect the missing devices, or add a [drives.NAME] table: "
                 "docs/reference/machine_file.md",
             )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 
 from catenary.errors import ConfigurationError
 from catenary.model.module import ConfiguredModule
@@ -33,7 +34,7 @@ def gather_requests(
     gathered: dict[int, DeviceRequest] = {}
     for request in requests:
         for position, pdos in request.pdos(period_ns).items():
-            before = gathered.get(position, DeviceRequest(divider=pdos.divider, required=False))
+            before = gathered.get(position, DeviceRequest(divider=0, required=False))
             gathered[position] = DeviceRequest(
                 _merged(before.outputs, pdos.outputs),
                 _merged(before.inputs, pdos.inputs),
@@ -47,7 +48,10 @@ def gather_requests(
                 _one_telegram(position, before.telegrams, pdos.telegrams),
                 before.idns + tuple(each for each in pdos.idns if each not in before.idns),
             )
-    return gathered
+    return {
+        position: request if request.divider else replace(request, divider=1)
+        for position, request in gathered.items()
+    }
 
 
 def _one_clock(

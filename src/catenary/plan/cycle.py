@@ -77,6 +77,7 @@ class ImageArea:
     device: int  # position on the segment
     sync_unit: int
     safe: bytes = b""
+    field: str = ""  # name in the rows of a sink; empty: input_bytes or output_bytes
 
 
 @dataclass(frozen=True, slots=True)
@@ -248,7 +249,7 @@ class CyclePlan:
     input_columns: tuple[Column, ...] = ()
     output_areas: tuple[ImageArea, ...] = ()
     input_areas: tuple[ImageArea, ...] = ()
-    copies: tuple[ImageCopy, ...] = ()  # between devices, in every cycle
+    copies: tuple[ImageCopy, ...] = ()  # between devices
     lost_limit: int = 3  # consecutive bad cycles before WorkingCounterError
     # Time without fresh set-points (at least 3 cycles) before a quick stop; 0: never (not in CST)
     late_limit_position_ns: int = 50_000_000  # CSP

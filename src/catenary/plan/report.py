@@ -210,11 +210,11 @@ def _entries(direction: Direction, assignments: Sequence[Assignment], offset: in
 def _copies(cycle: CyclePlan) -> Iterator[str]:
     """Yield the copies between devices."""
     if cycle.copies:
-        yield "copies between devices, in every cycle"
+        yield "copies between devices"
     for copy in cycle.copies:
         whole = copy.bit_length % 8 == 0
-        size = f"{copy.bit_length // 8} bytes" if whole else f"{copy.bit_length} bits"
-        yield f"    {copy.name}, {size}"
+        count, noun = (copy.bit_length // 8, "byte") if whole else (copy.bit_length, "bit")
+        yield f"    {copy.name}, {count} {noun}{'s' if count > 1 else ''}"
 
 
 def _frames(cycle: CyclePlan) -> Iterator[str]:

@@ -134,14 +134,15 @@ class DeviceRequest:
 
     An existing mapping is only changed if a required object is missing or `pdos` requires it.
     Several requests may name one device. Its divider is then the greatest common divisor of their
-    dividers, and it is required if any of them requires it.
+    dividers, and it is required if any of them requires it. A divider of 0 leaves the choice to the
+    other requests. Without them, it is 1.
     """
 
     outputs: tuple[ObjectReference, ...] = ()  # MainDevice → device (RxPDO)
     inputs: tuple[ObjectReference, ...] = ()  # device → MainDevice (TxPDO)
     start_up: tuple[tuple[int, int, bytes], ...] = ()  # SDOs in PRE-OP: index, subindex, data
     clock: DistributedClock | None = None
-    divider: int = 1  # n: exchanged in every n-th cycle
+    divider: int = 1  # n: exchanged in every n-th cycle; 0: see above
     required: bool = True  # True if a cycle without it is bad
     pdos: tuple[WrittenPdo, ...] = ()  # PDOs to use in their directions, without a search
     objects: tuple[StartUp, ...] = ()  # start-up objects of the application, in their order

@@ -12,9 +12,10 @@ from itertools import count
 from typing import NamedTuple, TypeVar
 
 from catenary.errors import AdsError, DecodeError, MailboxError, ResponseTimeout
-from catenary.procedure.aoe_fragments import collect, send_message
+from catenary.procedure.aoe_fragments import collect, parts_of, send_message
 from catenary.procedure.exchange import Procedure
 from catenary.procedure.mailbox import MailboxChannel, exclusively
+from catenary.procedure.station import checked_timeout
 from catenary.wire import ads
 from catenary.wire.ads_error import ads_meaning
 from catenary.wire.ads_response import decode_data, decode_result
@@ -92,16 +93,15 @@ def request(
         AdsError: The device refuses the request.
         ResponseTimeout: The device does not answer.
         MailboxError: The device violates the protocol, or does not support AoE.
-        ValueError: The size or a field is out of range.
+        ValueError: The size, the timeout or a field is out of range.
     """
     if not 0 <= size <= MAX_SIZE:
         raise ValueError(f"AoE: {size} bytes; 0 to {MAX_SIZE} are possible")
     message = peer.message(request, port)
     if len(message.data) > MAX_SIZE + RESULT_SIZE:
         raise ValueError(f"AoE: {len(message.data)} bytes; at most {MAX_SIZE} are possible")
-    message.encode()  # a value that does not fit is the caller's mistake
     text = what or f"{request.command.name} at port {port}"
-    return exclusively(channel, _ask(channel, message, size + RESULT_SIZE, timeout, text))
+    return _ask(channel, message, size + RESULT_SIZE, timeout, text)
 
 
 def read(
@@ -140,7 +140,7 @@ def read(
 def _read(
     channel: MailboxChannel, exchange: Procedure[bytes], size: int, what: str
 ) -> Procedure[bytes]:
-    found = decoded(channel, decode_data, (yield from exchange))
+    found = yield from answered_as(channel, decode_data, exchange)
     if len(found) > size:
         raise MailboxError(
             f"{channel.station}: {what}: the device sent {len(found)} bytes",
@@ -175,8 +175,15 @@ def assign_net_id(channel: MailboxChannel, peer: AdsPeer) -> Procedure[None]:
     """
     address = channel.station.address
     message = peer.message(ads.Write(*NET_ID_PLACE, peer.net_id), address, address)
-    asked = _ask(channel, message, RESULT_SIZE, ANSWER_TIMEOUT, "assignment of the NetId")
-    return _discard(exclusively(channel, asked))
+    what = "assignment of the NetId"
+    return _discard(_ask(channel, message, RESULT_SIZE, ANSWER_TIMEOUT, what))
+
+
+def answered_as(
+    channel: MailboxChannel, decode: Callable[[bytes], T], asked: Procedure[bytes]
+) -> Procedure[T]:
+    """Run a request and return its decoded response. Raises MailboxError if it is invalid."""
+    return decoded(channel, decode, (yield from asked))
 
 
 def decoded(channel: MailboxChannel, decode: Callable[[bytes], T], data: bytes) -> T:
@@ -190,10 +197,24 @@ def decoded(channel: MailboxChannel, decode: Callable[[bytes], T], data: bytes) 
 def _ask(
     channel: MailboxChannel, message: Message, limit: int, timeout: float, what: str
 ) -> Procedure[bytes]:
+    """Return the procedure. A value that does not fit is an error before anything is sent."""
+    parts = parts_of(channel, message)
+    checked_timeout(timeout)
+    return exclusively(channel, _exchange(channel, message, parts, limit, timeout, what))
+
+
+def _exchange(
+    channel: MailboxChannel,
+    message: Message,
+    parts: list[bytes],
+    limit: int,
+    timeout: float,
+    what: str,
+) -> Procedure[bytes]:
     others: list[int] = []  # invoke IDs of other responses
     accept = _acceptor(channel, message, others)
     try:
-        answer = yield from send_message(channel, message, accept, timeout)
+        answer = yield from send_message(channel, parts, accept, timeout)
         if isinstance(answer, Fragment):
             answer = yield from collect(channel, answer, limit, timeout)
     except ResponseTimeout as error:

@@ -4,11 +4,14 @@ Fragments of a request carry the flag NO_RETURN, so that the device does not ack
 SSC writes through a null pointer when it acknowledges the last one (ecataoe.c,
 AOE_FragmentedCmdInd). The SSC also sends all fragments of a response without waiting. A fragment of
 a response is therefore acknowledged only if the device waits for it.
+
+The next fragment of a response may replace one whose frame was lost, before it can be repeated. The
+request then fails: it is not known here if it may be repeated.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 from catenary.errors import DecodeError, MailboxError, ResponseTimeout
 from catenary.procedure.exchange import Procedure
@@ -17,6 +20,7 @@ from catenary.procedure.mailbox import (
     RECOVERIES,
     MailboxChannel,
     converse,
+    drain,
     further,
     send_only,
 )
@@ -32,38 +36,49 @@ from catenary.wire.aoe import (
 )
 from catenary.wire.mailbox import HEADER_SIZE, Mailbox, Type
 
-PACKET = 1  # number of the fragments; only one message is outstanding
 
+def parts_of(channel: MailboxChannel, message: Message) -> list[bytes]:
+    """Return a request as mailbox data: one element, or its fragments if it exceeds the mailbox.
 
-def send_message(
-    channel: MailboxChannel,
-    message: Message,
-    accept: Callable[[Mailbox], AoeMessage | None],
-    timeout: float,
-) -> Procedure[AoeMessage]:
-    """Send a request, in fragments if it exceeds the mailbox, and return the start of the answer.
-
-    Args:
-        channel: The mailbox of the device.
-        message: The request.
-        accept: Function that accepts the answer.
-        timeout: Longest time until the device answers [s].
+    Each request has another packet number. The SSC refuses the first fragment of a request whose
+    number is that of an incomplete one (ecataoe.c, AOE_FragmentedCmdInd).
     """
     room = channel.layout.receive_size - HEADER_SIZE
     encoded = message.encode()
     if len(encoded) <= room:
-        whole: Procedure[AoeMessage] = converse(channel, Type.AOE, encoded, accept, timeout=timeout)
-        return (yield from whole)
-    *parts, last = fragments(message, room, PACKET)
-    for part in parts:
-        sent = yield from send_only(channel, Type.AOE, part.encode(), attempts=RECOVERIES)
-        if not sent:
+        return [encoded]
+    return [part.encode() for part in fragments(message, room, message.invoke_id & 0xFFFF)]
+
+
+def send_message(
+    channel: MailboxChannel,
+    parts: Sequence[bytes],
+    accept: Callable[[Mailbox], AoeMessage | None],
+    timeout: float,
+) -> Procedure[AoeMessage]:
+    """Send a request and return its answer, or the first fragment of its answer.
+
+    A device may answer before it has received all fragments, for example with an error. It may also
+    send notifications meanwhile, and stop reading while its mailbox is full.
+
+    Args:
+        channel: The mailbox of the device.
+        parts: The request, from `parts_of`.
+        accept: Function that accepts the answer.
+        timeout: Longest time until the device answers [s].
+    """
+    *others, last = parts
+    for number, part in enumerate(others):
+        if not (yield from send_only(channel, Type.AOE, part, attempts=RECOVERIES)):
             raise ResponseTimeout(
-                f"{channel.station}: {RECOVERIES} frames with fragment {part.number} of an AoE "
-                "request were lost",
+                f"{channel.station}: {RECOVERIES} frames with fragment {number} of an AoE request "
+                "were lost",
                 hint="check the cables: the error counters at 0x0300 show which one is faulty",
             )
-    end: Procedure[AoeMessage] = converse(channel, Type.AOE, last.encode(), accept, timeout=timeout)
+        arrived: Procedure[list[AoeMessage]] = drain(channel, accept)
+        if early := (yield from arrived):
+            return early[0]
+    end: Procedure[AoeMessage] = converse(channel, Type.AOE, last, accept, timeout=timeout)
     return (yield from end)
 
 
@@ -106,9 +121,9 @@ def _next(channel: MailboxChannel, before: Fragment, timeout: float) -> Procedur
     """Return the fragment after `before`. Acknowledge that one if the device waits for this."""
     accept = _acceptor(channel, before)
     if before.flags & Flag.NO_RETURN:
-        return (yield from further(channel, accept, timeout=timeout))
+        return (yield from further(channel, accept, timeout=timeout, kind=Type.AOE))
     try:
-        return (yield from further(channel, accept, timeout=GRACE))
+        return (yield from further(channel, accept, timeout=GRACE, kind=Type.AOE))
     except ResponseTimeout:
         acknowledgement = before.acknowledge().encode()
         return (yield from converse(channel, Type.AOE, acknowledgement, accept, timeout=timeout))

@@ -6,7 +6,7 @@ from collections.abc import Sized
 
 from catenary.procedure.exchange import Procedure, after, read
 from catenary.procedure.mailbox import IN, MailboxChannel, drain, exclusively
-from catenary.procedure.station import Deadline, answered
+from catenary.procedure.station import Deadline, answered, checked_timeout
 from catenary.wire.datagram import EcatCommand
 from catenary.wire.register import sync_manager_status
 from catenary.wire.sync_manager import Status
@@ -15,7 +15,7 @@ POLL = 2e-3  # [s] between two checks for a message
 
 
 def await_delivery(channel: MailboxChannel, queue: Sized, timeout: float) -> Procedure[None]:
-    """Read the mailbox until a queue has an entry, or until the timeout.
+    """Return the procedure that reads the mailbox until a queue has an entry, or until the timeout.
 
     Args:
         channel: The mailbox of the device.
@@ -24,7 +24,12 @@ def await_delivery(channel: MailboxChannel, queue: Sized, timeout: float) -> Pro
 
     Raises:
         MailboxError: A message is invalid or a mailbox error.
+        ValueError: The timeout is negative or infinite.
     """
+    return _await(channel, queue, checked_timeout(timeout))
+
+
+def _await(channel: MailboxChannel, queue: Sized, timeout: float) -> Procedure[None]:
     deadline, register = Deadline(timeout), sync_manager_status(IN)
     while not queue:
         [reply] = yield [read(EcatCommand.FPRD, channel.station.address, register)]

@@ -2,28 +2,48 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 from catenary.errors import ConfigurationError
 from catenary.procedure.exchange import Procedure
 from catenary.procedure.registers import read_register, write_register
 from catenary.procedure.station import Station
 from catenary.wire.clock import CyclicUnit
 from catenary.wire.latch import (
-    BLOCK,
-    BLOCK_SIZE,
+    TIMES_SIZE,
     LatchControl,
-    Latched,
-    decode_latched,
+    LatchStatus,
+    decode_times,
 )
-from catenary.wire.register import CYCLIC_UNIT_CONTROL, LATCH0_CONTROL, LATCH1_CONTROL
+from catenary.wire.register import (
+    CYCLIC_UNIT_CONTROL,
+    LATCH0_CONTROL,
+    LATCH0_STATUS,
+    LATCH0_TIME_POSITIVE,
+    LATCH1_CONTROL,
+    LATCH1_STATUS,
+    LATCH1_TIME_POSITIVE,
+)
 
 CONTROLS = (LATCH0_CONTROL, LATCH1_CONTROL)
+STATUSES = (LATCH0_STATUS, LATCH1_STATUS)
+TIMES = (LATCH0_TIME_POSITIVE, LATCH1_TIME_POSITIVE)  # the first register of each input
 OF_PDI = (CyclicUnit.LATCH0_BY_PDI, CyclicUnit.LATCH1_BY_PDI)
+
+
+@dataclass(frozen=True, slots=True)
+class Latched:
+    """Level of a latch input, and the times of its last edges [ns]."""
+
+    active: bool
+    rising_ns: int
+    falling_ns: int
 
 
 def set_up(
     station: Station, number: int, control: LatchControl, clock_bits: int
 ) -> Procedure[Latched]:
-    """Set the mode of a latch input, and return its status and times before.
+    """Set the mode of a latch input, and return its level and times before.
 
     Reading the times acknowledges old events.
 
@@ -55,7 +75,9 @@ def set_up(
 
 
 def read(station: Station, number: int, clock_bits: int) -> Procedure[Latched]:
-    """Read and acknowledge the events of a latch input.
+    """Read the level and the times of a latch input. This acknowledges its events.
+
+    The other input is not read, because that would acknowledge its events too.
 
     Args:
         station: The device.
@@ -63,7 +85,9 @@ def read(station: Station, number: int, clock_bits: int) -> Procedure[Latched]:
         clock_bits: Width of the clock of the device.
 
     Raises:
-        RegisterError: The device refuses the access.
+        RegisterError: The device refuses an access.
     """
-    data = yield from read_register(station, BLOCK, BLOCK_SIZE)
-    return decode_latched(data, number, clock_bits)
+    [status] = yield from read_register(station, STATUSES[number].address, 1)
+    data = yield from read_register(station, TIMES[number].address, TIMES_SIZE)
+    rising, falling = decode_times(data, clock_bits)
+    return Latched(bool(status & LatchStatus.PIN), rising, falling)

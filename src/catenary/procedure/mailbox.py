@@ -297,6 +297,7 @@ def _post(channel: MailboxChannel, message: bytes) -> Procedure[tuple[bool, bool
         request = write_memory(station, layout.receive_offset, message, repeatable=False)
         seen, reply = yield [check, request]
         if reply.lost:
+            channel.lost_writes += 1
             return False, False
         if reply.working_counter:
             answered(reply, channel.station, "mailbox write")

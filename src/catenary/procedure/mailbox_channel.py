@@ -52,6 +52,7 @@ class MailboxChannel:
     subscribers: dict[Type, Subscriber] = field(default_factory=dict)
     dropped: int = 0  # unexpected messages and duplicates
     lost_reads: int = 0  # lost frames that read the mailbox; each may have lost a message
+    lost_writes: int = 0  # lost frames that wrote the mailbox; each message may have arrived
     # Active and waiting procedures; the first one uses the mailbox.
     turns: deque[object] = field(default_factory=deque)
     posted_ns: int | None = None  # time of the last request, until its answer arrives
@@ -60,6 +61,7 @@ class MailboxChannel:
     unsure_ns: int | None = None  # time of a lost frame that may have emptied the mailbox
     owed: bool = False  # an answer may still arrive: a request is pending or has timed out
     undescribed: int = 0  # number of missing or malformed SDO information answers in a row
+    resets: int = 0  # number of times that the SyncManagers were configured again
     emptied: bool = False  # configured again since the request, so no answer will arrive
 
     def reset(self) -> None:
@@ -68,6 +70,7 @@ class MailboxChannel:
         self.received = None
         self.counts = self.owed = False
         self.unsure_ns = None
+        self.resets += 1
         self.emptied = True
 
     def accept(self, message: Mailbox) -> bool:

@@ -28,7 +28,8 @@ class Outgoing:
 
     kind: Type
     data: bytes
-    encoded: bytes | None = None  # with its counter, from the first attempt on
+    encoded: bytes = b""  # with its counter, from the first attempt on
+    counter: int = 0
     losses: int = 0
     deadline: Deadline | None = None
 
@@ -75,10 +76,12 @@ def swap(
     if eager:
         requests.append(box.read_request(channel))
     replies = yield requests
+    seen, read_eagerly = replies[0], eager and bool(replies[-1].lost or replies[-1].working_counter)
+    # The read comes first: an error of the write must not hide a lost read.
+    received = read_eagerly and _take_eager(channel, replies[-1])
     sent = outgoing is not None and _note_sent(channel, outgoing, replies[1])
-    seen = replies[0]
-    if eager and (replies[-1].lost or replies[-1].working_counter):
-        return Swapped(sent, _take_eager(channel, replies[-1]))
+    if read_eagerly:
+        return Swapped(sent, received)
     full = not seen.lost and bool(
         answered(seen, station, "mailbox status")[0] & Status.MAILBOX_FULL
     )
@@ -88,13 +91,22 @@ def swap(
 
 
 def _encoded(channel: MailboxChannel, outgoing: Outgoing) -> bytes:
-    """Return the bytes of a message. A repetition has the same counter."""
-    if outgoing.encoded is None:
-        channel.counter = next_counter(channel.counter)
+    """Return the bytes of a message. A repetition has the same counter.
+
+    If another procedure has used the mailbox since the last attempt, the message gets a new counter
+    and a new deadline. The device compares counters only with that of the previous message.
+    """
+    if not outgoing.encoded or outgoing.counter != channel.counter:
+        channel.counter = outgoing.counter = next_counter(channel.counter)
         message = Mailbox(outgoing.kind, outgoing.data, channel.counter)
         outgoing.encoded = message.encode(channel.layout.receive_size)
-        outgoing.deadline = Deadline(box.WRITE_TIMEOUT)
+        outgoing.deadline = Deadline(_patience(channel))
     return outgoing.encoded
+
+
+def _patience(channel: MailboxChannel) -> float:
+    """Return the time in which the device has to read its mailbox [s]."""
+    return max(box.WRITE_TIMEOUT, channel.station.timeouts.mailbox_request or 0.0)
 
 
 def _note_sent(channel: MailboxChannel, outgoing: Outgoing, reply: Reply) -> bool:
@@ -106,7 +118,7 @@ def _note_sent(channel: MailboxChannel, outgoing: Outgoing, reply: Reply) -> boo
         return True
     if outgoing.deadline is not None and outgoing.deadline.passed(reply):
         raise MailboxError(
-            f"{channel.station} has not read its mailbox for {box.WRITE_TIMEOUT:g} s",
+            f"{channel.station} has not read its mailbox for {_patience(channel):g} s",
             hint="its application hangs, or its mailbox is disabled: bring it to PRE-OP again",
         )
     return False

@@ -15,6 +15,7 @@ from catenary.plan.start_up import DevicePlan, renewed
 from catenary.procedure.al_state import request_state
 from catenary.procedure.configure import configure_mailbox, configure_process_data
 from catenary.procedure.exchange import Procedure, Request, read, write, write_memory
+from catenary.procedure.idn_commands import PRE_OP_STEPS, SAFE_OP_STEPS, run_idn_commands
 from catenary.procedure.mailbox import MailboxChannel
 from catenary.procedure.modules import prepare_modules
 from catenary.procedure.pdo import read_mapping, verify_mapping, write_downloads, write_in_safe_op
@@ -23,7 +24,6 @@ from catenary.procedure.sii import read_identity
 from catenary.procedure.sii_owner import hand_over
 from catenary.procedure.station import Station, answered
 from catenary.procedure.stations import FMMU_BLOCK, SYNC_MANAGER_BLOCK
-from catenary.procedure.telegrams import PRE_OP_STEPS, SAFE_OP_STEPS, run_idn_commands
 from catenary.procedure.telegrams import restore as restore_telegrams
 from catenary.wire.al import AlState
 from catenary.wire.datagram import EcatCommand

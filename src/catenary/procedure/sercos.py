@@ -209,31 +209,48 @@ def run_command(target: Target, timeout: float = COMMAND_TIMEOUT) -> Procedure[N
         ResponseTimeout: The command does not end, or the device does not answer.
         MailboxError: The device violates the protocol.
     """
-    yield from write(target, int(START).to_bytes(_STATE, "little"))
-    deadline, pace = Deadline(timeout), Pace(COMMAND_PAUSE, COMMAND_PAUSE_MAX)
     try:
-        while True:
-            data = yield from read(target, Element.STATE)
-            state = _checked_state(target, data)
-            if CommandState.FAILED in state:
-                raise _failed(target, state)
-            if CommandState.SET in state and CommandState.PENDING not in state:
-                break
-            if deadline.passed_at(target.channel.received_ns):
-                raise _stuck(target, state, timeout)
-            yield after(pace.pause())
-    except (SoeError, ResponseTimeout):
+        yield from write(target, int(START).to_bytes(_STATE, "little"))
+    except (ResponseTimeout, MailboxError):
+        yield from _cancel(target)  # it may have started
+        raise
+    try:
+        state = yield from _await_end(target, Deadline(timeout))
+    except (SoeError, ResponseTimeout, MailboxError):
         yield from _cancel(target)
         raise
+    if not _has_ended(state):
+        cancelled = yield from _cancel(target)
+        raise _stuck(target, state, timeout, cancelled)
+    if CommandState.FAILED in state:
+        yield from _cancel(target)
+        raise _failed(target, state)
     yield from write(target, bytes(_STATE))
 
 
-def _cancel(target: Target) -> Procedure[None]:
-    """Cancel a command after an error. A refusal is ignored: the first error is more useful."""
+def _await_end(target: Target, deadline: Deadline) -> Procedure[CommandState]:
+    """Return the state of a command at its end, or at the deadline."""
+    pace = Pace(COMMAND_PAUSE, COMMAND_PAUSE_MAX)
+    while True:
+        data = yield from read(target, Element.STATE)
+        state = _checked_state(target, data)
+        if _has_ended(state) or deadline.passed_at(target.channel.received_ns):
+            return state
+        yield after(pace.pause())
+
+
+def _has_ended(state: CommandState) -> bool:
+    done = CommandState.SET in state and CommandState.PENDING not in state
+    return done or CommandState.FAILED in state
+
+
+def _cancel(target: Target) -> Procedure[bool]:
+    """Clear a command after an error. Return False if the drive refuses: the first error counts."""
     try:
         yield from write(target, bytes(_STATE))
     except (SoeError, ResponseTimeout, MailboxError):
-        return
+        return False
+    return True
 
 
 def _checked_state(target: Target, data: bytes) -> CommandState:
@@ -255,9 +272,10 @@ def _failed(target: Target, state: CommandState) -> SoeError:
     )
 
 
-def _stuck(target: Target, state: CommandState, timeout: float) -> ResponseTimeout:
+def _stuck(target: Target, state: CommandState, timeout: float, cancelled: bool) -> ResponseTimeout:
+    end = "it was cancelled" if cancelled else "it could not be cancelled, and may still run"
     return ResponseTimeout(
         f"{target}: the procedure command has not ended after {timeout:g} s "
-        f"(state 0x{int(state):04X}); it was cancelled",
+        f"(state 0x{int(state):04X}); {end}",
         hint="allow more time if the command needs it; S-0-0095 describes the state of the drive",
     )

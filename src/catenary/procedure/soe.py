@@ -2,17 +2,21 @@
 
 Where the standard is silent:
 
-- A message with another drive or IDN is not the answer, as in IgH (fsm_soe.c).
+- A message with another drive, other elements or another IDN is not the answer. It may be a late
+  answer to an earlier request.
 - The number of fragments left decreases by one from fragment to fragment. A constant number is
   accepted, because SOEM (ec_soe.c) and IgH do not read it. Any other number ends the transfer.
 - A fragment with the number of the last one is also accepted, so that lost frames are counted
   instead: after one, the request is repeated. SOEM and IgH do not notice a lost fragment.
-- After each fragment that this side writes, a refusal may arrive. SOEM also looks for one.
+- After a lost frame of a write in fragments, all fragments are written again. A device that does
+  not recognise a repetition would otherwise store a fragment twice.
+- After each fragment that this side writes, a refusal may arrive, as in SOEM. It has the IDN, or
+  the number of the fragment.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -36,7 +40,7 @@ from catenary.wire.soe import HEADER_SIZE, Element, Message, OpCode, decode_soe
 ANSWER_TIMEOUT = 5.0  # [s] for each message: drives write parameters to flash memory
 TRANSFER_TIMEOUT = 60.0  # [s] for all fragments of one answer
 SIZE_MAX = 1 << 18  # [bytes] of an answer: eight elements, of which four may be lists of 64 KiB
-RECOVERIES = 5  # requests of one answer while frames are lost
+RECOVERIES = 5  # attempts to transfer fragments while frames are lost
 LAST_ATTEMPTS = 5  # to send a fragment if its frame is lost
 OVERHEAD = mailbox.HEADER_SIZE + HEADER_SIZE
 
@@ -105,10 +109,7 @@ def _read(target: Target, request: Message) -> Procedure[bytes]:
         if not answer.in_fragments or channel.lost_reads == lost:
             break
     else:
-        raise ResponseTimeout(
-            f"{target}: frames with fragments were lost in {RECOVERIES} attempts",
-            hint="check the cables: the error counters at 0x0300 show which one is faulty",
-        )
+        raise _line_fault(target)
     if answer.fault:
         raise _violation(target, answer.fault)
     return answer.data
@@ -144,26 +145,58 @@ def _read_once(target: Target, request: Message) -> Procedure[_Answer]:
 
 
 def _write(target: Target, request: Message, data: bytes) -> Procedure[None]:
-    channel, accept = target.channel, _acceptor(target, request, OpCode.WRITE_RESPONSE)
+    """Write data. Write all fragments again if a frame was lost."""
+    channel = target.channel
     capacity = channel.layout.receive_size - OVERHEAD
     parts = [data[at : at + capacity] for at in range(0, len(data), capacity)] or [b""]
-    for left, part in zip(range(len(parts) - 1, 0, -1), parts, strict=False):
+    for _ in range(RECOVERIES):
+        lost = channel.lost_writes
+        try:
+            yield from _write_once(target, request, parts)
+        except SoeError:
+            if len(parts) == 1 or channel.lost_writes == lost:
+                raise
+            continue  # because of a fragment that the device received twice
+        if len(parts) == 1 or channel.lost_writes == lost:
+            return
+    raise _line_fault(target)
+
+
+def _write_once(target: Target, request: Message, parts: Sequence[bytes]) -> Procedure[None]:
+    channel, last = target.channel, len(parts) - 1
+    for k, part in enumerate(parts[:-1]):
+        left = last - k
         fragment = replace(request, data=part, number=left, incomplete=True)
-        yield from send_only(channel, Type.SOE, fragment.encode(), attempts=LAST_ATTEMPTS)
-        early = yield from drain(channel, accept)
+        sent = yield from send_only(channel, Type.SOE, fragment.encode(), attempts=LAST_ATTEMPTS)
+        if not sent:
+            raise _line_fault(target)
+        early = yield from drain(channel, _acceptor(target, request, OpCode.WRITE_RESPONSE, left))
         if early:
             raise _violation(target, "answered before it had received all fragments")
-    last = replace(request, data=parts[-1])
-    talk: Procedure[Message] = converse(
-        channel, Type.SOE, last.encode(), accept, timeout=target.timeout
-    )
+    accept = _acceptor(target, request, OpCode.WRITE_RESPONSE)
+    final = replace(request, data=parts[-1]).encode()
+    talk: Procedure[Message] = converse(channel, Type.SOE, final, accept, timeout=target.timeout)
     yield from talk
 
 
+def _line_fault(target: Target) -> ResponseTimeout:
+    return ResponseTimeout(
+        f"{target}: frames with fragments were lost in {RECOVERIES} attempts",
+        hint="check the cables: the error counters at 0x0300 show which one is faulty",
+    )
+
+
 def _acceptor(
-    target: Target, request: Message, expected: OpCode
+    target: Target, request: Message, expected: OpCode, fragment: int | None = None
 ) -> Callable[[Mailbox], Message | None]:
-    """Return the function that accepts the answer to a request, and raises its refusal."""
+    """Return the function that accepts the answer to a request, and raises its refusal.
+
+    Args:
+        target: The IDN.
+        request: The request.
+        expected: Service of the answer.
+        fragment: Number of the last written fragment, which a refusal may have; None: the last one.
+    """
 
     def accept(received: Mailbox) -> Message | None:
         if received.type is not Type.SOE:
@@ -174,16 +207,13 @@ def _acceptor(
             raise _violation(target, f"sent an invalid SoE message: {error.message}") from error
         if message.op_code is not expected or message.drive != target.drive:
             return None
-        if not message.incomplete and message.number != target.idn:
+        refuses_fragment = message.error and message.number == fragment
+        if not (message.incomplete or refuses_fragment or message.number == target.idn):
             return None
         if message.error:
             raise _refused(target, message, request)
         if message.elements != request.elements and expected is OpCode.READ_RESPONSE:
-            raise _violation(
-                target,
-                f"answered with the elements 0x{message.elements:02X} instead of "
-                f"0x{request.elements:02X}",
-            )
+            return None
         return message
 
     return accept

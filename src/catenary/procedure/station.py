@@ -61,6 +61,13 @@ def answered(reply: Reply, station: Station, what: str) -> bytes:
     return reply.data
 
 
+def checked_timeout(seconds: float) -> float:
+    """Return a timeout [s]. Raises ValueError unless it is 0 or more, and finite."""
+    if not 0 <= seconds < float("inf"):
+        raise ValueError(f"timeout must be 0 or more and finite, not {seconds} s")
+    return seconds
+
+
 class Deadline:
     """A deadline [s], measured with the time stamps of replies. It starts at the first reply.
 

@@ -12,7 +12,6 @@ from dataclasses import replace
 
 from catenary.errors import CatenaryError, MailboxError, MappingError, SoeError
 from catenary.model.device import DeviceDescription
-from catenary.model.esi_settings import IdnCommand
 from catenary.model.sercos_axis import (
     AT_LIST,
     CONFIGURABLE,
@@ -26,13 +25,13 @@ from catenary.model.sercos_axis import (
 )
 from catenary.model.telegram_data import with_process_data
 from catenary.procedure.exchange import Procedure
+from catenary.procedure.idn_commands import PRE_OP_STEPS, run_idn_commands
 from catenary.procedure.mailbox import MailboxChannel
 from catenary.procedure.sercos import read_parameter, read_value, write_value
-from catenary.procedure.soe import Target, write
+from catenary.procedure.soe import Target
 from catenary.wire.sercos import Attribute, idn_number, idn_text
 from catenary.wire.soe import DRIVES, Element
 
-PRE_OP_STEPS, SAFE_OP_STEPS = ("IP", "PS"), ("SO",)  # the mailbox is not available in INIT
 ENTRIES_MAX = 64  # IDNs in a telegram; SOEM accepts as many (EC_SOE_MAXMAPPING)
 WORD = Attribute(2)
 # Telegram types 0 to 6 of S-0-0015: IDNs of MDT and AT
@@ -74,36 +73,6 @@ def write_telegrams(channel: MailboxChannel, device: DeviceDescription) -> Proce
     own = (TELEGRAM_TYPE, MDT_LIST, AT_LIST)
     chosen = [each for each in device.idn_commands if each.number in own]
     yield from run_idn_commands(channel, chosen, PRE_OP_STEPS)
-
-
-def run_idn_commands(
-    channel: MailboxChannel, commands: Sequence[IdnCommand], steps: Sequence[str]
-) -> Procedure[None]:
-    """Write the IDNs of transitions, in their order.
-
-    Args:
-        channel: The mailbox of the device.
-        commands: Commands of all transitions.
-        steps: The transitions, such as "IP" and "PS".
-
-    Raises:
-        SoeError: The drive refuses one. The message names file and line of the command.
-    """
-    for each in commands:
-        if not set(steps).intersection(each.transitions):
-            continue
-        target = Target(channel, each.number, each.drive)
-        try:
-            yield from write(target, each.data, Element(each.element))
-        except SoeError as error:
-            raise SoeError(
-                f"{error.message} (start-up command of {each.source} {each.comment})".rstrip(),
-                position=error.position,
-                idn=error.idn,
-                drive=error.drive,
-                code=error.code,
-                hint=error.hint,
-            ) from error
 
 
 def configure(
@@ -150,10 +119,14 @@ def restore(channel: MailboxChannel, device: DeviceDescription) -> Procedure[Non
     present = yield from read_axes(channel, scaling=False)
     lists = {each.drive: (each.outputs, each.inputs) for each in present}
     for axis in device.sercos_axes:
-        if lists.get(axis.drive) != (axis.outputs, axis.inputs) and axis.is_configurable:
+        if lists.get(axis.drive) == (axis.outputs, axis.inputs):
+            continue
+        if axis.is_configurable:
             mdt = [each.number for each in axis.outputs[1:]]
             at = [each.number for each in axis.inputs[1:]]
             yield from configure(channel, device, axis.drive, mdt, at)
+        elif axis.telegram_type is not None:
+            yield from write_value(Target(channel, TELEGRAM_TYPE, axis.drive), axis.telegram_type)
     yield from check_unchanged(channel, device)
 
 

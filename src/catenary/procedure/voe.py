@@ -15,6 +15,7 @@ from catenary.procedure.mailbox import (
     exclusively,
     send_only,
 )
+from catenary.procedure.station import checked_timeout
 from catenary.wire.mailbox import HEADER_SIZE, Mailbox, Type
 from catenary.wire.voe import HEADER_SIZE as VOE_HEADER_SIZE
 from catenary.wire.voe import VoeMessage, decode_voe
@@ -35,9 +36,10 @@ def exchange(
     Raises:
         ResponseTimeout: The device does not answer.
         MailboxError: The device violates the protocol, or does not support VoE.
-        ValueError: The message does not fit into the mailbox.
+        ValueError: The message does not fit into the mailbox, or the timeout is invalid.
     """
     data = _checked(channel, message)
+    checked_timeout(timeout)
 
     def accept(received: Mailbox) -> VoeMessage | None:
         return _decoded(channel, received) if received.type is Type.VOE else None

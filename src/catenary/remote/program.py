@@ -19,14 +19,9 @@ from catenary.procedure.exchange import Procedure
 from catenary.procedure.mailbox import MailboxChannel
 from catenary.share.events import SharedEvent
 from catenary.share.share import Share
-from catenary.wire.cia402 import AxisState
+from catenary.wire.cia402 import POWERED
 
 T = TypeVar("T")
-POWERED = (  # states in which a drive moves or brakes its axis
-    AxisState.OPERATION_ENABLED,
-    AxisState.QUICK_STOP_ACTIVE,
-    AxisState.FAULT_REACTION_ACTIVE,
-)
 WAITING = True
 # A method yields None where it may be cut, and WAITING until something outside of it has happened.
 Work: TypeAlias = Generator[bool | None, None, T]

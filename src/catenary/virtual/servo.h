@@ -119,7 +119,7 @@ typedef struct servo_axis {
     servo_probe probes[PROBES];
     probe_quirks probe_quirks;
     double probed;                                    /* position at the last step [rad] */
-    int64_t probed_at;                                /* system time of the last step [ns] */
+    int64_t probed_at;                                /* time of the segment at the last step [ns] */
 } servo_axis;
 
 static const uint16_t statuswords[] = {

@@ -72,8 +72,9 @@ static void probes_command(servo_axis *a, int64_t *slots) {
     }
 }
 
-/* Store an edge of a source in each enabled probe that waits for it. */
-static void probe_edge(servo_axis *a, int64_t *slots, int source, int falling, double position, int64_t time) {
+/* Store an edge of a source in each enabled probe that waits for it. `when`: time of the segment. */
+static void probe_edge(const controller *c, servo_axis *a, int64_t *slots, int source, int falling, double position,
+                       int64_t when) {
     for (int n = 0; n < PROBES; n++) {
         int function = probe_function(slots, n), status = probe_status(slots, n);
         if (!(status & PROBE_ENABLED) || probe_source(slots, n) != source
@@ -83,7 +84,7 @@ static void probe_edge(servo_axis *a, int64_t *slots, int source, int falling, d
             continue;
         int value = 2 * n + falling;
         slots[SLOT_PROBE_POSITIONS + value] = wrap32(llrint(position * a->counts_per_radian) - a->zero);
-        slots[SLOT_PROBE_TIMES + value] = time & 0xFFFFFFFF;
+        slots[SLOT_PROBE_TIMES + value] = dc_system_time(c, when) & 0xFFFFFFFF;
         slots[SLOT_PROBE_COUNTERS + value] = (slots[SLOT_PROBE_COUNTERS + value] + 1) & 0xFFFF;
         status |= PROBE_STORED << falling;
         if (a->probe_quirks.toggles && (function & PROBE_CONTINUOUS))
@@ -104,7 +105,7 @@ static inline int probe_level(const servo_axis *a, int input) {
 /* Motion of the axis since the last step. */
 typedef struct probe_path {
     double before, after;             /* rad */
-    int64_t began, ended;             /* system time [ns] */
+    int64_t began, ended;             /* time of the segment [ns] */
 } probe_path;
 
 static inline int probe_passes(const probe_path *m, double at) {
@@ -112,35 +113,36 @@ static inline int probe_passes(const probe_path *m, double at) {
 }
 
 static inline int64_t probe_time(const probe_path *m, double at) {
-    double share = (at - m->before) / (m->after - m->before);
-    return m->began + llrint(share * (double)(m->ended - m->began));
+    double fraction = (at - m->before) / (m->after - m->before);
+    return m->began + llrint(fraction * (double)(m->ended - m->began));
 }
 
-static void probe_passed(servo_axis *a, int64_t *slots, const probe_path *m, int source, int falling, double at) {
+static void probe_passed(const controller *c, servo_axis *a, int64_t *slots, const probe_path *m, int source,
+                         int falling, double at) {
     if (probe_passes(m, at))
-        probe_edge(a, slots, source, falling, at, probe_time(m, at));
+        probe_edge(c, a, slots, source, falling, at, probe_time(m, at));
 }
 
-static void probe_switch_passed(servo_axis *a, int64_t *slots, const probe_path *m, int input) {
+static void probe_switch_passed(const controller *c, servo_axis *a, int64_t *slots, const probe_path *m, int input) {
     const servo_probe *p = &a->probes[input];
     int forward = m->after > m->before;
     if (p->wire || !(p->from < p->to))
         return;
-    probe_passed(a, slots, m, input, 0, forward ? p->from : p->to);
-    probe_passed(a, slots, m, input, 1, forward ? p->to : p->from);
+    probe_passed(c, a, slots, m, input, 0, forward ? p->from : p->to);
+    probe_passed(c, a, slots, m, input, 1, forward ? p->to : p->from);
 }
 
 /* Handle all edges on the way from the last step to this one. */
 static void probes_step(const controller *c, servo_axis *a, int64_t *slots) {
-    probe_path m = {a->probed, a->position, a->probed_at, dc_system_time(c, c->segment->now)};
+    probe_path m = {a->probed, a->position, a->probed_at, c->segment->now};
     a->probed_at = m.ended;
     a->probed = m.after;
     if (slots[SLOT_PROBE_STATUS] == 0 || m.before == m.after)
         return;
     for (int input = 0; input < PROBES; input++)
-        probe_switch_passed(a, slots, &m, input);
+        probe_switch_passed(c, a, slots, &m, input);
     double turn = PROBE_TURN * floor((m.after > m.before ? m.after : m.before) / PROBE_TURN);
-    probe_passed(a, slots, &m, PROBE_INDEX, 0, turn);
+    probe_passed(c, a, slots, &m, PROBE_INDEX, 0, turn);
 }
 
 /* Change the wire of an input now. The position is extrapolated from the last step. */
@@ -150,9 +152,9 @@ static void probe_wire(const controller *c, servo_axis *a, int64_t *slots, int i
     int after = probe_level(a, input);
     if (before == after)
         return;
-    int64_t now = dc_system_time(c, c->segment->now);
+    int64_t now = c->segment->now;
     double elapsed = a->joint == NULL ? (double)(now - a->probed_at) * 1e-9 : 0;
-    probe_edge(a, slots, input, before, a->position + a->velocity * elapsed, now);
+    probe_edge(c, a, slots, input, before, a->position + a->velocity * elapsed, now);
 }
 
 #endif

@@ -132,7 +132,9 @@ def encode_notification(samples: tuple[Sample, ...]) -> bytes:
 
 def decode_notification(data: bytes) -> tuple[Sample, ...]:
     """Decode the data of a notification. Raises DecodeError if a length exceeds the data."""
-    _length, stamps = unpack(_STAMPS, data)
+    length, stamps = unpack(_STAMPS, data)
+    if 4 + length > len(data):
+        raise DecodeError(f"ADS: a notification of {4 + length} bytes, {len(data)} received")
     found: list[Sample] = []
     place = _STAMPS.size
     for _ in range(_bounded(stamps)):

@@ -22,6 +22,7 @@ from catenary.errors import DecodeError
 HEADER_SIZE = 32
 ADDRESSES_SIZE = 16  # of the target and the source
 REST_SIZE = HEADER_SIZE - ADDRESSES_SIZE
+FRAGMENTS_MAX = 1 << 16  # their numbers have 16 bits
 _HEADER = struct.Struct("<6sH6sHHHIII")
 _REST = struct.Struct("<HHIII")  # of the header after the addresses
 
@@ -207,6 +208,8 @@ def fragments(message: Message, size: int, packet: int) -> Iterator[Fragment]:
     rest, room = message.encode()[ADDRESSES_SIZE:], size - HEADER_SIZE
     if room < REST_SIZE:
         raise ValueError(f"AoE: a mailbox with {size} bytes of data is too small for fragments")
+    if len(rest) > room * FRAGMENTS_MAX:
+        raise ValueError(f"AoE: {len(rest)} bytes do not fit into {FRAGMENTS_MAX} fragments")
     for number, start in enumerate(range(0, len(rest), room)):
         part = rest[start : start + room]
         yield Fragment(message.target, message.source, packet, number, part)

@@ -36,6 +36,11 @@ STATE_CODING = {
 
 
 IN_FAULT = (AxisState.FAULT_REACTION_ACTIVE, AxisState.FAULT)
+POWERED = (  # states in which a drive moves or brakes its axis
+    AxisState.OPERATION_ENABLED,
+    AxisState.QUICK_STOP_ACTIVE,
+    AxisState.FAULT_REACTION_ACTIVE,
+)
 
 
 def state_of(statusword: int) -> AxisState | None:

@@ -8,17 +8,14 @@ the first edge until its time is read.
 from __future__ import annotations
 
 import struct
-from dataclasses import dataclass
 from enum import IntFlag
 
 from catenary.errors import DecodeError
 
-BLOCK = 0x09AE  # status of both inputs, followed by their times
-BLOCK_SIZE = 0x09D0 - BLOCK
+TIMES_SIZE = 16  # of one input: rising edge, then falling edge
 INPUTS = 2
 EDGES = ("rising", "falling")
-_STATUS_SIZE = 2
-_BLOCK = struct.Struct("<2B4Q")
+_TIMES = struct.Struct("<2Q")
 
 
 class LatchControl(IntFlag):
@@ -36,32 +33,18 @@ class LatchStatus(IntFlag):
     PIN = 0x04
 
 
-@dataclass(frozen=True, slots=True)
-class Latched:
-    """Status and times of one latch input."""
-
-    status: LatchStatus
-    rising_ns: int
-    falling_ns: int
-
-
-def decode_latched(data: bytes, number: int, clock_bits: int) -> Latched:
-    """Return the status and times of a latch input.
+def decode_times(data: bytes, clock_bits: int) -> tuple[int, int]:
+    """Return the times of the last rising and the last falling edge [ns].
 
     Args:
-        data: Registers 0x09AE to 0x09CF.
-        number: Number of the input, 0 or 1.
+        data: Registers of the times of one input.
         clock_bits: Width of the clock, 32 or 64. The upper half of a time is unused with 32 bits.
 
     Raises:
         DecodeError: The data has the wrong length.
-        ValueError: The input does not exist.
     """
-    if not 0 <= number < INPUTS:
-        raise ValueError(f"latch input {number}: must be 0 or 1")
-    if len(data) != BLOCK_SIZE:
-        raise DecodeError(f"latch unit: needs {BLOCK_SIZE} bytes, received {len(data)}")
-    values = _BLOCK.unpack(data)
+    if len(data) != TIMES_SIZE:
+        raise DecodeError(f"latch times: need {TIMES_SIZE} bytes, received {len(data)}")
     mask = (1 << clock_bits) - 1
-    rising, falling = values[_STATUS_SIZE + 2 * number :][:2]
-    return Latched(LatchStatus(values[number] & 0x07), rising & mask, falling & mask)
+    rising, falling = _TIMES.unpack(data)
+    return rising & mask, falling & mask

@@ -21,7 +21,7 @@ COMMAND_ACTIVE, NOT_INTERRUPTIBLE, NOT_EXECUTABLE, INVALID_PARAMETERS = (
     0x7012,
     0x7013,
 )
-DRIVE_NUMBER = 0x800A
+DRIVE_NUMBER, GENERAL_ERROR, NO_ELEMENT = 0x800A, 0x800B, 0x800C
 
 
 class Meaning(NamedTuple):
@@ -82,6 +82,8 @@ SPECIAL: Mapping[int, Meaning] = {
     # Codes of SoE that SERCOS does not have; numbers as in SOEM (ec_print.c)
     0x7014: Meaning("the IDN has no data state"),
     DRIVE_NUMBER: Meaning("invalid drive number", "a device with one drive has only drive 0"),
+    GENERAL_ERROR: Meaning("general error", "the drive may read only one element at a time"),
+    NO_ELEMENT: Meaning("the request names no element"),
 }
 
 

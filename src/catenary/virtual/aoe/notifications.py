@@ -36,8 +36,9 @@ class Notifications:
         self._last_handle = 0
 
     def clear(self) -> None:
-        """End all notifications."""
+        """End all notifications. The next handle is 1 again."""
         self._active.clear()
+        self._last_handle = 0
 
     def add(
         self, message: Head, place: tuple[int, int, int], mode: int, cycle: int
@@ -61,26 +62,23 @@ class Notifications:
             return NO_MEMORY, 0
         self._last_handle += 1
         period_ns = max(cycle, PERIOD_MIN) * 100
-        self._active[self._last_handle] = _Notification(
-            message, place, mode == ON_CHANGE, period_ns
-        )
-        self._schedule(self._last_handle)
+        added = _Notification(message, place, mode == ON_CHANGE, period_ns)
+        self._active[self._last_handle] = added
+        self._schedule(self._last_handle, added)
         return 0, self._last_handle
 
     def delete(self, handle: int) -> int:
         """End a notification. Return the error code, or 0."""
         return NO_HANDLE if self._active.pop(handle, None) is None else 0
 
-    def _schedule(self, handle: int) -> None:
-        period_ns = self._active[handle].period_ns
-        self._around.scheduler.after(period_ns, lambda: self._send(handle))
+    def _schedule(self, handle: int, found: _Notification) -> None:
+        self._around.scheduler.after(found.period_ns, lambda: self._send(handle, found))
 
-    def _send(self, handle: int) -> None:
-        found = self._active.get(handle)
-        if found is None:
-            return
+    def _send(self, handle: int, found: _Notification) -> None:
+        if self._active.get(handle) is not found:
+            return  # it has ended; another one may have its handle
         if self._around.state() not in (2, 4, 8):  # INIT or BOOT: no AoE
-            self._active.clear()
+            self.clear()
             return
         data = self._read(*found.place)
         if not found.on_change or data != found.last:
@@ -90,4 +88,4 @@ class Notifications:
             body = struct.pack("<II", len(sample) + 4, 1) + sample
             head = replace(found.message, length=len(body)).encode()
             self._around.mailbox.send(AOE_PROTOCOL, head + body)
-        self._schedule(handle)
+        self._schedule(handle, found)

@@ -18,6 +18,7 @@ from catenary.virtual.coe.dictionary import (
     MAP_RX,
     MAP_TX,
     READ_ANY,
+    UNSIGNED32,
     UNSIGNED64,
     WRITE_ANY,
     Entry,
@@ -38,8 +39,9 @@ MINIMUM_CYCLE_NS = 5_000  # shortest SYNC0 cycle
 IDLE_NS = 1_000_000  # interval between two checks of whether SYNC1 is active
 AHEAD_NS = 1_000  # time before SYNC1 at which the samples are complete
 CHANNELS_MAX, SAMPLES_MAX = 8, 30
-NEXT_SYNC1, CYCLE = 0x0998, 0x09A4  # registers
+NEXT_SYNC1 = 0x0998  # register
 TIME_INDEX, TIME_SUBINDEX = 0x1D09, 0x98  # named after the register of SYNC1
+TIME_NAME = "StartTimeNextLatch"
 RECORDED_MAX = 1_000_000  # samples that a terminal with outputs records
 
 
@@ -72,7 +74,7 @@ class OversamplingTerminal(AppliedDevice):
             serial: Serial number.
             lrw: True if the device supports LRW.
             crystal: Frequency error and jitter of the clock.
-            clock_bits: Width of the clock, 32 or 64.
+            clock_bits: Width of the clock, 32 or 64. The input 0x1D09:98 has this width.
 
         Raises:
             ValueError: A value is out of range.
@@ -114,9 +116,13 @@ class OversamplingTerminal(AppliedDevice):
         """Samples that the outputs have put out, as (system time [s], value of each channel)."""
         return tuple(self._recorded)
 
+    @property
+    def _time_type(self) -> int:
+        return UNSIGNED64 if self.clock_bits == 64 else UNSIGNED32
+
     def description(self) -> Description:
         pdos = [self._pdo(channel) for channel in range(self.channels)]
-        time = MappedEntry(TIME_INDEX, TIME_SUBINDEX, 64, "StartTimeNextLatch", UNSIGNED64)
+        time = MappedEntry(TIME_INDEX, TIME_SUBINDEX, self.clock_bits, TIME_NAME, self._time_type)
         is_input = self.direction == "inputs"
         tx = (*pdos, Pdo(0x1A10, "NextSync1Time", (time,), 3)) if is_input else ()
         rx = () if is_input else tuple(pdos)
@@ -172,7 +178,7 @@ class OversamplingTerminal(AppliedDevice):
             application.dictionary.add_record(index + 0x10 * channel, title, entries)
         if is_input:
             slot = self.channels * self.samples
-            time = application.slot_entry("StartTimeNextLatch", UNSIGNED64, 64, slot, access)
+            time = application.slot_entry(TIME_NAME, self._time_type, self.clock_bits, slot, access)
             entry: dict[int, Entry] = {TIME_SUBINDEX: time}
             application.dictionary.add(TIME_INDEX, "Distributed clocks", entry)
         application.synchronisation = Synchronisation(
@@ -202,8 +208,11 @@ class OversamplingTerminal(AppliedDevice):
         active = self.core.peek(self.position, ACTIVATION, 1)[0] & PULSES[DC_SYNC1]
         cycle = synchronisation.cycle_ns
         if active and cycle:
-            pulse = int.from_bytes(self.core.peek(self.position, NEXT_SYNC1, 8), "little")
-            ahead = pulse - self.core.system_time(self.position)
+            now = self.core.system_time(self.position)
+            register = self.core.peek(self.position, NEXT_SYNC1, self.clock_bits // 8)
+            span = 1 << self.clock_bits  # the register has the low bits of the time
+            ahead = (int.from_bytes(register, "little") - now + span // 2) % span - span // 2
+            pulse = now + ahead
             wait = ahead - AHEAD_NS
             if 0 < ahead <= 2 * AHEAD_NS and pulse != self._shown:
                 self._shown = pulse
@@ -221,7 +230,8 @@ class OversamplingTerminal(AppliedDevice):
                 for n, time in enumerate(times):
                     slot = channel * self.samples + n
                     self.core.put_slot(self.position, slot, wave(time))
-            self.core.put_slot(self.position, self.channels * self.samples, pulse)
+            shown = pulse % (1 << self.clock_bits)
+            self.core.put_slot(self.position, self.channels * self.samples, shown)
             return
         if not self.core.outputs_valid(self.position) or len(self._recorded) >= RECORDED_MAX:
             return

@@ -133,10 +133,10 @@ class _SafetyDevice(Device):
 
 
 class SafetyLogic(_SafetyDevice):
-    """Safety logic with an FSoE MainInstance for each connection. Connection k has the ID k + 1.
+    """Safety logic with an FSoE MainInstance for each connection.
 
-    It connects to the safety addresses 1, 2, and so on. Its safe outputs follow its safe inputs:
-    each connection receives its own safe inputs back.
+    `connections[k]` has the connection ID k + 1, and connects to the safety address k + 1. Its safe
+    outputs follow its safe inputs: each connection receives its own safe inputs back.
     """
 
     kind = "safety_logic"

@@ -78,7 +78,7 @@ class DriveStates:
 
         Args:
             control: S-0-0134.
-            in_operation: True in OP; otherwise the control word has no effect.
+            in_operation: True in OP; otherwise the drive brakes, as without bit 15.
         """
         state = self._motor_state()
         word = control if in_operation else ENABLE  # drive off: it brakes
@@ -123,7 +123,7 @@ class DriveStates:
         if state == FAULT:
             return CLASS_1 | word
         if state in (OPERATION, QUICK_STOP):
-            follows = self._get(_segment.SLOT_STATUSWORD) & FOLLOWS_TARGET
+            follows = control & ON and self._get(_segment.SLOT_STATUSWORD) & FOLLOWS_TARGET
             return OPERATING | word | (FOLLOWS if state == OPERATION and follows else 0)
         if state == SWITCHED_ON and self.mains:
             return POWERED | word

@@ -70,6 +70,7 @@ class SoeServer:
         flags, elements, number = HEADER.unpack_from(payload)
         data, drive = payload[HEADER.size :], flags >> 5
         if flags & 0x07 == READ_REQUEST:
+            self.reset()  # the rest of a write does not arrive
             return self._answer_read(drive, elements, number)
         if flags & 0x07 == WRITE_REQUEST:
             return self._answer_write(drive, elements, number, data, bool(flags & INCOMPLETE))
@@ -148,14 +149,19 @@ class SoeServer:
         return [HEADER.pack(WRITE_RESPONSE | drive << 5, elements, number)]
 
     def _take_fragment(self, drive: int, elements: int, left: int, data: bytes) -> list[bytes]:
-        """Store a fragment. A fragment that was repeated after a lost frame is dropped."""
+        """Store a fragment. A fragment that was repeated after a lost frame is dropped.
+
+        A fragment with any other number than the next one starts a new write.
+        """
         if left == self._left:
             return []
+        if self._left is not None and left != self._left - 1:
+            self.reset()
         self._left = left
         self._received += data
         if len(self._received) > LIST_MAX + 4:
             self.reset()
-            return [_error(WRITE_RESPONSE, drive, elements, 0, TOO_LONG)]
+            return [_error(WRITE_RESPONSE, drive, elements, left, TOO_LONG)]
         return []
 
     def _write(self, parameter: Parameter, elements: int, data: bytes) -> None:

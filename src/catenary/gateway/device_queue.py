@@ -1,4 +1,4 @@
-"""Desk: the requests of all clients for one device, in turn."""
+"""Queue of the requests of all clients for one device."""
 
 from __future__ import annotations
 
@@ -6,16 +6,17 @@ import logging
 import threading
 from collections import deque
 from collections.abc import Callable
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 from catenary.bus import MainDevice, SubDevice
 from catenary.errors import CatenaryError, ResponseTimeout
 from catenary.gateway.clients import Client
 from catenary.gateway.exchange import forward
-from catenary.gateway.gate import Gate
 from catenary.gateway.lease import Lease
 from catenary.gateway.limits import TURN_TIMEOUT
+from catenary.gateway.policy import Policy
 from catenary.gateway.refusal import Reason, Refusal, refusal_answer, to_client
+from catenary.gateway.reports import Reports
 from catenary.gateway.request import Access, Request, read_request
 from catenary.gateway.transfer import Transfer, continues, next_transfer
 from catenary.procedure.exchange import Procedure
@@ -39,23 +40,14 @@ class Job(NamedTuple):
     request: Request
 
 
-class Reporter(Protocol):
-    """Receiver of the results of a desk. Any thread may call it."""
-
-    def deliver(self, client: Client, answers: list[Mailbox]) -> None: ...
-
-    def refused(self, sub: SubDevice | None, client: Client, refusal: Refusal) -> None: ...
-
-    def written(
-        self, sub: SubDevice, client: Client, request: Request, answer: Mailbox | str
-    ) -> None: ...
+CLOSED = "the gateway was closed"
 
 
 class Closing(Exception):
     """The gateway is being closed."""
 
 
-class Desk:
+class DeviceQueue:
     """Owner of the queue of one device, and of the lease of its mailbox.
 
     `put`, `sweep` and `forget` belong to the thread of the sockets; `run` to a worker.
@@ -65,25 +57,25 @@ class Desk:
         self,
         main: MainDevice,
         position: int,
-        gate: Gate,
-        reporter: Reporter,
+        policy: Policy,
+        reports: Reports,
         schedule: Callable[[Callable[[], None]], None],
         check_open: Callable[[], None],
     ) -> None:
-        """Initialise the desk.
+        """Initialise the queue.
 
         Args:
             main: The MainDevice.
             position: Position of the device.
-            gate: Policy.
-            reporter: Receiver of answers, refusals and writes.
+            policy: Policy of the gateway.
+            reports: Receiver of answers, refusals and writes.
             schedule: Function that lets a worker call another one.
             check_open: Function that raises Closing when the gateway is being closed.
         """
         self._main = main
         self._position = position
-        self._gate = gate
-        self._reporter = reporter
+        self._policy = policy
+        self._reports = reports
         self._schedule = schedule
         self._check_open = check_open
         self._lock = threading.Lock()  # for the queue, and the two variables below
@@ -122,8 +114,9 @@ class Desk:
         with self._lock:
             self._queue.clear()
         lease = self._lease
-        if lease is not None:
-            lease.end()
+        transfer = None if lease is None else lease.end()
+        if lease is not None and transfer is not None:
+            self._report_incomplete(lease, transfer, CLOSED)
 
     def _end(self, lease: Lease, why: str) -> None:
         transfer = lease.end()
@@ -135,10 +128,13 @@ class Desk:
 
     def _abandon(self, lease: Lease, transfer: Transfer, why: str) -> None:
         """Report a transfer that is not complete, and end it in the device."""
+        self._report_incomplete(lease, transfer, why)
+        self._put(Job(None, read_request(transfer.end_message)))
+
+    def _report_incomplete(self, lease: Lease, transfer: Transfer, why: str) -> None:
         if transfer.writes and lease.client is not None and self._position < len(self._main.subs):
             sub = self._main.subs[self._position]
-            self._reporter.written(sub, lease.client, transfer.first, f"not completed: {why}")
-        self._put(Job(None, read_request(transfer.end_message)))
+            self._reports.written(sub, lease.client, transfer.first, f"not completed: {why}")
 
     def run(self) -> None:
         """Serve the queue until it is empty, or only messages outside of the transfer are left."""
@@ -173,11 +169,13 @@ class Desk:
         if len(request.message.data) + HEADER_SIZE > channel.layout.receive_size:
             return self._refuse(sub, job, Refusal(Reason.TOO_LONG, "larger than the mailbox"))
         lease = self._lease
-        if lease is None or lease.channel is not channel:
+        if lease is not None and lease.channel is not channel:
+            self._end(lease, "the device has another mailbox now")  # such as that of BOOT
+        if lease is None or lease.has_ended:
             lease = Lease(channel, job.client)
-        self._conduct(sub, lease, job)
+        self._run_exchange(sub, lease, job)
 
-    def _conduct(self, sub: SubDevice, lease: Lease, job: Job) -> None:
+    def _run_exchange(self, sub: SubDevice, lease: Lease, job: Job) -> None:
         """Run the exchange of one message, and report its result."""
         before = lease.transfer
         try:
@@ -185,8 +183,13 @@ class Desk:
             outcome = self._main.converse(procedure, self._check_open)
         except Closing:
             lease.end()
+            write = written_by(job.request, before)
+            if write is not None and job.client is not None and self._policy.permits(sub):
+                self._reports.written(sub, job.client, write, f"not completed: {CLOSED}")
             raise
-        except (CatenaryError, RuntimeError) as error:  # RuntimeError: the MainDevice was closed
+        except Exception as error:  # RuntimeError: the MainDevice was closed
+            if not isinstance(error, CatenaryError | RuntimeError):
+                log.exception("device %d: request failed", self._position)
             lease.transfer = None
             reason = Reason.NO_ANSWER if isinstance(error, ResponseTimeout) else Reason.FAILED
             outcome = Outcome([], Refusal(reason, str(error).split("\n", 1)[0]))
@@ -217,18 +220,15 @@ class Desk:
     ) -> Procedure[tuple[Outcome, Transfer | None]]:
         """Forward one message, in turn. Return its result, and the transfer to continue."""
         request = job.request
-        if request.access in (Access.CONTINUE, Access.END):
-            out_of_turn = transfer is None or not (
-                request.access is Access.END or continues(transfer, request)
-            )
-            if out_of_turn and job.client is not None:
-                refusal = Refusal(Reason.OUT_OF_TURN, f"{request.what}: no transfer to continue")
-                return Outcome([], refusal), transfer
-        elif not continues(transfer, request):
+        in_turn = continues(transfer, request)
+        if request.access in (Access.CONTINUE, Access.END) and not in_turn and job.client:
+            refusal = Refusal(Reason.OUT_OF_TURN, f"{request.what}: no transfer to continue")
+            return Outcome([], refusal), transfer
+        if not in_turn:
             transfer = None  # another transfer begins
         refused = None
         if job.client is not None:
-            refused = yield from self._gate.refusal(sub, channel, request, transfer)
+            refused = yield from self._policy.refusal(sub, channel, request, transfer)
         if refused is not None:
             if transfer is not None:
                 end = transfer.end_message
@@ -251,29 +251,29 @@ class Desk:
         request, refusal = job.request, outcome.refusal
         write = written_by(request, before)
         if before is not None and before.writes and write is not before.first:
-            self._reporter.written(sub, job.client, before.first, "not completed: replaced")
+            self._reports.written(sub, job.client, before.first, "not completed: replaced")
         if refusal is not None:
             tried = refusal.reason in (Reason.NO_ANSWER, Reason.FAILED)
             begun = before is not None and following is None and write is before.first
             if write is not None and (tried or begun):
-                self._reporter.written(sub, job.client, write, refusal.text)
+                self._reports.written(sub, job.client, write, refusal.text)
             return self._refuse(sub, job, refusal)
         if write is not None and following is None:
             last = outcome.answers[-1] if outcome.answers else "ended by the client"
-            self._reporter.written(sub, job.client, write, last)
+            self._reports.written(sub, job.client, write, last)
         self._answer(job, outcome.answers)
 
     def _refuse(self, sub: SubDevice | None, job: Job, refusal: Refusal) -> None:
         if job.client is None:
             return
-        self._reporter.refused(sub, job.client, refusal)
+        self._reports.refused(sub, job.client, refusal)
         ends = job.request.access is Access.END  # has no answer
         self._answer(job, [] if ends else [refusal_answer(job.request, refusal)])
 
     def _answer(self, job: Job, answers: list[Mailbox]) -> None:
         if job.client is not None:
             message = job.request.message
-            self._reporter.deliver(job.client, [to_client(message, each) for each in answers])
+            self._reports.deliver(job.client, [to_client(message, each) for each in answers])
 
 
 def written_by(request: Request, before: Transfer | None) -> Request | None:

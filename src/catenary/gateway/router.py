@@ -1,13 +1,11 @@
-"""Desks: distribution of the messages of all clients to the devices, by address."""
+"""Router: distribution of the messages of all clients to the devices, by address."""
 
 from __future__ import annotations
 
-from collections.abc import Collection
-
 from catenary.bus import MainDevice
 from catenary.gateway.clients import Client
-from catenary.gateway.desk import Closing, Desk
-from catenary.gateway.gate import Gate
+from catenary.gateway.device_queue import Closing, DeviceQueue
+from catenary.gateway.policy import Policy
 from catenary.gateway.refusal import Reason, Refusal, refusal_answer, to_client
 from catenary.gateway.reports import Reports
 from catenary.gateway.request import read_request
@@ -17,19 +15,19 @@ from catenary.wire.mailbox import Mailbox
 FIRST_ADDRESS = 1001  # of the device at position 0 in TwinCAT, and for tools that expect it
 
 
-class Desks:
-    """Owner of the desks and their workers. Only the thread of the sockets calls it."""
+class Router:
+    """Owner of the queues of the devices, and of the workers. Only the socket thread calls it."""
 
-    def __init__(self, main: MainDevice, writable: Collection[int], reports: Reports) -> None:
+    def __init__(self, main: MainDevice, policy: Policy, reports: Reports) -> None:
         self._main = main
-        self._gate = Gate(main, writable)
+        self._policy = policy
         self._reports = reports
         self._workers = Workers()
-        self._desks: dict[int, Desk] = {}
+        self._queues: dict[int, DeviceQueue] = {}
         self._closing = False
 
     def receive(self, client: Client, message: Mailbox) -> None:
-        """Pass a message to the desk of its device. Answer if the device does not exist.
+        """Queue a message for its device. Answer if the device does not exist.
 
         Args:
             client: The client.
@@ -37,7 +35,7 @@ class Desks:
         """
         position = position_of(self._main, message.address)
         if position is not None:
-            return self._desk(position).put(client, message)
+            return self._queue(position).put(client, message)
         refusal = Refusal(Reason.NO_DEVICE, f"no device has the address 0x{message.address:04X}")
         self._reports.refused(None, client, refusal)
         answer = refusal_answer(read_request(message), refusal)
@@ -45,32 +43,32 @@ class Desks:
 
     def forget(self, client: Client) -> None:
         """Drop the messages of a client that has gone, and end its transfers."""
-        for desk in self._desks.values():
-            desk.forget(client)
+        for each in self._queues.values():
+            each.forget(client)
 
     def sweep(self) -> None:
         """End transfers that their clients have not continued in time."""
-        for desk in self._desks.values():
-            desk.sweep()
+        for each in self._queues.values():
+            each.sweep()
 
     def close(self) -> None:
         """Drop all messages, and release all mailboxes. The thread of the sockets has ended."""
         self._closing = True
-        for desk in self._desks.values():
-            desk.close()
+        for each in self._queues.values():
+            each.close()
         self._workers.close()
 
-    def _desk(self, position: int) -> Desk:
-        if position not in self._desks:
-            self._desks[position] = Desk(
+    def _queue(self, position: int) -> DeviceQueue:
+        if position not in self._queues:
+            self._queues[position] = DeviceQueue(
                 self._main,
                 position,
-                self._gate,
+                self._policy,
                 self._reports,
                 schedule=self._workers.submit,
                 check_open=self._check_open,
             )
-        return self._desks[position]
+        return self._queues[position]
 
     def _check_open(self) -> None:
         if self._closing:
