@@ -32,11 +32,20 @@ from catenary.bench.report import machine
 from catenary.bench.segment import COUNTS_PER_TURN, PRIORITY, START_SECONDS, processors
 from catenary.bus import SubDevice
 from catenary.demo.server import serve_at_priority
-from catenary.errors import CatenaryError, LinkError
+from catenary.errors import CatenaryError, LinkError, ResponseTimeout
 from catenary.realtime.child import start_python
 from catenary.realtime.private_network import veth_pair
 from catenary.realtime.system.scheduling import request_scheduling
-from catenary.virtual import Ads, Coupler, DeviceFiles, Segment, Servo, VendorEcho
+from catenary.virtual import (
+    Ads,
+    Coupler,
+    DeviceFiles,
+    Ethernet,
+    Segment,
+    SercosDrive,
+    Servo,
+    VendorEcho,
+)
 from catenary.virtual.protocols import MailboxProtocol
 
 POSITION, MAILBOX = 1, 1024  # of the device that serves the protocols
@@ -46,13 +55,15 @@ FILE, AREA, CONTENT = "file", 0x4020, bytes(range(256)) * 64
 OBJECT, DESCRIBED = 0x2100, 0x1018
 LIMIT_US = 1.0  # target for the delay of the median
 ROUND_SECONDS = 60.0  # of a process in addition to its windows
+FAILED_MAX = 100  # uses without an answer, because frames were lost
 
 
 class Row(NamedTuple):
-    """One protocol: its name, and one use of it."""
+    """One protocol: its name, one use of it, and the position of the device."""
 
     name: str
     use: Callable[[SubDevice], object]
+    position: int = POSITION
 
 
 PROTOCOLS = (
@@ -61,6 +72,8 @@ PROTOCOLS = (
     Row("FoE read", lambda sub: sub.foe.read(FILE)),
     Row("AoE read", lambda sub: sub.aoe.read(AREA, 0, len(CONTENT))),
     Row("VoE exchange", lambda sub: sub.voe.exchange(1, CONTENT[:1000])),
+    Row("EoE address", lambda sub: sub.eoe.address()),
+    Row("SoE read", lambda sub: sub.soe.read("S-0-0030"), position=-1),
 )
 NOTHING = "nothing"
 NAMES = (NOTHING, *(row.name for row in PROTOCOLS))
@@ -68,7 +81,7 @@ NAMES = (NOTHING, *(row.name for row in PROTOCOLS))
 
 def offered() -> tuple[MailboxProtocol, ...]:
     """Return the device side of the protocols beside CoE and FoE."""
-    return Ads(areas={AREA: CONTENT}), VendorEcho()
+    return Ads(areas={AREA: CONTENT}), VendorEcho(), Ethernet()
 
 
 class Job(msgspec.Struct, frozen=True):
@@ -90,6 +103,7 @@ class Window(msgspec.Struct, frozen=True):
     lost: int
     late: int
     uses: int  # of the protocol
+    failed: int  # uses without an answer, because frames were lost
     cpu_us: float  # of the process, per cycle
 
 
@@ -153,6 +167,7 @@ def _row(windows: Sequence[Window], idle: Sequence[Window]) -> dict[str, float]:
         "lost": sum(each.lost for each in windows),
         "late": sum(each.late for each in windows),
         "uses": sum(each.uses for each in windows),
+        "failed": sum(each.failed for each in windows),
         "cpu_us": round(median(each.cpu_us for each in windows), 2),
     }
 
@@ -160,7 +175,7 @@ def _row(windows: Sequence[Window], idle: Sequence[Window]) -> dict[str, float]:
 def as_text(rows: Mapping[str, Mapping[str, float]]) -> str:
     """Return the figures as a table, and the protocols that miss the target."""
     columns = ("send_us", "delay_us", "send_p99_us", "lateness_us", "cpu_us")
-    counts = ("lost", "late", "uses")
+    counts = ("lost", "late", "uses", "failed")
     lines = [f"{'':18}" + "".join(f"{name:>13}" for name in (*columns, *counts))]
     for name, row in rows.items():
         figures = "".join(f"{row[column]:13.2f}" for column in columns)
@@ -200,13 +215,13 @@ def once(interface: str, job: Job) -> Found:
 
 
 class User:
-    """Thread that uses one protocol without a pause. It owns the count of the uses."""
+    """Thread that uses one protocol without a pause. It owns the counts of the uses."""
 
-    def __init__(self, sub: SubDevice) -> None:
-        self._sub = sub
-        self._use: Callable[[SubDevice], object] | None = None
+    def __init__(self, subs: Sequence[SubDevice]) -> None:
+        self._subs = subs
+        self._row: Row | None = None
         self._ended = threading.Event()
-        self.uses = 0
+        self.uses = self.failed = 0
         self.error: CatenaryError | None = None
         self._thread = threading.Thread(target=self._run, name="protocol", daemon=True)
 
@@ -219,23 +234,25 @@ class User:
 
     def choose(self, name: str) -> None:
         """Use another protocol from the next use on; `nothing` pauses."""
-        self._use = {row.name: row.use for row in PROTOCOLS}.get(name)
+        self._row = {row.name: row for row in PROTOCOLS}.get(name)
 
     def _run(self) -> None:
         os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))  # not that of the loop
         while not self._ended.is_set():
-            use = self._use
-            if use is None:
+            row = self._row
+            if row is None:
                 time.sleep(1e-3)
                 continue
             try:
-                use(self._sub)
+                row.use(self._subs[row.position])
+                self.uses += 1
             except CatenaryError as error:
                 if self._ended.is_set():
                     return  # the loop has ended during the use
-                self.error = error
-                return
-            self.uses += 1
+                self.failed += 1
+                if not isinstance(error, ResponseTimeout) or self.failed > FAILED_MAX:
+                    self.error = error
+                    return
 
 
 def run(interface: str, job: Job) -> Found:
@@ -244,7 +261,7 @@ def run(interface: str, job: Job) -> Found:
     with cat.MainDevice(interface) as main:
         subs = main.scan()
         subs[POSITION].foe.write(FILE, CONTENT)
-        arm = cat.Drives(subs[POSITION:], counts_per_turn=COUNTS_PER_TURN, velocity_limit=100.0)
+        arm = cat.Drives(subs[POSITION:-1], counts_per_turn=COUNTS_PER_TURN, velocity_limit=100.0)
         gc.collect()
         gc.freeze()
         with (
@@ -257,7 +274,7 @@ def run(interface: str, job: Job) -> Found:
                 stop=cat.StopPolicy(lost_limit=LOST_LIMIT, late_limit=LATE_LIMIT),
                 log=job.cycles + 2,
             ) as loop,
-            User(subs[POSITION]) as user,
+            User(subs) as user,
         ):
             windows = [
                 _window(loop, user, name, job.cycles)
@@ -275,12 +292,13 @@ def _rotated(number: int) -> tuple[str, ...]:
 def _window(loop: cat.Loop, user: User, name: str, cycles: int) -> Window:
     """Use a protocol for the cycles of one window, and return its figures."""
     user.choose(name)
-    before, uses, cpu = dict(loop.timing.counters), 0, 0
+    before, uses, failed, cpu = dict(loop.timing.counters), 0, 0, 0
     for number, _cycle in enumerate(loop):
         if user.error is not None:
             raise user.error
         if number == SETTLING:
-            before, uses, cpu = dict(loop.timing.counters), user.uses, time.process_time_ns()
+            before, cpu = dict(loop.timing.counters), time.process_time_ns()
+            uses, failed = user.uses, user.failed
         elif number == SETTLING + cycles:
             break
     cpu, after = time.process_time_ns() - cpu, loop.timing.counters
@@ -294,6 +312,7 @@ def _window(loop: cat.Loop, user: User, name: str, cycles: int) -> Window:
         lost=after["lost"] - before["lost"],
         late=after["late"] - before["late"],
         uses=user.uses - uses,
+        failed=user.failed - failed,
         cpu_us=cpu / cycles * 1e-3,
     )
 
@@ -304,7 +323,7 @@ def serve(interface: str, cpu: str, axes: str) -> None:
         mailbox_bytes=MAILBOX, counts_per_turn=COUNTS_PER_TURN, files=files, protocols=offered()
     )
     others = [Servo(counts_per_turn=COUNTS_PER_TURN) for _ in range(int(axes) - 1)]
-    segment = Segment([Coupler(), first, *others], clock="monotonic")
+    segment = Segment([Coupler(), first, *others, SercosDrive()], clock="monotonic")
     serve_at_priority(segment, interface, PRIORITY, second=None, cpu=int(cpu) if cpu else None)
 
 

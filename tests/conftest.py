@@ -55,12 +55,9 @@ def pytest_addoption(parser: pytest.Parser) -> None:
         "(shared_data, wire, tshark, rtlab, browser, ros2)",
     )
     parser.addoption(
-        "--elsewhere",
-        action="append",
-        default=[],
-        choices=sorted(FIXTURE_OF),
-        metavar="MARKER",
-        help="another process may run all tests with this marker: ignore it without a test here",
+        "--part",
+        action="store_true",
+        help="another process runs the other tests: ignore required markers without a test here",
     )
 
 
@@ -89,8 +86,10 @@ def pytest_runtest_makereport(item: pytest.Item) -> Iterator[None]:
 
 def not_passed(config: pytest.Config) -> set[str]:
     """Return the required markers without a test that passed."""
-    elsewhere = set(config.getoption("--elsewhere")) - config.stash[COLLECTED]
-    return config.stash[REQUIRED] - elsewhere - config.stash[PASSED]
+    required = config.stash[REQUIRED]
+    if config.getoption("--part"):
+        required = required & config.stash[COLLECTED]
+    return required - config.stash[PASSED]
 
 
 def pytest_sessionfinish(session: pytest.Session) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from benchmarks.foe import WAYS, Transfer, bound, checked, content, ratios
+from benchmarks.foe import WAYS, Transfer, accepted, bound, checked, content, ratios
 from catenary.errors import CatenaryError
 
 
@@ -30,3 +30,9 @@ def test_a_wrong_file_is_refused() -> None:
     checked(content(1000), content(1000))
     with pytest.raises(CatenaryError, match="differ"):
         checked(content(1000), content(999))
+
+
+def test_an_error_code_of_pysoem_is_refused() -> None:
+    accepted(1)
+    with pytest.raises(CatenaryError, match="-7"):
+        accepted(-7)

@@ -18,7 +18,7 @@ from benchmarks.protocols import (
 
 
 def window(name: str, send_us: float, lost: int = 0) -> Window:
-    return Window(name, send_us, 2 * send_us, 3.0, lost, 0, 10, 100.0)
+    return Window(name, send_us, 2 * send_us, 3.0, lost, 0, 10, 0, 100.0)
 
 
 def test_the_delay_is_the_median_of_the_differences_within_rounds() -> None:
@@ -39,7 +39,7 @@ def test_a_slow_protocol_is_named() -> None:
 
 
 def test_a_protocol_without_a_completed_use_is_named() -> None:
-    unused = Window("AoE read", 10.0, 20.0, 3.0, 0, 0, 0, 100.0)
+    unused = Window("AoE read", 10.0, 20.0, 3.0, 0, 0, 0, 0, 100.0)
     text = as_text(summary([window(NOTHING, 10.0), unused]))
     assert text.endswith("without a completed use: AoE read")
 

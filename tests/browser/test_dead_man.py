@@ -9,6 +9,7 @@ from __future__ import annotations
 import json
 import signal
 import subprocess
+import time
 from contextlib import ExitStack
 
 from tests.browser import processes
@@ -64,9 +65,14 @@ def test_page_frozen(shared_rig: Rig) -> None:
         life = shown.page.context.new_cdp_session(shown.page)
         life.send("Page.setWebLifecycleState", {"state": "frozen"})
         life.send("Debugger.enable")  # Chromium freezes no visible page, so this stops its scripts
+        paused: list[object] = []
+        life.on("Debugger.paused", lambda event: paused.append(event))
         life.send("Debugger.pause")
         assert shared_rig.stands()
         position = shared_rig.position()
+        until = time.monotonic() + SECONDS / 1e3
+        while not paused and time.monotonic() < until:
+            shown.page.wait_for_timeout(20)  # Playwright receives events only while it waits
         life.send("Debugger.resume")
         life.send("Page.setWebLifecycleState", {"state": "active"})
         expect(shown.plus(AXIS)).to_have_attribute("aria-pressed", "false", timeout=SECONDS)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import struct
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 
 import pytest
@@ -30,10 +30,10 @@ def answer_uploads(servo: Servo, answer: Callable[[bytes], list[bytes] | None]) 
     mailbox = servo.application.mailbox
     serve = mailbox._serve
 
-    def replace(payload: bytes) -> list[bytes]:
+    def replace(protocol: int, payload: bytes) -> Iterable[bytes] | int:
         is_upload = payload[1] >> 4 == SDO_REQUEST and payload[2] >> 5 in (UPLOAD, SEGMENT)
         own = answer(payload) if is_upload else None
-        return serve(payload) if own is None else own
+        return serve(protocol, payload) if own is None else own
 
     mailbox._serve = replace
 
@@ -143,9 +143,9 @@ def test_pdos_without_a_description_do_not_end_a_plan(length: int | None) -> Non
         mailbox = odd.application.mailbox
         serve = mailbox._serve
 
-        def describe(payload: bytes) -> list[bytes]:
+        def describe(protocol: int, payload: bytes) -> Iterable[bytes] | int:
             if payload[1] >> 4 != SDO_INFORMATION or payload[2] & 0x7F != GET_ENTRY:
-                return serve(payload)
+                return serve(protocol, payload)
             if length is None:
                 return []
             answer = struct.pack("<HBBH", SDO_INFORMATION << 12, GET_ENTRY + 1, 0, 0)

@@ -106,7 +106,7 @@ def test_an_endless_object_does_not_block_a_scan() -> None:
     segment = cat.Segment([cat.virtual.Coupler(), device, cat.virtual.Servo(serial=2)])
     announced = struct.pack("<HBHBI", 0x3000, 0x41, 0x1000, 0, 4000)
 
-    def drip(payload: bytes) -> list[bytes]:
+    def drip(protocol: int, payload: bytes) -> list[bytes]:
         command = payload[2]
         if command >> 5 == 3:  # segments
             return [struct.pack("<HB7x", 0x3000, command & 0x10 | 6 << 1)]

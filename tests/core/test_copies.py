@@ -23,7 +23,7 @@ def copy(input_bit: int, output_bit: int, bits: int) -> ImageCopy:
 
 
 class Source(ScriptedDrive):
-    """Device whose inputs count the frames it has processed, from 1."""
+    """Device with one input: the number of frames that it has processed."""
 
     count = 0
 

@@ -47,6 +47,12 @@ class Beside:
         return result
 
 
+@pytest.fixture(autouse=True)
+def patience(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Wait long for the client, whose thread competes with that of a loop in virtual time."""
+    monkeypatch.setattr("catenary.gateway.lease.LEASE_IDLE", 30.0)
+
+
 @pytest.fixture
 def beside(line: Line) -> Iterator[Beside]:
     """Yield a loop with the enabled axes of both servos."""

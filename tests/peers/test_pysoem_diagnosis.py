@@ -61,5 +61,9 @@ def test_a_message_as_in_the_table_of_etg_1020(master: Any) -> None:
 @again(devices=1)
 def test_the_history_has_no_complete_access(master: Any) -> None:
     """As in Beckhoff's slave stack code."""
-    with pytest.raises(pysoem.SdoError):
-        master.slaves[0].sdo_read(0x10F3, 0, ca=True)
+    for _ in range(5):
+        with pytest.raises((pysoem.SdoError, pysoem.WkcError)) as raised:
+            master.slaves[0].sdo_read(0x10F3, 0, ca=True)
+        if raised.type is pysoem.SdoError:  # not a late answer on a busy machine
+            return
+    pytest.fail("no answer in five attempts")

@@ -7,7 +7,7 @@ from contextlib import suppress
 from dataclasses import dataclass
 from types import TracebackType
 
-from catenary.bus.protocol_channel import MailboxOwner
+from catenary.bus.sdo import MailboxOwner
 from catenary.errors import AdsError, DecodeError, MailboxError
 from catenary.procedure.aoe import AdsPeer, request
 from catenary.procedure.delivery import await_delivery

@@ -12,7 +12,8 @@ from catenary.bus.ads_notifications import (
     NotificationSource,
 )
 from catenary.bus.pending import Pending
-from catenary.bus.protocol_channel import MailboxOwner, protocol_channel
+from catenary.bus.protocol_channel import protocol_channel
+from catenary.bus.sdo import MailboxOwner
 from catenary.procedure.aoe import (
     ANSWER_TIMEOUT,
     DEVICE_PORT,

@@ -7,8 +7,9 @@ from typing import Protocol, TypeAlias
 
 from catenary.bus.ethernet_bridge import EthernetBridge
 from catenary.bus.pending import Pending
-from catenary.bus.sdo import Conversations
-from catenary.errors import CatenaryError, ConfigurationError, MailboxError
+from catenary.bus.protocol_channel import usable_channel
+from catenary.bus.sdo import Conversations, MailboxOwner
+from catenary.errors import ConfigurationError, MailboxError
 from catenary.procedure.eoe import (
     read_address,
     read_filter,
@@ -17,7 +18,6 @@ from catenary.procedure.eoe import (
     write_filter,
 )
 from catenary.procedure.mailbox_channel import MailboxChannel
-from catenary.procedure.station import Station
 from catenary.wire.eoe import BLOCK, HEADER_SIZE
 from catenary.wire.eoe_address import MAC_SIZE, NAME_SIZE, EthernetAddress, MacFilter
 from catenary.wire.eoe_frames import fragment_room
@@ -39,26 +39,14 @@ class EthernetMain(Conversations, Protocol):
     def eoe(self) -> TapConnector: ...
 
 
-class EthernetOwner(Protocol):
-    """Interface to the device of an Ethernet port; `SubDevice` implements it."""
+class EthernetOwner(MailboxOwner, Protocol):
+    """Interface to the device of an Ethernet port."""
 
     @property
     def main(self) -> EthernetMain: ...
 
     @property
     def position(self) -> int: ...
-
-    @property
-    def station(self) -> Station: ...
-
-    @property
-    def channel(self) -> MailboxChannel | None: ...
-
-    @property
-    def in_boot(self) -> bool: ...
-
-    @property
-    def error(self) -> CatenaryError | None: ...
 
 
 class Eoe:
@@ -198,27 +186,22 @@ class Eoe:
             ConfigurationError: The master does not offer EoE, or the device is in BOOT.
             MailboxError: The device has no mailbox, or a mailbox that is too small.
         """
-        sub = self._sub
-        if self._unavailable:
-            raise ConfigurationError(f"{sub.station}: {self._unavailable}")
-        if sub.in_boot:
-            raise ConfigurationError(
-                f"{sub.station} is in BOOT, where it has no Ethernet port",
-                hint='bring it to PRE-OP: sub.request_state("INIT"), then "PRE_OP"',
-            )
-        if sub.error is not None:
-            raise sub.error
-        if sub.channel is None:
+        station = self._sub.station
+        in_boot = ConfigurationError(
+            f"{station} is in BOOT, where it has no Ethernet port",
+            hint='bring it to PRE-OP: sub.request_state("INIT"), then "PRE_OP"',
+        )
+        without = MailboxError(
+            f"{station} has no mailbox: it cannot have an Ethernet port",
+            hint="couplers and simple terminals have none",
+        )
+        channel = usable_channel(self._sub, self._unavailable, in_boot, without)
+        if fragment_room(room_to(channel)) < BLOCK:
             raise MailboxError(
-                f"{sub.station} has no mailbox: it cannot have an Ethernet port",
-                hint="couplers and simple terminals have none",
+                f"{station}: EoE needs room for {HEADER_SIZE + BLOCK} bytes in a mailbox, it "
+                f"has {room_to(channel)}"
             )
-        if fragment_room(room_to(sub.channel)) < BLOCK:
-            raise MailboxError(
-                f"{sub.station}: EoE needs room for {HEADER_SIZE + BLOCK} bytes in a mailbox, it "
-                f"has {room_to(sub.channel)}"
-            )
-        return sub.channel
+        return channel
 
 
 def make_address(

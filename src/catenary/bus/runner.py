@@ -188,9 +188,13 @@ class BlockingRunner:
                 watch()
 
     def _sleep_until(self, deadline_ns: int) -> None:
+        before = None
         while (now := self._link.now()) < deadline_ns:
-            if now < deadline_ns - self._busy_ns:
+            if now == before:  # a clock that advances only while its user waits
+                self._link.wait_until(deadline_ns, False)
+            elif now < deadline_ns - self._busy_ns:
                 self._link.wait_until(deadline_ns - self._busy_ns, False)
+            before = now
 
     def _wake(self, tasks: Sequence[Task[Any]]) -> None:
         now = self._link.now()
@@ -239,13 +243,15 @@ class BlockingRunner:
         """Receive the frames of one window, until a deadline. Missing frames count as lost."""
         start = self._link.now()
         busy_until, deadline = start + self._busy_ns, start + self._timeout_ns
+        before = None
         # The deadline also ends a flood of frames.
         while under_way and (now := self._link.now()) < deadline:
             raw = self._link.receive()
             if raw is not None:
                 self._take(raw, under_way, replies)
-            elif now >= busy_until:
+            elif now >= busy_until or now == before:  # see `_sleep_until`
                 self._link.wait_until(deadline, True)
+            before = now
         for _ in range(WINDOW):  # frames that arrived while this process did not run
             raw = self._link.receive() if under_way else None
             if raw is None:

@@ -51,8 +51,8 @@ class Conversations(Protocol):
         ...
 
 
-class ObjectOwner(Protocol):
-    """Interface to the device of an object dictionary; `SubDevice` implements it."""
+class MailboxOwner(Protocol):
+    """Interface to a device with a mailbox; `SubDevice` implements it."""
 
     @property
     def main(self) -> Conversations: ...
@@ -68,6 +68,10 @@ class ObjectOwner(Protocol):
 
     @property
     def error(self) -> CatenaryError | None: ...
+
+
+class ObjectOwner(MailboxOwner, Protocol):
+    """Interface to the device of an object dictionary."""
 
     @property
     def esi(self) -> EsiDevice | None: ...

@@ -6,13 +6,13 @@ from collections.abc import Mapping, Sequence
 from typing import Protocol, TypeVar
 
 from catenary.bus.pending import Pending
-from catenary.bus.sdo import Conversations
-from catenary.errors import CatenaryError, ConfigurationError, MailboxError
+from catenary.bus.protocol_channel import usable_channel
+from catenary.bus.sdo import Conversations, MailboxOwner
+from catenary.errors import MailboxError
 from catenary.model.device import DeviceDescription
 from catenary.model.sercos import Parameter
 from catenary.model.sercos_axis import TELEGRAM_TYPE, SercosAxis
 from catenary.procedure.exchange import Procedure
-from catenary.procedure.mailbox import MailboxChannel
 from catenary.procedure.sercos import (
     ALL,
     COMMAND_TIMEOUT,
@@ -22,7 +22,6 @@ from catenary.procedure.sercos import (
     write_value,
 )
 from catenary.procedure.soe import ANSWER_TIMEOUT, Target, read, write
-from catenary.procedure.station import Station
 from catenary.procedure.telegrams import configure, with_lists
 from catenary.wire.sercos import idn_number
 from catenary.wire.sercos_values import Value
@@ -38,25 +37,13 @@ class LoopOwner(Conversations, Protocol):
     def require_no_loop(self) -> None: ...
 
 
-class DriveOwner(Protocol):
-    """Interface to the device of the drives; `SubDevice` implements it."""
+class DriveOwner(MailboxOwner, Protocol):
+    """Interface to the device of the drives."""
 
     description: DeviceDescription
 
     @property
     def main(self) -> LoopOwner: ...
-
-    @property
-    def station(self) -> Station: ...
-
-    @property
-    def channel(self) -> MailboxChannel | None: ...
-
-    @property
-    def in_boot(self) -> bool: ...
-
-    @property
-    def error(self) -> CatenaryError | None: ...
 
 
 class Soe:
@@ -276,21 +263,15 @@ class Soe:
         if drive not in DRIVES:
             raise ValueError(f"drive must be 0 to 7, not {drive}")
         _check(timeout)
-        sub = self._sub
-        if self._unavailable:
-            raise ConfigurationError(f"{sub.station}: {self._unavailable}")
-        if sub.in_boot:
-            raise MailboxError(
-                f"{sub.station} is in BOOT, where it has no SoE", hint="bring it to PRE-OP"
-            )
-        if sub.error is not None:
-            raise sub.error
-        if sub.channel is None:
-            raise MailboxError(
-                f"{sub.station} has no mailbox: cannot access its IDNs",
-                hint="only SERCOS drives have IDNs",
-            )
-        return Target(sub.channel, number, drive, timeout)
+        station = self._sub.station
+        in_boot = MailboxError(
+            f"{station} is in BOOT, where it has no SoE", hint="bring it to PRE-OP"
+        )
+        without = MailboxError(
+            f"{station} has no mailbox: cannot access its IDNs", hint="only SERCOS drives have IDNs"
+        )
+        channel = usable_channel(self._sub, self._unavailable, in_boot, without)
+        return Target(channel, number, drive, timeout)
 
 
 def _check(timeout: float) -> None:

@@ -6,7 +6,8 @@ from collections import deque
 from typing import Protocol
 
 from catenary.bus.pending import Pending
-from catenary.bus.protocol_channel import MailboxOwner, protocol_channel
+from catenary.bus.protocol_channel import protocol_channel
+from catenary.bus.sdo import MailboxOwner
 from catenary.errors import DecodeError
 from catenary.model.device import Identity
 from catenary.procedure.delivery import await_delivery

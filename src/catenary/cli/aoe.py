@@ -16,7 +16,7 @@ from catenary.cli.parsers import (
     add_position,
     add_target,
 )
-from catenary.cli.share_target import names_share
+from catenary.cli.share_target import require_interface
 
 if TYPE_CHECKING:
     from catenary.bus import MainDevice, SubDevice
@@ -104,19 +104,11 @@ def _device(main: MainDevice, arguments: argparse.Namespace) -> SubDevice:
     return device_at(main.scan(strict=False), arguments.position)
 
 
-def _require_interface(arguments: argparse.Namespace) -> None:
-    if names_share(arguments.target):
-        raise UsageError(
-            "a share offers no ADS data: the program that owns the interface must be stopped",
-            hint="stop the program and give the interface, such as eth0",
-        )
-
-
 def run_info(arguments: argparse.Namespace) -> int:
     from catenary.cli.text import escaped
     from catenary.target import MainDevice
 
-    _require_interface(arguments)
+    require_interface(arguments.target, "ADS data")
     with MainDevice(arguments.target, force=arguments.force) as main:
         device = _device(main, arguments)
         info = device.aoe.device_info(port=arguments.port)
@@ -141,7 +133,7 @@ def run_info(arguments: argparse.Namespace) -> int:
 def run_read(arguments: argparse.Namespace) -> int:
     from catenary.target import MainDevice
 
-    _require_interface(arguments)
+    require_interface(arguments.target, "ADS data")
     with MainDevice(arguments.target, force=arguments.force) as main:
         device = _device(main, arguments)
         data = device.aoe.read(
@@ -158,7 +150,7 @@ def run_write(arguments: argparse.Namespace) -> int:
     from catenary.cli.text import escaped
     from catenary.target import MainDevice
 
-    _require_interface(arguments)
+    require_interface(arguments.target, "ADS data")
     try:
         data = bytes.fromhex(arguments.data)
     except ValueError:

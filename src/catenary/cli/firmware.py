@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING
 
 from catenary.cli.arguments import number, positive_seconds
 from catenary.cli.failure import UsageError, one_line, with_hint
-from catenary.cli.foe import add_transfer_options, contents, name_in_device, require_interface
+from catenary.cli.foe import add_transfer_options, contents, name_in_device
 from catenary.cli.parsers import Commands, add_command, add_json, add_position, add_target
 from catenary.cli.progress import TransferProgress, transfer_text
+from catenary.cli.share_target import require_interface
 from catenary.cli.text import escaped
 
 if TYPE_CHECKING:
@@ -73,7 +74,7 @@ def run(arguments: argparse.Namespace) -> int:
     from catenary.cli.devices import device_at
     from catenary.target import MainDevice
 
-    require_interface(arguments)
+    require_interface(arguments.target, "files")
     options, data = _options(arguments), contents(arguments)
     if not data:  # a device erases its memory before it receives the first byte
         raise UsageError(f"{arguments.file} is empty", hint="give the firmware file of the vendor")

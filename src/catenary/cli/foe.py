@@ -20,7 +20,7 @@ from catenary.cli.parsers import (
 )
 from catenary.cli.progress import TransferProgress
 from catenary.cli.sdo_value import write_bytes
-from catenary.cli.share_target import names_share
+from catenary.cli.share_target import require_interface
 
 if TYPE_CHECKING:
     from catenary.bus import MainDevice, SubDevice
@@ -110,15 +110,6 @@ def add_transfer_options(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def require_interface(arguments: argparse.Namespace) -> None:
-    """Raise UsageError if the target is a share."""
-    if names_share(arguments.target):
-        raise UsageError(
-            "a share offers no files: the program that owns the interface must be stopped",
-            hint="stop the program and give the interface, such as eth0",
-        )
-
-
 def name_in_device(arguments: argparse.Namespace) -> str:
     """Return the name of the file in the device."""
     if arguments.name is None and arguments.file == STDIO:
@@ -152,7 +143,7 @@ def run_read(arguments: argparse.Namespace) -> int:
     from catenary.procedure.foe import MAX_SIZE
     from catenary.target import MainDevice
 
-    require_interface(arguments)
+    require_interface(arguments.target, "files")
     name = name_in_device(arguments)
     _require_folder(Path(arguments.file))
     with (
@@ -177,7 +168,7 @@ def run_read(arguments: argparse.Namespace) -> int:
 def run_write(arguments: argparse.Namespace) -> int:
     from catenary.target import MainDevice
 
-    require_interface(arguments)
+    require_interface(arguments.target, "files")
     name, data = name_in_device(arguments), contents(arguments)
     with (
         MainDevice(arguments.target, force=arguments.force) as main,

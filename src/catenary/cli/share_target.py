@@ -27,6 +27,20 @@ def names_share(target: str) -> bool:
     return target.strip().startswith(PREFIX)
 
 
+def require_interface(target: str, missing: str) -> None:
+    """Raise UsageError if the target is a share.
+
+    Args:
+        target: Target of the command.
+        missing: What the command needs and a share does not offer.
+    """
+    if names_share(target):
+        raise UsageError(
+            f"a share offers no {missing}: the program that owns the interface must be stopped",
+            hint="stop the program and give the interface, such as eth0",
+        )
+
+
 def connect_to(target: str) -> Client:
     """Connect to the program of a share, such as "share:arm"."""
     from catenary.remote import connect

@@ -18,7 +18,7 @@ from catenary.cli.parsers import (
     add_position,
     add_target,
 )
-from catenary.cli.share_target import names_share
+from catenary.cli.share_target import require_interface
 from catenary.cli.soe_values import facts, line, parsed, shown
 from catenary.cli.text import escaped
 
@@ -148,11 +148,7 @@ def _device(arguments: argparse.Namespace) -> Iterator[SubDevice]:
     from catenary.cli.devices import device_at
     from catenary.target import MainDevice
 
-    if names_share(arguments.target):
-        raise UsageError(
-            "a share offers no IDNs: the program that owns the interface must be stopped",
-            hint="stop the program and give the interface, such as eth0",
-        )
+    require_interface(arguments.target, "IDNs")
     with MainDevice(arguments.target, force=arguments.force) as main:
         yield device_at(main.scan(strict=False), arguments.position)
 

@@ -25,7 +25,7 @@ _BYTES = re.compile(r"bytes (\d{1,4}) to (\d{1,4})")
 
 @dataclass(frozen=True, slots=True)
 class FoundPlace:
-    """Place of a copy whose name is resolved. Exactly one of the last three fields is set."""
+    """Resolved place of a copy. Exactly one of the last three fields is set."""
 
     device: DeviceDescription
     direction: Direction

@@ -176,7 +176,7 @@ class GetAddress:
 
 @dataclass(frozen=True, slots=True)
 class GetAddressResult:
-    """Answer to `GetAddress`; the address is None if the device only sends a result."""
+    """Answer to `GetAddress`; without an address if the device only sends a result."""
 
     address: EthernetAddress | None
     result: int = 0
@@ -225,7 +225,7 @@ class GetFilter:
 
 @dataclass(frozen=True, slots=True)
 class GetFilterResult:
-    """Answer to `GetFilter`; the filter is None if the device only sends a result."""
+    """Answer to `GetFilter`; without a filter if the device only sends a result."""
 
     filter: MacFilter | None
     result: int = 0

@@ -1,4 +1,4 @@
-"""Safety logic and safety terminal, whose frames a MainDevice relays.
+"""Safety logic and safety terminal. A MainDevice relays their frames.
 
 Their protocol is a simplified FSoE (virtual/fsoe): it shows the effects of a relay, and does not
 conform to ETG.5100. The process data has the layout of real devices, such as the EL1904: a PDO with
@@ -35,7 +35,7 @@ def _entries(index: int, size: int, label: str) -> tuple[MappedEntry, ...]:
 
 
 class _SafetyDevice(Device):
-    """Device whose process data consists of safety frames of one size."""
+    """Device with safety frames of one size as its process data."""
 
     order = ""
     sends, receives = "", ""  # names of its frames
