@@ -50,7 +50,9 @@ class ScriptedSercosDrive(ScriptedDrive):
             self.left = 0
         elif self.state == POWERED and word & RUN == RUN:
             self.state, self.left = OPERATING, 0
-        elif self.state == OPERATING and not word & ON and not self.ignores_drive_off:
+        elif self.state == OPERATING and word & ON:
+            self.left = 0  # drive on during the ramp: it follows at once
+        elif self.state == OPERATING and not self.ignores_drive_off:
             self.count_down(self.ramp, POWERED)
         elif self.state == REACTION:
             self.count_down(self.reaction, FAULT)

@@ -132,17 +132,78 @@ def test_a_stop_is_drive_off_until_the_drive_removes_the_torque(request_: int) -
     assert set(sent(rig)[-50:]) == {0}
 
 
-def test_a_drive_that_ignores_drive_off_loses_its_torque_by_bit_14() -> None:
-    """Quick stop for 50 ms, disable operation for 20 ms, then bit 14 ends."""
-    rig = one(ScriptedSercosDrive(ignores_drive_off=True))
-    rig.enable()
+@pytest.mark.parametrize(("mode", "cycles"), [(CSP, 320), (CSV, 320), (CST, 40)])
+def test_a_drive_that_ignores_drive_off_loses_its_torque_by_bit_14(mode: int, cycles: int) -> None:
+    """In CSP and CSV, the core decelerates it until the stop deadline; in CST, it has 40 ms."""
+    rig = bench(
+        sercos_axis(mode=mode),
+        drives=[ScriptedSercosDrive(ignores_drive_off=True)],
+        stop_deadline_ns=300_000_000,
+    )
+    rig.ask(ENABLED)
+    for _ in range(20):
+        rig.target_velocity[:] = 1.5
+        rig.target_torque[:] = 0.3
+        rig.engine.next()
+    assert rig.statusword[0] == 0x1027
     rig.ask(QUICK_STOP)
     before = len(sent(rig))
-    run(rig, 200)
+    run(rig, 400)
     words = sent(rig)[before:]
-    assert words.count(OFF) == pytest.approx(70, abs=3)
+    assert words.count(OFF) == pytest.approx(cycles, abs=3)
     assert words[-1] == 0
     assert not drive_of(rig).torque_on
+    assert drive_of(rig).target_velocity == 0
+
+
+@pytest.mark.parametrize("mode", [CSP, CST])
+def test_a_stop_before_it_follows_keeps_the_torque_while_the_brake_closes(mode: int) -> None:
+    """After drive on, bit 3 is clear for S-0-0206. After drive off, its brake has S-0-0207."""
+    rig = one(ScriptedSercosDrive(ramp=150, shows_bit_3=False), mode=mode)
+    rig.target_torque[:] = 0.3
+    rig.ask(ENABLED)
+    for _ in range(20):
+        rig.target_torque[:] = 0.3
+        rig.engine.next()
+    assert rig.statusword[0] == 0x0027
+    rig.ask(DISABLED)
+    run(rig, 149)
+    assert drive_of(rig).torque_on
+    assert sent(rig)[-1] == OFF
+    run(rig, 5)
+    assert drive_of(rig).state == POWERED
+
+
+def test_it_ends_a_stop_before_it_is_enabled_again() -> None:
+    """The ramp of the drive is not that of the command, so it must not follow within it."""
+    rig = one(ScriptedSercosDrive(ramp=50))
+    rig.enable()
+    rig.target_position[:] = 0.5
+    rig.steps(3)
+    rig.ask(QUICK_STOP)
+    run(rig, 10)
+    drive_of(rig).position = 900  # where its ramp leads
+    rig.ask(ENABLED)
+    before = len(sent(rig))
+    run(rig, 60)
+    words = sent(rig)[before:]
+    assert words[:36] == [OFF] * 36
+    assert words[-1] == RUN
+    assert drive_of(rig).state == OPERATING
+    assert drive_of(rig).target_position == 900
+
+
+def test_requests_within_a_ramp_do_not_end_it() -> None:
+    rig = one(ScriptedSercosDrive(ramp=50))
+    rig.enable()
+    before = len(sent(rig))
+    for request in (QUICK_STOP, ENABLED, DISABLED, ENABLED, QUICK_STOP):
+        rig.ask(request)
+        run(rig, 5)
+    assert set(sent(rig)[before + 1 :]) == {OFF}
+    run(rig, 50)
+    assert drive_of(rig).state == POWERED
+    assert sent(rig)[-1] == 0
 
 
 def test_a_ramp_without_end_is_ended_by_the_stop_deadline() -> None:
@@ -251,6 +312,20 @@ def test_lost_frames_stop_it_and_its_first_frame_keeps_the_torque() -> None:
     rig.segment.silent.clear()
     rig.engine.next()
     assert sent(rig)[count:] == [OFF]
+    run(rig, 20)
+    assert not drive_of(rig).torque_on
+
+
+def test_a_drive_that_returns_while_it_brakes_has_the_time_of_its_ramp() -> None:
+    """It has cleared bit 3 already when its answers return."""
+    rig = one(ScriptedSercosDrive(ramp=300))
+    rig.enable()
+    drive_of(rig).step(OFF)  # it brakes by itself, without frames
+    rig.segment.silent.add(0)
+    rig.steps(10)
+    rig.segment.silent.clear()
+    run(rig, 290)
+    assert drive_of(rig).torque_on
     run(rig, 20)
     assert not drive_of(rig).torque_on
 

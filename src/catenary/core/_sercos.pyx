@@ -6,9 +6,11 @@ tables translate the words of a SERCOS drive where an axis is read and written (
 every state, limit and stop is that of a CiA 402 axis. Bits 15 and 14 of S-0-0135 are the state, bit
 13 is an error of class 1, and bit 3 is set while the drive follows its command values.
 
-A stop clears bit 15 of S-0-0134 (drive off) and keeps bit 14: the drive brakes and then removes the
-torque itself. It clears bit 3 of S-0-0135 meanwhile. Bit 14 removes the torque at once. A fault is
-reset by the procedure command S-0-0099 through the mailbox, since S-0-0134 has no bit for it.
+A stop clears bit 15 of S-0-0134 (drive off) and keeps bit 14: the drive brakes, closes its brake
+within S-0-0207, and then removes the torque itself. Bits 15 and 14 of S-0-0135 remain set, and bit 3
+is clear. A request to enable waits until this ends. The end of bit 14 removes the torque at once.
+A fault is reset by the procedure command S-0-0099 through the mailbox, since S-0-0134 has no bit
+for it.
 Source: Beckhoff, AX5000, description of S-0-0134 and S-0-0135. Bit 10 of S-0-0134
 (synchronisation) toggles with the command values, as in linuxcnc-ethercat (lcec_class_ax5.c).
 

@@ -58,6 +58,7 @@ from catenary.core._guard cimport (
     TORQUE,
     VELOCITY,
     is_commanded,
+    is_switching_off,
     lose_axis,
     prepare_other_mode,
     quantity_of,
@@ -457,7 +458,7 @@ cdef void axis_setpoints(axes_t *x, axis_t *a, const target_t *t, uint32_t i,
         follow(x, a, t, i, fresh)
         if a.followed:
             judge_lateness(x, a)
-    elif a.requested_state != ENABLED:
+    elif a.requested_state != ENABLED or is_switching_off(a):
         stopping(x, a)
     else:
         waiting(x, a, t, i, fresh)
