@@ -82,6 +82,26 @@ def test_a_velocity_needs_other_telegrams_and_another_mode(bench: Bench) -> None
     ]
 
 
+@pytest.mark.parametrize(
+    ("found", "written"), [(0x0003, 0x0003), (0x000B, 0x000B), (0x0013, 0x000B), (0x8003, 0x000B)]
+)
+def test_the_drive_must_not_compute_the_motion(bench: Bench, found: int, written: int) -> None:
+    """0x0013: interpolation by an IndraDrive. 0x8003: telegrams of an AX5000 that change."""
+    bench.soe.write("S-0-0032", found)
+    with cat.Loop(bench.drives(), period=1e-3) as loop:
+        next(loop)
+        assert bench.drive.idn_value("S-0-0032") == written.to_bytes(2, "little")
+
+
+def test_a_limit_in_the_telegram_is_refused(bench: Bench) -> None:
+    """Without a program that writes it, the torque limit would be 0."""
+    assert isinstance(bench.drive, SercosDrive)
+    bench.drive.application.telegrams.lists = {True: (47, 92), False: (51,)}
+    bench.main.scan()
+    with pytest.raises(ConfigurationError, match="MDT contains S-0-0092"):
+        bench.main.plan(bench.drives())
+
+
 def test_a_torque_in_percent_of_the_rated_torque(bench: Bench) -> None:
     arm = bench.drives(mode="cst", rated_torque=2.0)
     with cat.Loop(arm, period=1e-3) as loop:
@@ -226,6 +246,7 @@ def test_limits_of_the_drive_tighten_the_options(bench: Bench) -> None:
         ("S-0-0086", 0x0001, "linear scaling"),
         ("S-0-0086", 0x0012, "in·lbf"),
         ("S-0-0032", 0x000C, "external encoder"),
+        ("S-0-0032", 0x0005, "external encoder"),
     ],
 )
 def test_scalings_that_an_axis_cannot_use(bench: Bench, idn: str, value: int, message: str) -> None:

@@ -24,7 +24,9 @@ if TYPE_CHECKING:
 OUTPUTS = {number for each, number in IDNS.items() if each.output}
 CYCLE_TIMES = {1: "control unit cycle time", 2: "SERCOS cycle time"}  # [us]
 CYCLE_TIME_MAX = 0xFFFF  # [us]
-EXTERNAL_ENCODER = 4  # lowest bits of S-0-0032
+EXTERNAL_ENCODERS = (4, 5)  # lowest bits of S-0-0032: the second encoder alone, or both
+WITHOUT_LAG = 0x0008  # bit 3 of S-0-0032; both values suit an axis
+LIMITS = {38, 39, 82, 83, 91, 92}  # limits of velocity and torque: 0 would remove the torque
 NO_IDN = 0x1001  # error code of SoE
 IN_AT, IN_MDT = 187, 188  # lists of the IDNs that a telegram may contain
 
@@ -106,6 +108,7 @@ def _telegrams(sub: SubDevice, axes: Sequence[Axis]) -> tuple[SercosAxis, ...]:
         drive = _drive_of(axis, present)
         mdt = [each.number for each in drive.outputs[1:]]
         at = [each.number for each in drive.inputs[1:]]
+        _check_limits(axis, LIMITS.intersection(mdt))
         required, optional = _needed(axis)
         if required <= {*mdt, *at}:
             continue
@@ -122,6 +125,16 @@ def _telegrams(sub: SubDevice, axes: Sequence[Axis]) -> tuple[SercosAxis, ...]:
             )
         wanted[axis.slot] = mdt, at
     return sub.soe.planned_telegrams(wanted) if wanted else present
+
+
+def _check_limits(axis: Axis, limits: set[int]) -> None:
+    """Raise ConfigurationError if the telegrams of an axis contain limits."""
+    if limits:
+        raise ConfigurationError(
+            f"{axis.name}: its MDT contains {', '.join(map(idn_text, sorted(limits)))}, a limit "
+            "that an axis does not write; it would be 0, without torque or motion",
+            hint="omit it in soe.configure_telegrams(mdt=...), and write the limit with soe.write",
+        )
 
 
 def _needed(axis: Axis) -> tuple[set[int], list[int]]:
@@ -181,15 +194,18 @@ def _check_scales(axis: Axis) -> None:
 
 
 def _mode(axis: Axis, sub: SubDevice) -> tuple[IdnCommand, ...]:
-    """Return the operation mode to write (S-0-0032); empty if the drive is in it."""
+    """Return the operation mode to write (S-0-0032); empty if the drive is in it.
+
+    The other bits select motions of the drive itself, or telegrams that change (AX5000, bit 15).
+    """
     low, value = OPERATION_MODES[axis.modes[0]]
     found = _number(sub, axis, 32)
-    if found is not None and axis.modes[0] is Mode.CSP and found & 7 == EXTERNAL_ENCODER:
+    if found is not None and axis.modes[0] is Mode.CSP and found & 7 in EXTERNAL_ENCODERS:
         raise ConfigurationError(
             f"{axis.name}: S-0-0032 is 0x{found:04X}, position control with an external encoder",
             hint="an axis uses the encoder of the motor: write 0x000B to S-0-0032 if this is safe",
         )
-    if found is not None and found & 7 == low:
+    if found is not None and found & ~WITHOUT_LAG == low:
         return ()
     return (_command(axis, 32, value, "operation mode"),)
 

@@ -31,7 +31,7 @@ IDNS: Mapping[AxisObject, int] = {
     NAMED_COLUMNS["following_error"]: 189,
 }
 POLARITY_BITS = {36: 0, 37: 1, 40: 2, 47: 0, 51: 2, 80: 0, 81: 1, 84: 2}
-OPERATION_MODES = {  # S-0-0032: lowest bits, value to write
+OPERATION_MODES = {  # S-0-0032: without bit 3, value to write
     Mode.CSP: (3, 0x000B),  # position control, encoder of the motor, without following distance
     Mode.CSV: (2, 0x0002),
     Mode.CST: (1, 0x0001),

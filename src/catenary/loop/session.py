@@ -216,10 +216,15 @@ class Session:
         )
 
     def _reset_sercos(self) -> None:
-        """Reset the faults of SERCOS drives: their control word has no bit for a reset."""
-        faulty = np.flatnonzero(self._in_fault()).tolist()
-        axes = [k for k in faulty if self.plan.cycle.axes[k].profile == "sercos"]
-        for k in axes:
+        """Reset the faults of SERCOS drives: their control word has no bit for a reset.
+
+        A drive that still brakes after its fault refuses the reset.
+        """
+        is_sercos = np.array([each.profile == "sercos" for each in self.plan.cycle.axes], bool)
+        if not (is_sercos & self._in_fault()).any():
+            return
+        self._await(lambda: is_sercos & (self.views.axis_state == AxisState.FAULT_REACTION_ACTIVE))
+        for k in np.flatnonzero(is_sercos & self._in_fault()).tolist():
             axis = self.plan.cycle.axes[k]
             channel = self.main.subs[axis.device].channel
             assert channel is not None  # its telegrams were read through it
