@@ -351,7 +351,7 @@ def test_a_fault_is_an_event_and_is_reset(
         drive.inject_fault(0)
         command = sub.soe.request_command("S-0-0099")
         for _ in loop:
-            if command.done and raw["S-0-0135"] >> 14 == 1:
+            if command.done and raw["S-0-0135"] >> 14 == 2:
                 break
         command.result()
 

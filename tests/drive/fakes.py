@@ -115,6 +115,7 @@ def fake_sub(
         sdo=sdo,
         slots=slots,
         is_drive=True,
+        description=SimpleNamespace(sercos_axes=()),
         main=FakeMain(sdo),
     )
 

@@ -3,6 +3,8 @@ A position holds; velocity and torque ramp to zero. After the late limit, the dr
 Late targets then move nothing until the application requests it.
 """
 
+from collections.abc import Iterator
+
 import pytest
 
 import catenary as cat
@@ -10,7 +12,14 @@ from catenary import events
 from catenary.errors import DriveError
 from catenary.plan.stop_reason import StopReason
 from catenary.wire.cia402 import AxisState
-from tests.scenario.cell import OP, Cell
+from tests.scenario.cell import KINDS, OP, Cell, cell_with
+
+
+@pytest.fixture(params=KINDS)
+def cell(request: pytest.FixtureRequest) -> Iterator[Cell]:
+    """Yield a cell with drives of each kind."""
+    with cell_with(request.param) as cell:
+        yield cell
 
 
 def test_a_position_holds_while_python_is_a_little_late(cell: Cell) -> None:

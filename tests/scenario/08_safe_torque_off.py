@@ -2,12 +2,21 @@
 The requested state is then disabled. Only a request of the application enables the axis again.
 """
 
+from collections.abc import Iterator
+
 import pytest
 
 import catenary as cat
 from catenary.errors import DriveError
 from catenary.plan.stop_reason import StopReason
-from tests.scenario.cell import OP, Cell
+from tests.scenario.cell import KINDS, OP, Cell, cell_with
+
+
+@pytest.fixture(params=KINDS)
+def cell(request: pytest.FixtureRequest) -> Iterator[Cell]:
+    """Yield a cell with drives of each kind."""
+    with cell_with(request.param) as cell:
+        yield cell
 
 
 def test_nothing_moves_after_sto_until_the_application_requests_it(cell: Cell) -> None:

@@ -2,12 +2,21 @@
 The drives brake with a quick stop while the cycle continues. Then the states go down.
 """
 
+from collections.abc import Iterator
+
 import pytest
 
 import catenary as cat
-from tests.scenario.cell import PRE_OP, Cell
+from tests.scenario.cell import KINDS, PRE_OP, Cell, cell_with
 
 FAST = 20.0  # [rad/s]; the quick stop ramp of the servos is 1000 rad/s²
+
+
+@pytest.fixture(params=KINDS)
+def cell(request: pytest.FixtureRequest) -> Iterator[Cell]:
+    """Yield a cell with drives of each kind."""
+    with cell_with(request.param) as cell:
+        yield cell
 
 
 class Stumble(Exception):

@@ -9,13 +9,13 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 
 import pytest
 
 import catenary as cat
 from catenary.virtual import Coupler, DigitalOutputs, Segment, Server, Servo, ServoQuirks
-from tests.scenario.cell import Cell, cell_of
+from tests.scenario.cell import KINDS, Cell, cell_of, cell_with
 from tests.scenario.vertical import VerticalCell, vertical_cell
 
 WATCHDOG = 0.1  # [s], the default of Loop
@@ -37,6 +37,13 @@ with cat.MainDevice(sys.argv[1]) as main:
             if cycle.number == 50:
                 print("running", flush=True)
 """
+
+
+@pytest.fixture(params=KINDS)
+def cell(request: pytest.FixtureRequest) -> Iterator[Cell]:
+    """Yield a cell with drives of each kind."""
+    with cell_with(request.param) as cell:
+        yield cell
 
 
 def test_without_frames_the_watchdogs_stop_all_devices(cell: Cell) -> None:

@@ -18,6 +18,7 @@ from tests.scenario.frames import SentOutputs, sent_to_axis
 from tests.scenario.vertical import LOAD, MS, RAMP, RESOLUTION, follow, vertical_cell
 
 ENABLE, QUICK_STOP, DISABLE_OPERATION, DISABLE_VOLTAGE = 0x0F, 0x02, 0x07, 0x00
+RUN, DRIVE_OFF, SYNCHRONISATION = 0xE000, 0x4000, 0x0400  # S-0-0134
 LOAD_RAW = 500  # per mille of the rated torque
 SLOW_DOWN = RAMP / 2  # rad/s²: the servo's 0x6084, which 0x605C uses
 EFFECT = 2 * MS  # from a controlword in the outputs to its effect
@@ -74,6 +75,37 @@ def test_never_zero_torque_in_the_frame_that_stops(
     first = [k for k, each in enumerate(sent) if each.controlword == ENABLE][-1] + 1
     assert sent[first].controlword == (DISABLE_OPERATION if stop is disable else QUICK_STOP)
     if mode == "cst":  # and in the next one: the drive's answer is not there yet
+        assert [each.torque for each in sent[first - 1 : first + 2]] == [LOAD_RAW] * 3
+
+
+@pytest.mark.parametrize("mode", ["cst", "csp"])
+@pytest.mark.parametrize("stop", [disable, quick_stop, leave, be_late, write_nan])
+def test_a_sercos_drive_brakes_before_it_removes_its_torque(
+    stop: Callable[[cat.Drives, cat.Loop], None], mode: str, tmp_path: Path
+) -> None:
+    """Drive off (bit 14 alone) until the drive has no torque; then 0."""
+    recording = tmp_path / "frames.pcapng"
+    with vertical_cell(record=recording, sercos=True) as cell:
+        arm = cell.drives(mode=mode, velocity_limit=6.0)
+        try:
+            with cat.Loop(arm, stop=cat.StopPolicy(on_axis_stopped="event")) as loop:
+                plan = loop.plan.cycle
+                follow(cell, arm, loop, 100)
+                before = cell.joint
+                stop(arm, loop)
+                follow(cell, arm, loop, 300)
+        except Stumble:
+            pass
+        assert cell.fall(before) < cell.fall_bound() + RESOLUTION
+        assert not cell.powered
+        cell.let_pass(1.0)
+        assert cell.fall(before) < cell.fall_bound() + RESOLUTION
+    sent = sent_to_axis(recording, plan)
+    words = [each.controlword & ~SYNCHRONISATION for each in sent]
+    first = [k for k, word in enumerate(words) if word == RUN][-1] + 1
+    assert words[first : first + 2] == [DRIVE_OFF] * 2
+    assert set(words[first:]) <= {DRIVE_OFF, 0}
+    if mode == "cst":
         assert [each.torque for each in sent[first - 1 : first + 2]] == [LOAD_RAW] * 3
 
 

@@ -13,10 +13,11 @@ from dataclasses import dataclass
 import catenary as cat
 from catenary.bus import SubDevices
 from catenary.link import Fault, FaultInjector
-from catenary.virtual import Coupler, Device, DigitalOutputs, Segment, Servo
+from catenary.virtual import Coupler, Device, DigitalOutputs, Segment, SercosDrive, Servo
 
 PRE_OP, SAFE_OP, OP = 2, 4, 8
 TURN = 2 * math.pi
+KINDS = ("cia402", "sercos", "mixed")  # of the two drives of a cell
 
 
 @dataclass
@@ -30,8 +31,9 @@ class Cell:
         return self.main.subs
 
     @property
-    def servos(self) -> list[Servo]:
-        return [device for device in self.segment if isinstance(device, Servo)]
+    def servos(self) -> list[Servo | SercosDrive]:
+        """Drives of the segment, of any profile."""
+        return [device for device in self.segment if isinstance(device, (Servo, SercosDrive))]
 
     @property
     def states(self) -> list[int]:
@@ -45,6 +47,8 @@ class Cell:
     def drives(self, **options: object) -> cat.Drives:
         """Return all servos, with the default resolution of the segment."""
         given = {"counts_per_turn": 2**20, "velocity_limit": 100.0, **options}
+        if any(isinstance(each, SercosDrive) for each in self.segment):
+            given = {"rated_torque": 2.0, **given}
         return cat.Drives(self.subs.drives, **given)  # type: ignore[arg-type]
 
     def spoil(self, fault: str, cycles: int, **options: object) -> None:
@@ -78,3 +82,12 @@ def cell_of(
     with cat.MainDevice(link) as main:
         main.scan()
         yield Cell(segment, link, main)
+
+
+@contextmanager
+def cell_with(kind: str) -> Iterator[Cell]:
+    """Yield a cell with two drives of a kind, one of KINDS."""
+    first = Servo(serial=1) if kind == "cia402" else SercosDrive(serial=1)
+    second = SercosDrive(serial=2) if kind == "sercos" else Servo(serial=2)
+    with cell_of(Coupler(), DigitalOutputs(), first, second) as cell:
+        yield cell

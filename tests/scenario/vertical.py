@@ -29,7 +29,7 @@ import numpy.typing as npt
 import catenary as cat
 from catenary.link import FaultInjector, Recorder
 from catenary.loop.stream import Stream
-from catenary.virtual import Joint, Plant, Segment, Servo, ServoQuirks
+from catenary.virtual import Joint, Plant, Segment, SercosDrive, Servo, ServoQuirks
 
 MODEL = Path(__file__).with_name("vertical.xml")
 COUNTS = 131072  # per turn of the motor
@@ -85,7 +85,7 @@ class VerticalCell:
     link: FaultInjector
     main: cat.MainDevice
     plant: Plant
-    servo: Servo
+    servo: Servo | SercosDrive
     brake: float  # N·m at the joint
     brake_delay: float  # s
     gravity: float  # N·m at the joint that hold the arm where it started
@@ -162,6 +162,8 @@ class VerticalCell:
     def drives(self, **options: object) -> cat.Drives:
         """Return the axis as an application declares it; `options` as of `cat.Drives`."""
         given = {"counts_per_turn": COUNTS, "gear_ratio": GEAR}
+        if isinstance(self.servo, SercosDrive):
+            given["rated_torque"] = RATED_TORQUE
         return cat.Drives(self.main.subs.drives, **{**given, **options})  # type: ignore[arg-type]
 
 
@@ -227,6 +229,7 @@ def vertical_cell(
     brake_delay: float = 0.030,
     brake: float = BRAKE,
     record: Path | None = None,
+    sercos: bool = False,
     **servo: object,
 ) -> Iterator[VerticalCell]:
     """Set the rig up with the arm on its brake at `start` [rad], and scan it.
@@ -237,9 +240,20 @@ def vertical_cell(
         brake_delay: Time until the brake has closed [s].
         brake: Torque of the closed brake at the joint [N·m].
         record: File for all frames, see `frames.sent_to_axis`.
+        sercos: True for a SERCOS drive, which has the default friction.
         servo: Options of `Servo`.
     """
-    motor = Servo(name="lift", quirks=quirks, **{**SERVO, **servo})  # type: ignore[arg-type]
+    motor: Servo | SercosDrive
+    if sercos:
+        motor = SercosDrive(
+            name="lift",
+            resolution=COUNTS,
+            inertia=1e-4,
+            rated_torque=RATED_TORQUE,
+            max_velocity=500,
+        )
+    else:
+        motor = Servo(name="lift", quirks=quirks, **{**SERVO, **servo})  # type: ignore[arg-type]
     joint = Joint("shoulder", GEAR, start=start, brake=brake, brake_delay=brake_delay)
     plant = Plant(MODEL, [joint])
     segment = Segment([motor], plant=plant)

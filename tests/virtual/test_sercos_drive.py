@@ -8,7 +8,7 @@ import catenary as cat
 from catenary.virtual import Coupler, Segment, SercosDrive, _segment
 from catenary.virtual.soe.drive_states import DriveStates
 
-ON, POWER, RUN = 0x8000, 0xC000, 0xE000
+ON, ENABLE, POWER, RUN = 0x8000, 0x4000, 0xC000, 0xE000
 
 
 def test_the_state_machine_of_the_control_word() -> None:
@@ -28,14 +28,28 @@ def test_the_state_machine_of_the_control_word() -> None:
                 )
                 return drive.status
 
-            assert hold(0) == "READY"
+            assert hold(0) == "POWERED"
             assert hold(ON) == "POWERED"
             assert hold(RUN) == "OPERATING"
             assert raw["S-0-0135"] & 0x08
             assert hold(POWER) == "OPERATING"  # drive halt
             assert not raw["S-0-0135"] & 0x08
             assert hold(RUN) == "OPERATING"
+            assert hold(ENABLE) == "POWERED"  # drive off
+            assert hold(RUN) == "OPERATING"
+            assert hold(POWER) == "OPERATING"
+            assert hold(ENABLE) == "POWERED"  # drive off after a halt
+            assert hold(RUN) == "OPERATING"
             assert hold(ON) == "POWERED"
+            assert hold(RUN) == "OPERATING"
+            drive.switch_mains(False)
+            assert hold(RUN) == "READY"
+            drive.switch_mains(True)
+            assert hold(0) == "POWERED"
+            assert hold(RUN) == "OPERATING"
+            drive.switch_sto(True)
+            assert hold(RUN) == "READY"
+            drive.switch_sto(False)
             assert hold(RUN) == "OPERATING"
             drive.inject_fault(0x7310)
             assert hold(RUN) == "NOT READY"
@@ -82,14 +96,14 @@ def test_bit_15_brakes_and_bit_14_removes_the_torque(word: int, brakes: bool, ha
                 assert drive.status != "OPERATING"
                 assert drive.velocity_rad_s > before - 5
             hold(word, 500)
-            assert drive.status == ("POWERED" if word & ON else "READY")
+            assert drive.status == "POWERED"
             if brakes:
                 assert abs(drive.velocity_rad_s) < 1
 
 
 def test_a_drive_that_leaves_op_brakes() -> None:
     """Without its MainDevice, the last control word remains, for example after the watchdog."""
-    slots = {_segment.SLOT_VELOCITY: 6_000_000}
+    slots = {_segment.SLOT_VELOCITY: 6_000_000, _segment.SLOT_STATUSWORD: 0x1000}
     motor = 4  # OPERATION ENABLED
     states = DriveStates(
         lambda slot: slots.get(slot, 0),

@@ -162,12 +162,12 @@ def test_a_command_runs_and_is_cleared(client: Client) -> None:
     assert (written.op_code, written.error) == (OpCode.WRITE_RESPONSE, False)
     assert end == Message(OpCode.NOTIFICATION, 127, Element.STATE, b"\x03\x00")
     assert client.read("S-0-0127", STATE) == b"\x03\x00"
-    assert int.from_bytes(client.read("S-0-0135"), "little") == 0x4020  # change bit
+    assert int.from_bytes(client.read("S-0-0135"), "little") == 0x8020  # change bit
     assert client.code(WRITE, VALUE, "S-0-0127", b"\x03\x00") == 0x7010
     assert client.code(WRITE, VALUE, "S-0-0127", bytes(2)) == 0
     assert client.read("S-0-0127", STATE) == bytes(2)
     client.main.let_pass(2)
-    assert int.from_bytes(client.read("S-0-0135"), "little") == 0x4000
+    assert int.from_bytes(client.read("S-0-0135"), "little") == 0x8000
 
 
 def test_a_stuck_command_is_interrupted_and_cancelled() -> None:

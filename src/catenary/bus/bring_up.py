@@ -18,6 +18,7 @@ from catenary.errors import (
 )
 from catenary.link import RingLink
 from catenary.model.device import DeviceDescription, Direction, mapped_pdos
+from catenary.model.telegram_data import with_process_data
 from catenary.plan.clocks import SYNC_OBJECTS
 from catenary.plan.combination import gather_requests
 from catenary.plan.modules import with_requested_modules
@@ -46,7 +47,7 @@ from catenary.procedure.profile import read_object
 from catenary.procedure.register_commands import run_commands
 from catenary.procedure.station import within
 from catenary.procedure.sync import bring_together, read_types, stop, write_types
-from catenary.procedure.telegrams import check_unchanged
+from catenary.procedure.telegrams import check_unchanged, restore
 from catenary.wire.al import AlState
 
 READ_TIMEOUT = 60.0  # [s] to read one device for a plan: hundreds of slow SDOs
@@ -215,7 +216,12 @@ def _prepare(sub: SubDevice, plan: DevicePlan) -> Procedure[None]:
         yield from within(WRITE_TIMEOUT, sub.station, writing, "its configuration was")
     if device.idn_commands:
         yield from run_idn_commands(_channel(sub), device.idn_commands, PRE_OP_STEPS)
-    if device.sercos_axes:
+    if plan.idns:
+        yield from run_idn_commands(_channel(sub), plan.idns, PRE_OP_STEPS)
+    if plan.telegrams:
+        device = sub.description = with_process_data(device, plan.telegrams)
+        yield from restore(_channel(sub), device)
+    elif device.sercos_axes:
         yield from check_unchanged(_channel(sub), device)
     yield from configure_process_data(sub.station, device, plan)
     yield from run_commands(sub.station, plan.registers, "PS")

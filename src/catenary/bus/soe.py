@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Protocol, TypeVar
 
 from catenary.bus.pending import Pending
@@ -11,7 +11,7 @@ from catenary.bus.sdo import Conversations, MailboxOwner
 from catenary.errors import MailboxError
 from catenary.model.device import DeviceDescription
 from catenary.model.sercos import Parameter
-from catenary.model.sercos_axis import TELEGRAM_TYPE
+from catenary.model.sercos_axis import TELEGRAM_TYPE, SercosAxis
 from catenary.procedure.exchange import Procedure
 from catenary.procedure.sercos import (
     ALL,
@@ -22,7 +22,7 @@ from catenary.procedure.sercos import (
     write_value,
 )
 from catenary.procedure.soe import ANSWER_TIMEOUT, Target, read, write
-from catenary.procedure.telegrams import configure
+from catenary.procedure.telegrams import configure, with_lists
 from catenary.wire.sercos import idn_number
 from catenary.wire.sercos_values import Value
 from catenary.wire.soe import DRIVES, Element
@@ -210,6 +210,24 @@ class Soe:
         self._sub.description = self._sub.main.converse(
             configure(target.channel, self._sub.description, drive, *numbers)
         )
+
+    def planned_telegrams(
+        self, wanted: Mapping[int, tuple[Sequence[int], Sequence[int]]]
+    ) -> tuple[SercosAxis, ...]:
+        """Return the drives of the device as they are with other telegrams. Write nothing.
+
+        Args:
+            wanted: IDNs of MDT and AT, without the first words, by the number of the drive. Other
+                drives keep theirs.
+
+        Raises:
+            SoeError: A drive does not have an IDN.
+            ResponseTimeout: The device does not answer.
+            MailboxError: The device violates the protocol, or does not support SoE.
+        """
+        channel = self._target(TELEGRAM_TYPE, 0).channel
+        axes = self._sub.description.sercos_axes
+        return tuple(self._sub.main.converse(with_lists(channel, axes, wanted)))
 
     def request(self, idn: str | int, *, drive: int = 0) -> Pending[Value]:
         """Read while a loop runs, without waiting: poll `done`, then call `result()`.

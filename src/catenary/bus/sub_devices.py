@@ -26,8 +26,8 @@ class SubDevices(Sequence[SubDevice]):
 
     @property
     def drives(self) -> tuple[SubDevice, ...]:
-        """Devices with CiA 402 axes."""
-        return tuple(sub for sub in self._subs if sub.is_drive)
+        """Devices with CiA 402 axes or SERCOS drives."""
+        return tuple(s for s in self._subs if s.is_drive or s.description.sercos_axes)
 
     def by_alias(self, alias: int) -> SubDevice:
         """Return the device with this station alias.

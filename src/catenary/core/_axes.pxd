@@ -52,6 +52,7 @@ cdef struct axis_t:
     double torque_slope        # [N·m/s] while the command returns to the set-points
     double standstill          # [rad/s] maximum velocity at rest
     uint8_t on_loss
+    uint8_t sercos             # its words are S-0-0134 and S-0-0135 (_sercos.pyx)
     # observed
     uint8_t known              # its inputs were valid at least once
     uint8_t lost               # its unit was invalid lost_limit times in a row

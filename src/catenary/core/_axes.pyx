@@ -1,7 +1,8 @@
 # cython: boundscheck=False, wraparound=False, cdivision=True
 """Axes, columns and areas: conversion of process images (bytes) from and to arrays in SI units.
 
-Theory of operation. An axis is a slot of a CiA 402 drive. The plan contains the position of each
+Theory of operation. An axis is a slot of a CiA 402 drive, or a SERCOS drive whose two words are
+translated (_sercos.pyx). The plan contains the position of each
 quantity in the image; a quantity may be absent. `axes_read` runs after the inputs of a cycle. It
 decodes the actual values and unwraps position counters of any width to 64 bits (`counts`,
 `last_raw`); then _guard.pyx judges the axis. `axes_write` runs before the outputs: requests
@@ -31,6 +32,7 @@ from catenary.core._cia402 cimport (
 from catenary.core._guard cimport (
     CSP,
     CST,
+    CSV,
     NO_MODE,
     STOP_OPERATOR,
     STOP_REQUEST,
@@ -60,6 +62,7 @@ from catenary.core._numbers cimport (
     number_put_wrapped,
     number_value,
 )
+from catenary.core._sercos cimport SYNCHRONISATION, sercos_control, sercos_status
 from catenary.core._setpoints cimport axis_setpoints
 
 AXIS_FOLLOWED = FOLLOWED
@@ -124,6 +127,8 @@ cdef inline double demand_error(axis_t *a, const uint8_t *inputs) noexcept nogil
 cdef inline void read_axis(axes_t *x, axis_t *a, const uint8_t *inputs,
                            int64_t instant) noexcept nogil:
     a.status = <uint16_t>number_bits(&a.statusword, inputs)
+    if a.sercos:
+        a.status = sercos_status(a.status)
     a.state = cia402_state(a.status)
     a.mode_shown = a.mode
     if a.mode_actual.present:
@@ -229,8 +234,25 @@ cdef inline bint takes(put_t *put, double value) noexcept nogil:
     return True
 
 
-cdef inline void write_axis(axis_t *a, uint8_t *outputs, uint16_t controlword) noexcept nogil:
-    if controlword != a.controlword_sent or a.mode_wanted != a.mode_sent or not a.written:
+cdef inline void write_sercos(const axes_t *x, axis_t *a, uint8_t *outputs,
+                              uint16_t controlword) noexcept nogil:
+    """Write S-0-0134. Its synchronisation bit toggles with each exchange of the unit.
+
+    After a fault the drive brakes with bit 14 set, at most until the stop deadline.
+    """
+    cdef bint reacts = a.state == FAULT_REACTION_ACTIVE and a.stop_cycles <= x.stop_limit
+    cdef uint16_t word = sercos_control(controlword, reacts)
+    if (x.number // a.divider) & 1:
+        word |= SYNCHRONISATION
+    a.controlword_sent = controlword
+    number_put_bits(&a.controlword, outputs, word)
+
+
+cdef inline void write_axis(const axes_t *x, axis_t *a, uint8_t *outputs,
+                            uint16_t controlword) noexcept nogil:
+    if a.sercos:
+        write_sercos(x, a, outputs, controlword)
+    elif controlword != a.controlword_sent or a.mode_wanted != a.mode_sent or not a.written:
         a.written = 1
         a.controlword_sent = controlword
         a.mode_sent = a.mode_wanted
@@ -250,7 +272,7 @@ cdef inline void write_axis(axis_t *a, uint8_t *outputs, uint16_t controlword) n
 
 cdef inline void lead_axis(axes_t *x, axis_t *a, uint16_t bits) noexcept nogil:
     """Write the commanded set-points and the controlword that leads to the requested state."""
-    write_axis(a, x.image.outputs, guard_controlword(x, a, bits))
+    write_axis(x, a, x.image.outputs, guard_controlword(x, a, bits))
 
 
 cdef inline bint apply_stop(axes_t *x) noexcept nogil:
@@ -543,8 +565,13 @@ cdef class Axes:
             raise ValueError(
                 f"{name}: no sync unit {plan.sync_unit}, the plan has {len(cycle.sync_units)}"
             )
+        divider = cycle.sync_units[plan.sync_unit].divider
+        if not 1 <= divider <= 0x7FFFFFFF:
+            raise ValueError(f"{name}: divider {divider} of its sync unit, must be at least 1")
         if not -128 <= plan.mode <= 127:
             raise ValueError(f"{name}: mode {plan.mode}, must be -128 to 127")
+        self.check_profile(plan, name)
+        a.sercos = plan.profile == "sercos"
         outputs, inputs = cycle.output_size, cycle.input_size
         make_number(&a.controlword, plan.controlword, outputs, f"{name} controlword")
         make_number(&a.statusword, plan.statusword, inputs, f"{name} statusword")
@@ -561,13 +588,25 @@ cdef class Axes:
         make_number(&a.velocity_offset, plan.velocity_offset, outputs, f"{name} velocity_offset")
         self.make_limits(plan, name)
         a.unit = plan.sync_unit
-        a.divider = cycle.sync_units[plan.sync_unit].divider
+        a.divider = divider
         a.mode = a.mode_wanted = plan.mode
         a.mode_refused = NO_MODE
         a.mode_shown = 0
         a.position = a.velocity = a.torque = NAN
         a.put_position.value = a.put_velocity.value = a.put_torque.value = NAN
         self.c.axis_count += 1
+
+    def check_profile(self, plan, name):
+        if plan.profile not in ("cia402", "sercos"):
+            raise ValueError(f"{name}: profile {plan.profile!r}, must be 'cia402' or 'sercos'")
+        if plan.profile == "cia402":
+            return
+        if plan.mode not in (CSP, CSV, CST):
+            raise ValueError(f"{name}: mode {plan.mode}, a SERCOS drive has 8, 9 or 10 (CSP, CSV, CST)")
+        if plan.mode_target is not None or plan.mode_actual is not None:
+            raise ValueError(f"{name}: a SERCOS drive has no modes 0x6060 and 0x6061")
+        if plan.on_loss == "csp_hold":
+            raise ValueError(f"{name}: on_loss 'csp_hold' needs a change of mode")
 
     def make_limits(self, plan, name):
         cdef axis_t *a = &self.c.axes[self.c.axis_count]

@@ -89,6 +89,17 @@ cdef inline bint is_commanded(const axes_t *x, int8_t mode) noexcept nogil:
 cdef inline bint shows_mode(const axis_t *a) noexcept nogil:
     return not a.mode_actual.present or a.mode_shown == a.mode
 
+cdef inline bint is_drive_off(const axis_t *a) noexcept nogil:
+    """Return True if the last control word of a SERCOS drive was drive off."""
+    return a.sercos and a.command != OPERATE
+
+cdef inline bint is_switching_off(const axis_t *a) noexcept nogil:
+    """Return True if a SERCOS drive is in operation after drive off.
+
+    It must not follow again in the middle of its ramp, which the command does not know.
+    """
+    return is_drive_off(a) and a.state == OPERATION_ENABLED
+
 cdef inline void guard_orders(axes_t *x, axis_t *a, const target_t *t, uint32_t i) noexcept nogil:
     """Process new requests; a no-op for an axis that works and has none."""
     if (t.request[i] != a.request or t.mode[i] != a.mode_wanted or a.mode_refused != NO_MODE

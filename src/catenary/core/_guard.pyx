@@ -14,6 +14,8 @@ which it was never shown, and `climbing_cycles` those since the request.
 
 A stop (`stop_axis`) needs a new request afterwards; `stop_reason` and `stop_cycle` keep its cause.
 It sends quick stop, then disable operation, then disable voltage (`stop_command`, `stop_cycles`).
+A SERCOS drive has no state for its ramp: a stop ends before a new request takes effect
+(`is_switching_off`).
 With `on_loss` csp_hold, an axis in CST without set-points is held in CSP instead (`holding`).
 
 Budget: 10 ns per axis that works.
@@ -98,7 +100,7 @@ cdef void take_mode(axes_t *x, axis_t *a, int8_t mode) noexcept nogil:
     a.flags &= ~MODE_REFUSED
     if a.holding or mode == a.mode_wanted:
         return
-    if enters_without_torque(a, mode):
+    if a.sercos or enters_without_torque(a, mode):  # SERCOS: the mode is a parameter
         refuse_mode(x, a, mode)
         return
     a.mode_wanted = mode
@@ -168,17 +170,30 @@ cdef void guard_stop(axes_t *x, uint8_t reason) noexcept nogil:
             a.stop_cycle = x.number
 
 
+cdef inline bint may_be_braking(const axis_t *a) noexcept nogil:
+    """Return True if a drive that shows OPERATION_ENABLED may be braking, after a stop began.
+
+    A drive that clears bit 12 is reacting. A lost device may return, still powered: its first frame
+    must not remove the voltage. A SERCOS drive keeps its state while it brakes and while its brake
+    closes. Before the stop, it may have cleared bit 12 already (delay after drive on, or a lost
+    device). It may even show the bit: then the core decelerates the axis, except in CST.
+    """
+    cdef bint follows = a.status & FOLLOWS_COMMAND != 0
+    if a.sercos and (not follows or quantity_of(a.mode) != TORQUE):
+        return True
+    return a.lost or (a.followed_at_stop and not follows)
+
+
 cdef uint16_t stop_command(axes_t *x, axis_t *a) noexcept nogil:
     """Return the command for an axis in OPERATION_ENABLED that must stop.
 
-    A drive that clears bit 12 is reacting: its ramp may last until the stop deadline. A lost device
-    may return within that time, still powered: its first frame must not remove the voltage.
+    A drive that may be braking has time until the stop deadline.
     """
     cdef uint32_t patience = max(x.stop_patience, 4 * a.divider)
     cdef bint quick = a.requested_state == QUICK_STOP or (a.stopping and a.on_loss != LOSS_DISABLE)
     if quantity_of(a.mode) == TORQUE:
         patience = max(x.stop_patience_torque, 4 * a.divider)
-    if a.lost or (a.followed_at_stop and not a.status & FOLLOWS_COMMAND):
+    if may_be_braking(a):
         patience = max(patience, x.stop_limit)
     if a.stop_cycles <= patience:
         return QUICK_STOP_COMMAND if quick else DISABLE_OPERATION
@@ -203,7 +218,7 @@ cdef uint16_t guard_lead(axes_t *x, axis_t *a, uint16_t bits) noexcept nogil:
         # A brake must not open before a set-point holds the load.
         if not a.followed and a.state != OPERATION_ENABLED:
             requested_state = DISABLED
-    if a.state == OPERATION_ENABLED and requested_state != ENABLED:
+    if a.state == OPERATION_ENABLED and (requested_state != ENABLED or is_switching_off(a)):
         command = stop_command(x, a)
     else:
         if a.state == QUICK_STOP_ACTIVE and not may_lose_voltage(x, a):
@@ -303,7 +318,8 @@ cdef bint is_trusted(axes_t *x, axis_t *a) noexcept nogil:
     stopped when its drive shows the bit for the first time.
     """
     if (a.requested_state != ENABLED or a.state != OPERATION_ENABLED or a.lost or a.holding
-            or a.mode_wanted != a.mode or not is_mapped(a) or not shows_mode(a)):
+            or a.mode_wanted != a.mode or not is_mapped(a) or not shows_mode(a)
+            or is_switching_off(a)):
         if a.mute_cycles < x.mute_limit:
             a.mute_cycles = 0
         return False
@@ -328,7 +344,8 @@ cdef void observe_requested_state(axes_t *x, axis_t *a, uint8_t state_before) no
     if a.requested_state == ENABLED:
         if a.state >= FAULT_REACTION_ACTIVE and state_before < FAULT_REACTION_ACTIVE:
             stop_axis(x, a, STOP_FAULT)
-        elif state_before == OPERATION_ENABLED and a.state != OPERATION_ENABLED:
+        elif (state_before == OPERATION_ENABLED and a.state != OPERATION_ENABLED
+                and not is_drive_off(a)):
             stop_axis(x, a, STOP_LEFT_OPERATION)
     elif a.requested_state == QUICK_STOP:
         if a.state != OPERATION_ENABLED and a.state != QUICK_STOP_ACTIVE:

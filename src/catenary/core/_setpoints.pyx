@@ -34,7 +34,13 @@ from libc.math cimport INFINITY, copysign, fabs, fmax, fmin, isfinite, sqrt
 from libc.stdint cimport uint8_t, uint32_t, uint64_t
 
 from catenary.core._axes cimport DROPPED, FALLBACK, MODE_REFUSED, REFUSED
-from catenary.core._cia402 cimport ENABLED, OPERATION_ENABLED, QUICK_STOP_ACTIVE, SWITCHED_ON
+from catenary.core._cia402 cimport (
+    ENABLED,
+    FAULT_REACTION_ACTIVE,
+    OPERATION_ENABLED,
+    QUICK_STOP_ACTIVE,
+    SWITCHED_ON,
+)
 from catenary.core._guard cimport (
     CSP,
     CSV,
@@ -52,6 +58,7 @@ from catenary.core._guard cimport (
     TORQUE,
     VELOCITY,
     is_commanded,
+    is_switching_off,
     lose_axis,
     prepare_other_mode,
     quantity_of,
@@ -365,7 +372,7 @@ cdef void rest(axes_t *x, axis_t *a, const target_t *t, uint32_t i) noexcept nog
     a.commanded_velocity = 0.0
     a.commanded_torque = 0.0
     a.command_velocity = 0.0
-    if a.state == QUICK_STOP_ACTIVE:
+    if a.state == QUICK_STOP_ACTIVE or a.state == FAULT_REACTION_ACTIVE:
         a.stop_cycles += 1
     if (a.state == SWITCHED_ON and a.requested_state == ENABLED and a.armed and not t.header.hold
             and quantity_of(a.mode) == TORQUE and isfinite(t.torque[i])):
@@ -451,7 +458,7 @@ cdef void axis_setpoints(axes_t *x, axis_t *a, const target_t *t, uint32_t i,
         follow(x, a, t, i, fresh)
         if a.followed:
             judge_lateness(x, a)
-    elif a.requested_state != ENABLED:
+    elif a.requested_state != ENABLED or is_switching_off(a):
         stopping(x, a)
     else:
         waiting(x, a, t, i, fresh)

@@ -59,7 +59,8 @@ def axis_sources(
             sources.append(source)
         else:
             slots = described(source, chosen_modules(source, modules)).slots if modules else ()
-            sources.extend((source, slot) for slot in slots or source.slots or (0,))
+            slots = slots or source.slots or _sercos_drives(source) or (0,)
+            sources.extend((source, slot) for slot in slots)
         check_drive(sources[-1][0])
     if not sources:
         raise ValueError("no axes: the list of SubDevices is empty")
@@ -75,14 +76,19 @@ def check_drive(sub: SubDevice) -> None:
 
     A drive that does not state its profile in 0x1000 is accepted.
     """
-    if sub.is_drive or sub.description.coe:
+    if sub.is_drive or sub.description.coe or sub.description.sercos_axes:
         return
     assignments = (*sub.description.inputs, *sub.description.outputs)
     if not any(entry.index == STATUSWORD for entry in mapped_entries(assignments)):
         raise ValueError(
-            f"{sub.station} is not a drive: it has no CiA 402 objects; use Inputs or "
-            "Outputs for its process data; main.subs.drives are the drives"
+            f"{sub.station} is not a drive: it has neither CiA 402 objects nor SERCOS drives; use "
+            "Inputs or Outputs for its process data; main.subs.drives are the drives"
         )
+
+
+def _sercos_drives(sub: SubDevice) -> tuple[int, ...]:
+    """Return the numbers of the SERCOS drives of a device."""
+    return tuple(each.drive for each in sub.description.sercos_axes)
 
 
 def axis_name(sub: SubDevice, slot: int) -> str:

@@ -10,6 +10,8 @@ from catenary.drive.homing import HomingMethod
 from catenary.drive.limits import AxisBounds, LimitOptions, make_bounds
 from catenary.drive.objects import AxisObject, Unit
 from catenary.drive.report import axis_report
+from catenary.drive.sercos_settings import REACTIONS, SercosSettings
+from catenary.drive.sercos_values import IDNS, sign
 from catenary.drive.settings import DriveSettings, own_limits
 from catenary.drive.units import AxisUnits
 from catenary.errors import MappingError
@@ -17,9 +19,10 @@ from catenary.model.module import ConfiguredModule
 from catenary.plan.axis_report import AxisReport
 from catenary.plan.cycle import AxisPlan, Bank, Column, Number, NumberKind
 from catenary.plan.numbers import Which
-from catenary.plan.request import DeviceRequest, ImageLayout, WrittenPdo
+from catenary.plan.request import DeviceRequest, ImageLayout, ObjectReference, WrittenPdo
 from catenary.plan.start_up_object import StartUp
 from catenary.wire.cia402 import SLOT_OFFSET, Mode
+from catenary.wire.sercos import idn_text
 
 TARGETS: dict[int, AxisObject] = {
     Mode.CSP: objects.TARGET_POSITION,
@@ -58,6 +61,7 @@ class Axis:
     objects: tuple[StartUp, ...] = ()  # start-up objects of its device
     modules: tuple[ConfiguredModule, ...] | None = None  # in the slots of its device
     settings: DriveSettings = field(default_factory=DriveSettings)  # read in PRE-OP
+    sercos: SercosSettings | None = None  # of SERCOS drive number `slot`
 
     def index(self, base: int) -> int:
         """Return the index in this slot of the object that has the index `base` in slot 0."""
@@ -86,7 +90,10 @@ class Axis:
             ConfigurationError: velocity_limit is infinite and no deceleration is known.
         """
         homing_offset = None if self.homing is None else self.homing.offset_counts(self.units)
-        own = own_limits(self.settings, self.units, homing_offset)
+        if self.sercos is not None:
+            own = self.sercos.own_limits(self.units)
+        else:
+            own = own_limits(self.settings, self.units, homing_offset)
         return make_bounds(self.name, self.options, self.modes, own, self.units)
 
     def report(self, period_ns: int) -> AxisReport:
@@ -99,7 +106,7 @@ class Axis:
             self.name,
             self.modes,
             self.bounds,
-            self.settings,
+            self.settings.reactions() if self.sercos is None else REACTIONS,
             period_ns * self.divider,
             self.units,
         )
@@ -110,6 +117,27 @@ class Axis:
         Args:
             start_up: (index, subindex, data) of the objects to write at the start-up.
         """
+        exchanged, optional = self._exchanged(), self._optional()
+        references = [
+            (each.output, self._reference(each, required=each not in optional))
+            for each in exchanged
+        ]
+        sercos = self.sercos
+        return DeviceRequest(
+            outputs=tuple(each for is_output, each in references if is_output and each),
+            inputs=tuple(each for is_output, each in references if not is_output and each),
+            start_up=start_up,
+            telegrams=() if sercos is None else sercos.telegrams,
+            idns=() if sercos is None else sercos.idns,
+            divider=self.divider,
+            required=self.required,
+            pdos=self.pdos,
+            objects=self.objects,
+            modules=self.modules,
+        )
+
+    def _exchanged(self) -> list[AxisObject]:
+        """Return the objects of the request, each once."""
         outputs = [
             objects.CONTROLWORD,
             objects.MODE_TARGET,
@@ -121,23 +149,29 @@ class Axis:
             inputs.append(objects.ACTUAL_POSITION)
         if self.uses_profile:
             outputs += objects.PROFILE_OBJECTS.values()
-        for column in (*self.columns.values(), *self.optional_columns.values()):
-            (outputs if column.output else inputs).append(column)
-        optional = self._optional()
-        return DeviceRequest(
-            outputs=tuple(
-                o.reference(self.slot, required=o not in optional) for o in dict.fromkeys(outputs)
-            ),
-            inputs=tuple(
-                o.reference(self.slot, required=o not in optional) for o in dict.fromkeys(inputs)
-            ),
-            start_up=start_up,
-            divider=self.divider,
-            required=self.required,
-            pdos=self.pdos,
-            objects=self.objects,
-            modules=self.modules,
-        )
+        columns = (*self.columns.values(), *self.optional_columns.values())
+        return list(dict.fromkeys((*outputs, *inputs, *columns)))
+
+    def sercos_values(self) -> tuple[list[AxisObject], list[AxisObject]]:
+        """Return the values that the telegrams of a SERCOS drive must contain, and may contain.
+
+        The actual position is always necessary in CSP, because the core holds it.
+        """
+        needed = [objects.ACTUAL_POSITION] if Mode.CSP in self.modes else []
+        exchanged = [each for each in dict.fromkeys((*needed, *self._exchanged())) if each in IDNS]
+        optional = self._optional() - set(needed)
+        return [each for each in exchanged if each not in optional], [
+            each for each in exchanged if each in optional
+        ]
+
+    def _reference(self, wanted: AxisObject, *, required: bool) -> ObjectReference | None:
+        """Return an object of the request; None if a SERCOS drive does not exchange it."""
+        if self.sercos is None:
+            return wanted.reference(self.slot, required=required)
+        value = self.sercos.value(wanted)
+        if value is None:
+            return None
+        return ObjectReference(value.number, self.slot, value.bit_length, required)
 
     @property
     def uses_profile(self) -> bool:
@@ -199,6 +233,7 @@ class Axis:
             standstill=self.units.defaults.standstill,
             step_floor=self.units.defaults.step_limit,
             on_loss=bounds.on_loss,
+            profile="cia402" if self.sercos is None else "sercos",
         )
 
     def _demand(self, layout: ImageLayout, mode: Mode, wanted: AxisObject) -> Number | None:
@@ -251,15 +286,18 @@ class Axis:
     def _required(self, layout: ImageLayout, wanted: AxisObject) -> Number:
         place = self._place(layout, wanted)
         if place is None:
-            index = self.index(wanted.index)
+            what = f"0x{self.index(wanted.index):04X}:{wanted.subindex:02X}"
+            if self.sercos is not None and wanted in IDNS:
+                what = idn_text(IDNS[wanted])
             raise MappingError(
-                f"device {self.device} ({self.name}): 0x{index:04X}:{wanted.subindex:02X} "
-                "is not in its process data",
+                f"device {self.device} ({self.name}): {what} is not in its process data",
                 hint="see the device's mapping with `catenary scan`",
             )
         return place
 
     def _place(self, layout: ImageLayout, wanted: AxisObject) -> Number | None:
+        if self.sercos is not None:
+            return self._sercos_place(layout, wanted)
         find = layout.output if wanted.output else layout.input
         which = Which(bit_length=wanted.bit_length)
         place = find(self.device, self.index(wanted.index), wanted.subindex, which)
@@ -273,6 +311,23 @@ class Axis:
         if place.kind is not NumberKind.REAL:
             place = replace(place, kind=kind)
         return self.units.apply(place, wanted.unit)
+
+    def _sercos_place(self, layout: ImageLayout, wanted: AxisObject) -> Number | None:
+        """Return the place of a value in the telegrams, with the polarity of the position."""
+        assert self.sercos is not None
+        value = self.sercos.value(wanted)
+        lacks_velocity = wanted.unit is Unit.VELOCITY and self.units.velocity_unit is None
+        lacks_torque = wanted.unit in TORQUES and self.units.rated_torque is None
+        if value is None or lacks_velocity or lacks_torque:
+            return None
+        find = layout.output if wanted.output else layout.input
+        place = find(self.device, value.number, self.slot, Which(bit_length=value.bit_length))
+        if place is None:
+            return None
+        if place.kind is not NumberKind.REAL:
+            place = replace(place, kind=NumberKind.SIGNED if wanted.signed else NumberKind.UNSIGNED)
+        scaled = self.units.apply(place, wanted.unit)
+        return replace(scaled, scale=scaled.scale * sign(self.sercos.drive, value.number))
 
 
 def column_bank(wanted: AxisObject) -> Bank:

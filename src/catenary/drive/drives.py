@@ -1,4 +1,4 @@
-"""Drives: the CiA 402 axes of any devices and slots, as one set of arrays in SI units."""
+"""Drives: CiA 402 axes and SERCOS drives of any devices, as one set of arrays in SI units."""
 
 from __future__ import annotations
 
@@ -43,6 +43,8 @@ from catenary.drive.probe_port import ProbePort
 from catenary.drive.probe_request import check_probe, chosen_axis, probe_request
 from catenary.drive.rates import RateColumns
 from catenary.drive.request import Request
+from catenary.drive.sercos_reset import SercosResets
+from catenary.drive.sercos_start_up import with_sercos
 from catenary.drive.state_machine import RequestedState
 from catenary.drive.touch_probe import (
     FUNCTION_COLUMN,
@@ -73,7 +75,8 @@ class Drives(Request):
     """Process-data request for n axes.
 
     `subs` is a list of SubDevices with all of their axes, or of `(SubDevice, slot)` for single
-    axes.
+    axes. A SERCOS drive is an axis, too. Its mode is "csp", "csv" or "cst", and options that need
+    CiA 402 are refused (docs/how_to/soe.md).
 
     Options for all axes:
 
@@ -233,6 +236,7 @@ class Drives(Request):
         self._ports: tuple[AxisPort, ...] = ()
         self._moves: Moves | None = None
         self._probes: Probes | None = None
+        self._resets = SercosResets()
         self._units: npt.NDArray[np.intp] = np.zeros(0, np.intp)
 
     def __len__(self) -> int:
@@ -589,6 +593,7 @@ class Drives(Request):
         """Read rated torque and settings once per plan, although the plan calls `pdos` twice."""
         if self._is_read:
             return
+        self._axes = with_sercos(self._axes, self.subs, self._period_ns)
         if self._touch_probe is not None:
             pairs = zip(self._axes, self.subs, strict=True)
             self._axes = tuple(with_offered(axis, sub) for axis, sub in pairs)
@@ -690,6 +695,9 @@ class Drives(Request):
     def _request(self, call: str, state: RequestedState, axes: Axes) -> None:
         views = self._of_open_loop(f"{call}()")
         chosen = self._numbers(axes)
+        if state in (RequestedState.ENABLED, RequestedState.RESET):
+            in_fault = set(self.faults).intersection(chosen)
+            self._resets.request([(self._subs[k], self._axes[k]) for k in sorted(in_fault)])
         views.requested_state[chosen] = state
         views.request[chosen] += 1  # only a new request clears a stop of the core
 
@@ -715,4 +723,5 @@ def joined(first: DeviceRequest, second: DeviceRequest) -> DeviceRequest:
         outputs=first.outputs + second.outputs,
         inputs=first.inputs + second.inputs,
         start_up=first.start_up + second.start_up,
+        idns=first.idns + second.idns,
     )

@@ -160,7 +160,7 @@ def make_bounds(
         position_min=position_min,
         position_max=position_max,
         velocity=velocity,
-        torque=_tightest(options.torque_limit, own.torque, "0x6072 of the drive", min),
+        torque=_tightest(options.torque_limit, own.torque, own.torque_source, min),
         step=_given(options.step_limit),
         acceleration=_given(options.acceleration_limit)
         if options.acceleration_limit is not None
@@ -196,11 +196,11 @@ def _positions(options: LimitOptions, own: OwnLimits) -> tuple[Chosen, Chosen]:
 
     Limits of the drive are ignored if they contradict the options.
     """
-    low = _tightest(options.position_min, own.position_min, "0x607D of the drive", max)
-    high = _tightest(options.position_max, own.position_max, "0x607D of the drive", min)
+    low = _tightest(options.position_min, own.position_min, own.position_source, max)
+    high = _tightest(options.position_max, own.position_max, own.position_source, min)
     if low.value is None or high.value is None or low.value < high.value:
         return low, high
-    contradicted = "option; 0x607D of the drive contradicts it"
+    contradicted = f"option; {own.position_source} contradicts it"
     return Chosen(options.position_min, contradicted), Chosen(options.position_max, contradicted)
 
 

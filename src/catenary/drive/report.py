@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 from catenary.drive.limits import AxisBounds, Chosen
-from catenary.drive.settings import DriveSettings
 from catenary.drive.units import AxisUnits, UnitNames
 from catenary.plan.axis_report import AxisReport
 from catenary.wire.cia402 import Mode
@@ -17,7 +16,7 @@ def axis_report(
     name: str,
     modes: Sequence[Mode],
     bounds: AxisBounds,
-    settings: DriveSettings,
+    reactions: Sequence[str],
     exchange_ns: int,
     units: AxisUnits,
 ) -> AxisReport:
@@ -27,14 +26,14 @@ def axis_report(
         name: name of the axis.
         modes: modes that the axis may use; the first one is the mode at the start.
         bounds: limits in force.
-        settings: raw settings of the drive.
+        reactions: lines of text about the reactions of the drive.
         exchange_ns: time between two exchanges of the device [ns].
         units: units of the axis.
     """
     lines = (
         *_limits(bounds, units.names),
         *_fallback(modes, bounds, exchange_ns, units),
-        *settings.reactions(),
+        *reactions,
     )
     return AxisReport(name, tuple(map(int, modes)), lines)
 

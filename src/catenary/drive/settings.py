@@ -99,6 +99,8 @@ class OwnLimits:
     velocity_source: str = ""
     torque: float | None = None  # [N·m]
     deceleration: float | None = None  # [rad/s²]
+    position_source: str = "0x607D of the drive"
+    torque_source: str = "0x6072 of the drive"
 
 
 OBJECTS: tuple[tuple[str, int, int, DataType[int]], ...] = (

@@ -30,7 +30,7 @@ def with_rated_torque(axis: Axis, sub: SubDevice) -> Axis:
         ConfigurationError: The axis needs its torque, but the drive does not have a rated torque.
         SdoAbort: The drive has 0x6076, but refuses to read it.
     """
-    if axis.units.rated_torque is not None or not axis.uses_torque:
+    if axis.sercos or axis.units.rated_torque is not None or not axis.uses_torque:
         return axis
     index = axis.index(Object.MOTOR_RATED_TORQUE)
     try:
@@ -60,15 +60,14 @@ def with_settings(axes: Sequence[Axis], subs: Sequence[SubDevice]) -> tuple[Axis
         ConfigurationError: An axis in CST has no `on_loss=` and a quick stop that may not brake, or
             no deceleration is known.
     """
-    places = [(sub, axis.slot) for axis, sub in zip(axes, subs, strict=True)]
-    read = tuple(
-        replace(axis, settings=settings)
-        for axis, settings in zip(axes, read_settings(places), strict=True)
-    )
-    for axis in read:
-        _check_quick_stop(axis)
-        _ = axis.bounds  # an error must be raised before anything is written
-    return read
+    by_sdo = [k for k, axis in enumerate(axes) if axis.sercos is None]
+    places = [(subs[k], axes[k].slot) for k in by_sdo]
+    read = list(axes)
+    for k, settings in zip(by_sdo, read_settings(places), strict=True):
+        read[k] = replace(axes[k], settings=settings)
+        _check_quick_stop(read[k])
+        _ = read[k].bounds  # an error must be raised before anything is written
+    return tuple(read)
 
 
 def _check_quick_stop(axis: Axis) -> None:
@@ -103,6 +102,8 @@ def downloads(axis: Axis, sub: SubDevice, period_ns: int) -> tuple[tuple[int, in
         ConfigurationError: 0x60C2 cannot represent the period.
         SdoAbort: The drive refuses to read an object that it has.
     """
+    if axis.sercos is not None:
+        return ()
     found = _mode(axis, sub) + _interpolation(axis, sub, period_ns) + _ramps(axis)
     return found + (axis.homing.downloads(axis.units, axis.index(0)) if axis.homing else ())
 

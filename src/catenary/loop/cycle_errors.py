@@ -165,12 +165,14 @@ class AxisTrouble(NamedTuple):
 
     name: str
     state: AxisState | None
-    code: int | None  # object 0x603F; None: it could not be read
+    code: int | str | None  # 0x603F, or diagnosis of SERCOS; None: it could not be read
 
     def __str__(self) -> str:
         state = self.state.name if self.state is not None else "no valid CiA 402 state"
         if self.code is None:
             return f"{self.name}: {state}, its error code cannot be read"
+        if isinstance(self.code, str):
+            return f"{self.name}: {state}, {self.code}"
         return f"{self.name}: {state}, error code 0x{self.code:04X} ({error_text(self.code)})"
 
 

@@ -36,5 +36,8 @@ class Exchange(Protocol):
     def query_states(self) -> Evidence:
         """Query all devices for their states."""
 
-    def error_code(self, axis: int) -> int | None:
-        """Return object 0x603F of an axis; None if it cannot be read."""
+    def error_code(self, axis: int) -> int | str | None:
+        """Return object 0x603F of an axis, or the diagnosis of a SERCOS drive as text.
+
+        None if it cannot be read.
+        """

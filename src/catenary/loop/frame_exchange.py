@@ -23,6 +23,7 @@ from catenary.procedure.al_state import request_state
 from catenary.procedure.al_status_poll import survey
 from catenary.procedure.process_data_check import probe_inputs
 from catenary.procedure.sdo import upload
+from catenary.procedure.sercos_fault import read_diagnosis
 from catenary.types import UINT
 from catenary.wire.al import AlState
 from catenary.wire.cia402 import SLOT_OFFSET, Object
@@ -139,12 +140,17 @@ class FrameExchange:
                 return Evidence(answers, other_masters=others)
         return Evidence(answers, without_address=silent, other_masters=others)
 
-    def error_code(self, axis: int) -> int | None:
-        """Return object 0x603F of the axis; None if it cannot be read."""
+    def error_code(self, axis: int) -> int | str | None:
+        """Return object 0x603F of the axis, or the diagnosis of a SERCOS drive.
+
+        None if it cannot be read.
+        """
         plan = self._session.plan.cycle.axes[axis]
         channel = self._session.main.subs[plan.device].channel
         if channel is None:
             return None
+        if plan.profile == "sercos":
+            return self._session.service.converse(read_diagnosis(channel, plan.slot))[0]
         index = Object.ERROR_CODE + SLOT_OFFSET * plan.slot
         try:
             [data] = self._session.service.converse(upload(channel, index, 0))

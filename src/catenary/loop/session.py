@@ -43,6 +43,7 @@ from catenary.loop.watches.trigger import TriggerWatch
 from catenary.plan.planner import Plan
 from catenary.plan.request import ProcessDataRequest, Views
 from catenary.plan.sink import Sink
+from catenary.procedure.sercos_fault import reset_fault
 from catenary.wire.al import AlState
 from catenary.wire.cia402 import IN_FAULT, POWERED, AxisState, Mode
 
@@ -199,6 +200,7 @@ class Session:
             CatenaryError: The cycle failed.
         """
         in_position = np.isin(self.views.mode_target, (Mode.CSP, Mode.PP))
+        self._reset_sercos()
         if (
             ~in_position & self._in_fault()
         ).any():  # the reset by `enable` would come after their first targets
@@ -212,6 +214,24 @@ class Session:
                 & (self.views.jogged == 0)
             )
         )
+
+    def _reset_sercos(self) -> None:
+        """Reset the faults of SERCOS drives: their control word has no bit for a reset.
+
+        A drive that still brakes after its fault refuses the reset.
+        """
+        is_sercos = np.array([each.profile == "sercos" for each in self.plan.cycle.axes], bool)
+        if not (is_sercos & self._in_fault()).any():
+            return
+        self._await(lambda: is_sercos & (self.views.axis_state == AxisState.FAULT_REACTION_ACTIVE))
+        for k in np.flatnonzero(is_sercos & self._in_fault()).tolist():
+            axis = self.plan.cycle.axes[k]
+            channel = self.main.subs[axis.device].channel
+            assert channel is not None  # its telegrams were read through it
+            try:
+                self.service.converse(reset_fault(channel, axis.slot))
+            except CatenaryError as error:
+                raise self.faults.drive_error([k], "cannot be reset") from error
 
     def _request(self, state: int, axes: npt.NDArray[np.bool_]) -> None:
         self.views.requested_state[axes] = state

@@ -8,6 +8,7 @@ from dataclasses import replace
 
 from catenary.errors import ConfigurationError
 from catenary.model.module import ConfiguredModule
+from catenary.model.sercos_axis import SercosAxis
 from catenary.plan.request import (
     DeviceRequest,
     DistributedClock,
@@ -44,6 +45,8 @@ def gather_requests(
                 _one_mapping(position, before.pdos, pdos.pdos),
                 _one_start_up(position, before.objects, pdos.objects),
                 _one_list(position, before.modules, pdos.modules),
+                _one_telegram(position, before.telegrams, pdos.telegrams),
+                before.idns + tuple(each for each in pdos.idns if each not in before.idns),
             )
     return {
         position: request if request.divider else replace(request, divider=1)
@@ -107,6 +110,18 @@ def _one_list(
             hint="give both the same modules=, or only one of them",
         )
     return first if second is None else second
+
+
+def _one_telegram(
+    position: int, first: tuple[SercosAxis, ...], second: tuple[SercosAxis, ...]
+) -> tuple[SercosAxis, ...]:
+    """Return the telegrams of two requests. Raise ConfigurationError if they contradict."""
+    if first and second and first != second:
+        raise ConfigurationError(
+            f"device {position}: two requests need different telegrams",
+            hint="give all drives of the device to one Drives(...)",
+        )
+    return first or second
 
 
 def _merged(

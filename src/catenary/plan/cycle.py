@@ -12,6 +12,7 @@ from typing import Literal
 
 ExecutionMode = Literal["threaded", "inline"]
 ReceiveMode = Literal["poll", "wait", "busy"]
+Profile = Literal["cia402", "sercos"]
 FollowedClock = Literal["reference", "main"]
 OnLoss = Literal["quick_stop", "disable", "csp_hold"]
 
@@ -167,7 +168,9 @@ class AxisLimits:
 class AxisPlan:
     """One CiA 402 axis: slot k of a device (objects + 0x800·k), and the places of its quantities.
 
-    A quantity that is not exchanged is None. For a linear axis, read rad, rad/s and N·m below as m,
+    A SERCOS axis is drive k of a device: `controlword` is the place of S-0-0134, `statusword` that
+    of S-0-0135, `mode` that of S-0-0032. It has no other modes. A
+    quantity that is not exchanged is None. For a linear axis, read rad, rad/s and N·m below as m,
     m/s and N.
     """
 
@@ -199,6 +202,7 @@ class AxisPlan:
     step_floor: float = 0.1  # [rad] smallest default of the step limit
     torque_slope: float | None = None  # [N·m/s] on return to the set-points in CST; None: at once
     on_loss: OnLoss = "quick_stop"  # reaction when the core stops the axis
+    profile: Profile = "cia402"
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,6 +11,7 @@ from catenary import notebook
 from catenary.errors import ConfigurationError
 from catenary.model.device import DeviceDescription, Direction
 from catenary.model.module_mapping import with_mapping_of
+from catenary.model.telegram_data import with_process_data
 from catenary.plan.clock_report import Clocks
 from catenary.plan.clocks import ClockChoice, choose_clocks, make_clock_plan, make_sync
 from catenary.plan.combination import gather_requests
@@ -162,6 +163,8 @@ def _drafts(
     drafts = []
     for found in devices:
         request = combined.get(found.position, DeviceRequest(required=required))
+        if request.telegrams:
+            found = with_process_data(found, request.telegrams)
         device = with_requested_modules(found, request.modules)
         watchdog_ns, watchdog_source = choose_watchdog(
             device, request, options.watchdog, options.period_ns

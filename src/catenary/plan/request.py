@@ -14,7 +14,9 @@ import numpy as np
 import numpy.typing as npt
 
 from catenary.model.device import Direction
+from catenary.model.esi_settings import IdnCommand
 from catenary.model.module import ConfiguredModule
+from catenary.model.sercos_axis import SercosAxis
 from catenary.plan.axis_report import AxisReport
 from catenary.plan.cycle import AxisPlan, Column, ImageArea, ImageCopy, Number
 from catenary.plan.numbers import ANY, Which
@@ -145,6 +147,8 @@ class DeviceRequest:
     pdos: tuple[WrittenPdo, ...] = ()  # PDOs to use in their directions, without a search
     objects: tuple[StartUp, ...] = ()  # start-up objects of the application, in their order
     modules: tuple[ConfiguredModule, ...] | None = None  # None: those in the description
+    telegrams: tuple[SercosAxis, ...] = ()  # of a SERCOS device; empty: those in the description
+    idns: tuple[IdnCommand, ...] = ()  # IDNs of a SERCOS device, written in PRE-OP
 
 
 class ImageLayout(Protocol):

@@ -28,7 +28,9 @@ from catenary.model.device import (
     mapped_entries,
     mapped_pdos,
 )
+from catenary.model.esi_settings import IdnCommand
 from catenary.model.register_command import RegisterCommand
+from catenary.model.sercos_axis import SercosAxis
 from catenary.plan.changes import Change, mapping_changes, value_changes
 from catenary.plan.clocks import SyncPlan
 from catenary.plan.download import Download
@@ -73,6 +75,8 @@ class DevicePlan:
     mapping_source: str = ""  # "CoE", "SII", "ESI FILE:LINE", or of the OpMode or named mapping
     modules: ModulePlan | None = None  # None: the device is not modular
     registers: tuple[RegisterCommand, ...] = ()  # of an ENI, sent at the transitions
+    telegrams: tuple[SercosAxis, ...] = ()  # of a SERCOS device, to write; empty: unchanged
+    idns: tuple[IdnCommand, ...] = ()  # of a SERCOS device, written in PRE-OP
 
     @property
     def downloads(self) -> tuple[Download, ...]:
@@ -143,6 +147,8 @@ def make_device_plan(
         watchdog_source=watchdog_source,
         mapping_source=_mapping_source(device, outputs, inputs),
         registers=device.register_commands,
+        telegrams=request.telegrams,
+        idns=request.idns,
     )
 
 

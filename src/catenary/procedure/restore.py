@@ -162,6 +162,7 @@ def bring_to_safe_op(
             yield from verify_mapping(channel, device, again)
     if channel is not None:
         yield from run_idn_commands(channel, device.idn_commands, PRE_OP_STEPS)
+        yield from run_idn_commands(channel, plan.idns, PRE_OP_STEPS)
     if channel is not None and device.sercos_axes:
         yield from restore_telegrams(channel, device)
     yield from configure_process_data(station, device, plan)

@@ -11,7 +11,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 from catenary.errors import CatenaryError, MailboxError, MappingError, SoeError
-from catenary.model.device import Assignment, DeviceDescription, Direction, Entry, Pdo
+from catenary.model.device import DeviceDescription
 from catenary.model.sercos_axis import (
     AT_LIST,
     CONFIGURABLE,
@@ -23,16 +23,16 @@ from catenary.model.sercos_axis import (
     SercosAxis,
     TelegramValue,
 )
+from catenary.model.telegram_data import with_process_data
 from catenary.procedure.exchange import Procedure
 from catenary.procedure.idn_commands import PRE_OP_STEPS, run_idn_commands
 from catenary.procedure.mailbox import MailboxChannel
 from catenary.procedure.sercos import read_parameter, read_value, write_value
 from catenary.procedure.soe import Target
-from catenary.wire.sercos import Attribute, Display, idn_number, idn_text
+from catenary.wire.sercos import Attribute, idn_number, idn_text
 from catenary.wire.soe import DRIVES, Element
 
 ENTRIES_MAX = 64  # IDNs in a telegram; SOEM accepts as many (EC_SOE_MAXMAPPING)
-OUTPUT_MANAGER, INPUT_MANAGER = 2, 3
 WORD = Attribute(2)
 # Telegram types 0 to 6 of S-0-0015: IDNs of MDT and AT
 STANDARD: Mapping[int, tuple[tuple[int, ...], tuple[int, ...]]] = {
@@ -46,11 +46,6 @@ STANDARD: Mapping[int, tuple[tuple[int, ...], tuple[int, ...]]] = {
 }
 # Type, factor, exponent, polarity, resolution
 POSITION, VELOCITY, TORQUE = (76, 77, 78, 55, 79), (44, 45, 46, 43, 0), (86, 93, 94, 85, 0)
-_TYPES = {  # ETG.1000.6 table 64
-    Display.SIGNED: {1: 0x02, 2: 0x03, 4: 0x04, 8: 0x15},
-    Display.FLOAT: {4: 0x08, 8: 0x11},
-}
-_UNSIGNED = {1: 0x05, 2: 0x06, 4: 0x07, 8: 0x1B}
 
 
 def with_telegrams(
@@ -70,7 +65,7 @@ def with_telegrams(
     except CatenaryError as error:
         note = f"no process data, because its telegrams cannot be read: {error.message}"
         return replace(device, notes=(*device.notes, note))
-    return described(device, axes)
+    return with_process_data(device, axes)
 
 
 def write_telegrams(channel: MailboxChannel, device: DeviceDescription) -> Procedure[None]:
@@ -78,26 +73,6 @@ def write_telegrams(channel: MailboxChannel, device: DeviceDescription) -> Proce
     own = (TELEGRAM_TYPE, MDT_LIST, AT_LIST)
     chosen = [each for each in device.idn_commands if each.number in own]
     yield from run_idn_commands(channel, chosen, PRE_OP_STEPS)
-
-
-def described(device: DeviceDescription, axes: Sequence[SercosAxis]) -> DeviceDescription:
-    """Return the description with the process data of drives.
-
-    Args:
-        device: The description.
-        axes: The drives, in the order of their numbers.
-    """
-    outputs = tuple(_pdo(axis, Direction.OUTPUT) for axis in axes)
-    inputs = tuple(_pdo(axis, Direction.INPUT) for axis in axes)
-    return replace(
-        device,
-        sercos_axes=tuple(axes),
-        outputs=(Assignment(OUTPUT_MANAGER, outputs, fixed=True),) if axes else (),
-        inputs=(Assignment(INPUT_MANAGER, inputs, fixed=True),) if axes else (),
-        output_pdos=outputs,
-        input_pdos=inputs,
-        mapping_source="SoE",
-    )
 
 
 def configure(
@@ -128,15 +103,15 @@ def configure(
                 Target(channel, number, drive), [idn_text(each) for each in idns]
             )
     axes = yield from read_axes(channel)
-    return described(device, axes)
+    return with_process_data(device, axes)
 
 
 def restore(channel: MailboxChannel, device: DeviceDescription) -> Procedure[None]:
-    """Write the telegrams of a device that returned, as far as it has lost them.
+    """Write the telegrams of a device that has others, such as one that returned.
 
     Args:
         channel: The mailbox of the device, in PRE-OP.
-        device: Its description before it was lost.
+        device: Its description with the telegrams to write.
 
     Raises:
         MappingError: It does not accept them.
@@ -191,13 +166,45 @@ def read_axes(channel: MailboxChannel, *, scaling: bool = True) -> Procedure[lis
         if lists is None:
             break
         kind, mdt, at = lists
-        outputs = yield from _values(channel, drive, CONTROL_WORD, mdt, out_bit)
-        inputs = yield from _values(channel, drive, STATUS_WORD, at, in_bit)
+        outputs = yield from read_values(channel, drive, CONTROL_WORD, mdt, out_bit)
+        inputs = yield from read_values(channel, drive, STATUS_WORD, at, in_bit)
         out_bit = outputs[-1].bit_offset + outputs[-1].bit_length
         in_bit = inputs[-1].bit_offset + inputs[-1].bit_length
         axis = SercosAxis(drive, kind, outputs, inputs)
         axes.append((yield from _with_scaling(channel, axis)) if scaling else axis)
     return axes
+
+
+def with_lists(
+    channel: MailboxChannel,
+    axes: Sequence[SercosAxis],
+    wanted: Mapping[int, tuple[Sequence[int], Sequence[int]]],
+) -> Procedure[list[SercosAxis]]:
+    """Return the drives as they are with other telegrams. Only attributes are read.
+
+    Args:
+        channel: The mailbox of the device.
+        axes: The drives with their present telegrams.
+        wanted: IDNs of MDT and AT by the number of the drive. Other drives keep theirs.
+
+    Raises:
+        SoeError: A drive does not have an IDN.
+        MailboxError: An IDN is a list, or the device violates the protocol.
+        ResponseTimeout: The device does not answer.
+    """
+    found: list[SercosAxis] = []
+    out_bit = in_bit = 0
+    for axis in axes:
+        mdt = [each.number for each in axis.outputs[1:]]
+        at = [each.number for each in axis.inputs[1:]]
+        kind = CONFIGURABLE if axis.drive in wanted else axis.telegram_type
+        mdt, at = map(list, wanted.get(axis.drive, (mdt, at)))
+        outputs = yield from read_values(channel, axis.drive, CONTROL_WORD, mdt, out_bit)
+        inputs = yield from read_values(channel, axis.drive, STATUS_WORD, at, in_bit)
+        out_bit = outputs[-1].bit_offset + outputs[-1].bit_length
+        in_bit = inputs[-1].bit_offset + inputs[-1].bit_length
+        found.append(replace(axis, telegram_type=kind, outputs=outputs, inputs=inputs))
+    return found
 
 
 def _lists(
@@ -236,9 +243,23 @@ def _number(target: Target) -> Procedure[int | None]:
     return int(value) if isinstance(value, (int, float)) else None
 
 
-def _values(
+def read_values(
     channel: MailboxChannel, drive: int, word: int, idns: Sequence[int], bit: int
 ) -> Procedure[tuple[TelegramValue, ...]]:
+    """Read the attributes of the values of a telegram, and return them with their places.
+
+    Args:
+        channel: The mailbox of the device.
+        drive: Number of the drive.
+        word: IDN of the first value, S-0-0134 or S-0-0135.
+        idns: IDNs of the other values.
+        bit: Place of the first value.
+
+    Raises:
+        SoeError: The drive does not have an IDN.
+        MailboxError: An IDN is a list, or the device violates the protocol.
+        ResponseTimeout: The device does not answer.
+    """
     values = [TelegramValue(word, bit, WORD)]
     for number in idns:
         bit += values[-1].bit_length
@@ -263,24 +284,3 @@ def _with_scaling(channel: MailboxChannel, axis: SercosAxis) -> Procedure[Sercos
         found.append(Scaling(*numbers))
     position, velocity, torque = found
     return replace(axis, position=position, velocity=velocity, torque=torque)
-
-
-def _pdo(axis: SercosAxis, direction: Direction) -> Pdo:
-    """Return a telegram as a PDO. The index of an entry is its IDN, the subindex is the drive."""
-    is_output = direction is Direction.OUTPUT
-    suffix = f" of drive {axis.drive}" if axis.drive else ""
-    entries = tuple(
-        Entry(
-            each.number,
-            axis.drive,
-            each.bit_length,
-            each.idn + suffix,
-            _TYPES.get(each.attribute.display, _UNSIGNED).get(each.attribute.size, 0),
-            each.unit,
-        )
-        for each in (axis.outputs if is_output else axis.inputs)
-    )
-    index = (MDT_LIST if is_output else AT_LIST) | axis.drive << 12
-    manager = OUTPUT_MANAGER if is_output else INPUT_MANAGER
-    name = ("MDT" if is_output else "AT") + suffix
-    return Pdo(index, entries, manager, fixed=True, mandatory=True, name=name)

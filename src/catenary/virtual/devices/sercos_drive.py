@@ -133,6 +133,14 @@ class SercosDrive(MotorDevice):
             self._sercos.send_emergency(self.core.emergency(self.position))
         super().handle(events & ~_segment.EVENT_EMERGENCY)
 
+    def switch_mains(self, on: bool) -> None:
+        """Switch the mains power on or off. Without it, the drive has no torque.
+
+        Args:
+            on: True to switch it on.
+        """
+        self._sercos.states.mains = on
+
     # -- for tests -----------------------------------------------------------------------------
 
     def idn_value(self, text: str) -> bytes:
