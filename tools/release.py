@@ -1,8 +1,9 @@
 """Check a release and write its files: `make release`, or `python -m tools.release [OPTION ...]`.
 
 Nothing is uploaded, and no tag is made. All steps run, also after one that failed. `--quick` runs
-the checks that need no build: version, tree, examples and results. Steps that find something to
-improve, but not to refuse, report it after "note".
+the checks that need no build: version, tree, examples and results. A complete run removes the files
+of an earlier one first. Steps that find something to improve, but not to refuse, report it after
+"note".
 """
 
 from __future__ import annotations
@@ -44,7 +45,9 @@ def make_parser() -> argparse.ArgumentParser:
         epilog=f"steps: {', '.join([*CHECKS, *BUILDS])}",
     )
     parser.add_argument(
-        "--quick", action="store_true", help="only the checks; a changed tree is a note"
+        "--quick",
+        action="store_true",
+        help="only the checks; a changed tree and unreleased changes are notes",
     )
     parser.add_argument(
         "--only", action="append", choices=[*CHECKS, *BUILDS], metavar="STEP", help="run this step"
@@ -62,6 +65,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     steps = CHECKS if options.quick else CHECKS | BUILDS
     if options.only:
         steps = {name: step for name, step in (CHECKS | BUILDS).items() if name in options.only}
+    elif not options.quick:
+        release_builds.remove_files(release)
     failed = [name for name, step in steps.items() if not run_step(name, step, release)]
     if failed:
         print(f"\nnot ready for a release: {', '.join(failed)}", file=sys.stderr)

@@ -145,9 +145,19 @@ def candidates(version: str) -> Iterator[str]:
         yield path
 
 
+def built_files(release: Release) -> list[Path]:
+    return sorted(path for path in release.out.glob("catenary-*") if path.is_file())
+
+
+def remove_files(release: Release) -> None:
+    """Remove the files of an earlier run: they can have another content or version."""
+    for path in (*built_files(release), release.out / SUMS):
+        path.unlink(missing_ok=True)
+
+
 def write_sums(release: Release) -> str:
     """Write the SHA-256 sums of all files of the release."""
-    files = sorted(path for path in release.out.glob("catenary-*") if path.is_file())
+    files = built_files(release)
     if not files:
         raise Failure(f"{release.out} has no files")
     lines = [f"{hashlib.sha256(path.read_bytes()).hexdigest()}  {path.name}\n" for path in files]

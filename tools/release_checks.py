@@ -15,7 +15,6 @@ INIT = re.compile(r'^__version__ = "([^"]+)"$', re.MULTILINE)
 PAGE = re.compile(r"This is version ([^\s,]+)")
 STATUS = re.compile(r"^\*\*Status: (\S+)\. ", re.MULTILINE)
 PACKAGE = re.compile(r"<version>([^<]+)</version>")
-MACHINES = 1  # folders of machines with results
 
 
 def check_tree(release: Release) -> str:
@@ -52,7 +51,10 @@ def versions(release: Release) -> Iterator[tuple[str, str]]:
 
 
 def check_changelog(release: Release) -> str:
-    """Check that the first section is empty, and the second one is that of this release."""
+    """Check that the first section is empty, and the second one is that of this release.
+
+    With `quick`, as during development, unreleased lines are a note.
+    """
     text = text_of(release, "CHANGELOG.md")
     before, found, after = text.partition(f"\n{UNRELEASED}\n")
     if not found or "\n## " in before:
@@ -60,18 +62,19 @@ def check_changelog(release: Release) -> str:
     section = DATED.search(after)
     if section is None or section[1] != release.version:
         raise Failure(f"CHANGELOG.md: no section '## {release.version} (YYYY-MM-DD)'")
-    if lines := after[: section.start()].split():
-        raise Failure(f"CHANGELOG.md: {len(lines)} words are still unreleased")
+    unreleased = len(after[: section.start()].split())
+    if unreleased and not release.quick:
+        raise Failure(f"CHANGELOG.md: {unreleased} words are still unreleased")
     lines = re.findall(r"^- ", after[section.end() :].partition("\n## ")[0], re.MULTILINE)
-    return f"{len(lines)} changes, {section[2]}"
+    note = f"; note: {unreleased} words are still unreleased" if unreleased else ""
+    return f"{len(lines)} changes, {section[2]}{note}"
 
 
 def check_results(release: Release) -> str:
     """Check that the figures of the documents are present as JSON, and can be read."""
     folder = release.root / "benchmarks" / "results"
     files = sorted(folder.glob("*/*/*.json"))
-    machines = {path.relative_to(folder).parts[0] for path in files}
-    if len(machines) < MACHINES:
+    if not files:
         raise Failure(f"{folder} has no results")
     for path in files:
         try:
@@ -81,7 +84,8 @@ def check_results(release: Release) -> str:
     missing = [str(path) for path in linked_results(release) if not path.exists()]
     if missing:
         raise Failure(f"results that a document links to are missing: {missing[0]}")
-    return f"{len(files)} files of {', '.join(sorted(machines))}"
+    machines = sorted({path.relative_to(folder).parts[0] for path in files})
+    return f"{len(files)} files of {', '.join(machines)}"
 
 
 def linked_results(release: Release) -> Iterator[Path]:

@@ -85,6 +85,15 @@ def test_a_changed_tree_is_a_note_in_quick_mode(release: Release) -> None:
     assert release_checks.check_tree(quick) == "note: 1 files are not committed"
 
 
+def test_unreleased_changes_are_a_note_in_quick_mode(release: Release) -> None:
+    path = release.root / "CHANGELOG.md"
+    path.write_text(path.read_text().replace("## Unreleased\n", "## Unreleased\n\n- New.\n"))
+    quick = Release(release.root, release.out, quick=True)
+    assert release_checks.check_changelog(quick) == (
+        "2 changes, 2026-01-02; note: 2 words are still unreleased"
+    )
+
+
 def test_a_failure_is_printed_with_its_reason(
     release: Release, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -133,6 +142,15 @@ def test_wheels_are_built_by_the_script(release: Release) -> None:
         "e3b0c44298fc1c149afbf4c8996fb92427ae41e4649b934ca495991b7852b855",
         "catenary-1.2.0rc1-cp311-cp311-x.whl",
     ]
+
+
+def test_the_files_of_an_earlier_run_are_removed(release: Release) -> None:
+    folder = release.out / "environments"
+    folder.mkdir(parents=True)
+    for name in ("catenary-1.1.0.tar.gz", "SHA256SUMS", "notes.txt"):
+        (release.out / name).touch()
+    release_builds.remove_files(release)
+    assert sorted(release.out.iterdir()) == [folder, release.out / "notes.txt"]
 
 
 def test_this_clone_passes_the_quick_checks(capsys: pytest.CaptureFixture[str]) -> None:
