@@ -7,6 +7,7 @@ import shlex
 import zipfile
 from collections.abc import Iterator
 from pathlib import Path
+from random import Random
 
 import pytest
 
@@ -15,7 +16,7 @@ from catenary.cli import report_archive, report_parts
 from catenary.cli.main import main
 from catenary.cli.report_privacy import Redactor
 from catenary.cli.report_segment import Job
-from catenary.errors import LinkError
+from catenary.errors import ConfigurationError, LinkError
 from catenary.line import read_line
 from catenary.operate import devices
 from catenary.wire.capture import decode_capture
@@ -188,6 +189,22 @@ def test_show_refuses_other_files(
     status, out, err = call(f"report --show {path}", capsys)
     assert (status, out) == (1, "")
     assert reason in err
+
+
+@pytest.mark.parametrize(
+    "compression", [zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED, zipfile.ZIP_BZIP2, zipfile.ZIP_LZMA]
+)
+def test_damaged_archives_are_refused(compression: int, tmp_path: Path) -> None:
+    path, random = tmp_path / "r.zip", Random(1)
+    with zipfile.ZipFile(path, "w", compression) as archive:
+        archive.writestr("manifest.json", b'{"format": 1, "date": "2026"}')
+    whole = path.read_bytes()
+    for _ in range(500):
+        damaged = bytearray(whole)
+        damaged[random.randrange(len(whole))] = random.randrange(256)
+        path.write_bytes(damaged)
+        with pytest.raises(ConfigurationError, match=r"r\.zip"):
+            report_archive.read_manifest(path)
 
 
 @pytest.mark.parametrize("line", ["report", "report virtual --show x", "report x --seconds 121"])

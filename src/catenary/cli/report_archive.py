@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import json
+import lzma
 import os
 import zipfile
+import zlib
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -17,6 +19,8 @@ MANIFEST = "manifest.json"
 MANIFEST_BYTES = 1 << 20
 FILE_BYTES = 32 << 20  # largest file of an archive
 TOTAL_BYTES = 128 << 20  # largest size of all files before compression
+# What `zipfile` raises for damaged, encrypted or unknown data, also of a compression.
+UNREADABLE = (zipfile.BadZipFile, zlib.error, lzma.LZMAError, RuntimeError, EOFError)
 
 
 class Part(msgspec.Struct, frozen=True):
@@ -96,8 +100,12 @@ def read_manifest(path: Path) -> Manifest:
         if len(data) > MANIFEST_BYTES:
             raise ValueError(f"{MANIFEST} has more than {MANIFEST_BYTES} bytes")
         manifest = msgspec.json.decode(data, type=Manifest)
-    except (zipfile.BadZipFile, NotImplementedError, RuntimeError, EOFError) as error:
+    except UNREADABLE as error:
         raise _not_a_report(path, str(error)) from error
+    except OSError as error:
+        if error.filename is not None:  # the file itself; damaged data have no name
+            raise
+        raise _not_a_report(path, error.strerror or str(error)) from error
     except KeyError as error:
         raise _not_a_report(path, f"it contains no {MANIFEST}") from error
     except ValueError as error:  # of msgspec, too
