@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import sys
 from collections.abc import Iterator, Mapping
 from datetime import UTC, datetime
 from pathlib import Path
@@ -17,6 +18,9 @@ if TYPE_CHECKING:
 
 SECONDS = 10.0
 LONGEST = 120.0  # [s]
+EFFECTS = (
+    "the devices are reset and brought to OP with outputs of 0; no axis is enabled; Ctrl-C ends it"
+)
 EXAMPLE = """\
 catenary report eth0
 catenary report eth0 --seconds 60 --out report.zip
@@ -31,8 +35,8 @@ def add_parser(commands: Commands) -> None:
         description="Runs the checks of `catenary doctor`, a scan, a clone, a loop at 1 kHz and a "
         "capture, and writes their results into a ZIP archive that you can send "
         "(docs/reference/hardware.md). The devices are reset and brought to OP with outputs of 0. "
-        "No axis is enabled. Without --zero-outputs, the loop does not run if a device that is not "
-        "a drive has outputs other than single bits. The archive contains no user names, no host "
+        "No axis is enabled. Without --zero-outputs, the loop does not run if a device has outputs "
+        "other than single bits and the objects of its axes. The archive contains no user names, no host "
         "name and, without --serials, no serial numbers. A part that fails is recorded with its "
         "reason. Exit status 1 if a part is incomplete.",
         example=EXAMPLE,
@@ -88,7 +92,8 @@ def run(arguments: argparse.Namespace) -> int:
         manifest = read_manifest(arguments.show)
         print(as_json(manifest) if arguments.json else as_text(manifest))
         return 0
-    path = arguments.out or Path(f"catenary-report-{datetime.now(UTC):%Y%m%d-%H%M%S}.zip")
+    path = arguments.out or default_path()
+    print(f"note: {arguments.target}: {EFFECTS}", file=sys.stderr)
     manifest = collect(
         arguments.target,
         path,
@@ -103,6 +108,14 @@ def run(arguments: argparse.Namespace) -> int:
         print(f"{as_text(manifest)}\n\nwrote {path} ({path.stat().st_size // 1000} kB)")
     bad = any(part.status in ("failed", "incomplete") for part in manifest.parts)
     return FAILED if bad else 0
+
+
+def default_path() -> Path:
+    """Return a path in this folder. Raises UsageError if it cannot be written."""
+    try:
+        return result_file(f"catenary-report-{datetime.now(UTC):%Y%m%d-%H%M%S}.zip")
+    except argparse.ArgumentTypeError as error:
+        raise UsageError(str(error), hint="--out FILE") from error
 
 
 def as_text(manifest: Manifest) -> str:

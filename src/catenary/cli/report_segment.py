@@ -13,9 +13,11 @@ from catenary.cli.report_privacy import Redactor
 if TYPE_CHECKING:
     from catenary.bus import MainDevice, SubDevice
     from catenary.loop import Loop
+    from catenary.model.device import DeviceDescription
 
 CAPTURE_SECONDS = 1.0  # of cycles, after the bring-up
 PERIOD = 1e-3  # [s]
+AXIS_OBJECTS = 0x6000  # first object of axis 0
 
 
 class Incomplete(Exception):
@@ -101,12 +103,14 @@ def _run(job: Job, main: MainDevice, seconds: float, name: str = "timing") -> Lo
     from catenary.loop import Loop, StopPolicy
     from catenary.operate.devices import make_requests
 
-    subs = main.subs or main.scan(strict=False)
-    if not job.zero_outputs:
-        require_safe_outputs(subs)
-    requests, notes = make_requests(sub for sub in subs if sub.error is None)
+    scanned = main.subs or main.scan(strict=False)
+    subs = [sub for sub in scanned if sub.error is None]
+    requests, notes = make_requests(subs)
     if not requests:
         raise ConfigurationError("no device has process data")
+    main.read_mappings(*requests, period=PERIOD)  # the SII may describe another mapping
+    if not job.zero_outputs:
+        require_safe_outputs(subs)
     policy = StopPolicy(on_axis_stopped="event", raise_faults=False)
     loop = Loop(*requests, period=PERIOD, enable=False, stop=policy)
     opened = False
@@ -125,10 +129,10 @@ def _run(job: Job, main: MainDevice, seconds: float, name: str = "timing") -> Lo
 def require_safe_outputs(subs: Sequence[SubDevice]) -> None:
     """Raise Incomplete if an output of 0 may be a command for a device.
 
-    A loop sends 0 to all devices of a segment. For a drive, this is the control word 0: it stays
-    disabled. A digital output is off, as without power.
+    A loop sends 0 to all devices of a segment. An axis stays disabled. A digital output is off, as
+    without power.
     """
-    unknown = [sub for sub in subs if not sub.slots and has_wide_outputs(sub)]
+    unknown = [sub for sub in subs if has_unknown_outputs(sub.description)]
     if unknown:
         names = ", ".join(f"{sub.position} ({sub.name})" for sub in unknown)
         raise Incomplete(
@@ -137,11 +141,25 @@ def require_safe_outputs(subs: Sequence[SubDevice]) -> None:
         )
 
 
-def has_wide_outputs(sub: SubDevice) -> bool:
-    """Return True if a device has outputs that are not single bits, or unknown outputs."""
-    device = sub.description
-    entries = [entry for pdo in device.output_pdos for entry in pdo.entries if entry.index]
-    return any(entry.bit_length > 1 for entry in entries) or bool(device.outputs and not entries)
+def has_unknown_outputs(device: DeviceDescription) -> bool:
+    """Return True if a device has outputs other than single bits and objects of its axes.
+
+    All PDOs count, assigned or not. Of a drive, only the assigned ones count: others that a loop
+    needs contain objects of its axes.
+    """
+    from catenary.model.process_data import mapped_pdos
+
+    pdos = mapped_pdos(device.outputs) if device.slots else device.output_pdos
+    entries = [entry for pdo in pdos for entry in pdo.entries if entry.index]
+    known = [entry.bit_length == 1 or is_of_axis(device, entry.index) for entry in entries]
+    return not all(known) or bool(device.outputs and not entries)
+
+
+def is_of_axis(device: DeviceDescription, index: int) -> bool:
+    """Return True for an object of the profile CiA 402 of an axis of the device."""
+    from catenary.wire.cia402 import SLOT_OFFSET
+
+    return (index - AXIS_OBJECTS) // SLOT_OFFSET in device.slots
 
 
 def _write_timing(job: Job, name: str, loop: Loop, notes: list[str]) -> None:
