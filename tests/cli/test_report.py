@@ -6,7 +6,6 @@ import json
 import shlex
 import zipfile
 from collections.abc import Iterator
-from dataclasses import replace
 from pathlib import Path
 from random import Random
 
@@ -16,10 +15,9 @@ import catenary as cat
 from catenary.cli import report_archive, report_parts
 from catenary.cli.main import main
 from catenary.cli.report_privacy import Redactor
-from catenary.cli.report_segment import Job, has_unknown_outputs
+from catenary.cli.report_segment import Job
 from catenary.errors import ConfigurationError, LinkError
 from catenary.line import read_line
-from catenary.model.device import Assignment, DeviceDescription, Entry, Pdo
 from catenary.operate import devices
 from catenary.wire.capture import decode_capture
 
@@ -112,39 +110,6 @@ def test_outputs_of_unknown_devices_need_consent(
     assert "device 1 (Catenary virtual" in manifest["parts"][3]["reason"]
     status, out, _ = call(f"{line} --zero-outputs", capsys)
     assert (status, parts_of(json.loads(out))["timing"]) == (0, "done")
-
-
-def describe_servo() -> DeviceDescription:
-    with cat.MainDevice(cat.Segment([cat.virtual.Servo()])) as line:
-        return line.scan()[0].description
-
-
-def assigned(index: int, bits: int) -> tuple[Assignment, ...]:
-    """Return an assignment of one PDO with a controlword and another object."""
-    entries = (Entry(0x6040, 0, 16), Entry(index, 1, bits))
-    return (Assignment(2, (Pdo(0x1600, entries, 2),)),)
-
-
-@pytest.mark.parametrize(
-    ("index", "bits", "unknown"),
-    [
-        (0x60FE, 32, False),  # digital outputs of the axis
-        (0x6841, 16, True),  # an axis that this drive does not have
-        (0x7000, 16, True),  # a further module, such as an analog output
-        (0x2005, 16, True),
-        (0x2005, 1, False),
-        (0, 16, False),  # a gap
-    ],
-)
-def test_further_outputs_of_a_drive_are_unknown(index: int, bits: int, unknown: bool) -> None:
-    device = replace(describe_servo(), outputs=assigned(index, bits))
-    assert has_unknown_outputs(device) == unknown
-
-
-def test_outputs_without_a_description_are_unknown() -> None:
-    empty = (Assignment(2, (Pdo(0x1600, (Entry(0, 0, 8),), 2),)),)
-    device = replace(describe_servo(), slots=(), outputs=empty, output_pdos=empty[0].pdos)
-    assert has_unknown_outputs(device)
 
 
 def test_no_file_contains_a_serial_number(

@@ -36,9 +36,9 @@ def add_parser(commands: Commands) -> None:
         "capture, and writes their results into a ZIP archive that you can send "
         "(docs/reference/hardware.md). The devices are reset and brought to OP with outputs of 0. "
         "No axis is enabled. Without --zero-outputs, the loop does not run if a device has outputs "
-        "other than single bits and the objects of its axes. The archive contains no user names, no host "
-        "name and, without --serials, no serial numbers. A part that fails is recorded with its "
-        "reason. Exit status 1 if a part is incomplete.",
+        "other than single bits and the objects of its axes. The archive contains no user names, "
+        "no host name and, without --serials, no serial numbers. A part that fails is recorded "
+        "with its reason. Exit status 1 if a part is incomplete.",
         example=EXAMPLE,
     )
     parser.add_argument(
