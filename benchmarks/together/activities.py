@@ -23,7 +23,7 @@ WAITING_MAX = 20  # objects that wait; further ones are not requested
 IDENTITY, PRODUCT = 0x1018, 2
 FILE, FILE_BYTES = "program.bin", 16 * 1024
 CUT_EVERY, CUT_SECONDS = 20.0, 1.0  # [s] of the loop's time
-CABLES = 5  # between the devices of the ring
+DEVICES = 5  # of the ring
 FAILURES_SHOWN = 5
 
 
@@ -85,7 +85,7 @@ class Cuts:
         if self._segment is None or time < self._next:
             return
         self._next = time + CUT_EVERY
-        place = self._random.randrange(CABLES - 1)
+        place = self._random.randrange(DEVICES - 1)
         self._segment.inject(f.cut(between=(place, place + 1), for_=CUT_SECONDS))
         self._done.add("cuts")
 
