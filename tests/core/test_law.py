@@ -423,7 +423,7 @@ def test_the_laws_of_an_engine_share_one_monitor_that_sleeps_while_none_runs(
     b.enable()
     before = threads()
     laws = [make_law(b, lambda frame: 0) for _ in range(3)]
-    assert threads() == before
+    assert threads() <= before  # a thread of a former test may end
     for law in laws:
         b.engine.start_law(law)
         b.steps(2)
@@ -439,7 +439,7 @@ def test_the_laws_of_an_engine_share_one_monitor_that_sleeps_while_none_runs(
         pass
     del b
     gc.collect()
-    assert threads() == before
+    assert threads() <= before  # a thread of a former test may end
 
 
 def test_a_law_after_a_restart_is_given_up_in_its_new_thread(endless: ctypes.CDLL) -> None:
