@@ -33,6 +33,8 @@ def master(veth: tuple[str, str], tmp_path: Path) -> Iterator[Any]:
     file = tmp_path / "servo.toml"
     file.write_text(SEGMENT)
     with serving(theirs, file), opened(1, ours) as master:
+        found = master.slaves[0].state_check(pysoem.PREOP_STATE, 5_000_000)  # its mailbox is ready
+        assert found == pysoem.PREOP_STATE
         yield master
 
 
