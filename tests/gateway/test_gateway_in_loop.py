@@ -48,8 +48,8 @@ class Beside:
 
 
 @pytest.fixture(autouse=True)
-def patience(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Wait long for the client, whose thread competes with that of a loop in virtual time."""
+def long_lease(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Wait long for the client: its thread and the loop in virtual time share the processor."""
     monkeypatch.setattr("catenary.gateway.lease.LEASE_IDLE", 30.0)
 
 
