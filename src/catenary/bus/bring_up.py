@@ -214,10 +214,9 @@ def _prepare(sub: SubDevice, plan: DevicePlan) -> Procedure[None]:
     if plan.downloads:
         writing = _write(_channel(sub), device, plan)
         yield from within(WRITE_TIMEOUT, sub.station, writing, "its configuration was")
-    if device.idn_commands:
-        yield from run_idn_commands(_channel(sub), device.idn_commands, PRE_OP_STEPS)
-    if plan.idns:
-        yield from run_idn_commands(_channel(sub), plan.idns, PRE_OP_STEPS)
+    idns = (*device.idn_commands, *plan.idns)
+    if idns:
+        yield from run_idn_commands(_channel(sub), idns, PRE_OP_STEPS)
     if plan.telegrams:
         device = sub.description = with_process_data(device, plan.telegrams)
         yield from restore(_channel(sub), device)

@@ -6,11 +6,10 @@ from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
 from catenary.drive.axis import Axis
+from catenary.procedure.sercos_fault import RESET_CLASS_1
 
 if TYPE_CHECKING:
     from catenary.bus import Pending, SubDevice
-
-RESET_CLASS_1 = "S-0-0099"
 
 
 class SercosResets:
