@@ -3,7 +3,7 @@
 A test that uses `shared_data`, `veth`, `tshark`, `rtlab`, `chromium` or `ros2` is marked
 `shared_data`, `wire`, `tshark`, `rtlab`, `browser` or `ros2`. It is skipped with a reason if the
 resource is missing. If CI requires a marker (`--require MARKER`), such a skip is a failure, and at
-least one test with the marker must pass.
+least one test with the marker must run.
 """
 
 from __future__ import annotations
@@ -40,8 +40,9 @@ hypothesis.settings.register_profile(
 hypothesis.settings.load_profile("catenary")
 
 REQUIRED = pytest.StashKey[set[str]]()
-PASSED = pytest.StashKey[set[str]]()
+RAN = pytest.StashKey[set[str]]()
 COLLECTED = pytest.StashKey[set[str]]()
+REQUIRED_DID_NOT_RUN = 6  # exit status; pytest uses 0 to 5
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
@@ -65,7 +66,7 @@ def pytest_configure(config: pytest.Config) -> None:
     # A shell ignores SIGINT for background programs, which inherit this.
     signal.signal(signal.SIGINT, signal.default_int_handler)
     config.stash[REQUIRED] = set(config.getoption("--require"))
-    config.stash[PASSED] = set()
+    config.stash[RAN] = set()
     config.stash[COLLECTED] = set()
 
 
@@ -79,32 +80,33 @@ def pytest_itemcollected(item: pytest.Item) -> None:
 @pytest.hookimpl(wrapper=True)
 def pytest_runtest_makereport(item: pytest.Item) -> Iterator[None]:
     report = yield
-    if report.when == "call" and report.passed:
-        item.config.stash[PASSED].update(mark.name for mark in item.iter_markers())
+    if report.when == "call" and not report.skipped:
+        item.config.stash[RAN].update(mark.name for mark in item.iter_markers())
     return report
 
 
-def not_passed(config: pytest.Config) -> set[str]:
-    """Return the required markers without a test that passed."""
+def did_not_run(config: pytest.Config) -> set[str]:
+    """Return the required markers without a test that ran."""
     required = config.stash[REQUIRED]
     if config.getoption("--part"):
         required = required & config.stash[COLLECTED]
-    return required - config.stash[PASSED]
+    return required - config.stash[RAN]
 
 
 def pytest_sessionfinish(session: pytest.Session) -> None:
-    if not_passed(session.config) and session.exitstatus in (
+    if did_not_run(session.config) and session.exitstatus in (
         pytest.ExitCode.OK,
         pytest.ExitCode.NO_TESTS_COLLECTED,
+        pytest.ExitCode.TESTS_FAILED,
     ):
-        session.exitstatus = pytest.ExitCode.TESTS_FAILED
+        session.exitstatus = REQUIRED_DID_NOT_RUN
 
 
 def pytest_terminal_summary(
     terminalreporter: pytest.TerminalReporter, config: pytest.Config
 ) -> None:
-    for marker in sorted(not_passed(config)):
-        terminalreporter.write_line(f"REQUIRED: no test marked {marker} passed", red=True)
+    for marker in sorted(did_not_run(config)):
+        terminalreporter.write_line(f"REQUIRED: no test marked {marker} ran", red=True)
 
 
 def lacking(config: pytest.Config, marker: str, reason: str) -> Never:

@@ -19,10 +19,17 @@ BLOCKS = {
 }
 
 
+LEASE = ("&axis, 1, 0.5,", "&axis, 1, 600.0,")  # the test machine can pause for longer than 0.5 s
+
+
 def program_of(folder: Path, name: str) -> Path:
     source = folder / name
-    source.write_text(BLOCKS[name])
+    source.write_text(BLOCKS[name].replace(*LEASE))
     return build(folder / source.stem, C11, source, INCLUDE / "catenary_share.c")
+
+
+def test_replaced_time_of_the_lease_is_on_the_page() -> None:
+    assert LEASE[0] in BLOCKS["move_arm.c"]
 
 
 def test_read_arm_prints_every_position_until_the_end(name: str, tmp_path: Path) -> None:
