@@ -208,14 +208,15 @@ def test_a_drive_fault_stops_the_arm_and_the_motion_continues_later(
     assert came_home(outcome)
 
 
-@pytest.mark.parametrize("between", [("main", 0), (2, 3)], ids=["all", "the wrist"])
-@pytest.mark.parametrize("lasting", [0.01, 0.7])
+@pytest.mark.parametrize(
+    ("lasting", "between"), [(0.01, ("main", 0)), (0.7, (2, 3))], ids=["all", "the wrist"]
+)
 def test_the_program_waits_for_a_lost_bus(
     cobot: Any,
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
-    between: tuple[int, int],
     lasting: float,
+    between: tuple[int, int],
 ) -> None:
     """The loss is shorter than the drives' watchdogs, or so long that the drives are in fault."""
     with_fault(cobot, monkeypatch, cut(between=between, at=1.5, for_=lasting))
